@@ -1,0 +1,40 @@
+"""Dynamics of rolling bearings: from a drawing and an operating point to forces, whirl and power loss, with errors.
+
+``Scene`` reads and checks the input, ``simulate(scene)`` runs it, the result saves itself and ``load`` reads it back.
+Names are fetched when first used: importing the package loads neither numba nor scipy.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rbdyn.dynamics.simulate import simulate, trace
+    from rbdyn.faults import InputError, RunError
+    from rbdyn.result import SimulationResult
+    from rbdyn.scene import Scene
+
+__all__ = ["InputError", "RunError", "Scene", "SimulationResult", "load", "simulate", "trace"]
+
+_HOMES = {
+    "Scene": "rbdyn.scene",
+    "simulate": "rbdyn.dynamics.simulate",
+    "trace": "rbdyn.dynamics.simulate",
+    "SimulationResult": "rbdyn.result",
+    "InputError": "rbdyn.faults",
+    "RunError": "rbdyn.faults",
+}
+
+
+def load(path: str) -> SimulationResult:
+    """Read a saved result. Raises InputError when it is missing or not one."""
+    from rbdyn.result import SimulationResult
+
+    return SimulationResult.load(path)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'rbdyn' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)

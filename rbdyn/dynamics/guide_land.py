@@ -1,0 +1,204 @@
+"""Cage against the land of the guiding ring: a short-journal film, and dry contact below the film's floor.
+
+Whichever part runs inside the other is the journal: the cage under outer guidance, the inner ring under inner
+guidance.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from rbdyn.contact.damping import damped_load
+from rbdyn.contact.film import ShortJournalFilm, journal_film_force
+from rbdyn.contact.hertz_line import elastic_energy, elastic_load
+from rbdyn.contact.traction import traction
+from rbdyn.kernel import kernel, law
+
+
+class NoFilm(NamedTuple):
+    """A dry land."""
+
+
+class NoContact(NamedTuple):
+    """A land whose film alone holds the cage."""
+
+
+class DryContact(NamedTuple):
+    """Land contact once the eccentricity passes ``play`` [m]: the radial clearance less the film's floor."""
+
+    play: float
+    contact: Any
+    damping: Any
+    friction: Any
+
+
+class NoGuide(NamedTuple):
+    """No guide land: the rollers alone hold the cage."""
+
+
+class OuterGuide(NamedTuple):
+    """Cage inside the fixed outer ring."""
+
+    radius: float
+    film: Any
+    dry: Any
+
+
+class InnerGuide(NamedTuple):
+    """Cage around the inner ring."""
+
+    radius: float
+    film: Any
+    dry: Any
+
+
+@law
+def film_wrench(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    """Film force x, y on the journal [N], moments on journal and bearing [N m], power lost [W].
+
+    ``ex, ey, e``: direction and size [m] of the journal's offset; ``evx, evy``: its velocity [m/s].
+    """
+    raise NotImplementedError
+
+
+@film_wrench.body(NoFilm)
+def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    return 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+@film_wrench.body(ShortJournalFilm)
+def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    eccentricity = min(e / film.clearance, film.largest_eccentricity)
+    radial_rate = (evx * ex + evy * ey) / film.clearance
+    whirl_rate = 2.0 * (evy * ex - evx * ey) / film.clearance
+    wedge_rate = eccentricity * (journal_speed + bearing_speed) - whirl_rate
+    radial, across = journal_film_force(film.force_scale, eccentricity, radial_rate, wedge_rate)
+    shear = film.shear_scale * (journal_speed - bearing_speed) / math.sqrt(1.0 - eccentricity * eccentricity)
+    fx, fy = radial * ex - across * ey, radial * ey + across * ex
+    journal_moment = -shear - 0.5 * e * across
+    bearing_moment = shear - 0.5 * e * across
+    power = -(fx * evx + fy * evy + journal_moment * journal_speed + bearing_moment * bearing_speed)
+    return fx, fy, journal_moment, bearing_moment, power
+
+
+@law
+def dry_wrench(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    """Contact force x, y on the journal, moments on journal and bearing, load, powers in friction and damping."""
+    raise NotImplementedError
+
+
+@dry_wrench.body(NoContact)
+def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+@dry_wrench.body(DryContact)
+def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    approach = e - dry.play
+    if approach <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    approach_rate = evx * ex + evy * ey
+    elastic = elastic_load(dry.contact, approach)
+    load = damped_load(dry.damping, elastic, approach, approach_rate)
+    slip = bearing_speed * (e + radius) - journal_speed * radius - (evy * ex - evx * ey)
+    friction = traction(dry.friction, slip) * load
+    return (
+        -load * ex - friction * ey,
+        -load * ey + friction * ex,
+        radius * friction,
+        -(radius + e) * friction,
+        load,
+        friction * slip,
+        (load - elastic) * approach_rate,
+    )
+
+
+@kernel
+def journal_wrench(guide, dx, dy, dvx, dvy, journal_speed, bearing_speed):
+    """Film and dry contact together: force on the journal, two moments, dry load, three powers (film, friction, damping)."""
+    e = math.sqrt(dx * dx + dy * dy)
+    ex, ey = (dx / e, dy / e) if e > 0.0 else (1.0, 0.0)
+    film = film_wrench(guide.film, ex, ey, e, dvx, dvy, journal_speed, bearing_speed)
+    dry = dry_wrench(guide.dry, guide.radius, ex, ey, e, dvx, dvy, journal_speed, bearing_speed)
+    return (
+        film[0] + dry[0],
+        film[1] + dry[1],
+        film[2] + dry[2],
+        film[3] + dry[3],
+        dry[4],
+        film[4],
+        dry[5],
+        dry[6],
+    )
+
+
+@law
+def guide_wrench(guide, dx, dy, dvx, dvy, cage_speed, ring_speed):
+    """Force on the cage (x, y), moments on cage and inner ring, force on the inner ring (x, y), dry load, powers.
+
+    ``dx ... dvy``: (cage centre, inner ring centre) positions and velocities are passed as the pairs
+    ``dx = (cage x, ring x)`` and so on; speeds in rad/s. Powers: film, friction, damping [W].
+    """
+    raise NotImplementedError
+
+
+@guide_wrench.body(NoGuide)
+def _(guide, dx, dy, dvx, dvy, cage_speed, ring_speed):
+    return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+@guide_wrench.body(OuterGuide)
+def _(guide, dx, dy, dvx, dvy, cage_speed, ring_speed):
+    on_cage = journal_wrench(guide, dx[0], dy[0], dvx[0], dvy[0], cage_speed, 0.0)
+    return (
+        on_cage[0], on_cage[1], on_cage[2], 0.0, 0.0, 0.0, on_cage[4], on_cage[5], on_cage[6], on_cage[7],
+    )  # fmt: skip
+
+
+@guide_wrench.body(InnerGuide)
+def _(guide, dx, dy, dvx, dvy, cage_speed, ring_speed):
+    on_ring = journal_wrench(
+        guide, dx[1] - dx[0], dy[1] - dy[0], dvx[1] - dvx[0], dvy[1] - dvy[0], ring_speed, cage_speed
+    )
+    return (
+        -on_ring[0], -on_ring[1], on_ring[3], on_ring[2], on_ring[0], on_ring[1], on_ring[4], on_ring[5],
+        on_ring[6], on_ring[7],
+    )  # fmt: skip
+
+
+@law
+def dry_energy(dry, e):
+    """Elastic energy [J] of the land contact at an eccentricity [m]."""
+    raise NotImplementedError
+
+
+@dry_energy.body(NoContact)
+def _(dry, e):
+    return 0.0
+
+
+@dry_energy.body(DryContact)
+def _(dry, e):
+    return elastic_energy(dry.contact, e - dry.play) if e > dry.play else 0.0
+
+
+@law
+def guide_energy(guide, cage_x, cage_y, ring_x, ring_y):
+    """Elastic energy [J] stored in the guide land."""
+    raise NotImplementedError
+
+
+@guide_energy.body(NoGuide)
+def _(guide, cage_x, cage_y, ring_x, ring_y):
+    return 0.0
+
+
+@guide_energy.body(OuterGuide)
+def _(guide, cage_x, cage_y, ring_x, ring_y):
+    return dry_energy(guide.dry, math.sqrt(cage_x**2 + cage_y**2))
+
+
+@guide_energy.body(InnerGuide)
+def _(guide, cage_x, cage_y, ring_x, ring_y):
+    return dry_energy(guide.dry, math.sqrt((cage_x - ring_x) ** 2 + (cage_y - ring_y) ** 2))

@@ -1,0 +1,204 @@
+"""Roller against raceway: normal load, traction and rolling resistance as one wrench at the contact point.
+
+The wrench acts with opposite sign on roller and ring at the same point, so that force, moment and power balance
+exactly. ``side`` is +1 for the outer race (the ring encloses the roller) and -1 for the inner race.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.contact.damping import damped_load
+from rbdyn.contact.film import rolling_force
+from rbdyn.contact.hertz_line import elastic_load
+from rbdyn.contact.traction import traction
+from rbdyn.kernel import kernel
+
+# Contacts are worked through in blocks of LANES, VECTOR at a time; each quantity is a row of a block.
+LANES, VECTOR, INPUTS, OUTPUTS = 16, 4, 5, 8
+
+# Below these an overlap or a speed is round-off; they keep logarithms and roots of the laws finite.
+SMALLEST_APPROACH = 1e-18
+SMALLEST_SPEED = 1e-12
+
+
+class Scratch(NamedTuple):
+    """Work space of one thread."""
+
+    packed: NDArray[np.float64]  # (INPUTS * LANES,)
+    lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
+    roller: NDArray[np.int64]  # (LANES,) number of each packed roller
+
+
+def scratch() -> Scratch:
+    """Work space for the race contacts."""
+    return Scratch(np.ones(INPUTS * LANES), np.empty(OUTPUTS * LANES), np.empty(LANES, np.int64))
+
+
+class Race(NamedTuple):
+    """One raceway: its radius [m] and its laws."""
+
+    radius: float
+    contact: Any
+    damping: Any
+    traction: Any
+    rolling: Any
+
+
+@kernel
+def race_contact(race, side, roller_radius, dx, dy, dvx, dvy, roller_spin, ring_speed):
+    """Wrench of one race on one roller; zero, but for round-off, where they do not touch.
+
+    ``dx, dy, dvx, dvy``: position [m] and velocity [m/s] of the roller's centre less those of the ring's centre;
+    spins [rad/s]. Returns (force x, force y, moment on the roller, moment on the ring about its centre, load,
+    powers lost in traction, in rolling and in damping) in N, N m and W. The force on the ring is the opposite.
+
+    Load: Chen et al. 2022, eq 5-6; slip at the point that halves the approach: eq 7-10; rolling resistance with
+    the pressure offset 2 F_R R_x/R_b: Biboulet and Houpert 2010.
+    """
+    distance = math.sqrt(dx * dx + dy * dy)
+    inverse = 1.0 / distance
+    nx, ny = dx * inverse, dy * inverse
+    overlap = side * (distance - race.radius) + roller_radius
+    # Written without a branch, so that neighbouring contacts share vector instructions; NaN counts as closed.
+    approach = SMALLEST_APPROACH if overlap < SMALLEST_APPROACH else overlap
+    approach_rate = side * (dvx * nx + dvy * ny)
+    elastic = elastic_load(race.contact, approach)
+    load = damped_load(race.damping, elastic, approach, approach_rate)
+    elastic = 0.0 if overlap <= 0.0 else elastic
+    load = 0.0 if overlap <= 0.0 else load
+
+    roller_lever = side * (roller_radius - 0.5 * approach)
+    ring_lever = distance + roller_lever
+    tangential = dvy * nx - dvx * ny
+    slip = ring_speed * ring_lever - tangential - roller_spin * roller_lever
+    traction_force = traction(race.traction, slip) * load
+
+    # Seen from the line of centres both surfaces run the same way at the entrainment speed.
+    orbit_rate = tangential * inverse
+    roller_surface = (roller_spin - orbit_rate) * roller_lever
+    ring_surface = (ring_speed - orbit_rate) * ring_lever
+    entrainment = 0.5 * (roller_surface + ring_surface)
+    resistance = rolling_force(race.rolling, load, max(abs(entrainment), SMALLEST_SPEED))
+    rolling = math.copysign(resistance, entrainment)
+    along = traction_force + rolling * (ring_lever + roller_lever) * inverse
+    normal = -side * load
+    return (
+        normal * nx - along * ny,
+        normal * ny + along * nx,
+        roller_lever * (traction_force - rolling),
+        -ring_lever * (traction_force + rolling),
+        load,
+        traction_force * slip,
+        2.0 * rolling * entrainment,
+        (load - elastic) * approach_rate,
+    )
+
+
+@kernel
+def race_block(race, side, roller_radius, ring, source, first, stride, lanes, count):
+    """Contacts of ``count`` rollers, rounded up to whole vectors, into the rows of ``lanes``.
+
+    Roller i's x, y, vx, vy and spin stand at ``source[first + i + row * stride]``. Straight-line code over rows at
+    constant distances, which the compiler turns into vector instructions; the lanes past ``count`` hold nothing.
+    """
+    ring_x, ring_y, ring_vx, ring_vy, ring_speed = ring
+    for i in range((count + VECTOR - 1) // VECTOR * VECTOR):
+        j = first + i
+        out = race_contact(
+            race,
+            side,
+            roller_radius,
+            source[j] - ring_x,
+            source[j + stride] - ring_y,
+            source[j + 2 * stride] - ring_vx,
+            source[j + 3 * stride] - ring_vy,
+            source[j + 4 * stride],
+            ring_speed,
+        )
+        lanes[i] = out[0]
+        lanes[LANES + i] = out[1]
+        lanes[2 * LANES + i] = out[2]
+        lanes[3 * LANES + i] = out[3]
+        lanes[4 * LANES + i] = out[4]
+        lanes[5 * LANES + i] = out[5]
+        lanes[6 * LANES + i] = out[6]
+        lanes[7 * LANES + i] = out[7]
+
+
+@kernel
+def gather_touching(open_distance, ring, rollers, start, y, packed, index):
+    """Copy the state of rollers that touch the inner race, from ``start`` on, until a block is full.
+
+    Returns how many there are and where to go on.
+    """
+    count = 0
+    j = start
+    while j < rollers and count < LANES:
+        dx, dy = y[j] - ring[0], y[rollers + j] - ring[1]
+        if dx * dx + dy * dy < open_distance * open_distance:
+            for row in range(INPUTS):
+                packed[row * LANES + count] = y[row * rollers + j]
+            index[count] = j
+            count += 1
+        j += 1
+    return count, j
+
+
+@kernel
+def add_block(lanes, i, j, rollers, row, dy, sums):
+    """Add contact ``i`` of a block to roller ``j`` and to the sums of its race."""
+    force_x, force_y = lanes[i], lanes[LANES + i]
+    dy[row, 2 * rollers + j] += force_x
+    dy[row, 3 * rollers + j] += force_y
+    dy[row, 4 * rollers + j] += lanes[2 * LANES + i]
+    return (
+        sums[0] - force_x,
+        sums[1] - force_y,
+        sums[2] + lanes[3 * LANES + i],
+        max(sums[3], lanes[4 * LANES + i]),
+        sums[4] + lanes[5 * LANES + i],
+        sums[5] + lanes[6 * LANES + i],
+        sums[6] + lanes[7 * LANES + i],
+    )
+
+
+@kernel
+def outer_race_forces(race, radius, rollers, y, row, dy, scratch):
+    """All contacts of the fixed outer race: adds forces and moments on the rollers to row ``row`` of ``dy``.
+
+    Returns (force x, force y, moment on the ring, largest load, powers lost in traction, rolling and damping).
+    Nearly every roller touches this race, so none is picked out.
+    """
+    sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    still = (0.0, 0.0, 0.0, 0.0, 0.0)
+    start = 0
+    while start < rollers:
+        count = min(LANES, rollers - start)
+        race_block(race, 1.0, radius, still, y, start, rollers, scratch.lanes, count)
+        for i in range(count):
+            sums = add_block(scratch.lanes, i, start + i, rollers, row, dy, sums)
+        start += LANES
+    return sums
+
+
+@kernel
+def inner_race_forces(race, radius, ring, rollers, y, row, dy, scratch):
+    """All contacts of the inner race, as ``outer_race_forces``; ``ring``: its x, y, vx, vy and speed.
+
+    Only rollers of the load zone touch this race: they are picked out first.
+    """
+    sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    open_distance = race.radius + radius
+    start = 0
+    while start < rollers:
+        count, start = gather_touching(open_distance, ring, rollers, start, y, scratch.packed, scratch.roller)
+        if count > 0:
+            race_block(race, -1.0, radius, ring, scratch.packed, 0, LANES, scratch.lanes, count)
+        for i in range(count):
+            sums = add_block(scratch.lanes, i, scratch.roller[i], rollers, row, dy, sums)
+    return sums

@@ -1,0 +1,280 @@
+"""Dormand-Prince 5(4): explicit, adaptive with a PI controller, first-same-as-last, dense output.
+
+Dormand and Prince 1980; controller and continuous extension after Hairer, Norsett and Wanner, Solving ODEs I, II.4-6.
+
+The error of a step is the Euclidean norm of all components, each over its own absolute tolerance, and not averaged
+over them: it is never smaller than that of the worst component, however many rollers there are. Loss powers are
+integrated with the fifth-order weights from the same stages, so that the power balance tests the integrator too.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.dynamics.equations import LOADS, POCKET_LOAD, POWERS, derivative
+from rbdyn.dynamics.races import Scratch
+from rbdyn.dynamics.state import CAGE_VX, CAGE_VY
+from rbdyn.kernel import entry, kernel, law, reordered_sum, routine
+
+FINISHED, STEP_UNDERFLOW, NOT_FINITE, STEP_BUDGET = range(4)
+
+# Row s holds the weights of stages 1 ... s in the state at which stage s + 1 is evaluated; the last is the new state.
+A = np.array(
+    [
+        [0, 0, 0, 0, 0, 0],
+        [1 / 5, 0, 0, 0, 0, 0],
+        [3 / 40, 9 / 40, 0, 0, 0, 0],
+        [44 / 45, -56 / 15, 32 / 9, 0, 0, 0],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0],
+        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+)
+B1, B3, B4, B5, B6 = 35 / 384, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
+E1, E3, E4, E5, E6, E7 = 71 / 57600, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40
+D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
+D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
+
+SAFETY, BETA = 0.9, 0.04
+EXPONENT = 0.2 - 0.75 * BETA
+SHRINK, GROW = 0.2, 10.0
+PEAK_POINTS = 8  # interior points at which a step that holds a new largest pocket load is looked at
+
+
+class Control(NamedTuple):
+    """Step control: inverse absolute tolerance of each component, step limits [s], step budget."""
+
+    inverse_tolerance: NDArray[np.float64]
+    smallest_step: float
+    largest_step: float
+    step_budget: int
+
+
+class Carry(NamedTuple):
+    """What one call hands to the next. Arrays, changed in place."""
+
+    y: NDArray[np.float64]  # state
+    k: NDArray[np.float64]  # (7, n) stage derivatives; row 0 belongs to y
+    stage: NDArray[np.float64]  # (n,) scratch
+    power: NDArray[np.float64]  # (7, POWERS)
+    loads: NDArray[np.float64]  # (7, LOADS)
+    scratch: Scratch
+    clock: NDArray[np.float64]  # time, next step, previous error, next sample time
+    counts: NDArray[np.int64]  # accepted, rejected, right-hand sides, worst component
+
+
+class Tally(NamedTuple):
+    """What is kept over a window. Arrays, changed in place."""
+
+    work: NDArray[np.float64]  # (POWERS,) integrals of the powers [J]
+    largest: NDArray[np.float64]  # (LOADS,) largest loads [N]
+    largest_time: NDArray[np.float64]  # (LOADS,) and when [s]
+    whirl: NDArray[np.float64]  # samples, sum and sum of squares of the cage centre's speed
+
+
+class NoHistory(NamedTuple):
+    """Samples are counted and forgotten."""
+
+
+class History(NamedTuple):
+    """States at the uniform sample times, as many rows as there is room for."""
+
+    states: NDArray[np.float64]
+    filled: NDArray[np.int64]
+
+
+@law
+def record(history, carry, y_new, h, theta):
+    """Keep the state at the fraction ``theta`` of the step, if a history is asked for."""
+    raise NotImplementedError
+
+
+@record.body(NoHistory)
+def _(history, carry, y_new, h, theta):
+    pass
+
+
+@record.body(History)
+def _(history, carry, y_new, h, theta):
+    row = history.filled[0]
+    if row < history.states.shape[0]:
+        for i in range(carry.y.size):
+            history.states[row, i] = interpolate(carry, y_new, h, theta, i)
+        history.filled[0] = row + 1
+
+
+@kernel
+def interpolate(carry, y_new, h, theta, i):
+    """Component ``i`` at the fraction ``theta`` of the step, fourth-order accurate."""
+    k = carry.k
+    difference = y_new[i] - carry.y[i]
+    slope = h * k[0, i] - difference
+    curve = difference - h * k[6, i] - slope
+    quartic = h * (D1 * k[0, i] + D3 * k[2, i] + D4 * k[3, i] + D5 * k[4, i] + D6 * k[5, i] + D7 * k[6, i])
+    rest = 1.0 - theta
+    return carry.y[i] + theta * (difference + rest * (slope + theta * (curve + rest * quartic)))
+
+
+@reordered_sum
+def error_norm(k, h, inverse_tolerance):
+    """Norm of the embedded error; a sum of squares, so that any NaN comes through."""
+    total = 0.0
+    for i in range(inverse_tolerance.size):
+        e = E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
+        e *= inverse_tolerance[i]
+        total += e * e
+    return h * math.sqrt(total)
+
+
+@routine
+def trial_step(bearing, carry, y_new, h):
+    """Stages 2 to 7 of a step of size ``h`` from ``carry.y``; the end state goes to ``y_new``."""
+    # One loop of a length the compiler does not know: unrolled, six derivatives overflow the instruction cache.
+    y, k = carry.y, carry.k
+    n, stages = y.size, k.shape[0]
+    for s in range(1, stages):
+        state = y_new if s == stages - 1 else carry.stage
+        weight = h * A[s, 0]
+        for i in range(n):
+            state[i] = y[i] + weight * k[0, i]
+        for j in range(1, s):
+            weight = h * A[s, j]
+            for i in range(n):
+                state[i] += weight * k[j, i]
+        derivative(bearing, state, s, k, carry.power, carry.loads, carry.scratch)
+
+
+@routine
+def worst_component(carry, h, inverse_tolerance):
+    """Component that limits the step: the first that is not finite, else the one of the largest error."""
+    k, worst, largest = carry.k, 0, -1.0
+    for i in range(inverse_tolerance.size):
+        e = E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
+        e = abs(h * e * inverse_tolerance[i])
+        if not math.isfinite(e):
+            return i
+        if e > largest:
+            worst, largest = i, e
+    return worst
+
+
+@routine
+def refine_peak(bearing, carry, y_new, h, tally):
+    """Look inside a step for its largest pocket load: eight points, then the vertex of a parabola."""
+    best, place = 0.0, 0
+    values = np.empty(PEAK_POINTS + 2)
+    values[0] = carry.loads[0, POCKET_LOAD]
+    values[PEAK_POINTS + 1] = carry.loads[6, POCKET_LOAD]
+    spacing = 1.0 / (PEAK_POINTS + 1)
+    for p in range(1, PEAK_POINTS + 1):
+        for i in range(carry.y.size):
+            carry.stage[i] = interpolate(carry, y_new, h, p * spacing, i)
+        # Row 1 of the stages is free once the step is accepted: b_2 = e_2 = d_2 = 0.
+        derivative(bearing, carry.stage, 1, carry.k, carry.power, carry.loads, carry.scratch)
+        values[p] = carry.loads[1, POCKET_LOAD]
+    for p in range(PEAK_POINTS + 2):
+        if values[p] > best:
+            best, place = values[p], p
+    theta = place * spacing
+    if 0 < place < PEAK_POINTS + 1:
+        left, right = values[place - 1], values[place + 1]
+        bend = left - 2.0 * best + right
+        if bend < 0.0:
+            shift = 0.5 * (left - right) / bend
+            best -= 0.25 * (left - right) * shift
+            theta += shift * spacing
+    if best > tally.largest[POCKET_LOAD]:
+        tally.largest[POCKET_LOAD] = best
+        tally.largest_time[POCKET_LOAD] = carry.clock[0] + theta * h
+
+
+@routine
+def keep(bearing, carry, y_new, h, tally, history, sample_step):
+    """Book an accepted step: work, largest loads, samples."""
+    power, loads, work = carry.power, carry.loads, tally.work
+    for p in range(POWERS):
+        work[p] += h * (
+            B1 * power[0, p] + B3 * power[2, p] + B4 * power[3, p] + B5 * power[4, p] + B6 * power[5, p]
+        )
+    time = carry.clock[0]
+    suspected = 0.0
+    for s in range(1, 7):
+        suspected = max(suspected, loads[s, POCKET_LOAD])
+    for force in range(LOADS):
+        if loads[6, force] > tally.largest[force]:
+            tally.largest[force] = loads[6, force]
+            tally.largest_time[force] = time + h
+    body = 5 * bearing.rollers
+    while carry.clock[3] <= time + h:
+        theta = (carry.clock[3] - time) / h
+        vx = interpolate(carry, y_new, h, theta, body + CAGE_VX)
+        vy = interpolate(carry, y_new, h, theta, body + CAGE_VY)
+        square = vx * vx + vy * vy
+        tally.whirl[0] += 1.0
+        tally.whirl[1] += math.sqrt(square)
+        tally.whirl[2] += square
+        record(history, carry, y_new, h, theta)
+        carry.clock[3] += sample_step
+    if suspected > tally.largest[POCKET_LOAD]:
+        refine_peak(bearing, carry, y_new, h, tally)
+        carry.counts[2] += PEAK_POINTS
+
+
+@entry
+def advance(bearing, control, carry, tally, history, t_end, sample_step):
+    """Integrate from the carried time to ``t_end`` [s]; returns FINISHED or why not.
+
+    Steps end exactly at ``t_end``. On any other status ``carry`` holds the last good state, and
+    ``carry.counts[3]`` the component that made it impossible.
+    """
+    clock, counts = carry.clock, carry.counts
+    y_new = np.empty_like(carry.y)
+    if counts[2] == 0:
+        derivative(bearing, carry.y, 0, carry.k, carry.power, carry.loads, carry.scratch)
+        counts[2] = 1
+        for i in range(carry.y.size):
+            if not math.isfinite(carry.k[0, i]):
+                counts[3] = i
+                return NOT_FINITE
+    grow = GROW
+    while clock[0] < t_end:
+        if counts[0] + counts[1] >= control.step_budget:
+            return STEP_BUDGET
+        remaining = t_end - clock[0]
+        last = clock[1] >= remaining
+        h = remaining if last else clock[1]
+        trial_step(bearing, carry, y_new, h)
+        counts[2] += 6
+        error = error_norm(carry.k, h, control.inverse_tolerance)
+        if error <= 1.0:
+            keep(bearing, carry, y_new, h, tally, history, sample_step)
+            counts[0] += 1
+            clock[0] = t_end if last else clock[0] + h
+            for i in range(carry.y.size):
+                carry.y[i] = y_new[i]
+                carry.k[0, i] = carry.k[6, i]
+            for p in range(POWERS):
+                carry.power[0, p] = carry.power[6, p]
+            for force in range(LOADS):
+                carry.loads[0, force] = carry.loads[6, force]
+            error = max(error, 1e-4)
+            factor = SAFETY * error**-EXPONENT * clock[2] ** BETA
+            # A step cut short by t_end says nothing against the step it was cut from.
+            proposal = min(h * min(max(factor, SHRINK), grow), control.largest_step)
+            clock[1] = max(proposal, clock[1]) if last else proposal
+            clock[2] = error
+            grow = GROW
+        else:
+            counts[1] += 1
+            finite = math.isfinite(error)
+            shrink = max(SAFETY * error**-0.2, SHRINK) if finite else SHRINK
+            if h * shrink < control.smallest_step:
+                counts[3] = worst_component(carry, h, control.inverse_tolerance)
+                return STEP_UNDERFLOW if finite else NOT_FINITE
+            clock[1] = h * shrink
+            grow = 1.0
+    return FINISHED

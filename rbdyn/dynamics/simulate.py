@@ -1,0 +1,306 @@
+"""Replicates of a scene, in threads (compiled code runs outside the GIL), gathered with error bars."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing, mechanical_energy, pocket_loads
+from rbdyn.dynamics.metrics import Replicate, quantity
+from rbdyn.dynamics.model import absolute_tolerance, kinematics, roller_bearing, scales
+from rbdyn.dynamics.races import scratch
+from rbdyn.dynamics.runge_kutta import (
+    FINISHED,
+    NOT_FINITE,
+    STEP_UNDERFLOW,
+    Carry,
+    Control,
+    History,
+    NoHistory,
+    Tally,
+    advance,
+)
+from rbdyn.dynamics.start import start_state
+from rbdyn.dynamics.state import CAGE_ANGLE, CAGE_X, CAGE_Y, name
+from rbdyn.faults import RunError
+from rbdyn.result import SimulationResult, versions
+from rbdyn.scene import Scene
+
+# Interruptions are looked at between chunks of this many shaft turns: some hundredths of a second.
+CHUNK_TURNS = 10.0
+LARGEST_STEP_TURNS = 0.02
+SMALLEST_STEP_TURNS = 1e-12
+COMPANION_FACTOR = 0.1
+PI_START_ERROR = 1e-4
+
+
+class CancelledError(Exception):
+    """The run was asked to stop."""
+
+
+@dataclass
+class Stop:
+    """Shared wish to stop; compiled code looks at it between chunks."""
+
+    event: threading.Event = field(default_factory=threading.Event)
+
+    def check(self) -> None:
+        """Raises CancelledError when a stop is wished."""
+        if self.event.is_set():
+            raise CancelledError
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A time history at uniform samples: time [s], cage centre [m], signed pocket wall loads [N] (samples, rollers)."""
+
+    time: NDArray[np.float64]
+    cage_x: NDArray[np.float64]
+    cage_y: NDArray[np.float64]
+    pocket_load: NDArray[np.float64]
+
+
+class Run:
+    """One replicate under way: parameters, integrator memory and where it stands."""
+
+    def __init__(self, scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> None:
+        self.scene, self.bearing, self.replicate, self.stop = scene, bearing, replicate, stop
+        seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
+        y = start_state(scene, bearing, np.random.default_rng(seeds))
+        tolerance = absolute_tolerance(bearing, scene, rtol)
+        numerics = scene.numerics
+        turns = numerics.turns + numerics.discard_turns
+        self.control = Control(
+            1.0 / tolerance,
+            SMALLEST_STEP_TURNS * scene.turn_s,
+            LARGEST_STEP_TURNS * scene.turn_s,
+            int(min(numerics.step_budget_per_turn * math.ceil(turns), 2**62)),
+        )
+        n = y.size
+        first_step = 1e-3 * scales(bearing, scene).length / scales(bearing, scene).speed
+        self.carry = Carry(
+            y=y,
+            k=np.zeros((7, n)),
+            stage=np.zeros(n),
+            power=np.zeros((7, POWERS)),
+            loads=np.zeros((7, LOADS)),
+            scratch=scratch(),
+            clock=np.array([0.0, first_step, PI_START_ERROR, 0.0]),
+            counts=np.zeros(4, dtype=np.int64),
+        )
+        self.tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
+
+    def to(self, turns: float, history: NoHistory | History) -> None:
+        """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""
+        sample_step = self.scene.turn_s / self.scene.numerics.samples_per_turn
+        while True:
+            self.stop.check()
+            here = self.carry.clock[0] / self.scene.turn_s
+            chunk = min(here + CHUNK_TURNS, turns)
+            t_end = chunk * self.scene.turn_s
+            status = advance(self.bearing, self.control, self.carry, self.tally, history, t_end, sample_step)
+            if status != FINISHED:
+                raise RunError(self._why(status))
+            if chunk >= turns:
+                return
+
+    def forget(self) -> None:
+        """Start counting here: empty the tally and sample from now on."""
+        for kept in self.tally:
+            kept[:] = 0.0
+        self.carry.clock[3] = self.carry.clock[0]
+
+    def _why(self, status: int) -> str:
+        time_s = self.carry.clock[0]
+        where = (
+            f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s, "
+            f"shaft turn {time_s / self.scene.turn_s:.4g}"
+        )
+        component = name(int(self.carry.counts[3]), self.bearing.rollers)
+        if status == STEP_UNDERFLOW:
+            return (
+                f"{where}: the step fell below {self.control.smallest_step:.2g} s because of {component}; "
+                "loosen numerics.rtol or soften the law that acts on it (damping, friction blend, film floor)"
+            )
+        if status == NOT_FINITE:
+            return f"{where}: {component} is not finite at any step size; check the laws that act on it"
+        return (
+            f"{where}: step budget of {self.control.step_budget} used up (last step {self.carry.clock[1]:.2g} s); "
+            "raise numerics.step_budget_per_turn, loosen numerics.rtol, or soften the stiffest law"
+        )
+
+
+def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> Replicate:
+    """Run one replicate: discard the transient, then count. Raises RunError or CancelledError."""
+    started = time.thread_time()
+    run = Run(scene, bearing, replicate, rtol, stop)
+    numerics = scene.numerics
+    nothing = NoHistory()
+    run.to(numerics.discard_turns, nothing)
+    run.forget()
+    body = 5 * bearing.rollers
+    angle = run.carry.y[body + CAGE_ANGLE]
+    energy = sum(mechanical_energy(bearing, run.carry.y))
+    window = scene.impact_window_turns
+    impacts, largest = [], np.zeros(LOADS)
+    for index in range(int(numerics.turns / window + 1e-9)):
+        run.tally.largest[:] = 0.0
+        run.to(numerics.discard_turns + (index + 1) * window, nothing)
+        impacts.append(run.tally.largest[0])
+        largest = np.maximum(largest, run.tally.largest)
+    run.to(numerics.discard_turns + numerics.turns, nothing)
+    largest = np.maximum(largest, run.tally.largest)
+    scale = scales(bearing, scene)
+    return Replicate(
+        duration=numerics.turns * scene.turn_s,
+        impact_windows=np.array(impacts),
+        whirl=run.tally.whirl.copy(),
+        work=run.tally.work.copy(),
+        largest=largest,
+        cage_angle=float(run.carry.y[body + CAGE_ANGLE] - angle),
+        kinematic_cage_speed=kinematics(scene).cage_speed,
+        energy_change=float(sum(mechanical_energy(bearing, run.carry.y)) - energy),
+        energy_scale=scale.load * scale.length,
+        accepted_steps=int(run.carry.counts[0]),
+        rejected_steps=int(run.carry.counts[1]),
+        derivatives=int(run.carry.counts[2]),
+        cpu_s=time.thread_time() - started,
+    )
+
+
+def trace(scene: Scene, turns: float, replicate: int = 0, stop: Stop | None = None) -> Trace:
+    """Time history of one replicate over the first ``turns`` counted turns. Raises RunError or CancelledError."""
+    bearing = roller_bearing(scene)
+    run = Run(scene, bearing, replicate, scene.numerics.rtol, stop or Stop())
+    run.to(scene.numerics.discard_turns, NoHistory())
+    run.forget()
+    samples = int(turns * scene.numerics.samples_per_turn)
+    history = History(np.empty((samples, run.carry.y.size)), np.zeros(1, dtype=np.int64))
+    run.to(scene.numerics.discard_turns + turns, history)
+    states = history.states[: history.filled[0]]
+    body = 5 * bearing.rollers
+    return Trace(
+        time=np.arange(len(states)) * scene.turn_s / scene.numerics.samples_per_turn,
+        cage_x=states[:, body + CAGE_X].copy(),
+        cage_y=states[:, body + CAGE_Y].copy(),
+        pocket_load=pocket_loads(bearing, states),
+    )
+
+
+def prepare(scene: Scene) -> float:
+    """Compile, or fetch from disk, what the scene needs; returns the seconds it took."""
+    started = time.perf_counter()
+    bearing = roller_bearing(scene)
+    run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
+    run.to(0.0, NoHistory())
+    mechanical_energy(bearing, run.carry.y)
+    return time.perf_counter() - started
+
+
+def simulate(
+    scene: Scene,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    stop: Stop | None = None,
+) -> SimulationResult:
+    """Simulate all replicates of a scene.
+
+    ``workers``: threads, all processors by default; the result does not depend on it. ``progress(done, total)`` is
+    called after every run. Raises RunError when a replicate cannot go on, KeyboardInterrupt on Ctrl-C.
+    """
+    stop = stop or Stop()
+    compile_s = prepare(scene)
+    bearing = roller_bearing(scene)
+    numerics = scene.numerics
+    tolerances = [numerics.rtol] + [COMPANION_FACTOR * numerics.rtol] * numerics.companion
+    tasks = [(index, rtol) for rtol in tolerances for index in range(numerics.replicates)]
+    started = time.perf_counter()
+    runs: dict[tuple[int, float], Replicate] = {}
+    with thread_pool(workers, stop) as pool:
+        futures = {pool.submit(run_replicate, scene, bearing, *task, stop): task for task in tasks}
+        for future in as_they_end(futures):
+            runs[futures[future]] = future.result()
+            if progress is not None:
+                progress(len(runs), len(tasks))
+    wall_s = time.perf_counter() - started
+    counted = [runs[index, numerics.rtol] for index in range(numerics.replicates)]
+    companions = (
+        [runs[index, tolerances[1]] for index in range(numerics.replicates)] if numerics.companion else []
+    )
+    return _gather(scene, counted, companions, wall_s, compile_s)
+
+
+@contextmanager
+def thread_pool(workers: int | None, stop: Stop) -> Iterator[ThreadPoolExecutor]:
+    """Threads that, should anything go wrong or Ctrl-C come, stop at the end of their chunk."""
+    pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+    try:
+        yield pool
+    except BaseException:
+        stop.event.set()
+        pool.shutdown(wait=True, cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+def as_they_end(futures: Iterable[Future[Replicate]]) -> Iterator[Future[Replicate]]:
+    """Futures in the order in which they end; waits in short naps so that Ctrl-C is heard at once."""
+    pending = set(futures)
+    while pending:
+        done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
+        yield from done
+
+
+def _gather(
+    scene: Scene, runs: list[Replicate], companions: list[Replicate], wall_s: float, compile_s: float
+) -> SimulationResult:
+    everything = [*runs, *companions]
+    per_run = scene.numerics.turns + scene.numerics.discard_turns
+    return SimulationResult(
+        status="ok",
+        impact_force=quantity(lambda run: run.impact_force, runs, companions),
+        whirl_deviation_ratio=quantity(lambda run: run.whirl_deviation_ratio, runs, companions),
+        power_loss=quantity(lambda run: run.power_loss, runs, companions),
+        cage_speed_rpm=quantity(lambda run: run.cage_speed * 30.0 / math.pi, runs, companions),
+        cage_slip=quantity(lambda run: run.cage_slip, runs, companions),
+        power_gap=max(run.power_gap for run in runs),
+        power_terms={term: float(np.mean([run.power(term) for run in runs])) for term in LOSSES},
+        max_inner_load=max(run.max_inner_load for run in runs),
+        max_outer_load=max(run.max_outer_load for run in runs),
+        impact_window_turns=scene.impact_window_turns,
+        cost={
+            "wall_s": wall_s,
+            "compile_s": compile_s,
+            "cpu_s": sum(run.cpu_s for run in everything),
+            "steps": sum(run.accepted_steps for run in everything),
+            "rejected_steps": sum(run.rejected_steps for run in everything),
+            "rhs_evaluations": sum(run.derivatives for run in everything),
+            "turns": per_run * len(everything),
+        },
+        replicates=scene.numerics.replicates,
+        seed=scene.numerics.seed,
+        notes=_notes(scene),
+        versions=versions(),
+        scene=scene.model_dump(mode="json"),
+    )
+
+
+def _notes(scene: Scene) -> tuple[str, ...]:
+    notes = []
+    if scene.traction.model == "four_constant":
+        notes.append(
+            "traction: one load-independent set of constants; lightly loaded rollers are driven too hard and "
+            "skidding is under-predicted"
+        )
+    if scene.numerics.replicates == 1:
+        notes.append("one replicate: no statistical error can be given; raise numerics.replicates")
+    return tuple(notes)

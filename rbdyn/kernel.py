@@ -1,0 +1,99 @@
+"""How compiled code is made here: plain kernels, laws chosen by type, and cached entry points.
+
+- ``@kernel``: a small pure function of floats and arrays, compiled as part of whatever calls it.
+- ``@law``: a function whose body is chosen, at compile time, by the type of its first argument (a
+  NamedTuple of parameters). A law that a scene leaves out is thus not compiled at all.
+- ``@entry``: the few functions called from Python. Their machine code is kept on disk, in a folder named
+  by a hash of every source file of the package, so that an edit anywhere can never bring back stale code.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numba.extending
+from numba import njit
+from numba.core import types
+
+# Contraction (fused multiply-add) is the one relaxation: NaN and infinity stay signals for the integrator.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+# Calls of compiled code return tuples through memory and carry an error status: small functions must vanish.
+INLINED: dict[str, Any] = {**OPTIONS, "forceinline": True}
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a small pure function into its callers; ``.py_func`` keeps the interpreted one."""
+    return njit(**INLINED)(function)
+
+
+def routine(function: Callable[..., Any]) -> Any:
+    """Compile a longer function that is called from several places and not copied into them."""
+    return njit(**OPTIONS)(function)
+
+
+def reordered_sum(function: Callable[..., Any]) -> Any:
+    """Compile a loop whose sums may be taken in any order, so that they vectorise; NaN still comes through."""
+    return njit(error_model="numpy", fastmath={"contract", "reassoc"}, forceinline=True)(function)
+
+
+def law(declaration: Callable[..., Any]) -> Any:
+    """Declare a law. Register a body for a parameter type with ``@declared.body(ParameterType)``.
+
+    Works compiled (the choice costs nothing) and interpreted. Raises TypeError where no body is registered.
+    """
+    bodies: dict[type, Callable[..., Any]] = {}
+
+    @functools.wraps(declaration)
+    def chosen(parameters: Any, *arguments: Any) -> Any:
+        if type(parameters) not in bodies:
+            raise TypeError(f"{declaration.__name__} has no body for {type(parameters).__name__}")
+        return bodies[type(parameters)](parameters, *arguments)
+
+    def body(parameter_type: type) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+        def register(function: Callable[..., Any]) -> Callable[..., Any]:
+            bodies[parameter_type] = function
+            return function
+
+        return register
+
+    def choose_at_compile_time(parameters: types.Type, *arguments: types.Type) -> Callable[..., Any] | None:
+        return bodies.get(getattr(parameters, "instance_class", type(None)))
+
+    chosen.body = body  # type: ignore[attr-defined]
+    overload: Any = numba.extending.overload
+    overload(chosen, jit_options=INLINED, strict=False)(choose_at_compile_time)
+    return chosen
+
+
+def entry(function: Callable[..., Any]) -> Any:
+    """Compile a function that Python calls: releases the GIL and keeps its machine code on disk."""
+    config: Any = numba.core.config
+    previous = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_folder())
+    try:
+        return njit(cache=True, nogil=True, **OPTIONS)(function)
+    finally:
+        config.CACHE_DIR = previous
+
+
+@functools.cache
+def cache_folder() -> Path:
+    """Folder of the compiled code of exactly these sources; a temporary one where the home is read-only."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(source.read_bytes())
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    folder = Path(base) / "rbdyn" / digest.hexdigest()[:16]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="rbdyn-"))

@@ -1,0 +1,138 @@
+"""What a simulation returns: a frozen record that saves and loads itself as JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from rbdyn.faults import InputError
+
+FORMAT = "rbdyn.simulation/1"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A figure with the half-widths of its 95 % intervals; None where an error was not estimated."""
+
+    value: float
+    statistical_error: float | None
+    numerical_error: float | None
+
+    def as_dict(self) -> dict[str, float | None]:
+        """JSON form."""
+        return {
+            "value": self.value,
+            "statistical_error": self.statistical_error,
+            "numerical_error": self.numerical_error,
+        }
+
+    def __str__(self) -> str:
+        errors = [
+            f"± {self.statistical_error:.2g} (statistical)" if self.statistical_error is not None else ""
+        ]
+        errors.append(f"± {self.numerical_error:.2g} (numerical)" if self.numerical_error is not None else "")
+        return " ".join((f"{self.value:.5g}", *filter(None, errors)))
+
+
+@dataclass(frozen=True)
+class SimulationResult:
+    """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input."""
+
+    status: str
+    impact_force: Quantity
+    whirl_deviation_ratio: Quantity
+    power_loss: Quantity
+    cage_speed_rpm: Quantity
+    cage_slip: Quantity
+    power_gap: float
+    power_terms: dict[str, float]
+    max_inner_load: float
+    max_outer_load: float
+    impact_window_turns: float
+    cost: dict[str, float]
+    replicates: int
+    seed: int
+    notes: tuple[str, ...]
+    versions: dict[str, str]
+    scene: dict[str, Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return {
+            "format": FORMAT,
+            "status": self.status,
+            "impact_force_N": self.impact_force.as_dict(),
+            "whirl_deviation_ratio": self.whirl_deviation_ratio.as_dict(),
+            "power_loss_W": self.power_loss.as_dict(),
+            "cage_speed_rpm": self.cage_speed_rpm.as_dict(),
+            "cage_slip": self.cage_slip.as_dict(),
+            "power_balance": {"relative_gap": self.power_gap},
+            "power_terms_W": self.power_terms,
+            "loads": {"max_inner_N": self.max_inner_load, "max_outer_N": self.max_outer_load},
+            "impact_window_turns": self.impact_window_turns,
+            "cost": self.cost,
+            "replicates": self.replicates,
+            "seed": self.seed,
+            "notes": list(self.notes),
+            "versions": self.versions,
+            "scene": self.scene,
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> SimulationResult:
+        """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
+        return cls(
+            status=data["status"],
+            impact_force=Quantity(**data["impact_force_N"]),
+            whirl_deviation_ratio=Quantity(**data["whirl_deviation_ratio"]),
+            power_loss=Quantity(**data["power_loss_W"]),
+            cage_speed_rpm=Quantity(**data["cage_speed_rpm"]),
+            cage_slip=Quantity(**data["cage_slip"]),
+            power_gap=data["power_balance"]["relative_gap"],
+            power_terms=data["power_terms_W"],
+            max_inner_load=data["loads"]["max_inner_N"],
+            max_outer_load=data["loads"]["max_outer_N"],
+            impact_window_turns=data["impact_window_turns"],
+            cost=data["cost"],
+            replicates=data["replicates"],
+            seed=data["seed"],
+            notes=tuple(data["notes"]),
+            versions=data["versions"],
+            scene=data["scene"],
+        )
+
+    def save(self, path: Path | str) -> None:
+        """Write JSON, whole or not at all."""
+        write_json(path, self.as_dict())
+
+    @classmethod
+    def load(cls, path: Path | str) -> SimulationResult:
+        """Read a saved result. Raises InputError when the file is missing or not such a result."""
+        try:
+            data = json.loads(Path(path).read_text(encoding="utf-8"))
+            if data["format"] != FORMAT:
+                raise InputError([f"{path}: format is {data['format']}, not {FORMAT}; run the scene again"])
+            return cls.from_dict(data)
+        except OSError as error:
+            raise InputError([f"{path}: cannot be read ({error.strerror}); check the path"]) from None
+        except (ValueError, KeyError, TypeError):
+            raise InputError([f"{path}: not a saved simulation result; check the path"]) from None
+
+
+def write_json(path: Path | str, data: dict[str, Any]) -> None:
+    """Write JSON so that an interruption leaves the old file or the new one, never half of it."""
+    path = Path(path)
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    os.replace(partial, path)
+
+
+def versions() -> dict[str, str]:
+    """Versions that the bits of a result depend on."""
+    packages = {name: version(name) for name in ("rbdyn", "numpy", "numba")}
+    return {**packages, "python": platform.python_version(), "machine": platform.machine()}

@@ -1,0 +1,88 @@
+"""What the commands share: exit codes, messages, JSON, progress. Knows no physics."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
+
+import typer
+
+from rbdyn.faults import InputError, RunError
+
+FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+
+
+@contextmanager
+def guarded(as_json: bool) -> Iterator[None]:
+    """Turn faults into sentences on standard error and an exit code; with ``--json`` also into one object."""
+    try:
+        yield
+    except InputError as error:
+        _leave(as_json, BAD_INPUT, {"status": "refused", "faults": error.faults}, error.faults)
+    except RunError as error:
+        _leave(as_json, FAILED, {"status": f"failed: {error}"}, [str(error)])
+    except KeyboardInterrupt:
+        _leave(as_json, INTERRUPTED, {"status": "interrupted"}, ["interrupted; what was finished is kept"])
+    except OSError as error:
+        sentence = (
+            f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
+        )
+        _leave(as_json, BAD_INPUT, {"status": "refused", "faults": [sentence]}, [sentence])
+
+
+def _leave(as_json: bool, code: int, record: dict[str, Any], sentences: Sequence[str]) -> NoReturn:
+    for sentence in sentences:
+        print(sentence, file=sys.stderr)
+    if as_json:
+        print_json(record)
+    raise typer.Exit(code)
+
+
+def print_json(record: dict[str, Any]) -> None:
+    """One JSON object on standard output."""
+    print(json.dumps(record, indent=1, allow_nan=False))
+
+
+def output_folder(path: Path) -> Path:
+    """Make the folder that ``--out`` names. Raises InputError where that is impossible."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            [f"--out {path}: cannot be made a folder ({error.strerror}); name another"]
+        ) from None
+    return path
+
+
+@contextmanager
+def progress_bar(title: str, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+    """Progress on a terminal, silence elsewhere; yields ``progress(done, total)``."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A plain table; the first column to the left, the others to the right."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+    for index, column in enumerate(header):
+        table.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    # Wide enough for the table when the output is a file or a pipe, which has no width of its own.
+    Console(width=None if sys.stdout.isatty() else 160, highlight=False, markup=False).print(table)
