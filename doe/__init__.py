@@ -1,0 +1,9 @@
+"""Designed experiments: design, response surface, Pareto front, dimension chain, and the study that joins them.
+
+- ``designs``, ``response_surface``, ``pareto``, ``dimension_chain``: methods that know no bearing
+- ``study_file``: STUDY.toml, checked
+- ``store``: finished runs on disk
+- ``clearance``: the bearing study; the only module that runs bearing simulations
+- ``study``: design, runs, surfaces, front, confirmation, chains in one go
+- ``report``, ``plots``, ``cli``: what a person sees
+"""

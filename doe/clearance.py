@@ -1,0 +1,143 @@
+"""The bearing behind the factors: builds scenes, runs them, and gives back responses.
+
+The only module of this package that runs bearing simulations.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.store import Store, run_key
+from doe.study_file import Study
+from rbdyn.faults import InputError, RunError, read_toml
+from rbdyn.result import SimulationResult, versions
+from rbdyn.scene import Scene
+
+Array = NDArray[np.float64]
+
+RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
+# Confirmation runs use seeds that no design run has.
+CONFIRMATION_SEEDS = 1_000_000
+
+
+def check_responses(study: Study) -> None:
+    """Raises InputError for a response that the simulation does not give."""
+    faults = [
+        f"{study.path}: response.name = {name!r}: the simulation does not give it; choose one of {', '.join(RESPONSES)}"
+        for name in study.responses
+        if name not in RESPONSES
+    ]
+    if faults:
+        raise InputError(faults)
+
+
+def scene_at(study: Study, factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
+    """The study's scene at factor values, with a seed. Raises InputError when a key or a value is impossible."""
+    path = study.beside(study.file.scene.file)
+    data = read_toml(path)
+    for factor in study.file.factor:
+        table, _, key = factor.key.rpartition(".")
+        if table not in data or key not in data[table]:
+            raise InputError(
+                [
+                    f"{study.path}: factor.key = {factor.key!r}: no such key in {path}; write table.key as in that file"
+                ]
+            )
+    assignments = [f"{factor.key}={float(x)!r}" for factor, x in zip(study.file.factor, factors, strict=True)]
+    return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments])
+
+
+def design_scenes(study: Study, points: Array) -> list[Scene]:
+    """A scene a design run (n, k); runs at one point differ by their seed only."""
+    first = study.file.design.seed
+    return [scene_at(study, point, first + run, study.file.scene.set) for run, point in enumerate(points)]
+
+
+def confirmation_scene(study: Study, point: Array) -> Scene:
+    """Scene of a confirmation run: more replicates, fresh seeds."""
+    confirmation = study.file.confirmation
+    overrides = [
+        *study.file.scene.set,
+        f"numerics.replicates={confirmation.replicates}",
+        "numerics.companion=true",
+        *confirmation.set,
+    ]
+    return scene_at(study, point, study.file.design.seed + CONFIRMATION_SEEDS, overrides)
+
+
+def run_scenes(
+    scenes: Sequence[Scene],
+    labels: Sequence[str],
+    store: Store,
+    workers: int | None,
+    progress: Callable[[int, int], None],
+) -> list[SimulationResult]:
+    """Results of scenes, from the store or simulated, each stored as soon as it ends.
+
+    Raises RunError naming every run that could not go on, after all others have ended; KeyboardInterrupt on
+    Ctrl-C, with all finished runs stored.
+    """
+    version = versions()["rbdyn"]
+    keys = [run_key(scene.model_dump(mode="json"), version) for scene in scenes]
+    stored = {key: store.get(key) for key in keys}
+    missing = {key: scene for key, scene in zip(keys, scenes, strict=True) if stored[key] is None}
+    results = {
+        key: SimulationResult.from_dict(record) for key, record in stored.items() if record is not None
+    }
+    progress(len(results), len(stored))
+    failures = {}
+    if missing:
+        from rbdyn.dynamics.simulate import Stop, prepare, simulate, thread_pool
+
+        # Compiled once here, lest every thread wait for the same compilation.
+        prepare(next(iter(missing.values())))
+        stop = Stop()
+        with thread_pool(workers or os.cpu_count(), stop) as pool:
+            pending: dict[Future[SimulationResult], str] = {
+                pool.submit(simulate, scene, 1, None, stop): key for key, scene in missing.items()
+            }
+            while pending:
+                done, _ = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in done:
+                    key = pending.pop(future)
+                    try:
+                        results[key] = future.result()
+                    except RunError as error:
+                        failures[key] = error
+                        continue
+                    store.put(key, results[key].as_dict())
+                    progress(len(results), len(stored))
+    if failures:
+        causes = [
+            f"{label}: {failures[key]}" for label, key in zip(labels, keys, strict=True) if key in failures
+        ]
+        raise RunError("; ".join(causes))
+    return [results[key] for key in keys]
+
+
+def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array]:
+    """Values and 95 % statistical half-widths (NaN where there is none), each (runs, responses)."""
+    records: list[dict[str, Any]] = [result.as_dict() for result in results]
+    values = [[record[name]["value"] for name in study.responses] for record in records]
+    errors = [[record[name]["statistical_error"] for name in study.responses] for record in records]
+    return np.array(values), np.array(errors, dtype=float)
+
+
+def draw_motion(study: Study, points: dict[str, Array], turns: float, folder: Path) -> list[str]:
+    """Draw cage orbits and pocket forces at points; returns the names of the pictures."""
+    from rbdyn import plots
+    from rbdyn.dynamics.simulate import trace
+
+    scenes = {name: confirmation_scene(study, point) for name, point in points.items()}
+    traces = {name: trace(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
+    clearances = [scene.guide_clearance_m for scene in scenes.values()]
+    plots.cage_orbit(traces, clearances, folder / "cage_orbit.png")
+    plots.pocket_forces(traces, folder / "pocket_forces.png")
+    return ["cage_orbit.png", "pocket_forces.png"]

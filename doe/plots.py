@@ -1,0 +1,94 @@
+"""Pictures of a study: response surfaces and the Pareto front."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+
+from doe.designs import axial_distance, to_actual
+
+if TYPE_CHECKING:
+    from doe.pareto import ParetoFront
+    from doe.response_surface import Surface
+    from doe.study_file import Study
+
+UNITS = {"mm": "mm", "N": "N", "W": "W", "rpm": "rpm"}
+
+
+def label(name: str) -> str:
+    """'impact_force_N' as 'impact force [N]'."""
+    words = name.split("_")
+    if words[-1] in UNITS:
+        return f"{' '.join(words[:-1])} [{UNITS[words[-1]]}]"
+    return " ".join(words)
+
+
+def response_surface(study: Study, surface: Surface, path: Path) -> None:
+    """Surface over the first factor and each other one, the rest at their centre, with contours beneath."""
+    factors = len(study.factors)
+    reach = axial_distance(factors, study.file.design.alpha)
+    grid = np.linspace(-reach, reach, 41)
+    figure = plt.figure(figsize=(6.2 * (factors - 1), 5.2))
+    for panel in range(1, factors):
+        coded = np.zeros((grid.size, grid.size, factors))
+        coded[..., 0], coded[..., panel] = np.meshgrid(grid, grid, indexing="ij")
+        actual = to_actual(coded, study.centre, study.step)
+        values = surface.predict(coded)
+        axis = figure.add_subplot(1, factors - 1, panel, projection="3d")
+        x, y = actual[..., 0], actual[..., panel]
+        axis.plot_surface(x, y, values, cmap="viridis", alpha=0.9, linewidth=0)
+        span = np.ptp(values) or abs(float(values.mean())) or 1.0
+        floor = values.min() - 0.35 * span
+        axis.contour(x, y, values, zdir="z", offset=floor, cmap="viridis", levels=10, linewidths=0.9)
+        axis.set_zlim(floor, values.max())
+        axis.set_xlabel(label(study.factors[0]), labelpad=8)
+        axis.set_ylabel(label(study.factors[panel]), labelpad=8)
+        axis.set_title(f"({'abcdefg'[panel - 1]}) {label(surface.name)}")
+        axis.tick_params(labelsize=8)
+        axis.view_init(elev=24, azim=-128)
+    figure.subplots_adjust(left=0.02, right=0.94, bottom=0.06, top=0.94, wspace=0.12)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def pareto_front(
+    study: Study, front: ParetoFront, surfaces: Sequence[Surface], confirmed: np.ndarray | None, path: Path
+) -> None:
+    """Every pair of responses: front on the surfaces, baseline and pick on them, confirmed points beside.
+
+    ``confirmed``: simulated responses of baseline and pick, shape (2, m), or None.
+    """
+    values = front.values * study.signs
+    baseline = np.array(
+        [surface.predict((study.baseline - study.centre) / study.step) for surface in surfaces]
+    )
+    pairs = list(combinations(range(len(surfaces)), 2))
+    figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
+    for axis, (i, j) in zip(axes[0], pairs, strict=True):
+        axis.plot(
+            values[:, i], values[:, j], ".", color="tab:blue", markersize=4, label="front on the surfaces"
+        )
+        axis.plot(baseline[i], baseline[j], "s", color="black", label="baseline on the surfaces")
+        axis.plot(
+            *values[front.pick, [i, j]], "*", color="tab:red", markersize=13, label="pick on the surfaces"
+        )
+        if confirmed is not None:
+            axis.plot(*confirmed[0, [i, j]], "s", mfc="none", color="black", label="baseline simulated")
+            axis.plot(
+                *confirmed[1, [i, j]], "*", mfc="none", color="tab:red", markersize=13, label="pick simulated"
+            )
+        axis.set_xlabel(label(surfaces[i].name))
+        axis.set_ylabel(label(surfaces[j].name))
+        axis.grid(alpha=0.3)
+    axes[0][0].legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=130)
+    plt.close(figure)

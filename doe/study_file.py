@@ -1,0 +1,214 @@
+"""STUDY.toml: which scene, factors, responses, front, chains. Checked before anything runs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from rbdyn.faults import InputError, Strict, read_toml, validated
+
+Array = NDArray[np.float64]
+
+
+class SceneFile(Strict):
+    """Scene that every run starts from; ``set`` replaces keys of it for the design runs."""
+
+    file: str
+    set: list[str] = []
+
+
+class Factor(Strict):
+    """A factor: its name in tables, its key in the scene, and its values at coded 0 and per coded unit.
+
+    The pick is rounded to a multiple of ``resolution``, the smallest step that a drawing makes.
+    """
+
+    name: Annotated[str, Field(min_length=1)]
+    key: Annotated[str, Field(min_length=3)]
+    centre: float
+    step: Annotated[float, Field(gt=0.0)]
+    resolution: Annotated[float, Field(gt=0.0)] | None = None
+
+
+class Design(Strict):
+    """Central composite design."""
+
+    kind: Literal["central_composite"] = "central_composite"
+    alpha: Literal["rotatable"] | Annotated[float, Field(gt=0.0, le=10.0)] = "rotatable"
+    centre_replicates: Annotated[int, Field(ge=0, le=100)] = 6
+    seed: Annotated[int, Field(ge=0)] = 1
+
+
+class Response(Strict):
+    """A response of the simulation and the surface fitted to it."""
+
+    name: Annotated[str, Field(min_length=1)]
+    model: Literal["linear", "quadratic", "reduced"] = "quadratic"
+    goal: Literal["min", "max"] = "min"
+
+
+class Front(Strict):
+    """NSGA-II on the surfaces, within the box of the design's axial points."""
+
+    population: Annotated[int, Field(ge=8, le=10000)] = 100
+    generations: Annotated[int, Field(ge=1, le=100000)] = 200
+    seed: Annotated[int, Field(ge=0)] = 1
+
+
+class Confirmation(Strict):
+    """Simulation at the baseline and at the pick; ``set`` replaces keys of the scene."""
+
+    replicates: Annotated[int, Field(ge=2, le=10000)] = 16
+    set: list[str] = []
+
+
+class StudyChain(Strict):
+    """Dimension chain whose closing link is the picked value of ``factor``, within +- ``half_width_mm``."""
+
+    name: Annotated[str, Field(min_length=1)]
+    factor: str
+    half_width_mm: Annotated[float, Field(gt=0.0)]
+    link: Annotated[list[dict[str, Any]], Field(min_length=1)]
+    allocate: dict[str, Any] = {}
+
+
+class Reference(Strict):
+    """A published table of the same design to stand beside; ``why`` says what to expect, by response."""
+
+    file: str
+    label: str
+    why: dict[str, str] = {}
+
+
+class StudyFile(Strict):
+    """The whole file."""
+
+    scene: SceneFile
+    factor: Annotated[list[Factor], Field(min_length=2, max_length=8)]
+    response: Annotated[list[Response], Field(min_length=1)]
+    design: Design = Design()
+    front: Front = Front()
+    confirmation: Confirmation = Confirmation()
+    baseline: dict[str, float] = {}
+    chain: list[StudyChain] = []
+    reference: Reference | None = None
+
+    @model_validator(mode="after")
+    def _names_agree(self) -> StudyFile:
+        names = [factor.name for factor in self.factor]
+        faults = []
+        for kind, given in (("factor", names), ("response", [each.name for each in self.response])):
+            repeated = [name for name, count in Counter(given).items() if count > 1]
+            faults += [f"{kind}.name = {name!r}: used more than once; name each once" for name in repeated]
+        known = ", ".join(names)
+        faults += [
+            f"baseline.{key}: no such factor; name one of {known}"
+            for key in self.baseline
+            if key not in names
+        ]
+        faults += [
+            f"chain.factor = {chain.factor!r}: no such factor; name one of {known}"
+            for chain in self.chain
+            if chain.factor not in names
+        ]
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+
+@dataclass(frozen=True)
+class Study:
+    """A checked study and where its file lies; paths in it are relative to that folder."""
+
+    path: Path
+    file: StudyFile
+
+    @classmethod
+    def load(cls, path: Path | str) -> Study:
+        """Read STUDY.toml. Raises InputError with all faults at once."""
+        path = Path(path)
+        return cls(path, validated(StudyFile, read_toml(path), str(path)))
+
+    @property
+    def factors(self) -> list[str]:
+        """Factor names in order."""
+        return [factor.name for factor in self.file.factor]
+
+    @property
+    def responses(self) -> list[str]:
+        """Response names in order."""
+        return [response.name for response in self.file.response]
+
+    @property
+    def centre(self) -> Array:
+        """Factor values at coded 0."""
+        return np.array([factor.centre for factor in self.file.factor])
+
+    @property
+    def step(self) -> Array:
+        """Factor values per coded unit."""
+        return np.array([factor.step for factor in self.file.factor])
+
+    @property
+    def baseline(self) -> Array:
+        """Baseline in factor units; the centre unless given."""
+        return np.array([self.file.baseline.get(factor.name, factor.centre) for factor in self.file.factor])
+
+    def rounded(self, point: Array) -> Array:
+        """A point with every factor at its resolution."""
+        values = [
+            x if factor.resolution is None else round(round(x / factor.resolution) * factor.resolution, 12)
+            for factor, x in zip(self.file.factor, point.tolist(), strict=True)
+        ]
+        return np.array(values)
+
+    @property
+    def signs(self) -> Array:
+        """+1 for responses to be small, -1 for those to be large."""
+        return np.array([1.0 if response.goal == "min" else -1.0 for response in self.file.response])
+
+    def beside(self, name: str) -> Path:
+        """A file named in the study."""
+        return self.path.parent / name
+
+    def read_table(self, path: Path) -> tuple[Array, Array]:
+        """Factor values (n, k) and responses (n, m) of a CSV table with a column for each name.
+
+        Raises InputError when the file, a column or a number is missing.
+        """
+        import pandas as pd
+
+        try:
+            table = pd.read_csv(path)
+        except FileNotFoundError:
+            raise InputError([f"{path}: no such file; check the path"]) from None
+        except (OSError, ValueError) as error:
+            raise InputError([f"{path}: cannot be read as a CSV table ({error}); mend the file"]) from None
+        wanted = [*self.factors, *self.responses]
+        faults = [
+            f"{path}: column {name!r} is missing; add it, or rename the factor or response in {self.path}"
+            for name in wanted
+            if name not in table.columns
+        ]
+        for name in set(wanted) & set(table.columns):
+            numbers = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
+            faults += [
+                f"{path}: {name} in row {row + 1} = {table[name].iloc[row]!r}: is not a finite number; mend it"
+                for row in np.flatnonzero(~np.isfinite(numbers))
+            ]
+        if faults:
+            raise InputError(faults)
+        return table[self.factors].to_numpy(float), table[self.responses].to_numpy(float)
+
+
+def chain_table(chain: StudyChain, value: float) -> Mapping[str, Any]:
+    """CHAIN.toml contents of a study's chain at a picked value [mm]."""
+    limits = {"lower_mm": value - chain.half_width_mm, "upper_mm": value + chain.half_width_mm}
+    return {"closing_link": limits, "link": chain.link, "allocate": chain.allocate}

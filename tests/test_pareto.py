@@ -1,0 +1,146 @@
+"""Fronts: known Pareto sets, hypervolume against a dense exact front, determinism, knee and pick."""
+
+import numpy as np
+import pytest
+
+from doe.pareto import front, hypervolume, knee_depth, non_dominated
+
+CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+LOWER, UPPER = [-1.0] * 3, [2.0] * 3
+
+
+def bowls(count):
+    """Squared distances to the first corners: the Pareto set is their convex hull."""
+    return lambda points: ((points[:, None, :] - CORNERS[None, :count]) ** 2).sum(axis=2)
+
+
+@pytest.fixture(scope="module")
+def two():
+    return front(bowls(2), LOWER, UPPER, population=60, generations=80, baseline=[0.7, 0.4, 0.1])
+
+
+@pytest.fixture(scope="module")
+def three():
+    return front(bowls(3), LOWER, UPPER, population=100, generations=100)
+
+
+def test_pareto_set_of_two_bowls_is_the_line_between_their_bottoms(two):
+    assert np.abs(two.points[:, 1:]).max() < 0.05
+    assert two.points[:, 0].min() == pytest.approx(0, abs=0.01)
+    assert two.points[:, 0].max() == pytest.approx(1, abs=0.01)
+
+
+def test_hypervolume_of_two_bowls_against_the_exact_front(two):
+    line = np.linspace(0, 1, 4001)[:, None] * [1.0, 0.0, 0.0]
+    exact = bowls(2)(line)
+    assert hypervolume(two.values, np.zeros(2), np.ones(2)) >= 0.99 * hypervolume(
+        exact, np.zeros(2), np.ones(2)
+    )
+    # f2 = (1 - sqrt(f1))^2 leaves 1/6 of the unit square below the front.
+    assert hypervolume(exact, np.zeros(2), np.ones(2)) == pytest.approx(1.21 - 1 / 6, abs=1e-3)
+
+
+def test_hypervolume_of_three_bowls_against_the_exact_front(three):
+    u, v = (axis.ravel() for axis in np.meshgrid(*[np.linspace(0, 1, 101)] * 2))
+    inside = u + v <= 1
+    exact = bowls(3)(np.stack([u[inside], v[inside], 0 * u[inside]], axis=1))
+    assert three.hypervolume >= 0.99 * hypervolume(exact, three.ideal, three.nadir)
+
+
+def test_archive_is_non_dominated_and_bounds_the_thinned_front(three):
+    assert three.archive_size > len(three.values) == 200
+    assert len(non_dominated(three.values)) == 200
+    assert three.values.min(axis=0) == pytest.approx(three.ideal, abs=0)
+    assert three.values.max(axis=0) == pytest.approx(three.nadir, abs=0)
+    assert (np.diff(three.values[:, 0]) >= 0).all()
+    assert bowls(3)(three.points) == pytest.approx(three.values, abs=0)
+    assert three.evaluations == 100 * 100
+
+
+def test_thinning_spreads_the_points(two):
+    gaps = np.linalg.norm(np.diff(two.values, axis=0), axis=1)
+    assert gaps.max() < 10 * np.median(gaps)
+
+
+def test_hypervolume_history_never_falls(three):
+    assert len(three.hypervolume_history) == 100
+    assert (np.diff(three.hypervolume_history) >= -1e-12).all()
+    assert three.hypervolume_history[-1] == pytest.approx(three.hypervolume)
+    assert hypervolume(three.values, three.ideal, three.nadir) <= three.hypervolume
+
+
+def test_same_seed_same_bits():
+    runs = [front(bowls(2), LOWER, UPPER, population=20, generations=15, seed=seed) for seed in (5, 5, 6)]
+    assert np.array_equal(runs[0].points, runs[1].points)
+    assert runs[0].hypervolume == runs[1].hypervolume
+    assert not np.array_equal(runs[0].points, runs[2].points)
+
+
+def test_pick_dominates_the_baseline(two):
+    pick = two.values[two.pick]
+    assert (pick <= two.baseline_values).all()
+    assert (pick < two.baseline_values).any()
+    better = (two.values <= two.baseline_values).all(axis=1)
+    assert knee_depth(two.values)[two.pick] == knee_depth(two.values)[better].max()
+    assert "dominate the baseline" in two.pick_reason
+
+
+def test_pick_is_the_knee_without_a_baseline_or_above_it(three):
+    assert three.pick == three.knee
+    assert "no baseline" in three.pick_reason
+    best = front(bowls(2), LOWER, UPPER, population=20, generations=10, baseline=[0.5, 0.0, 0.0])
+    assert best.pick == best.knee
+    assert "no point of the front dominates" in best.pick_reason
+
+
+def test_knee_of_two_bowls_is_halfway(two):
+    # The deepest point of f2 = (1 - sqrt(f1))^2 below the line f1 + f2 = 1 has f1 = f2.
+    assert two.points[two.knee, 0] == pytest.approx(0.5, abs=0.02)
+
+
+def test_knee_of_a_corner_and_of_degenerate_fronts():
+    assert knee_depth(np.array([[0.0, 10.0], [1.0, 1.0], [10.0, 0.0]])).argmax() == 1
+    assert knee_depth(np.array([[3.0, 4.0]])).tolist() == pytest.approx([2**-0.5])
+    assert np.isfinite(knee_depth(np.array([[0.0, 1.0, 5.0], [1.0, 0.0, 5.0]]))).all()
+
+
+def test_non_dominated_drops_repeats_and_weakly_dominated():
+    values = np.array([[2.0, 0.0], [0.0, 1.0], [0.0, 2.0], [1.0, 0.0], [1.0, 0.0]])
+    assert non_dominated(values).tolist() == [1, 3]
+
+
+def test_non_dominated_agrees_with_the_definition_on_many_points():
+    values = np.random.default_rng(1).random((20000, 3)) ** 2
+    rows = non_dominated(values)
+    kept = values[rows]
+    for row in np.random.default_rng(2).integers(0, 20000, 300):
+        beaten = ((kept <= values[row]).all(axis=1) & (kept < values[row]).any(axis=1)).any()
+        assert beaten == (row not in rows)
+
+
+def test_agreeing_objectives_leave_one_point():
+    only = front(
+        lambda x: np.column_stack([x[:, 0], 2 * x[:, 0]]), [0.0], [1.0], population=10, generations=5
+    )
+    assert only.values.shape == (1, 2)
+    assert only.knee == only.pick == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"lower": [0.0, 2.0, 0.0]}, "factor 2: lower bound 2 must be below upper bound 2"),
+        ({"upper": [1.0, np.inf, 1.0]}, "finite"),
+        ({"upper": [1.0]}, "equally long"),
+        ({"population": 1}, "population = 1: must be at least 4"),
+        ({"generations": 0}, "generations = 0: must be at least 1"),
+        ({"keep": 1}, "keep = 1: must be at least 2"),
+        ({"baseline": [0.0]}, "baseline"),
+        ({"objectives": lambda x: x[:, :1]}, "at least two objectives"),
+        ({"objectives": lambda x: np.where(x > 0.5, np.nan, x)[:, :2]}, "objective 1 is"),
+    ],
+)
+def test_bad_input_is_refused_with_the_mend(change, words):
+    arguments = {"objectives": bowls(2), "lower": [-1.0] * 3, "upper": UPPER} | change
+    with pytest.raises(ValueError, match=words):
+        front(**arguments)
