@@ -140,6 +140,7 @@ def summary(outcome: Outcome) -> dict[str, Any]:
             }
             for row in outcome.beside
         },
+        "notes": list(outcome.runs.notes),
         "cost": outcome.cost,
         "versions": versions(),
     }
@@ -216,6 +217,9 @@ def print_outcome(outcome: Outcome, quiet: bool) -> None:
     for name, chain in outcome.chains.items():
         print_chain(name, chain)
         print(chain.status)
+    if not quiet:
+        for note in outcome.runs.notes:
+            print(f"note: {note}")
 
 
 def part_text(part: Part) -> str:

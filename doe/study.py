@@ -26,12 +26,16 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Runs:
-    """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths."""
+    """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths.
+
+    ``notes``: what the simulations warn of, once each; none for a table that was read.
+    """
 
     coded: Array
     actual: Array
     values: Array
     errors: Array
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -124,7 +128,8 @@ def run_design(study: Study, folder: Path, workers: int | None, progress: Progre
     labels = [f"design run {run + 1}" for run in range(len(scenes))]
     with Store(folder / "study.sqlite") as store:
         results = clearance.run_scenes(scenes, labels, store, workers, progress)
-    return Runs(coded, actual, *clearance.responses(study, results))
+    notes = dict.fromkeys(note for result in results for note in result.notes)
+    return Runs(coded, actual, *clearance.responses(study, results), tuple(notes))
 
 
 def read_runs(study: Study, path: Path) -> Runs:
@@ -193,6 +198,8 @@ def run_study(
     started = time.perf_counter()
     # Whatever can be refused is refused before anything runs.
     clearance.check_responses(study)
+    clearance.design_scenes(study, to_actual(design_points(study), study.centre, study.step))
+    clearance.confirmation_scene(study, study.baseline)
     _chains(study, study.centre)
     reference = _reference_runs(study)
     runs = run_design(study, folder, workers, progress("design runs"))

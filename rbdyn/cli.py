@@ -168,7 +168,8 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
     )
     if verbose:
         terms = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
-        print_table("power lost", ("term", "W"), terms)
+        gap = result.power_gap * result.power_loss.value
+        print_table(f"power lost, each to ± {gap:.2g} W (gap of the power balance)", ("term", "W"), terms)
         print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
     if not quiet:
         for note in result.notes:

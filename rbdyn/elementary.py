@@ -44,6 +44,27 @@ def _from_bits(typing_context: Any, value: Any) -> Any:
     return types.float64(types.int64), generate
 
 
+@intrinsic
+def _fused(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.fma(*arguments)
+
+    return types.float64(types.float64, types.float64, types.float64), generate
+
+
+def fma(a: float, b: float, c: float) -> float:
+    """a b + c, rounded once where compiled: asked for by name, it is the same in scalar and in vector code."""
+    return a * b + c
+
+
+@overload(fma, jit_options=INLINED)  # type: ignore[arg-type]
+def _fma(a, b, c):
+    def body(a, b, c):
+        return _fused(a, b, c)
+
+    return body
+
+
 def fast_exp(x: float) -> float:
     """e^x for -700 <= x <= 700 (clamped below)."""
     return math.exp(max(x, -700.0))
@@ -53,18 +74,19 @@ def fast_exp(x: float) -> float:
 def _fast_exp(x):
     def body(x):
         x = -700.0 if x < -700.0 else x
-        shifted = x * LOG2_E + ROUND
+        shifted = fma(x, LOG2_E, ROUND)
         whole = shifted - ROUND
-        r = (x - whole * LN2_HIGH) - whole * LN2_LOW
+        r = fma(-whole, LN2_LOW, fma(-whole, LN2_HIGH, x))
         r2 = r * r
         r4 = r2 * r2
         r8 = r4 * r4
         # Taylor to r^13 (|r| < 0.35), in Estrin's order: four short chains instead of a long one.
-        low = (1.0 + r) + r2 * (0.5 + r * (1.0 / 6.0))
-        low += r4 * ((1.0 / 24.0 + r * (1.0 / 120.0)) + r2 * (1.0 / 720.0 + r * (1.0 / 5040.0)))
-        high = (1.0 / 40320.0 + r * (1.0 / 362880.0)) + r2 * (1.0 / 3628800.0 + r * (1.0 / 39916800.0))
-        high += r4 * (1.0 / 479001600.0 + r * (1.0 / 6227020800.0))
-        return (low + r8 * high) * _from_bits((_bits(shifted) + BIAS) << 52)
+        first = fma(r2, fma(r, 1.0 / 6.0, 0.5), 1.0 + r)
+        second = fma(r2, fma(r, 1.0 / 5040.0, 1.0 / 720.0), fma(r, 1.0 / 120.0, 1.0 / 24.0))
+        third = fma(r2, fma(r, 1.0 / 39916800.0, 1.0 / 3628800.0), fma(r, 1.0 / 362880.0, 1.0 / 40320.0))
+        high = fma(r4, fma(r, 1.0 / 6227020800.0, 1.0 / 479001600.0), third)
+        low = fma(r4, second, first)
+        return fma(r8, high, low) * _from_bits((_bits(shifted) + BIAS) << 52)
 
     return body
 
@@ -85,13 +107,15 @@ def _fast_log(x):
         z = s * s
         w = z * z
         # ln((1 + s)/(1 - s)) = 2 s (1 + z/3 + z^2/5 + ...), minimax coefficients of fdlibm.
-        even = w * (3.999999999940941908e-01 + w * (2.222219843214978396e-01 + w * 1.531383769920937332e-01))
-        odd = 6.666666666666735130e-01 + w * (
-            2.857142874366239149e-01 + w * (1.818357216161805012e-01 + w * 1.479819860511658591e-01)
+        even = w * fma(
+            w, fma(w, 1.531383769920937332e-01, 2.222219843214978396e-01), 3.999999999940941908e-01
         )
+        odd = fma(w, fma(w, 1.479819860511658591e-01, 1.818357216161805012e-01), 2.857142874366239149e-01)
+        odd = fma(w, odd, 6.666666666666735130e-01)
         half_square = 0.5 * f * f
-        series = s * (half_square + even + z * odd)
+        series = s * (half_square + fma(z, odd, even))
         # x - x is zero, or NaN where x is: the bits alone would hide it.
-        return power * LN2_HIGH - ((half_square - (series + power * LN2_LOW)) - f) + (x - x)
+        rest = half_square - fma(power, LN2_LOW, series)
+        return fma(power, LN2_HIGH, f - rest) + (x - x)
 
     return body

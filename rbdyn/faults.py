@@ -56,14 +56,13 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        faults = [sentence for fault in error.errors() for sentence in _sentences(model, fault, source)]
+        faults = _sentences(model, error, source)
         # A table with a bad key is not checked as a whole: without that key it may show more faults.
         rest = _without(data, [fault["loc"] for fault in error.errors()])
     try:
         model.model_validate(rest)
     except ValidationError as error:
-        hidden = [fault for fault in error.errors() if fault["type"] == "value_error"]
-        faults += [sentence for fault in hidden for sentence in _sentences(model, fault, source)]
+        faults += _sentences(model, error, source, only="value_error")
     raise InputError(dict.fromkeys(faults))
 
 
@@ -91,24 +90,44 @@ def set_key(data: dict[str, Any], assignment: str) -> None:
 def _without(data: Any, locations: list[tuple[int | str, ...]]) -> Any:
     if not isinstance(data, Mapping):
         return data
-    inner = {key: [place[1:] for place in locations if place[0] == key] for key in data}
+    inner = {key: [place[1:] for place in locations if place[:1] == (key,)] for key in data}
     return {key: _without(value, inner[key]) for key, value in data.items() if () not in inner[key]}
 
 
-def _sentences(model: type[BaseModel], fault: Any, source: str) -> list[str]:
-    key = _dotted(fault["loc"])
-    kind, value = fault["type"], fault["input"]
-    if kind == "extra_forbidden":
-        return [f"{source}: {key}: unknown key; {_nearest(model, fault['loc'])}"]
-    if kind == "missing":
-        return [f"{source}: {key}: missing; add it"]
-    if kind == "value_error":
-        # A validator of a whole table may find several faults: one a line.
-        where = f"{key} = {_shown(value)}: " if key and not isinstance(value, Mapping | BaseModel) else ""
-        return [f"{source}: {where}{line}" for line in str(fault["ctx"]["error"]).splitlines()]
-    if isinstance(value, float) and not math.isfinite(value):
-        return [f"{source}: {key} = {value}: is not a finite number; write a plain number"]
-    return [f"{source}: {key} = {_shown(value)}: {_mend(kind, fault)}"]
+def _sentences(
+    model: type[BaseModel], error: ValidationError, source: str, only: str | None = None
+) -> list[str]:
+    sentences: list[str] = []
+    mends: dict[str, list[str]] = {}
+    for fault in error.errors():
+        kind, value = fault["type"], fault["input"]
+        # Where a key may be of several kinds, each kind complains: keep what fits the value given.
+        alien = (
+            "model_type" if isinstance(value, str) else "literal_error" if isinstance(value, Mapping) else ""
+        )
+        if kind == alien or (only and kind != only):
+            continue
+        place = tuple(part for part in fault["loc"] if isinstance(part, int) or not _names_a_kind(part))
+        key = _dotted(place)
+        if kind == "extra_forbidden":
+            sentences.append(f"{source}: {key}: unknown key; {_nearest(model, place)}")
+        elif kind == "missing":
+            sentences.append(f"{source}: {key}: missing; add it")
+        elif kind == "value_error":
+            # A validator of a whole table may find several faults: one a line.
+            where = f"{key} = {_shown(value)}: " if key and not isinstance(value, Mapping | BaseModel) else ""
+            lines = str(fault["ctx"]["error"]).splitlines()
+            sentences += [f"{source}: {where}{line}" for line in lines]
+        elif isinstance(value, float) and not math.isfinite(value):
+            sentences.append(f"{source}: {key} = {value}: is not a finite number; write a plain number")
+        else:
+            mends.setdefault(f"{source}: {key} = {_shown(value)}", []).append(_mend(kind, fault))
+    return sentences + [f"{head}: {', or '.join(dict.fromkeys(mend))}" for head, mend in mends.items()]
+
+
+def _names_a_kind(part: str) -> bool:
+    """Whether a part of a location names one of the kinds that a key may be of, not a key."""
+    return part[:1].isupper() or "[" in part or part in ("float", "int", "str", "constrained-float")
 
 
 def _mend(kind: str, fault: Any) -> str:

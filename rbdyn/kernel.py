@@ -22,8 +22,9 @@ import numba.extending
 from numba import njit
 from numba.core import types
 
-# Contraction (fused multiply-add) is the one relaxation: NaN and infinity stay signals for the integrator.
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+# No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
+# arrays happen to lie: only when every operation is rounded by itself do both give the same bits. And NaN stays a signal.
+OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 # Calls of compiled code return tuples through memory and carry an error status: small functions must vanish.
 INLINED: dict[str, Any] = {**OPTIONS, "forceinline": True}
 
@@ -36,11 +37,6 @@ def kernel(function: Callable[..., Any]) -> Any:
 def routine(function: Callable[..., Any]) -> Any:
     """Compile a longer function that is called from several places and not copied into them."""
     return njit(**OPTIONS)(function)
-
-
-def reordered_sum(function: Callable[..., Any]) -> Any:
-    """Compile a loop whose sums may be taken in any order, so that they vectorise; NaN still comes through."""
-    return njit(error_model="numpy", fastmath={"contract", "reassoc"}, forceinline=True)(function)
 
 
 def law(declaration: Callable[..., Any]) -> Any:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from rbdyn.elementary import fast_exp, fast_log
 from rbdyn.kernel import kernel, law
 
-SMALLEST_LOAD = 1e-12  # [N], keeps the logarithm finite
+SMALLEST_LOAD = 1e-30  # [N], keeps the logarithm finite
 
 
 class NoRollingResistance(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rbdyn.kernel import law, reordered_sum
+from rbdyn.kernel import law
 
 AIR_DENSITY = 1.2  # [kg/m^3] at 20 C and 1 bar
 
@@ -43,18 +43,13 @@ def _(drag, rollers, y, row, dy):
 
 @drag_forces.body(CylinderDrag)
 def _(drag, rollers, y, row, dy):
-    return cylinder_drag_forces(drag.factor, rollers, y, row, dy)
-
-
-@reordered_sum
-def cylinder_drag_forces(factor, rollers, y, row, dy):
-    """Drag of cylinders in cross-flow; a loop of its own, so that it vectorises."""
-    power = 0.0
     for j in range(rollers):
         vx, vy = y[2 * rollers + j], y[3 * rollers + j]
-        square = vx * vx + vy * vy
-        per_speed = factor * math.sqrt(square)
+        per_speed = drag.factor * math.sqrt(vx * vx + vy * vy)
         dy[row, 2 * rollers + j] = -per_speed * vx
         dy[row, 3 * rollers + j] = -per_speed * vy
-        power += per_speed * square
+    # A sum in a loop of its own leaves the one above free to vectorise.
+    power = 0.0
+    for i in range(2 * rollers, 4 * rollers):
+        power -= dy[row, i] * y[i]
     return power

@@ -134,10 +134,10 @@ def cage_inertia(scene: Scene) -> float:
 
 
 def scales(bearing: RollerBearing, scene: Scene) -> Scales:
-    """Size of a race contact: five times the mean load share, or the centrifugal force, or the roller's weight."""
+    """Size of a race contact: the mean load share, or the centrifugal force, or the roller's weight."""
     cage = kinematics(scene).cage_speed
     centrifugal = bearing.roller_mass * 0.5e-3 * scene.bearing.pitch_diameter_mm * cage**2
-    load = max(5.0 * bearing.radial_load / bearing.rollers, centrifugal, 9.81 * bearing.roller_mass)
+    load = max(bearing.radial_load / bearing.rollers, centrifugal, 9.81 * bearing.roller_mass)
     stiffness = _palmgren(scene, "roller", "rings", scene.bearing.effective_length_mm)
     approach = (load / stiffness) ** 0.9
     frequency = math.sqrt(10.0 / 9.0 * load / approach / bearing.roller_mass)

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from rbdyn.dynamics.equations import LOADS, POCKET_LOAD, POWERS, derivative
 from rbdyn.dynamics.races import Scratch
 from rbdyn.dynamics.state import CAGE_VX, CAGE_VY
-from rbdyn.kernel import entry, kernel, law, reordered_sum, routine
+from rbdyn.elementary import fma
+from rbdyn.kernel import entry, kernel, routine
 
 FINISHED, STEP_UNDERFLOW, NOT_FINITE, STEP_BUDGET = range(4)
 
@@ -76,37 +77,6 @@ class Tally(NamedTuple):
     whirl: NDArray[np.float64]  # samples, sum and sum of squares of the cage centre's speed
 
 
-class NoHistory(NamedTuple):
-    """Samples are counted and forgotten."""
-
-
-class History(NamedTuple):
-    """States at the uniform sample times, as many rows as there is room for."""
-
-    states: NDArray[np.float64]
-    filled: NDArray[np.int64]
-
-
-@law
-def record(history, carry, y_new, h, theta):
-    """Keep the state at the fraction ``theta`` of the step, if a history is asked for."""
-    raise NotImplementedError
-
-
-@record.body(NoHistory)
-def _(history, carry, y_new, h, theta):
-    pass
-
-
-@record.body(History)
-def _(history, carry, y_new, h, theta):
-    row = history.filled[0]
-    if row < history.states.shape[0]:
-        for i in range(carry.y.size):
-            history.states[row, i] = interpolate(carry, y_new, h, theta, i)
-        history.filled[0] = row + 1
-
-
 @kernel
 def interpolate(carry, y_new, h, theta, i):
     """Component ``i`` at the fraction ``theta`` of the step, fourth-order accurate."""
@@ -119,42 +89,79 @@ def interpolate(carry, y_new, h, theta, i):
     return carry.y[i] + theta * (difference + rest * (slope + theta * (curve + rest * quartic)))
 
 
-@reordered_sum
+@kernel
+def scaled_error(k, i, inverse_tolerance):
+    """Embedded error of component ``i`` per step size, over its tolerance."""
+    e = E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
+    return e * inverse_tolerance[i]
+
+
+@kernel
 def error_norm(k, h, inverse_tolerance):
-    """Norm of the embedded error; a sum of squares, so that any NaN comes through."""
-    total = 0.0
-    for i in range(inverse_tolerance.size):
-        e = E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
-        e *= inverse_tolerance[i]
-        total += e * e
-    return h * math.sqrt(total)
+    """Norm of the embedded error: a sum of squares, so that any NaN comes through.
+
+    Four sums side by side, in an order that does not depend on how the compiler vectorises.
+    """
+    n = inverse_tolerance.size
+    whole = n // 4 * 4
+    sum_0 = sum_1 = sum_2 = sum_3 = 0.0
+    for i in range(0, whole, 4):
+        e_0, e_1 = scaled_error(k, i, inverse_tolerance), scaled_error(k, i + 1, inverse_tolerance)
+        e_2, e_3 = scaled_error(k, i + 2, inverse_tolerance), scaled_error(k, i + 3, inverse_tolerance)
+        sum_0 += e_0 * e_0
+        sum_1 += e_1 * e_1
+        sum_2 += e_2 * e_2
+        sum_3 += e_3 * e_3
+    for i in range(whole, n):
+        e = scaled_error(k, i, inverse_tolerance)
+        sum_0 += e * e
+    return h * math.sqrt((sum_0 + sum_1) + (sum_2 + sum_3))
+
+
+@kernel
+def stage_state(s, y, k, h, state):
+    """State at which stage ``s`` + 1 is evaluated. One pass a stage: rows of weight zero may hold anything."""
+    n = y.size
+    w0, w1, w2, w3, w4, w5 = h * A[s, 0], h * A[s, 1], h * A[s, 2], h * A[s, 3], h * A[s, 4], h * A[s, 5]
+    if s == 1:
+        for i in range(n):
+            state[i] = fma(w0, k[0, i], y[i])
+    elif s == 2:
+        for i in range(n):
+            state[i] = fma(w1, k[1, i], fma(w0, k[0, i], y[i]))
+    elif s == 3:
+        for i in range(n):
+            state[i] = fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i])))
+    elif s == 4:
+        for i in range(n):
+            state[i] = fma(w3, k[3, i], fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i]))))
+    elif s == 5:
+        for i in range(n):
+            early = fma(w2, k[2, i], fma(w1, k[1, i], w0 * k[0, i]))
+            state[i] = y[i] + fma(w4, k[4, i], fma(w3, k[3, i], early))
+    else:
+        for i in range(n):
+            early = fma(w3, k[3, i], fma(w2, k[2, i], w0 * k[0, i]))
+            state[i] = y[i] + fma(w5, k[5, i], fma(w4, k[4, i], early))
 
 
 @routine
 def trial_step(bearing, carry, y_new, h):
     """Stages 2 to 7 of a step of size ``h`` from ``carry.y``; the end state goes to ``y_new``."""
     # One loop of a length the compiler does not know: unrolled, six derivatives overflow the instruction cache.
-    y, k = carry.y, carry.k
-    n, stages = y.size, k.shape[0]
+    stages = carry.k.shape[0]
     for s in range(1, stages):
         state = y_new if s == stages - 1 else carry.stage
-        weight = h * A[s, 0]
-        for i in range(n):
-            state[i] = y[i] + weight * k[0, i]
-        for j in range(1, s):
-            weight = h * A[s, j]
-            for i in range(n):
-                state[i] += weight * k[j, i]
-        derivative(bearing, state, s, k, carry.power, carry.loads, carry.scratch)
+        stage_state(s, carry.y, carry.k, h, state)
+        derivative(bearing, state, s, carry.k, carry.power, carry.loads, carry.scratch)
 
 
 @routine
 def worst_component(carry, h, inverse_tolerance):
     """Component that limits the step: the first that is not finite, else the one of the largest error."""
-    k, worst, largest = carry.k, 0, -1.0
+    worst, largest = 0, -1.0
     for i in range(inverse_tolerance.size):
-        e = E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
-        e = abs(h * e * inverse_tolerance[i])
+        e = abs(h * scaled_error(carry.k, i, inverse_tolerance))
         if not math.isfinite(e):
             return i
         if e > largest:
@@ -193,7 +200,7 @@ def refine_peak(bearing, carry, y_new, h, tally):
 
 
 @routine
-def keep(bearing, carry, y_new, h, tally, history, sample_step):
+def keep(bearing, carry, y_new, h, tally, sample_step):
     """Book an accepted step: work, largest loads, samples."""
     power, loads, work = carry.power, carry.loads, tally.work
     for p in range(POWERS):
@@ -217,7 +224,6 @@ def keep(bearing, carry, y_new, h, tally, history, sample_step):
         tally.whirl[0] += 1.0
         tally.whirl[1] += math.sqrt(square)
         tally.whirl[2] += square
-        record(history, carry, y_new, h, theta)
         carry.clock[3] += sample_step
     if suspected > tally.largest[POCKET_LOAD]:
         refine_peak(bearing, carry, y_new, h, tally)
@@ -225,7 +231,7 @@ def keep(bearing, carry, y_new, h, tally, history, sample_step):
 
 
 @entry
-def advance(bearing, control, carry, tally, history, t_end, sample_step):
+def advance(bearing, control, carry, tally, t_end, sample_step):
     """Integrate from the carried time to ``t_end`` [s]; returns FINISHED or why not.
 
     Steps end exactly at ``t_end``. On any other status ``carry`` holds the last good state, and
@@ -251,7 +257,7 @@ def advance(bearing, control, carry, tally, history, t_end, sample_step):
         counts[2] += 6
         error = error_norm(carry.k, h, control.inverse_tolerance)
         if error <= 1.0:
-            keep(bearing, carry, y_new, h, tally, history, sample_step)
+            keep(bearing, carry, y_new, h, tally, sample_step)
             counts[0] += 1
             clock[0] = t_end if last else clock[0] + h
             for i in range(carry.y.size):

@@ -24,8 +24,6 @@ from rbdyn.dynamics.runge_kutta import (
     STEP_UNDERFLOW,
     Carry,
     Control,
-    History,
-    NoHistory,
     Tally,
     advance,
 )
@@ -41,6 +39,8 @@ LARGEST_STEP_TURNS = 0.02
 SMALLEST_STEP_TURNS = 1e-12
 COMPANION_FACTOR = 0.1
 PI_START_ERROR = 1e-4
+# Beyond this relative gap of the power balance a result warns of its tolerance.
+LARGEST_POWER_GAP = 0.005
 
 
 class CancelledError(Exception):
@@ -49,14 +49,17 @@ class CancelledError(Exception):
 
 @dataclass
 class Stop:
-    """Shared wish to stop; compiled code looks at it between chunks."""
+    """Shared wish to stop; compiled code looks at it between chunks. A stop within another heeds both."""
 
+    outer: Stop | None = None
     event: threading.Event = field(default_factory=threading.Event)
 
     def check(self) -> None:
         """Raises CancelledError when a stop is wished."""
         if self.event.is_set():
             raise CancelledError
+        if self.outer is not None:
+            self.outer.check()
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,7 @@ class Run:
         )
         self.tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
 
-    def to(self, turns: float, history: NoHistory | History) -> None:
+    def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""
         sample_step = self.scene.turn_s / self.scene.numerics.samples_per_turn
         while True:
@@ -107,7 +110,7 @@ class Run:
             here = self.carry.clock[0] / self.scene.turn_s
             chunk = min(here + CHUNK_TURNS, turns)
             t_end = chunk * self.scene.turn_s
-            status = advance(self.bearing, self.control, self.carry, self.tally, history, t_end, sample_step)
+            status = advance(self.bearing, self.control, self.carry, self.tally, t_end, sample_step)
             if status != FINISHED:
                 raise RunError(self._why(status))
             if chunk >= turns:
@@ -144,8 +147,7 @@ def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: fl
     started = time.thread_time()
     run = Run(scene, bearing, replicate, rtol, stop)
     numerics = scene.numerics
-    nothing = NoHistory()
-    run.to(numerics.discard_turns, nothing)
+    run.to(numerics.discard_turns)
     run.forget()
     body = 5 * bearing.rollers
     angle = run.carry.y[body + CAGE_ANGLE]
@@ -154,10 +156,10 @@ def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: fl
     impacts, largest = [], np.zeros(LOADS)
     for index in range(int(numerics.turns / window + 1e-9)):
         run.tally.largest[:] = 0.0
-        run.to(numerics.discard_turns + (index + 1) * window, nothing)
+        run.to(numerics.discard_turns + (index + 1) * window)
         impacts.append(run.tally.largest[0])
         largest = np.maximum(largest, run.tally.largest)
-    run.to(numerics.discard_turns + numerics.turns, nothing)
+    run.to(numerics.discard_turns + numerics.turns)
     largest = np.maximum(largest, run.tally.largest)
     scale = scales(bearing, scene)
     return Replicate(
@@ -177,19 +179,21 @@ def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: fl
     )
 
 
-def trace(scene: Scene, turns: float, replicate: int = 0, stop: Stop | None = None) -> Trace:
-    """Time history of one replicate over the first ``turns`` counted turns. Raises RunError or CancelledError."""
+def trace(scene: Scene, turns: float, replicate: int = 0) -> Trace:
+    """Time history of one replicate over the first ``turns`` counted turns. Raises RunError."""
     bearing = roller_bearing(scene)
-    run = Run(scene, bearing, replicate, scene.numerics.rtol, stop or Stop())
-    run.to(scene.numerics.discard_turns, NoHistory())
+    run = Run(scene, bearing, replicate, scene.numerics.rtol, Stop())
+    run.to(scene.numerics.discard_turns)
     run.forget()
-    samples = int(turns * scene.numerics.samples_per_turn)
-    history = History(np.empty((samples, run.carry.y.size)), np.zeros(1, dtype=np.int64))
-    run.to(scene.numerics.discard_turns + turns, history)
-    states = history.states[: history.filled[0]]
+    per_turn = scene.numerics.samples_per_turn
+    states = np.empty((int(turns * per_turn), run.carry.y.size))
+    for sample, state in enumerate(states):
+        # Steps end at the samples: what is recorded is what was integrated.
+        run.to(scene.numerics.discard_turns + sample / per_turn)
+        state[:] = run.carry.y
     body = 5 * bearing.rollers
     return Trace(
-        time=np.arange(len(states)) * scene.turn_s / scene.numerics.samples_per_turn,
+        time=np.arange(len(states)) * scene.turn_s / per_turn,
         cage_x=states[:, body + CAGE_X].copy(),
         cage_y=states[:, body + CAGE_Y].copy(),
         pocket_load=pocket_loads(bearing, states),
@@ -201,7 +205,7 @@ def prepare(scene: Scene) -> float:
     started = time.perf_counter()
     bearing = roller_bearing(scene)
     run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
-    run.to(0.0, NoHistory())
+    run.to(0.0)
     mechanical_energy(bearing, run.carry.y)
     return time.perf_counter() - started
 
@@ -217,7 +221,7 @@ def simulate(
     ``workers``: threads, all processors by default; the result does not depend on it. ``progress(done, total)`` is
     called after every run. Raises RunError when a replicate cannot go on, KeyboardInterrupt on Ctrl-C.
     """
-    stop = stop or Stop()
+    stop = Stop(outer=stop)
     compile_s = prepare(scene)
     bearing = roller_bearing(scene)
     numerics = scene.numerics
@@ -288,14 +292,19 @@ def _gather(
         },
         replicates=scene.numerics.replicates,
         seed=scene.numerics.seed,
-        notes=_notes(scene),
+        notes=_notes(scene, max(run.power_gap for run in runs)),
         versions=versions(),
         scene=scene.model_dump(mode="json"),
     )
 
 
-def _notes(scene: Scene) -> tuple[str, ...]:
+def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
     notes = []
+    if power_gap > LARGEST_POWER_GAP:
+        notes.append(
+            f"power balance closes only to {100.0 * power_gap:.2g} %: numerics.rtol = {scene.numerics.rtol:g} is too "
+            "loose for this scene, and loose tolerances bias outputs upward; tighten it tenfold"
+        )
     if scene.traction.model == "four_constant":
         notes.append(
             "traction: one load-independent set of constants; lightly loaded rollers are driven too hard and "

@@ -1,0 +1,5 @@
+"""``python -m doe``."""
+
+from doe.cli import run
+
+run()

@@ -1,0 +1,5 @@
+"""``python -m rbdyn``."""
+
+from rbdyn.cli import run
+
+run()

@@ -1,0 +1,165 @@
+"""Scenes, states and runs that several tests share; compiled once a session.
+
+Every distinct set of law types costs seconds to compile, so tests take their scenes from here: ``outer`` (all
+default laws), ``inner`` (as ``outer``, but guided on the inner ring) and ``conservative`` (nothing that dissipates).
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rbdyn.faults import read_toml
+from rbdyn.scene import Scene
+
+ROOT = Path(__file__).parent.parent
+EXAMPLE = ROOT / "examples" / "cylindrical_roller.toml"
+SHORT = (
+    "numerics.turns=4",
+    "numerics.discard_turns=2",
+    "numerics.replicates=2",
+    "numerics.impact_window_turns=2",
+    "numerics.companion=false",
+)
+CONSERVATIVE = (
+    "traction.model=off",
+    "model.race_damping=off",
+    "model.rolling_resistance=off",
+    "model.drag=off",
+    "model.pocket_friction=0.0",
+    "model.pocket_damping_alpha_s_m=0.0",
+    "model.guide_land=dry",
+    "model.land_friction=0.0",
+    "model.land_damping_alpha_s_m=0.0",
+)
+
+
+class Outcome(NamedTuple):
+    """What one call of the right-hand side fills."""
+
+    dy: NDArray[np.float64]
+    power: NDArray[np.float64]
+    loads: NDArray[np.float64]
+
+
+def make(*assignments: str) -> Scene:
+    """The example, short, with ``key.path=value`` assignments."""
+    return Scene.from_dict(read_toml(EXAMPLE), "scene", (*SHORT, *assignments))
+
+
+def right_hand_side(bearing: Any, y: NDArray[np.float64]) -> Outcome:
+    """The right-hand side under test; the work space is poisoned so that nothing stale can pass for a result."""
+    from rbdyn.dynamics.equations import LOADS, POWERS, derivative
+    from rbdyn.dynamics.races import scratch
+
+    dy, power, loads = (np.full((1, size), np.nan) for size in (y.size, POWERS, LOADS))
+    derivative(bearing, y, 0, dy, power, loads, scratch())
+    return Outcome(dy[0], power[0], loads[0])
+
+
+def state_near_contact(scene: Scene, seed: int) -> NDArray[np.float64]:
+    """A seeded state in which races, pocket walls and land are partly open, partly closed, and all slide."""
+    from rbdyn.dynamics.model import kinematics, raceway_radii
+    from rbdyn.dynamics.state import size
+
+    draw = np.random.default_rng(seed)
+    z = scene.bearing.rollers
+    outer, _ = raceway_radii(scene)
+    motion = kinematics(scene)
+    roller = 0.5e-3 * scene.bearing.roller_diameter_mm
+    half_pocket = 0.5e-3 * scene.cage.pocket_clearance_mm
+    cage_direction, cage_size = draw.uniform(0.0, 2.0 * np.pi), draw.choice([0.3, 0.9, 1.0])
+    cage = cage_size * 0.5e-3 * scene.cage.guide_clearance_mm + draw.uniform(-2e-6, 2e-6)
+    cage_xy = cage * np.array([np.cos(cage_direction), np.sin(cage_direction)])
+    ring_xy = draw.uniform(-20e-6, 20e-6, 2)
+    if scene.cage.guidance == "inner":
+        cage_xy += ring_xy
+    cage_angle = draw.uniform(0.0, 2.0 * np.pi)
+    angles = cage_angle + 2.0 * np.pi * np.arange(z) / z
+    radial, ahead = (
+        np.array([np.cos(angles), np.sin(angles)]),
+        np.array([-np.sin(angles), np.cos(angles)]),
+    )
+    # Distance ahead of the pocket's middle, measured from the cage: half way to a wall, or 0.2 to 4 um into it.
+    wall = draw.choice([-1.0, 1.0], z)
+    into = np.where(draw.random(z) < 0.6, draw.uniform(0.2e-6, 4e-6, z), -0.5 * half_pocket)
+    offset = wall * (half_pocket + into)
+    along = offset + cage_xy @ ahead
+    orbit = outer - roller + draw.uniform(-15e-6, 5e-6, z)
+    place = radial * np.sqrt(orbit**2 - along**2) + ahead * along
+    speed = motion.cage_speed * orbit * draw.uniform(0.9, 1.05, z)
+    velocity = np.array([-place[1], place[0]]) / orbit * speed + draw.uniform(-0.2, 0.2, (2, z))
+    y = np.zeros(size(z))
+    y[: 5 * z] = np.concatenate((*place, *velocity, motion.roller_spin * draw.uniform(0.8, 1.1, z)))
+    cage_motion = (*draw.uniform(-0.5, 0.5, 2), motion.cage_speed * draw.uniform(0.9, 1.05))
+    y[5 * z :] = (*cage_xy, cage_angle, *cage_motion, *ring_xy, *draw.uniform(-0.2, 0.2, 2))
+    return y
+
+
+@pytest.fixture(scope="session")
+def make_scene() -> Callable[..., Scene]:
+    """``make_scene(*assignments)``: the example, short, with changes."""
+    return make
+
+
+@pytest.fixture(scope="session")
+def evaluate() -> Callable[..., Outcome]:
+    """``evaluate(bearing, y)``: derivative, powers and loads."""
+    return right_hand_side
+
+
+@pytest.fixture(scope="session")
+def random_state() -> Callable[..., NDArray[np.float64]]:
+    """``random_state(scene, seed)``: contacts open, closed and sliding."""
+    return state_near_contact
+
+
+@pytest.fixture(scope="session")
+def outer() -> Scene:
+    """All default laws, guided on the outer ring."""
+    return make()
+
+
+@pytest.fixture(scope="session")
+def inner() -> Scene:
+    """All default laws, guided on the inner ring."""
+    return make("cage.guidance=inner")
+
+
+@pytest.fixture(scope="session")
+def conservative() -> Scene:
+    """Elastic contacts everywhere and nothing that dissipates."""
+    return make(*CONSERVATIVE)
+
+
+@pytest.fixture(scope="session")
+def outer_result(outer: Scene) -> Any:
+    """One simulation of the ``outer`` scene with a single worker."""
+    from rbdyn.dynamics.simulate import simulate
+
+    return simulate(outer, workers=1)
+
+
+@pytest.fixture(scope="session")
+def command() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """``command(*arguments, **environment)``: run ``rbdyn`` in a process of its own."""
+    import os
+
+    def run(*arguments: Any, **environment: str) -> subprocess.CompletedProcess[str]:
+        program = "from rbdyn.cli import run; run()"
+        return subprocess.run(
+            [sys.executable, "-c", program, *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            env={**os.environ, "NO_COLOR": "1", **environment},
+            check=False,
+        )
+
+    return run

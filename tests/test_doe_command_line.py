@@ -1,0 +1,147 @@
+"""Command line of ``doe``: exit codes, messages, JSON contract, what is imported."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+STUDY, TABLE = str(EXAMPLES / "clearance_study.toml"), str(EXAMPLES / "ccd_table4.csv")
+HEAVY = {"numba", "scipy", "pandas", "sklearn", "pymoo", "matplotlib"}
+
+
+def doe(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the command in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "doe", *arguments], capture_output=True, text=True, timeout=300
+    )
+
+
+def loaded_by(code: str) -> set[str]:
+    """Heavy packages in memory after running ``code`` in a fresh interpreter."""
+    tail = "; import sys; print(sorted({name.split('.')[0] for name in sys.modules}))"
+    shown = subprocess.run([sys.executable, "-c", code + tail], capture_output=True, text=True, check=True)
+    return HEAVY & set(eval(shown.stdout.splitlines()[-1]))
+
+
+def invoke(*arguments: str) -> str:
+    """Code that runs the command inside an interpreter and survives its exit."""
+    return (
+        "import contextlib, io; from doe.cli import app\n"
+        "with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):\n"
+        f"    app({list(arguments)!r})\n"
+        "0"
+    )
+
+
+def test_help_loads_nothing_heavy():
+    assert loaded_by("import doe") == set()
+    assert loaded_by(invoke("--help")) == set()
+
+
+def test_fit_loads_no_compiler_no_optimiser_no_plots():
+    assert (
+        loaded_by(invoke("fit", STUDY, "--data", TABLE, "--json")) & {"numba", "pymoo", "matplotlib"} == set()
+    )
+
+
+def test_chain_loads_no_compiler_and_no_tables():
+    chain = str(EXAMPLES / "pocket_chain_as_printed.toml")
+    assert loaded_by(invoke("chain", chain, "--json")) & {"numba", "pymoo", "sklearn", "matplotlib"} == set()
+
+
+def test_design_has_the_published_runs():
+    shown = doe("design", STUDY, "--json")
+    assert shown.returncode == 0
+    record = json.loads(shown.stdout)
+    assert len(record["runs"]) == 20
+    axial = sorted({round(run["factors"]["pocket_clearance_mm"], 5) for run in record["runs"]})
+    # Table 3 of Chen et al. 2022, pocket clearance.
+    assert axial == [0.21591, 0.25, 0.3, 0.35, 0.38409]
+    assert len({run["seed"] for run in record["runs"]}) == 20
+    lines = doe("design", STUDY, "--csv").stdout.splitlines()
+    assert lines[0] == "run,radial_clearance_mm,guide_clearance_mm,pocket_clearance_mm"
+    assert len(lines) == 21
+
+
+def test_fit_json_keeps_the_contract():
+    record = json.loads(doe("fit", STUDY, "--data", TABLE, "--json").stdout)
+    assert list(record["responses"]) == ["impact_force_N", "whirl_deviation_ratio", "power_loss_W"]
+    whirl = record["responses"]["whirl_deviation_ratio"]
+    assert set(whirl) == {
+        "model", "coefficients", "anova", "lack_of_fit", "pure_error", "r2", "adjusted_r2", "predicted_r2",
+        "press", "cv_percent", "adequate_precision", "stationary_point",
+    }  # fmt: skip
+    assert list(whirl["coefficients"]) == ["1", "A", "B", "C", "AB", "AC", "BC", "A^2", "B^2", "C^2"]
+    sources = [row["source"] for row in whirl["anova"]]
+    assert {"model", "residual", "lack_of_fit", "pure_error", "total"} <= set(sources)
+    assert set(whirl["stationary_point"]) == {"coded", "actual", "eigenvalues", "nature"}
+    # Linear effects of eq 22 of Chen et al. 2022 that survive in Table 4 as printed.
+    assert whirl["coefficients"]["B"] == pytest.approx(-0.062, abs=5e-4)
+    assert record["responses"]["power_loss_W"]["coefficients"]["C"] == pytest.approx(-27.49, abs=5e-3)
+
+
+def test_fit_prints_a_table_and_says_what_it_means():
+    shown = doe("fit", STUDY, "--data", TABLE).stdout
+    assert "sum of squares" in shown and "lack_of_fit" in shown
+    assert "lack of fit is significant" in shown
+
+
+def test_front_json_keeps_the_contract():
+    record = json.loads(doe("front", STUDY, "--data", TABLE, "--json").stdout)
+    assert {"front", "hypervolume", "ideal", "nadir", "knee", "baseline", "generations", "seed"} <= set(
+        record
+    )
+    assert set(record["front"][0]) == {"factors", "responses"}
+
+
+def test_printed_chain_of_the_paper_is_refused_with_the_numbers():
+    shown = doe("chain", str(EXAMPLES / "pocket_chain_as_printed.toml"), "--json")
+    assert shown.returncode == 2
+    record = json.loads(shown.stdout)
+    assert record["status"].startswith("refused")
+    assert record["closing_link"]["worst_case_mm"] == pytest.approx([-0.05, 0.05])
+    for number in ("-0.0500", "+0.0500", "0.2800", "0.2900", "9.2900"):
+        assert number in shown.stderr
+    assert "Traceback" not in shown.stderr
+
+
+def test_right_chain_is_accepted():
+    shown = doe("chain", str(EXAMPLES / "pocket_chain.toml"), "--json")
+    assert shown.returncode == 0
+    record = json.loads(shown.stdout)
+    assert record["allocation"]["pocket_width"] == {
+        "nominal_mm": 9.29, "upper_mm": 0.0, "lower_mm": -0.005, "grade": None,
+    }  # fmt: skip
+    assert set(record) == {"closing_link", "yield", "contributions", "allocation", "status"}
+
+
+@pytest.mark.parametrize("command", ["study", "design", "fit", "front", "chain"])
+def test_missing_file_is_one_sentence(command, tmp_path):
+    out = ["--out", str(tmp_path / "out")] if command == "study" else []
+    shown = doe(command, "nowhere.toml", *out)
+    assert shown.returncode == 2
+    assert shown.stderr.strip() == "nowhere.toml: no such file; check the path"
+    assert shown.stdout == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_all_faults_of_a_study_at_once(tmp_path):
+    text = Path(STUDY).read_text(encoding="utf-8")
+    path = tmp_path / "bad.toml"
+    path.write_text(
+        text.replace("step = 0.005", "step = -0.005")
+        .replace('goal = "min"', 'goal = "mininum"', 1)
+        .replace("population", "poplation"),
+        encoding="utf-8",
+    )
+    shown = doe("study", str(path), "--json")
+    assert shown.returncode == 2
+    assert json.loads(shown.stdout)["faults"] == shown.stderr.strip().splitlines()
+    for words in (("factor[1].step = -0.005", "greater than 0"), ("response[1].goal", "'min' or 'max'")):
+        assert any(all(word in line for word in words) for line in shown.stderr.splitlines())
+    assert "front.poplation: unknown key; did you mean population?" in shown.stderr

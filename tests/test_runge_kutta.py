@@ -1,0 +1,311 @@
+"""The integrator: order, dense output, agreement with scipy, refusals, conserved energy and closed power balance."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from rbdyn.dynamics import runge_kutta as rk
+from rbdyn.dynamics.equations import POWERS, SHAFT, mechanical_energy
+from rbdyn.dynamics.model import roller_bearing, scales
+from rbdyn.dynamics.simulate import CancelledError, Run, Stop
+from rbdyn.faults import RunError
+
+
+def run_of(scene, rtol, replicate=0):
+    return Run(scene, roller_bearing(scene), replicate, rtol, Stop())
+
+
+def vibrating(scene):
+    """A start whose loaded contacts vibrate but neither open nor close within 1e-4 s: a smooth problem."""
+    run = run_of(scene, 1e-6)
+    run.carry.y[58:60] += 0.05
+    return run
+
+
+def fixed_step(scene, step, duration):
+    """State after ``duration`` in steps of exactly ``step``: no error is ever too large."""
+    run = vibrating(scene)
+    control = run.control._replace(
+        inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step
+    )
+    run.carry.clock[1] = step
+    assert rk.advance(run.bearing, control, run.carry, run.tally, duration, 1.0) == rk.FINISHED
+    assert run.carry.counts[0] == pytest.approx(duration / step, abs=1.1)
+    return run.carry.y
+
+
+def slope_of(steps, errors):
+    return np.polyfit(np.log(steps), np.log(errors), 1)[0]
+
+
+def test_rate_order_five(conservative):
+    """Rate: the error over a smooth stretch falls with the fifth power of the step (4.6 leaves room for the fit)."""
+    duration, steps = 3.2e-5, np.array([3.2e-5 / n for n in (32, 48, 64, 96)])
+    reference = fixed_step(conservative, duration / 1024, duration)
+    errors = np.array([np.abs(fixed_step(conservative, h, duration) - reference) for h in steps])
+    for kind in (slice(0, 20), slice(20, 40)):  # positions, velocities
+        assert 4.6 < slope_of(steps, errors[:, kind].max(axis=1)) < 5.5
+
+
+def one_step(bearing, y, h, evaluate):
+    """One step in Python from the module's table: stages and end state."""
+    k = np.empty((7, y.size))
+    k[0] = evaluate(bearing, y).dy
+    for s in range(1, 7):
+        end = y + h * rk.A[s, :s] @ k[:s]
+        k[s] = evaluate(bearing, end).dy
+    return k, end
+
+
+def test_rate_dense_output(conservative, evaluate):
+    """Rate: inside a step the continuous extension has local order five, that is fourth-order accuracy."""
+    run = vibrating(conservative)
+    bearing, y = run.bearing, run.carry.y.copy()
+    steps = np.array([4e-6, 2.8e-6, 2e-6, 1.4e-6])
+    for theta in (0.25, 0.6, 0.9):
+        errors = []
+        for h in steps:
+            k, end = one_step(bearing, y, h, evaluate)
+            step = SimpleNamespace(k=k, y=y)
+            inside = np.array([rk.interpolate.py_func(step, end, h, theta, i) for i in range(y.size)])
+            exact = y
+            for _ in range(16):
+                exact = one_step(bearing, exact, theta * h / 16.0, evaluate)[1]
+            errors.append(np.abs(inside - exact)[20:40].max())
+        assert slope_of(steps, errors) > 4.6
+
+
+def test_unit_dense_output_meets_the_ends():
+    """Unit: values and slopes at both ends of a step are those of the step (round-off)."""
+    draw = np.random.default_rng(0)
+    step = SimpleNamespace(k=draw.normal(size=(7, 3)), y=draw.normal(size=3))
+    end, h = draw.normal(size=3), 0.3
+    # Slopes at the ends are k_1 and k_7 whatever the stages between.
+    for i in range(3):
+        at = [rk.interpolate.py_func(step, end, h, theta, i) for theta in (0.0, 1.0, 1e-6, 1.0 - 1e-6)]
+        assert at[:2] == pytest.approx([step.y[i], end[i]], abs=1e-14)
+        slopes = [(at[2] - at[0]) / (1e-6 * h), (at[1] - at[3]) / (1e-6 * h)]
+        assert slopes == pytest.approx([step.k[0, i], step.k[6, i]], abs=1e-3)
+
+
+def test_unit_tableau():
+    """Unit: row sums, quadrature and tree conditions to order five, embedded weights, first same as last."""
+    a = np.zeros((7, 7))
+    a[:, :6] = rk.A
+    b = np.array([rk.B1, 0.0, rk.B3, rk.B4, rk.B5, rk.B6, 0.0])
+    c = a.sum(axis=1)
+    assert c == pytest.approx([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0], abs=1e-15)
+    assert a[6] == pytest.approx(b, abs=0.0)
+    for power in range(5):
+        assert b @ c**power == pytest.approx(1.0 / (power + 1), abs=1e-15)
+    trees = {
+        "b A c": (b @ a @ c, 1 / 6),
+        "b c A c": ((b * c) @ a @ c, 1 / 8),
+        "b A c2": (b @ a @ c**2, 1 / 12),
+        "b A A c": (b @ a @ a @ c, 1 / 24),
+        "b A c3": (b @ a @ c**3, 1 / 20),
+        "b A A A c": (b @ a @ a @ a @ c, 1 / 120),
+        "b c2 A c": ((b * c**2) @ a @ c, 1 / 10),
+        "b c A c2": ((b * c) @ a @ c**2, 1 / 15),
+        "b (A c)2": (b @ (a @ c) ** 2, 1 / 20),
+        "b c A A c": ((b * c) @ a @ a @ c, 1 / 30),
+        "b A (c A c)": (b @ a @ (c * (a @ c)), 1 / 40),
+        "b A A c2": (b @ a @ a @ c**2, 1 / 60),
+    }
+    for name, (value, exact) in trees.items():
+        assert value == pytest.approx(exact, abs=2e-15), name
+    e = np.array([rk.E1, 0.0, rk.E3, rk.E4, rk.E5, rk.E6, rk.E7])
+    for power in range(4):  # the companion is of fourth order
+        assert e @ c**power == pytest.approx(0.0, abs=1e-16)
+    assert abs(e @ c**4) > 1e-5
+    d = (rk.D1, rk.D3, rk.D4, rk.D5, rk.D6, rk.D7)
+    assert sum(d) == pytest.approx(0.0, abs=1e-14)
+
+
+def test_oracle_quarter_turn(outer, evaluate):
+    """Oracle: a quarter turn and the work of every power, against DOP853 at 1e-11 on the same right-hand side.
+
+    Longer trajectories part by chaos; here errors grow by about e^1.
+    """
+    run = run_of(outer, 1e-9)
+    bearing, start = run.bearing, run.carry.y.copy()
+    duration, n = 0.25 * outer.turn_s, start.size
+    tolerance = 1e-11 / (run.control.inverse_tolerance * 1e-9)
+    scale = scales(bearing, outer)
+
+    def augmented(_, y):
+        found = evaluate(bearing, y[:n])
+        return np.concatenate((found.dy, found.power))
+
+    atol = np.concatenate((1e-2 / run.control.inverse_tolerance, np.full(POWERS, 1e-12)))
+    found = solve_ivp(
+        augmented, (0.0, duration), np.concatenate((start, np.zeros(POWERS))), "DOP853", rtol=1e-13, atol=atol
+    )
+    assert tolerance.min() > 0.0
+    run.to(0.25)
+    reference = found.y[:, -1]
+    # rtol 1e-9 of an approach (5 um) and of a contact speed (1.2 m/s) a step, some thousand steps.
+    assert np.abs(run.carry.y - reference[:n])[:20].max() < 1e-6 * scale.length
+    assert np.abs(run.carry.y - reference[:n])[20:40].max() < 1e-6 * scale.speed
+    assert run.tally.work == pytest.approx(reference[n:], rel=1e-6, abs=1e-6 * scale.load * scale.length)
+
+
+@pytest.mark.parametrize("replicate", [0, 1])
+def test_invariant_energy_without_friction(conservative, replicate):
+    """Invariant: ten turns without friction keep their energy, the better the tighter the tolerance.
+
+    The scale is the elastic energy that the static contacts store (6.0 mJ): the total of 20 J is nearly all orbit
+    and spin, which no contact ever touches.
+    """
+    drift = {}
+    for rtol in (1e-5, 1e-6, 1e-7):
+        run = run_of(conservative, rtol, replicate)
+        kinetic, elastic, potential = mechanical_energy(run.bearing, run.carry.y)
+        start, worst = kinetic + elastic + potential, 0.0
+        for turn in range(10):
+            run.to(turn + 1.0)
+            worst = max(worst, abs(sum(mechanical_energy(run.bearing, run.carry.y)) - start))
+        assert (run.tally.work == 0.0).all()
+        assert worst < 1e-6 * (kinetic + elastic)
+        drift[rtol] = worst / elastic
+    assert drift[1e-6] < 1e-5
+    assert drift[1e-7] < drift[1e-6] < drift[1e-5] < 2e-4
+
+
+@pytest.mark.parametrize("fixture", ["outer", "inner"])
+def test_invariant_power_balance(fixture, request):
+    """Invariant: shaft work = losses + change of energy; below 0.5 % at the default tolerance, shrinking with it."""
+    scene = request.getfixturevalue(fixture)
+    gaps: list[float] = []
+    for rtol in scene.numerics.rtol * np.array([10.0, 1.0, 0.1, 0.01]):
+        run = run_of(scene, rtol)
+        start = sum(mechanical_energy(run.bearing, run.carry.y))
+        run.to(4.0)
+        change = sum(mechanical_energy(run.bearing, run.carry.y)) - start
+        gaps.append(
+            abs(run.tally.work[SHAFT] - run.tally.work[:SHAFT].sum() - change) / run.tally.work[SHAFT]
+        )
+    assert gaps[1] < 0.005
+    assert (run.tally.work >= 0.0).all()
+    assert all(tight < 0.5 * loose for loose, tight in pairwise(gaps))
+
+
+def test_unit_chunks_change_nothing(outer):
+    """Unit: stopping at chunk ends gives the same samples, and the same figures to the tolerance of the steps."""
+    whole, parts = run_of(outer, 1e-8), run_of(outer, 1e-8)
+    whole.to(0.5)
+    for end in np.linspace(0.05, 0.5, 10):
+        parts.to(float(end))
+    assert parts.carry.clock[0] == whole.carry.clock[0] == 0.5 * outer.turn_s
+    assert parts.tally.whirl[0] == whole.tally.whirl[0] == 257  # 512 a turn, both ends counted
+    scale = scales(whole.bearing, outer)
+    # Ten extra step ends at rtol 1e-8, over half a turn in which differences grow about tenfold.
+    assert parts.tally.work == pytest.approx(whole.tally.work, rel=1e-5, abs=1e-5 * scale.load * scale.length)
+    assert parts.tally.whirl[1:] == pytest.approx(whole.tally.whirl[1:], rel=1e-5)
+    assert parts.tally.largest == pytest.approx(whole.tally.largest, rel=1e-4)
+
+
+def test_unit_peak_is_never_below_a_step_end(outer):
+    """Unit: the kept largest force is at least that of every step end, and its time lies inside the run."""
+    run = run_of(outer, 1e-4)
+    seen = 0.0
+    for end in np.linspace(0.001, 1.0, 1000):
+        run.to(float(end))
+        seen = max(seen, run.carry.loads[0, 0])
+        assert run.tally.largest[0] >= seen
+        assert (run.tally.largest >= run.carry.loads[0]).all()
+    assert seen > 0.0
+    assert 0.0 < run.tally.largest_time[0] <= run.carry.clock[0]
+
+
+def test_oracle_peak_is_the_true_peak(outer):
+    """Oracle: up to the first impacts, the peak of long steps is that of steps a hundred times shorter, to 0.5 %."""
+    coarse, fine = run_of(outer, 1e-4), run_of(outer, 1e-10)
+    for run in (coarse, fine):
+        run.to(0.5)
+    assert fine.tally.largest[0] > 1.0
+    # A parabola through points a ninth of a step apart; trajectories have hardly parted by then.
+    assert coarse.tally.largest[0] == pytest.approx(fine.tally.largest[0], rel=5e-3)
+    assert coarse.tally.largest_time[0] == pytest.approx(fine.tally.largest_time[0], abs=1e-7)
+
+
+def test_oracle_peak_inside_one_step(conservative, evaluate):
+    """Oracle: a roller that touches its wall and leaves it within one step; the force is sought on a fine grid.
+
+    Points stand a ninth of a step apart, so the best of them may miss 1 % of the peak; the parabola errs by 0.03 %.
+    """
+    run = run_of(conservative, 1e-4)
+    carry, h, speed = run.carry, 2e-5, 1.0
+    y = carry.y
+    y[10], y[50:52] = run.bearing.pocket.half_clearance - 1e-6, 0.0
+    for fall in (0.7, 1.0, 1.6):
+        carry.k[:] = 0.0
+        carry.k[0, 10], carry.k[6, 10] = speed, -fall * speed
+        carry.k[2, 10] = -(rk.D1 - rk.D7 * fall) * speed / rk.D3  # leaves a cubic
+        thetas = np.linspace(0.0, 1.0, 2001)
+        forces = []
+        for theta in thetas:
+            inside = y.copy()
+            inside[10] = rk.interpolate.py_func(carry, y, h, theta, 10)
+            forces.append(evaluate(run.bearing, inside).loads[0])
+        carry.loads[:] = run.tally.largest[:] = 0.0
+        rk.refine_peak(run.bearing, carry, y, h, run.tally)
+        assert run.tally.largest[0] == pytest.approx(max(forces), rel=1e-3)
+        assert run.tally.largest_time[0] == pytest.approx(thetas[np.argmax(forces)] * h, abs=0.01 * h)
+
+
+def test_unit_nan_is_refused(outer):
+    """Unit: a state that is not finite stops the run and names what it touches."""
+    run = run_of(outer, 1e-4)
+    run.carry.y[4] = np.nan
+    with pytest.raises(
+        RunError, match=r"replicate 1 \(seed 1\) stopped at t = 0 s.*roller 5 .* is not finite"
+    ):
+        run.to(1.0)
+
+
+def test_unit_overflowing_trial_step_is_rejected(outer):
+    """Unit: a trial step into infinity is shrunk, never accepted; the budget then ends the run with a sentence."""
+    run = run_of(outer, 1e-4)
+    run.control = run.control._replace(step_budget=1000)
+    run.carry.clock[1] = 1e200
+    status = rk.advance(run.bearing, run.control, run.carry, run.tally, 1e201, 1.0)
+    assert status == rk.STEP_BUDGET
+    assert run.carry.counts[1] > 280  # 1e200 s to 1e-6 s by fifths
+    assert np.isfinite(run.carry.y).all()
+    assert run.carry.counts[0] + run.carry.counts[1] == 1000
+
+
+def test_unit_step_underflow_names_component_and_mend(outer):
+    """Unit: a step that may not shrink ends the run; the sentence names place, component and remedy."""
+    run = run_of(outer, 1e-4)
+    run.control = run.control._replace(smallest_step=1e-4)
+    run.carry.clock[1] = 1e-3
+    with pytest.raises(
+        RunError, match=r"the step fell below 0.0001 s because of .*(roller|cage|ring).*numerics\.rtol"
+    ):
+        run.to(1.0)
+
+
+def test_unit_step_budget_names_time_and_mend(make_scene):
+    """Unit: a used-up step budget says when, how small the steps were, and what to change."""
+    scene = make_scene("numerics.step_budget_per_turn=100")
+    run = run_of(scene, 1e-4)
+    with pytest.raises(RunError) as caught:
+        run.to(6.0)
+    sentence = str(caught.value)
+    assert "shaft turn " in sentence and "step budget of 600 used up" in sentence
+    assert "numerics.step_budget_per_turn" in sentence and "numerics.rtol" in sentence
+
+
+def test_unit_stop_is_heard(outer):
+    """Unit: a wish to stop ends a run at the next chunk."""
+    run = run_of(outer, 1e-4)
+    run.stop.event.set()
+    with pytest.raises(CancelledError):
+        run.to(1.0)

@@ -1,0 +1,260 @@
+"""A whole simulation: determinism, seeds, records, error bars, and what the guidance does to the cage."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, SHAFT
+from rbdyn.dynamics.metrics import Replicate, quantity, student_half_width
+from rbdyn.dynamics.model import kinematics, roller_bearing
+from rbdyn.dynamics.simulate import simulate, trace
+from rbdyn.faults import InputError, RunError
+from rbdyn.result import Quantity, SimulationResult
+
+# The contract of `rbdyn simulate --json`; more keys may be added.
+KEYS = {
+    "format", "status", "impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip",
+    "power_balance", "power_terms_W", "loads", "cost", "replicates", "seed", "versions",
+}  # fmt: skip
+QUANTITIES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
+COST_KEYS = {"wall_s", "compile_s", "steps", "rejected_steps", "rhs_evaluations", "turns"}
+
+
+def figures(result):
+    """The record without what a clock says."""
+    record = result.as_dict()
+    del record["cost"]
+    return record
+
+
+def changed(scene, **numerics):
+    return scene.model_copy(update={"numerics": scene.numerics.model_copy(update=numerics)})
+
+
+def test_unit_workers_change_nothing(outer, outer_result):
+    """Unit: any number of workers gives the same bits, and the same count of steps."""
+    for workers in (2, 3):
+        again = simulate(outer, workers=workers)
+        assert figures(again) == figures(outer_result)
+        for key in ("steps", "rejected_steps", "rhs_evaluations", "turns"):
+            assert again.cost[key] == outer_result.cost[key]
+
+
+def test_unit_seeds_differ(outer, outer_result):
+    """Unit: another seed is another sample, and says so."""
+    other = simulate(changed(outer, seed=2))
+    assert other.seed == 2
+    assert other.impact_force.value != outer_result.impact_force.value
+    assert other.power_loss.value != outer_result.power_loss.value
+
+
+def test_unit_replicates_are_independent_of_their_number(outer, outer_result):
+    """Unit: the first replicate alone gives no statistical error, and says that it does not."""
+    one = simulate(changed(outer, replicates=1))
+    assert one.impact_force.statistical_error is None
+    assert one.as_dict()["power_loss_W"]["statistical_error"] is None
+    assert any("one replicate" in note for note in one.notes)
+    # Two values a, b: mean of both lies half way between.
+    assert outer_result.power_loss.value != one.power_loss.value
+    assert outer_result.power_loss.statistical_error is not None
+
+
+def test_unit_companions_give_a_numerical_error(outer, outer_result):
+    """Unit: with companions there is a numerical error, and the values stay those of the asked tolerance."""
+    both = simulate(changed(outer, companion=True))
+    assert both.power_loss.value == outer_result.power_loss.value
+    assert both.power_loss.numerical_error > 0.0
+    assert outer_result.power_loss.numerical_error is None
+
+
+def test_unit_json_keys_and_values(outer_result):
+    """Unit: keys, their form, and plain JSON without NaN."""
+    record = json.loads(json.dumps(outer_result.as_dict(), allow_nan=False))
+    assert record.keys() >= KEYS
+    assert (record["format"], record["status"]) == ("rbdyn.simulation/1", "ok")
+    for name in QUANTITIES:
+        assert record[name].keys() == {"value", "statistical_error", "numerical_error"}
+    assert record["power_balance"].keys() >= {"relative_gap"}
+    assert record["loads"].keys() >= {"max_inner_N", "max_outer_N"}
+    assert record["cost"].keys() >= COST_KEYS
+    assert set(record["power_terms_W"]) == set(LOSSES)
+    assert record["cost"]["turns"] == 2 * (4 + 2)
+    # The terms are the same means, summed in another order.
+    assert sum(record["power_terms_W"].values()) == pytest.approx(record["power_loss_W"]["value"], rel=1e-12)
+
+
+def test_literature_plausible_figures(outer_result):
+    """Literature: the size of the paper's responses: 150 to 260 N, 380 to 484 W, kinematic cage speed; loads 674 N and up."""
+    # Four turns are no statistic, and the traction law is not theirs: orders of magnitude.
+    assert 20.0 < outer_result.impact_force.value < 500.0
+    assert 150.0 < outer_result.power_loss.value < 600.0
+    assert abs(outer_result.cage_slip.value) < 0.02
+    assert outer_result.power_gap < 0.005
+    assert 650.0 < outer_result.max_inner_load < outer_result.max_outer_load < 1300.0
+
+
+def test_unit_saved_result_comes_back(outer_result, tmp_path):
+    """Unit: save and load are inverse; foreign and missing files are refused with a sentence."""
+    path = tmp_path / "result.json"
+    outer_result.save(path)
+    assert SimulationResult.load(path) == outer_result
+    assert list(tmp_path.iterdir()) == [path]
+    import rbdyn
+
+    assert rbdyn.load(str(path)) == outer_result
+    for text, words in (
+        ("{}", "not a saved simulation result"),
+        ("nonsense", "not a saved"),
+        ('{"format": "x/1"}', "format is x/1"),
+    ):
+        path.write_text(text)
+        with pytest.raises(InputError, match=words):
+            SimulationResult.load(path)
+    with pytest.raises(InputError, match="cannot be read"):
+        SimulationResult.load(tmp_path / "none.json")
+
+
+def test_unit_scene_inside_the_result_runs_again(outer, outer_result):
+    """Unit: the scene that a result carries is complete: it is the scene that gave it."""
+    from rbdyn.scene import Scene
+
+    assert Scene.from_dict(json.loads(json.dumps(outer_result.scene))) == outer
+
+
+def test_unit_impact_windows(outer, outer_result):
+    """Unit: a longer window finds larger forces on the same paths; a window longer than the run is the run."""
+    long = simulate(changed(outer, impact_window_turns=100.0))
+    short = simulate(changed(outer, impact_window_turns=1.0))
+    assert long.impact_window_turns == 4.0
+    assert short.impact_force.value < outer_result.impact_force.value < long.impact_force.value
+    # Steps end at the window's ends, so paths differ by round-off and then by chaos: figures of a kind, not bits.
+    assert short.power_loss.value == pytest.approx(outer_result.power_loss.value, rel=0.05)
+
+
+def test_unit_everything_off_loses_nothing(conservative):
+    """Unit: with every law off each power is exactly zero, and so is the shaft's."""
+    result = simulate(changed(conservative, replicates=1))
+    assert set(result.power_terms.values()) == {0.0}
+    assert result.power_loss.value == 0.0
+    assert result.impact_force.value > 0.0
+
+
+def test_invariant_guidance_brakes_or_drives(outer, inner, outer_result, evaluate):
+    """Invariant: an outer land brakes the cage, an inner land drives it; the cage then runs faster, never past the shaft."""
+    from rbdyn.dynamics.start import start_state
+
+    for scene, sign in ((outer, -1.0), (inner, 1.0)):
+        bearing = roller_bearing(scene)
+        y = start_state(scene, bearing, np.random.default_rng(0))
+        # Rollers in the middle of their pockets: the land alone acts on the cage.
+        assert sign * evaluate(bearing, y).dy[5 * bearing.rollers + 5] > 0.0
+    driven = simulate(inner)
+    assert driven.cage_speed_rpm.value > outer_result.cage_speed_rpm.value
+    assert driven.cage_slip.value < outer_result.cage_slip.value
+    assert driven.cage_speed_rpm.value < 24000.0
+
+
+def test_invariant_reversed_shaft(outer, outer_result):
+    """Invariant: the other sense of rotation is the same machine: figures of the same size, cage speed negative."""
+    operation = outer.operation.model_copy(update={"inner_speed_rpm": -24000.0})
+    turned = simulate(outer.model_copy(update={"operation": operation}))
+    assert turned.cage_speed_rpm.value == pytest.approx(-outer_result.cage_speed_rpm.value, rel=0.01)
+    assert turned.cage_slip.value == pytest.approx(outer_result.cage_slip.value, abs=0.01)
+    # Other starts, four turns: powers agree within their scatter.
+    assert turned.power_loss.value == pytest.approx(outer_result.power_loss.value, rel=0.1)
+
+
+def test_unit_trace_is_the_first_replicate(outer):
+    """Unit: uniform samples of the counted turns; the cage stays in its land; walls push both ways."""
+    history = trace(outer, 2.0)
+    assert len(history.time) == 2 * 512
+    assert np.diff(history.time) == pytest.approx(np.full(1023, outer.turn_s / 512), rel=1e-9)
+    assert history.pocket_load.shape == (1024, 10)
+    # Dry contact indents the land by a micrometre or so.
+    assert np.hypot(history.cage_x, history.cage_y).max() < 1.05 * outer.guide_clearance_m
+    assert history.pocket_load.max() > 0.0 > history.pocket_load.min()
+
+
+def test_unit_failing_replicate_raises(make_scene):
+    """Unit: a replicate that cannot go on ends the simulation, with its number in the sentence."""
+    with pytest.raises(RunError, match=r"replicate [12] \(seed 1\) stopped at t ="):
+        simulate(make_scene("numerics.step_budget_per_turn=100"), workers=2)
+
+
+def record_of(speeds, scene, **changes):
+    """A replicate whose cage centre had these speeds [m/s]."""
+    speeds = np.asarray(speeds)
+    blank = Replicate(
+        duration=1.0,
+        impact_windows=np.ones(1),
+        whirl=np.array([len(speeds), speeds.sum(), (speeds**2).sum()]),
+        work=np.zeros(POWERS),
+        largest=np.zeros(LOADS),
+        cage_angle=kinematics(scene).cage_speed,
+        kinematic_cage_speed=kinematics(scene).cage_speed,
+        energy_change=0.0,
+        energy_scale=1.0,
+        accepted_steps=1,
+        rejected_steps=0,
+        derivatives=7,
+        cpu_s=0.0,
+    )
+    return replace(blank, **changes)
+
+
+def test_literature_whirl_deviation_ratio(outer):
+    """Literature: 0 for steady circular whirl, 0.523 for an isotropic Gaussian velocity, 0 for a cage at rest."""
+    # The sum of squares loses half the digits.
+    assert record_of(np.full(1000, 0.3), outer).whirl_deviation_ratio == pytest.approx(0.0, abs=1e-7)
+    velocity = np.random.default_rng(0).normal(size=(2, 400_000))
+    # Standard error of the ratio of 400000 samples: 6e-4.
+    ratio = record_of(np.hypot(*velocity), outer).whirl_deviation_ratio
+    assert ratio == pytest.approx(math.sqrt(4.0 / math.pi - 1.0), abs=3e-3)
+    assert ratio == pytest.approx(0.523, abs=3e-3)
+    assert record_of(np.zeros(10), outer).whirl_deviation_ratio == 0.0
+    speeds = np.random.default_rng(1).uniform(0.1, 0.9, 50)
+    expected = speeds.std(ddof=1) / speeds.mean()
+    assert record_of(speeds, outer).whirl_deviation_ratio == pytest.approx(expected, rel=1e-12)
+
+
+def test_unit_replicate_figures(outer):
+    """Unit: means over windows, slip, and the gap of the power balance."""
+    work = np.zeros(POWERS)
+    work[0], work[2], work[SHAFT] = 3.0, 1.0, 5.0
+    run = record_of(
+        [1.0], outer, duration=2.0, work=work, energy_change=0.9, impact_windows=np.array([10.0, 20.0])
+    )
+    assert (run.impact_force, run.power_loss) == (15.0, 2.0)
+    assert run.power("outer_race_traction") == 1.5
+    assert run.power_gap == pytest.approx(0.02)
+    assert run.cage_slip == pytest.approx(0.5)
+
+
+def test_oracle_student_coverage():
+    """Oracle: intervals of eight normal values hold the mean 95 times in a hundred; against scipy's own."""
+    from scipy import stats
+
+    samples = np.random.default_rng(7).normal(3.0, 2.0, size=(4000, 8))
+    widths = np.array([student_half_width(values) for values in samples])
+    coverage = (np.abs(samples.mean(axis=1) - 3.0) < widths).mean()
+    assert coverage == pytest.approx(0.95, abs=0.014)  # four standard errors of 4000 trials
+    low, high = stats.t.interval(0.95, 7, samples[0].mean(), stats.sem(samples[0]))
+    assert widths[0] == pytest.approx(0.5 * (high - low), rel=1e-10)
+    assert student_half_width(np.array([1.0])) is None
+
+
+def test_unit_quantity(outer):
+    """Unit: the numerical error is the mean change plus its own half-width."""
+    runs = [record_of([1.0], outer, impact_windows=np.array([v])) for v in (1.0, 2.0, 3.0)]
+    pairs = [record_of([1.0], outer, impact_windows=np.array([v])) for v in (1.5, 2.5, 3.5)]
+    found = quantity(lambda run: run.impact_force, runs, pairs)
+    assert found.value == 2.0
+    assert found.statistical_error == pytest.approx(4.302652729911275 / math.sqrt(3.0))  # t(2, 0.975)
+    assert found.numerical_error == pytest.approx(0.5)
+    assert str(Quantity(2.0, None, None)) == "2"
+    assert "± 0.5 (numerical)" in str(found)

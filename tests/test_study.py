@@ -1,0 +1,251 @@
+"""The whole study on a short simulation: results, resumption, determinism, failures."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from doe import clearance, report
+from doe.store import Store, run_key
+from doe.study import Confirmed, Gain, _gains, find_front, fit_surfaces, read_runs, run_design, run_study
+from doe.study_file import Study
+from rbdyn.faults import InputError, RunError
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+SHORT = "turns=3,discard_turns=1,replicates=2,companion=false,impact_window_turns=1"
+
+
+def short_study(folder: Path, settings: str = SHORT, replace: tuple[str, str] = ("", "")) -> Path:
+    """The example study with a short simulation, in a folder of its own."""
+    for name in ("cylindrical_roller.toml", "ccd_table4.csv"):
+        shutil.copy(EXAMPLES / name, folder)
+    text = (EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8")
+    lines = [f'"numerics.{each}"' for each in settings.split(",")]
+    first = next(line for line in text.splitlines() if line.startswith("set = "))
+    text = text.replace(first, f"set = [{', '.join(lines)}]").replace("replicates = 16", "replicates = 2")
+    text = text.replace("generations = 200", "generations = 20").replace(*replace) if replace[0] else text
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def silent(done: int, total: int) -> None:
+    """Progress that nobody watches."""
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A finished study: outcome, folder, names of its files."""
+    folder = tmp_path_factory.mktemp("study")
+    study = Study.load(short_study(folder))
+    outcome = run_study(study, folder, None, lambda title: silent)
+    return outcome, folder, report.write(outcome, folder)
+
+
+def test_every_file_is_written(finished):
+    _, folder, files = finished
+    assert {"summary.json", "design_runs.csv", "anova.csv", "front.csv", "part_dimensions.csv"} <= set(files)
+    assert {"pareto_front.png", "cage_orbit.png", "pocket_forces.png"} <= set(files)
+    assert sum(name.startswith("surface_") for name in files) == 3
+    for name in files:
+        assert (folder / name).stat().st_size > 100, name
+
+
+def test_summary_answers_the_question(finished):
+    outcome, folder, _ = finished
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["status"] == "ok"
+    assert summary["design"]["runs"] == 20
+    assert set(summary["pick"]) == set(outcome.study.factors)
+    for gain in summary["gains"].values():
+        assert gain["verdict"] in ("better", "worse", "within error")
+    parts = summary["chains"]["pocket"]["allocation"]
+    width, roller = parts["pocket_width"], parts["roller_diameter"]
+    pocket = summary["pick"]["pocket_clearance_mm"]
+    assert width["nominal_mm"] + width["upper_mm"] - roller["nominal_mm"] - roller[
+        "lower_mm"
+    ] == pytest.approx(pocket + 0.005, abs=1e-9)
+    assert width["nominal_mm"] + width["lower_mm"] - roller["nominal_mm"] - roller[
+        "upper_mm"
+    ] == pytest.approx(pocket - 0.005, abs=1e-9)
+
+
+def test_pick_stands_on_the_resolution_of_the_drawing(finished):
+    outcome, _, _ = finished
+    assert np.allclose(outcome.pick.point * 1000.0, np.round(outcome.pick.point * 1000.0), atol=1e-9)
+
+
+def test_centre_runs_differ_by_seed_only(finished):
+    outcome, _, _ = finished
+    centre = np.abs(outcome.runs.coded).max(axis=1) == 0.0
+    assert centre.sum() == 6
+    assert len(np.unique(outcome.runs.values[centre, 0])) == 6
+
+
+def test_stands_beside_the_published_table(finished):
+    outcome, _, _ = finished
+    assert [row.response for row in outcome.beside] == outcome.study.responses
+    for row in outcome.beside:
+        assert -1.0 <= row.rank_correlation <= 1.0
+        assert row.verdict.startswith(row.response)
+        assert row.why
+    # Table 4 itself: its own mean impact force, and the signs of its own linear effects.
+    impact = outcome.beside[0]
+    assert impact.their_range == pytest.approx((145.6, 203.7, 278.2))
+    assert all(theirs[0] > 0.0 and theirs[1] for _, theirs in impact.effects.values())
+
+
+def test_nothing_runs_twice(finished, monkeypatch):
+    outcome, folder, _ = finished
+
+    def refuse(*arguments):
+        raise AssertionError("a stored run was simulated again")
+
+    monkeypatch.setattr("rbdyn.dynamics.simulate.simulate", refuse)
+    again = run_study(outcome.study, folder, None, lambda title: silent)
+    assert np.array_equal(again.runs.values, outcome.runs.values)
+    assert np.array_equal(again.pick.values, outcome.pick.values)
+
+
+def test_same_bits_for_any_number_of_workers(finished, tmp_path):
+    outcome, _, _ = finished
+    alone = run_design(outcome.study, tmp_path, 1, silent)
+    assert np.array_equal(alone.values, outcome.runs.values)
+
+
+def test_killed_study_loses_no_finished_run(finished, tmp_path):
+    # Long enough that the kill comes in the middle of it.
+    path = short_study(tmp_path, SHORT.replace("turns=3,", "turns=60,"))
+    store = tmp_path / "out" / "study.sqlite"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "doe", "study", str(path), "--out", str(tmp_path / "out"), "--workers", "1"],
+        stdout=subprocess.DEVNULL,
+    )
+    deadline = time.monotonic() + 120.0
+    while stored(store) < 3 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    survived = rows(store)
+    assert 3 <= len(survived) < 20
+    run_design(Study.load(path), tmp_path / "out", None, silent)
+    finished_rows = rows(store)
+    assert len(finished_rows) == 20
+    assert survived.items() <= finished_rows.items()
+
+
+def stored(path: Path) -> int:
+    """Rows in a store that another process may be making."""
+    try:
+        return len(rows(path))
+    except sqlite3.Error:
+        return 0
+
+
+def rows(path: Path) -> dict[str, str]:
+    """All rows of a store."""
+    if not path.exists():
+        return {}
+    connection = sqlite3.connect(path)
+    try:
+        return dict(connection.execute("SELECT key, result FROM runs"))
+    finally:
+        connection.close()
+
+
+def test_run_that_cannot_go_on_is_named_and_the_others_are_kept(tmp_path):
+    study = Study.load(short_study(tmp_path, SHORT + ",step_budget_per_turn=100"))
+    with pytest.raises(RunError, match=r"design run 1: .*step budget .*numerics\.step_budget_per_turn"):
+        run_design(study, tmp_path, None, silent)
+    assert stored(tmp_path / "study.sqlite") == 0
+
+
+@pytest.mark.parametrize(
+    ("replace", "words"),
+    [
+        (
+            ('key = "cage.guide_clearance_mm"', 'key = "cage.guide_clearence_mm"'),
+            ("factor.key", "no such key"),
+        ),
+        (('name = "power_loss_W"', 'name = "power_W"'), ("response.name", "choose one of")),
+        (('factor = "pocket_clearance_mm"', 'factor = "pocket"'), ("chain.factor", "no such factor")),
+        (("half_width_mm = 0.005", "half_width_mm = -0.005"), ("half_width_mm", "greater than 0")),
+        (("coefficient = -1.0", "coefficient = 0.0"), ("coefficient", "must not be zero")),
+        (("centre = 0.30", "centre = -0.30"), ("cage.pocket_clearance_mm", "greater than 0")),
+        (('file = "ccd_table4.csv"', 'file = "nowhere.csv"'), ("nowhere.csv", "no such file")),
+        (("[baseline]\n", "[baseline]\nradial = 1.0\n"), ("baseline.radial", "no such factor")),
+    ],
+)
+def test_bad_study_is_refused_before_anything_runs(tmp_path, replace, words):
+    with pytest.raises(InputError) as refused:
+        run_study(Study.load(short_study(tmp_path, SHORT, replace)), tmp_path, None, lambda title: silent)
+    assert all(word in str(refused.value) for word in words), str(refused.value)
+    assert stored(tmp_path / "study.sqlite") == 0
+
+
+def test_table_without_a_column_or_with_a_word_is_refused(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    table = tmp_path / "table.csv"
+    text = (EXAMPLES / "ccd_table4.csv").read_text(encoding="utf-8")
+    table.write_text(text.replace("power_loss_W", "loss").replace("278.2", "many"), encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        read_runs(study, table)
+    assert any("power_loss_W" in fault and "missing" in fault for fault in refused.value.faults)
+    assert any("impact_force_N in row 1" in fault for fault in refused.value.faults)
+
+
+def test_reference_of_another_design_is_refused(tmp_path):
+    study = Study.load(short_study(tmp_path, SHORT, ("centre_replicates = 6", "centre_replicates = 9")))
+    with pytest.raises(InputError, match="no run left for the design point"):
+        run_study(study, tmp_path, None, lambda title: silent)
+
+
+def test_front_on_the_published_table_improves_on_its_baseline(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    surfaces = fit_surfaces(study, read_runs(study, EXAMPLES / "ccd_table4.csv"))
+    record = report.front_record(study, surfaces, find_front(study, surfaces))
+    pick, baseline = record["pick"]["responses"], record["baseline"]["responses"]
+    assert all(pick[name] <= baseline[name] for name in study.responses)
+    assert all(
+        record["ideal"][name] <= min(point["responses"][name] for point in record["front"]) + 1e-9
+        for name in study.responses
+    )
+
+
+def test_gain_counts_only_beyond_its_error(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    none = np.zeros(3)
+    baseline = Confirmed(study.baseline, np.array([100.0, 1.0, 50.0]), np.array([3.0, 0.0, 0.0]), none)
+    pick = Confirmed(study.baseline, np.array([96.0, 0.9, 51.0]), np.array([4.0, 0.0, 0.0]), none)
+    gains = _gains(study, baseline, pick)
+    assert [gain.verdict for gain in gains] == ["within error", "better", "worse"]
+    assert gains[0] == Gain("impact_force_N", pytest.approx(4.0), pytest.approx(5.0))
+
+
+def test_store_keeps_and_refuses(tmp_path):
+    with Store(tmp_path / "runs.sqlite") as store:
+        assert store.get("a") is None
+        store.put("a", {"x": 1.5})
+        store.put("a", {"x": 2.5})
+        assert store.get("a") == {"x": 1.5}
+    (tmp_path / "text.sqlite").write_text("not a database, and long enough to be told from one" * 30)
+    with pytest.raises(InputError, match="cannot be used as a store"):
+        Store(tmp_path / "text.sqlite")
+
+
+def test_key_follows_scene_and_version(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    one, two = clearance.design_scenes(study, np.array([study.centre, study.centre]))
+    keys = {run_key(scene.model_dump(mode="json"), version) for scene in (one, two) for version in "ab"}
+    assert len(keys) == 4
+    assert run_key(one.model_dump(mode="json"), "a") in keys
