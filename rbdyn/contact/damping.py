@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rbdyn.kernel import law
 
@@ -31,9 +31,8 @@ class HuntCrossleyDamping(NamedTuple):
 
 
 @law
-def damped_load(damping: Any, elastic_load: float, approach: float, approach_rate: float) -> float:
+def damped_load(damping, elastic_load, approach, approach_rate):
     """Load [N] >= 0 of a closed contact: elastic load [N], approach [m] > 0 and its rate [m/s]."""
-    raise NotImplementedError
 
 
 @damped_load.body(NoDamping)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rbdyn.elementary import fast_exp, fast_log
 from rbdyn.kernel import kernel, law
@@ -44,9 +44,8 @@ def aihara_thermal_factor(viscosity_slope: float, conductivity: float, entrainme
 
 
 @law
-def rolling_force(film: Any, load: float, entrainment_speed: float) -> float:
+def rolling_force(film, load, entrainment_speed):
     """Rolling resistance per surface [N] at a contact load [N] and an entrainment speed [m/s], both > 0."""
-    raise NotImplementedError
 
 
 @rolling_force.body(NoRollingResistance)

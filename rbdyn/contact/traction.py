@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rbdyn.elementary import fast_exp
 from rbdyn.kernel import law
@@ -66,9 +66,8 @@ def four_constants(mu_0: float, mu_m: float, mu_inf: float, u_m: float) -> tuple
 
 
 @law
-def traction(model: Any, slip: float) -> float:
+def traction(model, slip):
     """Signed traction coefficient at a signed slip [m/s]; traction times slip is never negative."""
-    raise NotImplementedError
 
 
 @traction.body(NoTraction)

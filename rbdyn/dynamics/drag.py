@@ -31,7 +31,6 @@ def cylinder_drag(
 @law
 def drag_forces(drag, rollers, y, row, dy):
     """Write the drag on each roller into row ``row`` of ``dy``; returns the power lost [W]."""
-    raise NotImplementedError
 
 
 @drag_forces.body(NoDrag)

@@ -59,7 +59,6 @@ def film_wrench(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
 
     ``ex, ey, e``: direction and size [m] of the journal's offset; ``evx, evy``: its velocity [m/s].
     """
-    raise NotImplementedError
 
 
 @film_wrench.body(NoFilm)
@@ -85,7 +84,6 @@ def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
 @law
 def dry_wrench(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     """Contact force x, y on the journal, moments on journal and bearing, load, powers in friction and damping."""
-    raise NotImplementedError
 
 
 @dry_wrench.body(NoContact)
@@ -140,7 +138,6 @@ def guide_wrench(guide, dx, dy, dvx, dvy, cage_speed, ring_speed):
     ``dx ... dvy``: (cage centre, inner ring centre) positions and velocities are passed as the pairs
     ``dx = (cage x, ring x)`` and so on; speeds in rad/s. Powers: film, friction, damping [W].
     """
-    raise NotImplementedError
 
 
 @guide_wrench.body(NoGuide)
@@ -170,7 +167,6 @@ def _(guide, dx, dy, dvx, dvy, cage_speed, ring_speed):
 @law
 def dry_energy(dry, e):
     """Elastic energy [J] of the land contact at an eccentricity [m]."""
-    raise NotImplementedError
 
 
 @dry_energy.body(NoContact)
@@ -186,7 +182,6 @@ def _(dry, e):
 @law
 def guide_energy(guide, cage_x, cage_y, ring_x, ring_y):
     """Elastic energy [J] stored in the guide land."""
-    raise NotImplementedError
 
 
 @guide_energy.body(NoGuide)

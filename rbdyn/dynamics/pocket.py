@@ -33,7 +33,6 @@ def pocket_contact(pocket, roller_radius, ex, ey, dx, dy, dvx, dvy, roller_spin,
     the cage about its centre, wall load, powers lost in friction and in damping). The force on the cage is the
     opposite. Chen et al. 2022, eq 16, for the front and the rear wall alike.
     """
-    raise NotImplementedError
 
 
 @pocket_contact.body(NoPocket)
@@ -72,7 +71,6 @@ def _(pocket, roller_radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
 @law
 def pocket_energy(pocket, ex, ey, dx, dy):
     """Elastic energy [J] of a pocket contact, arguments as in ``pocket_contact``."""
-    raise NotImplementedError
 
 
 @pocket_energy.body(NoPocket)
