@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -34,6 +34,7 @@ Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all processor
 Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder of results and of the store of finished runs.")
 ]
+Save = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Also write the JSON record here.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the answer.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print the analysis of variance.")]
@@ -83,8 +84,11 @@ def study(
 @app.command()
 def design(
     path: StudyPath,
+    out: Save = None,
     as_json: Json = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print a CSV table and nothing else.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Actual values only.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also the seed of every run.")] = False,
 ) -> None:
     """Print the design: coded and actual factors of every run."""
     with guarded(as_json):
@@ -96,27 +100,32 @@ def design(
         coded = design_points(loaded)
         actual = to_actual(coded, loaded.centre, loaded.step)
         seed = loaded.file.design.seed
+        runs = [
+            {
+                "run": run + 1,
+                "coded": dict(zip(loaded.factors, c.tolist(), strict=True)),
+                "factors": dict(zip(loaded.factors, a.tolist(), strict=True)),
+                "seed": seed + run,
+            }
+            for run, (c, a) in enumerate(zip(coded, actual, strict=True))
+        ]
+        record = {"factors": loaded.factors, "runs": runs}
+        _save(out, "design.json", record)
         if as_json:
-            runs = [
-                {
-                    "run": run + 1,
-                    "coded": dict(zip(loaded.factors, c.tolist(), strict=True)),
-                    "factors": dict(zip(loaded.factors, a.tolist(), strict=True)),
-                    "seed": seed + run,
-                }
-                for run, (c, a) in enumerate(zip(coded, actual, strict=True))
-            ]
-            print_json({"factors": loaded.factors, "runs": runs})
+            print_json(record)
         elif as_csv:
             print(",".join(["run", *loaded.factors]))
             for run, row in enumerate(actual):
                 print(",".join([str(run + 1), *(f"{x:.9g}" for x in row)]))
         else:
-            rows = [
-                (str(run + 1), *(f"{x:+.4f}" for x in c), *(f"{x:.6g}" for x in a))
-                for run, (c, a) in enumerate(zip(coded, actual, strict=True))
-            ]
-            header = ("run", *(f"{name} (coded)" for name in loaded.factors), *loaded.factors)
+            header = ["run", *loaded.factors]
+            rows = [[str(run + 1), *(f"{x:.6g}" for x in row)] for run, row in enumerate(actual)]
+            if not quiet:
+                header += [f"{name} (coded)" for name in loaded.factors]
+                rows = [[*row, *(f"{x:+.4f}" for x in c)] for row, c in zip(rows, coded, strict=True)]
+            if verbose:
+                header.append("seed")
+                rows = [[*row, str(seed + run)] for run, row in enumerate(rows)]
             print_table(f"{loaded.file.design.kind}, {len(coded)} runs", header, rows)
 
 
@@ -134,10 +143,12 @@ def fit(
         from doe import report
 
         _, surfaces = _fitted(path, data, out, workers, quiet or as_json)
+        record = report.fit_record(surfaces)
+        _save(out, "fit.json", record)
         if as_json:
-            print_json(report.fit_record(surfaces))
+            print_json(record)
         else:
-            report.print_fit(surfaces)
+            report.print_fit(surfaces, quiet)
 
 
 @app.command()
@@ -148,6 +159,7 @@ def front(
     workers: Workers = None,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also every point of the front.")] = False,
 ) -> None:
     """Find the Pareto front on the response surfaces."""
     with guarded(as_json):
@@ -156,16 +168,20 @@ def front(
 
         loaded, surfaces = _fitted(path, data, out, workers, quiet or as_json)
         record = report.front_record(loaded, surfaces, find_front(loaded, surfaces))
+        _save(out, "front.json", record)
         if as_json:
             print_json(record)
         else:
-            report.print_front(record)
+            report.print_front(record, verbose)
 
 
 @app.command()
 def chain(
     path: Annotated[Path, typer.Argument(metavar="CHAIN.toml", help="Dimension chain to solve.")],
+    out: Save = None,
     as_json: Json = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Parts only.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also yields and contributions.")] = False,
 ) -> None:
     """Solve a dimension chain: limits, yield, contributions, allocation. One that misses its limits is refused."""
     with guarded(as_json):
@@ -173,13 +189,21 @@ def chain(
         from doe.dimension_chain import read_chain, solve
 
         result = solve(read_chain(path))
+        _save(out, "chain.json", result.as_dict())
         if as_json:
             print_json(result.as_dict())
         else:
-            report.print_chain(path.stem, result)
+            report.print_chain(path.stem, result, quiet, verbose)
         if result.status.startswith("refused"):
             print(f"{path}: {result.status}", file=sys.stderr)
             raise typer.Exit(BAD_INPUT)
+
+
+def _save(out: Path | None, name: str, record: dict[str, Any]) -> None:
+    if out is not None:
+        from rbdyn.result import write_json
+
+        write_json(output_folder(out) / name, record)
 
 
 def _fitted(

@@ -146,20 +146,13 @@ def summary(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def print_fit(surfaces: list[Surface]) -> None:
-    """Analysis of variance and what it says, a response at a time."""
+def print_fit(surfaces: list[Surface], quiet: bool = False) -> None:
+    """Analysis of variance and what it says, a response at a time; quietly, only what it says."""
     from doe.response_surface import describe
 
     for surface in surfaces:
-        rows = [
-            (row["source"], *(_shown(row[key]) for key in ("ss", "df", "ms", "f", "p")))
-            for row in surface.anova
-        ]
-        print_table(
-            f"{surface.name}: {surface.model} model, coded units",
-            ("source", "sum of squares", "df", "mean square", "F", "p"),
-            rows,
-        )
+        if not quiet:
+            _print_anova(surface)
         terms = zip(surface.terms, surface.coefficients, strict=True)
         print(f"{surface.name} = " + " ".join(f"{c:+.5g}{'' if t == '1' else ' ' + t}" for t, c in terms))
         print(
@@ -172,23 +165,47 @@ def print_fit(surfaces: list[Surface]) -> None:
         print()
 
 
-def print_front(record: dict[str, Any]) -> None:
-    """Baseline, knee and pick of a front."""
-    names = [*record["baseline"]["factors"], *record["baseline"]["responses"]]
+def _print_anova(surface: Surface) -> None:
     rows = [
-        (point, *(f"{x:.5g}" for kind in ("factors", "responses") for x in record[point][kind].values()))
-        for point in ("baseline", "knee", "pick")
+        (row["source"], *(_shown(row[key]) for key in ("ss", "df", "ms", "f", "p"))) for row in surface.anova
+    ]
+    print_table(
+        f"{surface.name}: {surface.model} model, coded units",
+        ("source", "sum of squares", "df", "mean square", "F", "p"),
+        rows,
+    )
+
+
+def print_front(record: dict[str, Any], verbose: bool = False) -> None:
+    """Baseline, knee and pick of a front; verbosely, every point of it."""
+    names = [*record["baseline"]["factors"], *record["baseline"]["responses"]]
+    points = {name: record[name] for name in ("baseline", "knee", "pick")}
+    if verbose:
+        points |= {str(number): point for number, point in enumerate(record["front"], 1)}
+    rows = [
+        (name, *(f"{x:.5g}" for kind in ("factors", "responses") for x in point[kind].values()))
+        for name, point in points.items()
     ]
     print_table(f"Pareto front on the surfaces, {len(record['front'])} points", ("", *names), rows)
     print(f"pick: {record['pick']['reason']}; hypervolume {record['hypervolume']:.4f} of 1.331")
 
 
-def print_chain(name: str, chain: ChainResult) -> None:
-    """Closing link, parts and yield of a dimension chain."""
+def print_chain(name: str, chain: ChainResult, quiet: bool = False, verbose: bool = False) -> None:
+    """Parts, closing link and yield of a dimension chain; verbosely, all yields and contributions."""
     refused = chain.status.startswith("refused")
     title = f"dimension chain {name}" + (": the nearest parts that meet the limits" if refused else "")
     rows = [(part.name, part_text(part), part.grade or "") for part in chain.allocation]
     print_table(title, ("part", "dimension [mm]", "grade"), rows)
+    if verbose:
+        shares = [
+            (part, f"{each['variance_percent']:.1f} %", f"{each['worst_case_percent']:.1f} %")
+            for part, each in chain.contributions.items()
+        ]
+        print_table("contributions", ("part", "variance", "worst case"), shares)
+        yields = [(kind.replace("_", " "), f"{share:.6f}") for kind, share in chain.yields.items()]
+        print_table(f"yield, ± {chain.standard_error:.1g}", ("distribution of the parts", "yield"), yields)
+    if quiet:
+        return
     low, high = chain.worst_case_mm
     print(
         f"{'as given: ' if refused else ''}closing link {low:.4f} to {high:.4f} mm in worst case, yield "

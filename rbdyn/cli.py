@@ -86,6 +86,7 @@ def accuracy(
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also versions.")] = False,
 ) -> None:
     """Show error against run time: bias of every output and cost at each tolerance."""
     with guarded(as_json):

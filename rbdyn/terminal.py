@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -27,6 +28,9 @@ def guarded(as_json: bool) -> Iterator[None]:
         _leave(as_json, FAILED, {"status": f"failed: {error}"}, [str(error)])
     except KeyboardInterrupt:
         _leave(as_json, INTERRUPTED, {"status": "interrupted"}, ["interrupted; what was finished is kept"])
+    except BrokenPipeError:
+        # The reader of a pipe has seen enough; what is left unwritten goes nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
         sentence = (
             f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"

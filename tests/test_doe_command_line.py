@@ -120,6 +120,25 @@ def test_right_chain_is_accepted():
     assert set(record) == {"closing_link", "yield", "contributions", "allocation", "status"}
 
 
+@pytest.mark.parametrize(
+    ("arguments", "name", "quiet", "verbose"),
+    [
+        (["design", STUDY], "design.json", "run", "seed"),
+        (["fit", STUDY, "--data", TABLE], "fit.json", "significant at", "sum of squares"),
+        (["front", STUDY, "--data", TABLE], "front.json", "baseline", "hypervolume"),
+        (["chain", str(EXAMPLES / "pocket_chain.toml")], "chain.json", "pocket_width", "contributions"),
+    ],
+)
+def test_quiet_says_less_and_out_keeps_the_record(arguments, name, quiet, verbose, tmp_path):
+    less = doe(*arguments, "--quiet", "--out", str(tmp_path))
+    more = doe(*arguments, *([] if "fit" in arguments else ["--verbose"]))
+    assert less.returncode == more.returncode == 0, less.stderr + more.stderr
+    assert quiet in less.stdout and verbose in more.stdout
+    assert len(less.stdout) < len(more.stdout)
+    record = json.loads((tmp_path / name).read_text(encoding="utf-8"))
+    assert record == json.loads(doe(*arguments, "--json").stdout)
+
+
 @pytest.mark.parametrize("command", ["study", "design", "fit", "front", "chain"])
 def test_missing_file_is_one_sentence(command, tmp_path):
     out = ["--out", str(tmp_path / "out")] if command == "study" else []
