@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
 from typing import Any
 
@@ -38,26 +37,37 @@ def check_responses(study: Study) -> None:
         raise InputError(faults)
 
 
-def scene_at(study: Study, factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
-    """The study's scene at factor values, with a seed. Raises InputError when a key or a value is impossible."""
+def read_scene(study: Study) -> dict[str, Any]:
+    """Tables of the study's scene file. Raises InputError when the file or a factor's key is not there."""
     path = study.beside(study.file.scene.file)
     data = read_toml(path)
+    faults = []
     for factor in study.file.factor:
         table, _, key = factor.key.rpartition(".")
         if table not in data or key not in data[table]:
-            raise InputError(
-                [
-                    f"{study.path}: factor.key = {factor.key!r}: no such key in {path}; write table.key as in that file"
-                ]
+            faults.append(
+                f"{study.path}: factor.key = {factor.key!r}: no such key in {path}; write table.key as in that file"
             )
+    if faults:
+        raise InputError(faults)
+    return data
+
+
+def scene_at(
+    study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]
+) -> Scene:
+    """The study's scene at factor values, with a seed. Raises InputError when a value is impossible."""
+    path = study.beside(study.file.scene.file)
     assignments = [f"{factor.key}={float(x)!r}" for factor, x in zip(study.file.factor, factors, strict=True)]
     return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments])
 
 
 def design_scenes(study: Study, points: Array) -> list[Scene]:
-    """A scene a design run (n, k); runs at one point differ by their seed only."""
-    first = study.file.design.seed
-    return [scene_at(study, point, first + run, study.file.scene.set) for run, point in enumerate(points)]
+    """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError."""
+    data, first = read_scene(study), study.file.design.seed
+    return [
+        scene_at(study, data, point, first + run, study.file.scene.set) for run, point in enumerate(points)
+    ]
 
 
 def confirmation_scene(study: Study, point: Array) -> Scene:
@@ -69,7 +79,8 @@ def confirmation_scene(study: Study, point: Array) -> Scene:
         "numerics.companion=true",
         *confirmation.set,
     ]
-    return scene_at(study, point, study.file.design.seed + CONFIRMATION_SEEDS, overrides)
+    seed = study.file.design.seed + CONFIRMATION_SEEDS
+    return scene_at(study, read_scene(study), point, seed, overrides)
 
 
 def run_scenes(
@@ -94,26 +105,22 @@ def run_scenes(
     progress(len(results), len(stored))
     failures = {}
     if missing:
-        from rbdyn.dynamics.simulate import Stop, prepare, simulate, thread_pool
+        from rbdyn.dynamics.simulate import Stop, as_they_end, prepare, simulate, thread_pool
 
         # Compiled once here, lest every thread wait for the same compilation.
         prepare(next(iter(missing.values())))
         stop = Stop()
         with thread_pool(workers or os.cpu_count(), stop) as pool:
-            pending: dict[Future[SimulationResult], str] = {
-                pool.submit(simulate, scene, 1, None, stop): key for key, scene in missing.items()
-            }
-            while pending:
-                done, _ = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-                for future in done:
-                    key = pending.pop(future)
-                    try:
-                        results[key] = future.result()
-                    except RunError as error:
-                        failures[key] = error
-                        continue
-                    store.put(key, results[key].as_dict())
-                    progress(len(results), len(stored))
+            futures = {pool.submit(simulate, scene, 1, None, stop): key for key, scene in missing.items()}
+            for future in as_they_end(futures):
+                key = futures[future]
+                try:
+                    results[key] = future.result()
+                except RunError as error:
+                    failures[key] = error
+                    continue
+                store.put(key, results[key].as_dict())
+                progress(len(results), len(stored))
     if failures:
         causes = [
             f"{label}: {failures[key]}" for label, key in zip(labels, keys, strict=True) if key in failures

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from rbdyn.dynamics.metrics import Replicate, student_half_width
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Stop, as_they_end, prepare, run_replicate, thread_pool
+from rbdyn.dynamics.simulate import Stop, prepare, run_series
 from rbdyn.result import versions
 from rbdyn.scene import Scene
 
@@ -55,22 +54,9 @@ def work_precision(
 ) -> list[Row]:
     """A row a tolerance, loosest first. Runs one replicate at a time. Raises RunError, KeyboardInterrupt."""
     prepare(scene)
-    bearing = roller_bearing(scene)
     ordered = sorted(tolerances, reverse=True)
-    tasks = [(rtol, index) for rtol in ordered for index in range(scene.numerics.replicates)]
-    runs: dict[tuple[float, int], Replicate] = {}
-    stop = Stop()
-    with thread_pool(1, stop) as pool:
-        futures = {
-            pool.submit(run_replicate, scene, bearing, index, rtol, stop): (rtol, index)
-            for rtol, index in tasks
-        }
-        for future in as_they_end(futures):
-            runs[futures[future]] = future.result()
-            if progress is not None:
-                progress(len(runs), len(tasks))
-    series = {rtol: [runs[rtol, i] for i in range(scene.numerics.replicates)] for rtol in ordered}
-    return [_row(scene, rtol, series[rtol], series[ordered[-1]]) for rtol in ordered]
+    series = run_series(scene, ordered, 1, progress, Stop())
+    return [_row(scene, rtol, runs, series[-1]) for rtol, runs in zip(ordered, series, strict=True)]
 
 
 def conclusion(rows: Sequence[Row], scene: Scene) -> str:

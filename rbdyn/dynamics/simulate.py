@@ -6,10 +6,11 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,8 @@ from rbdyn.dynamics.state import CAGE_ANGLE, CAGE_X, CAGE_Y, name
 from rbdyn.faults import RunError
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene
+
+T = TypeVar("T")
 
 # Interruptions are looked at between chunks of this many shaft turns: some hundredths of a second.
 CHUNK_TURNS = 10.0
@@ -223,24 +226,37 @@ def simulate(
     """
     stop = Stop(outer=stop)
     compile_s = prepare(scene)
-    bearing = roller_bearing(scene)
     numerics = scene.numerics
     tolerances = [numerics.rtol] + [COMPANION_FACTOR * numerics.rtol] * numerics.companion
-    tasks = [(index, rtol) for rtol in tolerances for index in range(numerics.replicates)]
     started = time.perf_counter()
-    runs: dict[tuple[int, float], Replicate] = {}
+    series = run_series(scene, tolerances, workers, progress, stop)
+    wall_s = time.perf_counter() - started
+    return _gather(scene, series[0], series[1] if numerics.companion else [], wall_s, compile_s)
+
+
+def run_series(
+    scene: Scene,
+    tolerances: Sequence[float],
+    workers: int | None,
+    progress: Callable[[int, int], None] | None,
+    stop: Stop,
+) -> list[list[Replicate]]:
+    """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""
+    bearing = roller_bearing(scene)
+    tasks = [(place, index) for place in range(len(tolerances)) for index in range(scene.numerics.replicates)]
+    runs: dict[tuple[int, int], Replicate] = {}
     with thread_pool(workers, stop) as pool:
-        futures = {pool.submit(run_replicate, scene, bearing, *task, stop): task for task in tasks}
+        futures = {
+            pool.submit(run_replicate, scene, bearing, index, tolerances[place], stop): (place, index)
+            for place, index in tasks
+        }
         for future in as_they_end(futures):
             runs[futures[future]] = future.result()
             if progress is not None:
                 progress(len(runs), len(tasks))
-    wall_s = time.perf_counter() - started
-    counted = [runs[index, numerics.rtol] for index in range(numerics.replicates)]
-    companions = (
-        [runs[index, tolerances[1]] for index in range(numerics.replicates)] if numerics.companion else []
-    )
-    return _gather(scene, counted, companions, wall_s, compile_s)
+    return [
+        [runs[place, index] for index in range(scene.numerics.replicates)] for place in range(len(tolerances))
+    ]
 
 
 @contextmanager
@@ -256,7 +272,7 @@ def thread_pool(workers: int | None, stop: Stop) -> Iterator[ThreadPoolExecutor]
     pool.shutdown()
 
 
-def as_they_end(futures: Iterable[Future[Replicate]]) -> Iterator[Future[Replicate]]:
+def as_they_end(futures: Iterable[Future[T]]) -> Iterator[Future[T]]:
     """Futures in the order in which they end; waits in short naps so that Ctrl-C is heard at once."""
     pending = set(futures)
     while pending:
