@@ -10,17 +10,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rbdyn.dynamics.simulate import simulate, trace
+    from rbdyn.dynamics.history import History, history
+    from rbdyn.dynamics.simulate import simulate
     from rbdyn.faults import InputError, RunError
     from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
 
-__all__ = ["InputError", "RunError", "Scene", "SimulationResult", "load", "simulate", "trace"]
+__all__ = ["History", "InputError", "RunError", "Scene", "SimulationResult", "history", "load", "simulate"]
 
 _HOMES = {
     "Scene": "rbdyn.scene",
     "simulate": "rbdyn.dynamics.simulate",
-    "trace": "rbdyn.dynamics.simulate",
+    "history": "rbdyn.dynamics.history",
+    "History": "rbdyn.dynamics.history",
     "SimulationResult": "rbdyn.result",
     "InputError": "rbdyn.faults",
     "RunError": "rbdyn.faults",

@@ -105,7 +105,7 @@ def _sentences(
         alien = (
             "model_type" if isinstance(value, str) else "literal_error" if isinstance(value, Mapping) else ""
         )
-        if kind == alien or (only and kind != only):
+        if (kind == alien and _names_a_kind(str(fault["loc"][-1]))) or (only and kind != only):
             continue
         place = tuple(part for part in fault["loc"] if isinstance(part, int) or not _names_a_kind(part))
         key = _dotted(place)

@@ -40,7 +40,7 @@ def routine(function: Callable[..., Any]) -> Any:
 
 
 def law(declaration: Callable[..., Any]) -> Any:
-    """Declare a law. Register a body for a parameter type with ``@declared.body(ParameterType)``.
+    """Declare a law. Register a body for one or more parameter types with ``@declared.body(ParameterType)``.
 
     Works compiled (the choice costs nothing) and interpreted. Raises TypeError where no body is registered.
     """
@@ -52,9 +52,9 @@ def law(declaration: Callable[..., Any]) -> Any:
             raise TypeError(f"{declaration.__name__} has no body for {type(parameters).__name__}")
         return bodies[type(parameters)](parameters, *arguments)
 
-    def body(parameter_type: type) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    def body(*parameter_types: type) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
         def register(function: Callable[..., Any]) -> Callable[..., Any]:
-            bodies[parameter_type] = function
+            bodies.update(dict.fromkeys(parameter_types, function))
             return function
 
         return register

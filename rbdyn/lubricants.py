@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 ABSOLUTE_ZERO_C = -273.15
+# The pressure coefficient of MIL-L-7808 has a pole at 215.56 K: it is held at its value at -40 C below that.
+COLDEST_PRESSURE = 233.15
 
 
 @dataclass(frozen=True)
@@ -18,13 +20,14 @@ class Oil:
     """An oil at one temperature.
 
     ``viscosity`` [Pa s], ``viscosity_slope`` = -d(viscosity)/dT [Pa s/K], ``density`` [kg/m^3],
-    ``conductivity`` [W/(m K)].
+    ``conductivity`` [W/(m K)], ``pressure_coefficient`` alpha of viscosity exp(alpha p) [1/Pa].
     """
 
     viscosity: float
     viscosity_slope: float
     density: float
     conductivity: float
+    pressure_coefficient: float
 
 
 def mil_l_7808(kelvin: float) -> Oil:
@@ -35,7 +38,8 @@ def mil_l_7808(kelvin: float) -> Oil:
     slope = viscosity * 3.7048 * a * b / ((b - 0.87) * kelvin)
     density = _between(kelvin, (311.0, 367.0, 422.0, 478.0), (954.0, 914.0, 870.0, 826.0))
     conductivity = _between(kelvin, (311.0, 367.0, 422.0, 478.0), (0.1449, 0.1340, 0.1327, 0.1314))
-    return Oil(viscosity, slope, density, conductivity)
+    pressure_coefficient = 7.5808e-10 + 1.0742e-6 / (max(kelvin, COLDEST_PRESSURE) - 215.56)
+    return Oil(viscosity, slope, density, conductivity, pressure_coefficient)
 
 
 def mil_l_23699(kelvin: float) -> Oil:
@@ -44,7 +48,9 @@ def mil_l_23699(kelvin: float) -> Oil:
     viscosity = 0.0276 * math.exp(3609.6 * inverse + 7.7657e5 * inverse**2)
     slope = viscosity * (3609.6 + 2.0 * 7.7657e5 * inverse) / kelvin**2
     density = _between(kelvin, (233.0, 300.0, 367.0, 422.0), (1016.0, 966.0, 922.0, 884.0))
-    return Oil(viscosity, slope, density, 0.14868 - 2.2275e-4 * (kelvin - 366.67))
+    pressure_coefficient = math.exp(1.15607 * math.log(viscosity) - 17.496) / viscosity
+    conductivity = 0.14868 - 2.2275e-4 * (kelvin - 366.67)
+    return Oil(viscosity, slope, density, conductivity, pressure_coefficient)
 
 
 OILS: dict[str, Callable[[float], Oil]] = {"MIL-L-7808": mil_l_7808, "MIL-L-23699": mil_l_23699}

@@ -8,9 +8,12 @@ import platform
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rbdyn.faults import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FORMAT = "rbdyn.simulation/1"
 
@@ -41,7 +44,11 @@ class Quantity:
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input."""
+    """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input.
+
+    ``races``: pressure, half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and
+    operating diametral clearance [um], with what fits, temperature and rotation take of it where a mounting is given.
+    """
 
     status: str
     impact_force: Quantity
@@ -53,6 +60,9 @@ class SimulationResult:
     power_terms: dict[str, float]
     max_inner_load: float
     max_outer_load: float
+    max_land_load: float
+    races: dict[str, dict[str, float]]
+    clearance: dict[str, float]
     impact_window_turns: float
     cost: dict[str, float]
     replicates: int
@@ -73,7 +83,13 @@ class SimulationResult:
             "cage_slip": self.cage_slip.as_dict(),
             "power_balance": {"relative_gap": self.power_gap},
             "power_terms_W": self.power_terms,
-            "loads": {"max_inner_N": self.max_inner_load, "max_outer_N": self.max_outer_load},
+            "loads": {
+                "max_inner_N": self.max_inner_load,
+                "max_outer_N": self.max_outer_load,
+                "max_land_N": self.max_land_load,
+            },
+            "races": self.races,
+            "clearance_um": self.clearance,
             "impact_window_turns": self.impact_window_turns,
             "cost": self.cost,
             "replicates": self.replicates,
@@ -97,6 +113,9 @@ class SimulationResult:
             power_terms=data["power_terms_W"],
             max_inner_load=data["loads"]["max_inner_N"],
             max_outer_load=data["loads"]["max_outer_N"],
+            max_land_load=data["loads"]["max_land_N"],
+            races=data["races"],
+            clearance=data["clearance_um"],
             impact_window_turns=data["impact_window_turns"],
             cost=data["cost"],
             replicates=data["replicates"],
@@ -105,6 +124,20 @@ class SimulationResult:
             versions=data["versions"],
             scene=data["scene"],
         )
+
+    def table(self) -> pd.DataFrame:
+        """A row a figure: value and the half-widths of its 95 % errors; units in the names."""
+        import pandas as pd
+
+        figures = {
+            "impact_force_N": self.impact_force,
+            "whirl_deviation_ratio": self.whirl_deviation_ratio,
+            "power_loss_W": self.power_loss,
+            "cage_speed_rpm": self.cage_speed_rpm,
+            "cage_slip": self.cage_slip,
+        }
+        rows = {name: figure.as_dict() for name, figure in figures.items()}
+        return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
 
     def save(self, path: Path | str) -> None:
         """Write JSON, whole or not at all."""

@@ -1,7 +1,8 @@
 """Scenes, states and runs that several tests share; compiled once a session.
 
 Every distinct set of law types costs seconds to compile, so tests take their scenes from here: ``outer`` (all
-default laws), ``inner`` (as ``outer``, but guided on the inner ring) and ``conservative`` (nothing that dissipates).
+default laws), ``inner`` (as ``outer``, but guided on the inner ring), ``conservative`` (nothing that dissipates) and
+``everything`` (every law that goes with guidance on the outer ring).
 """
 
 from __future__ import annotations
@@ -16,7 +17,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rbdyn.dynamics.equations import LOADS, POWERS, derivative
+from rbdyn.dynamics.geometry import kinematics, layout_of, raceway_radii, roller_radii
+from rbdyn.dynamics.races import scratch
 from rbdyn.faults import read_toml
+from rbdyn.kernel import entry
 from rbdyn.scene import Scene
 
 ROOT = Path(__file__).parent.parent
@@ -39,6 +44,33 @@ CONSERVATIVE = (
     "model.land_friction=0.0",
     "model.land_damping_alpha_s_m=0.0",
 )
+# Each law that a scene may have besides the default ones, as far as they go together.
+EVERYTHING = (
+    "support.stiffness_N_m=5e7",
+    "support.damping_N_s_m=2e3",
+    "support.outer_ring_mass_kg=0.4",
+    "operation.outer_speed_rpm=-6000.0",
+    "operation.rotating_load_N=150.0",
+    "operation.unbalance_g_mm=3.0",
+    "operation.gravity_m_s2=9.81",
+    "operation.gravity_direction_deg=-70.0",
+    "operation.schedule.time_s=[0.0, 2e-3, 6e-3]",
+    "operation.schedule.inner_speed_rpm=[20000.0, 24000.0, 22000.0]",
+    "operation.schedule.radial_load_N=[900.0, 1300.0, 1200.0]",
+    "cage.imbalance_um=40.0",
+    "bearing.roller_diameter_errors_um=[0.0, 1.0, -1.0, 0.4, 0.0, -2.0, 0.3, 0.0, 1.5, -0.2]",
+    "bearing.outer_waviness=[{order=2, amplitude_um=6.0, phase_deg=20.0}, {order=21, amplitude_um=0.3}]",
+    "bearing.inner_waviness=[{order=9, amplitude_um=0.4, phase_deg=70.0}]",
+    "bearing.roller_profile=crowned",
+    "bearing.crown_radius_mm=800.0",
+    "bearing.tilt_mrad=0.6",
+    "bearing.tilt_direction_deg=40.0",
+    "bearing.inner_tilt_share=0.4",
+    "model.line_contact=dowson_higginson",
+    "model.pocket_film=true",
+    "traction.model=thermal_newtonian",
+    "traction.friction=mixed",
+)
 
 
 class Outcome(NamedTuple):
@@ -54,27 +86,31 @@ def make(*assignments: str) -> Scene:
     return Scene.from_dict(read_toml(EXAMPLE), "scene", (*SHORT, *assignments))
 
 
+@entry
+def compiled_right_hand_side(bearing: Any, y: Any, dy: Any, power: Any, loads: Any, work: Any) -> None:
+    """The right-hand side, its machine code kept on disk."""
+    derivative(bearing, y, 0, dy, power, loads, work)
+
+
 def right_hand_side(bearing: Any, y: NDArray[np.float64]) -> Outcome:
     """The right-hand side under test; the work space is poisoned so that nothing stale can pass for a result."""
-    from rbdyn.dynamics.equations import LOADS, POWERS, derivative
-    from rbdyn.dynamics.races import scratch
-
     dy, power, loads = (np.full((1, size), np.nan) for size in (y.size, POWERS, LOADS))
-    derivative(bearing, y, 0, dy, power, loads, scratch())
+    work = scratch()
+    work.lanes[:] = np.nan
+    compiled_right_hand_side(bearing, y, dy, power, loads, work)
     return Outcome(dy[0], power[0], loads[0])
 
 
 def state_near_contact(scene: Scene, seed: int) -> NDArray[np.float64]:
     """A seeded state in which races, pocket walls and land are partly open, partly closed, and all slide."""
-    from rbdyn.dynamics.model import kinematics, raceway_radii
-    from rbdyn.dynamics.state import size
-
     draw = np.random.default_rng(seed)
-    z = scene.bearing.rollers
+    z, parts = scene.bearing.rollers, layout_of(scene)
     outer, _ = raceway_radii(scene)
     motion = kinematics(scene)
     roller = 0.5e-3 * scene.bearing.roller_diameter_mm
-    half_pocket = 0.5e-3 * scene.cage.pocket_clearance_mm
+    radii = roller_radii(scene)
+    larger = 0.0 if radii is None else radii - roller
+    half_pocket = 0.5e-3 * scene.cage.pocket_clearance_mm - larger
     cage_direction, cage_size = draw.uniform(0.0, 2.0 * np.pi), draw.choice([0.3, 0.9, 1.0])
     cage = cage_size * 0.5e-3 * scene.cage.guide_clearance_mm + draw.uniform(-2e-6, 2e-6)
     cage_xy = cage * np.array([np.cos(cage_direction), np.sin(cage_direction)])
@@ -96,10 +132,18 @@ def state_near_contact(scene: Scene, seed: int) -> NDArray[np.float64]:
     place = radial * np.sqrt(orbit**2 - along**2) + ahead * along
     speed = motion.cage_speed * orbit * draw.uniform(0.9, 1.05, z)
     velocity = np.array([-place[1], place[0]]) / orbit * speed + draw.uniform(-0.2, 0.2, (2, z))
-    y = np.zeros(size(z))
-    y[: 5 * z] = np.concatenate((*place, *velocity, motion.roller_spin * draw.uniform(0.8, 1.1, z)))
+    y = np.zeros(parts.size)
     cage_motion = (*draw.uniform(-0.5, 0.5, 2), motion.cage_speed * draw.uniform(0.9, 1.05))
-    y[5 * z :] = (*cage_xy, cage_angle, *cage_motion, *ring_xy, *draw.uniform(-0.2, 0.2, 2))
+    ring_motion = draw.uniform(-0.2, 0.2, 2)
+    if parts.support is not None:
+        # The outer ring goes a little off its place and takes all else along.
+        support = draw.uniform(-20e-6, 20e-6, 2)
+        y[parts.support : parts.support + 4] = (*support, *draw.uniform(-0.1, 0.1, 2))
+        place, cage_xy, ring_xy = place + support[:, np.newaxis], cage_xy + support, ring_xy + support
+    if parts.clock is not None:
+        y[parts.clock :] = (draw.uniform(0.0, 4.0) * scene.turn_s, *draw.uniform(-20.0, 20.0, 2))
+    y[: 5 * z] = np.concatenate((*place, *velocity, motion.roller_spin * draw.uniform(0.8, 1.1, z)))
+    y[5 * z : 5 * z + 10] = (*cage_xy, cage_angle, *cage_motion, *ring_xy, *ring_motion)
     return y
 
 
@@ -137,6 +181,12 @@ def inner() -> Scene:
 def conservative() -> Scene:
     """Elastic contacts everywhere and nothing that dissipates."""
     return make(*CONSERVATIVE)
+
+
+@pytest.fixture(scope="session")
+def everything() -> Scene:
+    """Every law that goes with guidance on the outer ring."""
+    return make(*EVERYTHING)
 
 
 @pytest.fixture(scope="session")

@@ -1,9 +1,9 @@
 """The right-hand side once more: plain numpy and loops, straight from the equations, with no kernel of ``rbdyn``.
 
 It differs on purpose in how it gets there. Every contact is a pair of forces at a point in the plane, velocities of
-the two surfaces come from rigid-body motion, moments from cross products; the rolling resistance comes from the
-equilibrium of the film; the bar in series with a wall is solved by bracketing; the guide film is integrated over
-angle. Parameters are worked out from the scene's own numbers.
+the two surfaces come from rigid-body motion, moments from cross products; the force of a wavy race is virtual work by
+a complex step; films carry no moment of their own; an unbalanced cage moves about its centre of mass; the guide
+film is integrated over angle. The scalar laws stand in ``numpy_twin_laws``.
 """
 
 from __future__ import annotations
@@ -12,24 +12,41 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+from numpy_twin_laws import (
+    alpha_of,
+    hunt_crossley,
+    oil_of,
+    palmgren_stiffness,
+    race_damped,
+    race_load,
+    race_traction,
+    raceways,
+    roller_errors,
+    rolling_resistance,
+    scheduled,
+    wall_load,
+)
 
-from rbdyn.lubricants import oil_at
 from rbdyn.scene import Scene
 
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(300)
+NAMES = (
+    "outer_race_traction", "inner_race_traction", "rolling_resistance", "race_damping", "pocket_friction",
+    "pocket_damping", "pocket_film", "land_film", "land_friction", "land_damping", "roller_drag", "support_damping",
+    "shaft", "load",
+)  # fmt: skip
+POWERS = {name: index for index, name in enumerate(NAMES)}
 
 
 class Body:
     """A rigid body in the plane: centre, velocity, spin, and the force and moment gathered on it."""
 
-    def __init__(self, centre, velocity, spin):
+    def __init__(self, centre, velocity, spin, angle=0.0):
         self.centre, self.velocity, self.spin = np.array(centre), np.array(velocity), float(spin)
-        self.force, self.moment = np.zeros(2), 0.0
+        self.angle, self.force, self.moment = angle, np.zeros(2), 0.0
 
     def velocity_at(self, point):
-        arm = point - self.centre
-        return self.velocity + self.spin * np.array([-arm[1], arm[0]])
+        return self.velocity + self.spin * turned(point - self.centre)
 
     def push(self, force, point):
         self.force = self.force + force
@@ -37,7 +54,7 @@ class Body:
 
 
 class Twin(NamedTuple):
-    """Result: derivative of the state, powers in the order of LOSSES and the shaft, loads."""
+    """Result: derivative of the state, powers in the order of ``POWERS``, largest loads."""
 
     dy: Any
     power: Any
@@ -52,135 +69,54 @@ def turned(a):
     return np.array([-a[1], a[0]])
 
 
-def modulus(first, second):
-    return 2.0 / sum((1.0 - part.poisson_ratio**2) / part.elastic_modulus for part in (first, second))
+def race_overlap(scene, encloses, radius, between, ring_angle):
+    """Overlap of a roller's middle with a race whose harmonics have turned by ``ring_angle``; complex as well."""
+    surface = raceways(scene)[0 if encloses else 1]
+    # The azimuth is counted from the real place, as the arctangent of two arguments knows no complex ones.
+    near = np.real(between)
+    azimuth = math.atan2(near[1], near[0]) + np.arctan(cross(near, between) / (near @ between))
+    for harmonic in scene.bearing.outer_waviness if encloses else scene.bearing.inner_waviness:
+        phase = math.radians(harmonic.phase_deg)
+        surface += harmonic.amplitude_um * 1e-6 * np.cos(harmonic.order * (azimuth - ring_angle - phase))
+    distance = np.sqrt(between @ between)
+    return distance + radius - surface if encloses else surface + radius - distance
 
 
-def stiffness(scene, first, second, length):
-    """Chen et al. 2022, eq 6, solved for the load: Palmgren's line contact [N/m^(10/9)]."""
-    return (
-        modulus(scene.material(first), scene.material(second))
-        / 8.0
-        * (1.0 / 0.39) ** (10.0 / 9.0)
-        * length ** (8.0 / 9.0)
-    )
-
-
-def race_load(scene, approach):
-    """Elastic load of a roller on a race, summed over slices of the profiled roller."""
-    drawing = scene.bearing
-    length = drawing.effective_length_mm * 1e-3
-    k = stiffness(scene, "roller", "rings", length)
-    profiled = drawing.roller_profile == "logarithmic"
-    slices = scene.model.slices or (31 if profiled else 1)
-    load = 0.0
-    for s in range(slices):
-        x = ((s + 0.5) / slices - 0.5) * length
-        relief = (
-            -0.00035 * drawing.roller_diameter_mm * 1e-3 * math.log(1.0 - (2.0 * x / length) ** 2)
-            if profiled
-            else 0.0
-        )
-        load += k / slices * max(approach - relief, 0.0) ** (10.0 / 9.0)
-    return load
-
-
-def wall_load(scene, approach):
-    """Elastic load on a pocket wall: indentation plus bending of the bar make up the approach."""
-    k = stiffness(scene, "roller", "cage", scene.bearing.effective_length_mm * 1e-3)
-    bar = scene.model.pocket_bar_stiffness_N_m
-    if bar == "rigid":
-        return k * approach ** (10.0 / 9.0)
-    indentation = brentq(
-        lambda d: d + k * d ** (10.0 / 9.0) / bar - approach, 0.0, approach, xtol=1e-300, rtol=1e-15
-    )
-    return k * indentation ** (10.0 / 9.0)
-
-
-def hunt_crossley(load, alpha, rate):
-    return max(load * (1.0 + 1.5 * alpha * rate), 0.0)
-
-
-def race_damped(scene, load, approach, rate, mass):
-    laws = scene.model
-    if laws.race_damping == "hunt_crossley":
-        return hunt_crossley(load, laws.race_damping_alpha_s_m, rate)
-    if laws.race_damping == "off":
-        return load
-    critical = 2.0 * math.sqrt(10.0 / 9.0 * load / approach * mass)
-    share = min(approach / (laws.race_damping_engagement_um * 1e-6), 1.0)
-    return max(load + laws.race_damping_ratio * critical * (3.0 * share**2 - 2.0 * share**3) * rate, 0.0)
-
-
-def gupta_constants(table):
-    """A, B, C, D from the peak: x exp(-(x - A)/x) = mu_m - mu_inf, B = (x - A)/u_m, C = B/x."""
-    a, peak = table.mu_0 - table.mu_inf, table.mu_m - table.mu_inf
-    x = brentq(
-        lambda x: x * math.exp(-(x - a) / x) - peak,
-        max(a, 1e-4 * abs(a)),
-        100.0 * (abs(a) + peak),
-        xtol=1e-300,
-        rtol=1e-15,
-    )
-    b = (x - a) / table.u_m_m_s
-    return a, b, b / x, table.mu_inf
-
-
-def race_traction(scene, slip):
-    table = scene.traction
-    if table.model == "off":
-        return 0.0
-    if table.model == "coulomb":
-        return table.coulomb * math.tanh(slip / table.blend_speed_m_s)
-    a, b, c, d = gupta_constants(table)
-    speed = abs(slip)
-    mu = (a + b * speed) * math.exp(-c * speed) + d
-    if table.mu_0 > 0.0:
-        return mu * slip / math.hypot(slip, table.blend_speed_m_s)
-    return math.copysign(mu, slip)
-
-
-def rolling_resistance(scene, oil, radius, load, speed):
-    """Biboulet and Houpert 2010 with Aihara's heating of the inlet, from the dimensionless groups."""
-    if scene.model.rolling_resistance == "off" or load == 0.0:
-        return 0.0
-    drawing = scene.bearing
-    length = drawing.effective_length_mm * 1e-3
-    e = modulus(scene.material("roller"), scene.material("rings"))
-    u, w = 2.0 * oil.viscosity * speed / (e * radius), load / (length * e * radius)
-    regime = 1.4 / 1.45 * math.sqrt(w / math.sqrt(u))
-    shaft, (outer, inner) = scene.operation.inner_speed_rpm * math.pi / 30.0, raceways(scene)
-    entrainment = shaft * outer * inner / (outer + inner)
-    thermal = 1.0 / (1.0 + 0.29 * (oil.viscosity_slope * entrainment**2 / oil.conductivity) ** 0.78)
-    return thermal * 1.42 * math.sqrt(u * w) / (1.0 + regime**10) ** 0.1 * e * radius * length
-
-
-def raceways(scene):
-    pitch, roller = scene.bearing.pitch_diameter_mm, scene.bearing.roller_diameter_mm
-    clearance = scene.bearing.radial_clearance_mm
-    return (pitch + roller + 0.5 * clearance) / 2e3, (pitch - roller - 0.5 * clearance) / 2e3
-
-
-def race(scene, oil, mass, ring, roller, encloses):
+def race(scene, mass, ring, roller, radius, encloses):
     """One race and one roller. Returns (load, powers in traction, rolling, damping)."""
-    race_radius = raceways(scene)[0 if encloses else 1]
-    radius = 0.5e-3 * scene.bearing.roller_diameter_mm
     between = roller.centre - ring.centre
     distance = math.hypot(*between)
     outward = between / distance
-    to_race = outward if encloses else -outward
-    approach = distance + radius - race_radius if encloses else race_radius + radius - distance
-    if approach <= 0.0:
+    to_race, tangent = (outward if encloses else -outward), turned(outward)
+
+    def overlap(shift, turn):
+        return race_overlap(scene, encloses, radius, between + shift, ring.angle + turn)
+
+    middle = float(overlap(np.zeros(2), 0.0))
+    elastic, stiffness, approach, lean = race_load(
+        scene, encloses, middle, math.atan2(between[1], between[0])
+    )
+    if elastic == 0.0:
         return 0.0, 0.0, 0.0, 0.0
-    rate = float((roller.velocity - ring.velocity) @ to_race)
-    elastic = race_load(scene, approach)
-    load = race_damped(scene, elastic, approach, rate, mass)
+    if scene.bearing.outer_waviness if encloses else scene.bearing.inner_waviness:
+        # Virtual work: the load times how the overlap changes with the centre and with the angle of the ring, each by
+        # a step of 1e-30 along the imaginary axis, which loses no digits.
+        gradient = np.array([overlap(1e-30j * axis, 0.0).imag / 1e-30 for axis in np.eye(2)])
+        by_angle = overlap(np.zeros(2), 1e-30j).imag / 1e-30
+    else:
+        gradient, by_angle = to_race, 0.0
+    gradient = gradient + lean / distance * tangent
+    rate = float((roller.velocity - ring.velocity) @ gradient) + by_angle * ring.spin
+    load = race_damped(scene, elastic, stiffness, approach, rate, mass)
+    roller.push(-load * gradient, roller.centre)
+    ring.push(load * gradient, ring.centre)
+    ring.moment -= load * by_angle
+
     point = roller.centre + to_race * (radius - 0.5 * approach)
-    tangent = turned(outward)
     slip = float((ring.velocity_at(point) - roller.velocity_at(point)) @ tangent)
-    traction = race_traction(scene, slip) * load
-    roller.push(traction * tangent - load * to_race, point)
-    ring.push(load * to_race - traction * tangent, point)
+    traction = race_traction(scene, encloses, slip, load) * load
+    roller.push(traction * tangent, point)
+    ring.push(-traction * tangent, point)
 
     # Rolling resistance, seen from the line of centres: both surfaces drag the film along at mean speed u, and it
     # holds each back with F_R. Pressure on a round surface points to its centre, so its resultants P on roller and
@@ -190,8 +126,7 @@ def race(scene, oil, mass, ring, roller, encloses):
     lever = float((point - ring.centre) @ outward)
     roller_surface = (roller.spin - line_spin) * float((point - roller.centre) @ outward)
     mean_speed = 0.5 * (roller_surface + (ring.spin - line_spin) * lever)
-    reduced = 1.0 / (1.0 / radius + (-1.0 if encloses else 1.0) / race_radius)
-    held = math.copysign(rolling_resistance(scene, oil, reduced, load, abs(mean_speed)), mean_speed)
+    held = math.copysign(rolling_resistance(scene, encloses, load, abs(mean_speed)), mean_speed)
     pressure = 2.0 * held * lever / distance
     roller.push(-held * tangent, point)
     roller.push(pressure * tangent, roller.centre)
@@ -200,31 +135,88 @@ def race(scene, oil, mass, ring, roller, encloses):
     return load, traction * slip, 2.0 * held * mean_speed, (load - elastic) * rate
 
 
-def pocket(scene, roller, cage, mid_line):
-    """One pocket, both walls. Returns (load, powers in friction, damping)."""
-    if scene.model.pocket == "off":
+def touch(scene, roller, cage, point, to_wall, along, approach):
+    """Dry contact of a roller with a plane of the cage. Returns (load, powers in friction, damping)."""
+    if approach <= 0.0:
         return 0.0, 0.0, 0.0
+    # The approach is measured against the plane, which turns with the cage about the foot of the roller's centre.
+    rate = float((roller.velocity - cage.velocity_at(roller.centre)) @ to_wall)
+    elastic = wall_load(scene, approach)
+    load = hunt_crossley(elastic, alpha_of(scene, "pocket"), rate)
+    slip = float((cage.velocity_at(point) - roller.velocity_at(point)) @ along)
+    friction = scene.model.pocket_friction * math.tanh(slip / scene.traction.blend_speed_m_s) * load
+    force = friction * along - load * to_wall
+    roller.push(force, point)
+    cage.push(-force, point)
+    return load, friction * slip, (load - elastic) * rate
+
+
+def film_on_wall(scene, roller, cage, point, to_wall, along, gap):
+    """Rigid cylinder on a plane in isoviscous oil, seen from axes that turn with the plane. Returns the power lost."""
+    laws = scene.model
     radius = 0.5e-3 * scene.bearing.roller_diameter_mm
-    half = 0.5e-3 * scene.cage.pocket_clearance_mm
+    h = max(gap, laws.pocket_film_floor_um * 1e-6)
+    weight = laws.pocket_fill * oil_of(scene).viscosity * scene.bearing.roller_length_mm * 1e-3
+
+    def seen(body, place):
+        """Velocity of a body at a place, less that of the roller's centre, in axes that turn with the cage."""
+        return float(
+            (body.velocity_at(place) - roller.velocity - cage.spin * turned(place - roller.centre)) @ along
+        )
+
+    round_speed, plane_speed = seen(roller, point), seen(cage, point)
+    entrainment = 0.5 * (round_speed + plane_speed)
+    closing = float((roller.velocity - cage.velocity_at(roller.centre)) @ to_wall)
+    push = 4.895 * weight * abs(entrainment) * radius / h
+    push += 3.0 * math.sqrt(2.0) * math.pi * weight * (radius / h) ** 1.5 * max(closing, 0.0)
+    couette = math.pi * weight * math.sqrt(2.0 * radius / h) * (plane_speed - round_speed)
+    held = 4.60 * weight * entrainment * math.sqrt(radius / h)
+
+    film = Body(cage.centre, (0.0, 0.0), 0.0)
+    before = roller.force, roller.moment
+    for force, place in (
+        (-push * to_wall, roller.centre),
+        ((couette - held) * along, point),
+        (2.0 * held * along, roller.centre),
+    ):
+        roller.push(force, place)
+        film.push(-force, place)
+    cage.force, cage.moment = cage.force + film.force, cage.moment + film.moment
+    force, moment = roller.force - before[0], roller.moment - before[1]
+    return (
+        -float(force @ roller.velocity - force @ cage.velocity)
+        - moment * roller.spin
+        - film.moment * cage.spin
+    )
+
+
+def pocket(scene, roller, cage, radius, mid_line):
+    """One pocket: walls, films, lips. Returns (load, powers in friction, damping, film)."""
+    if scene.model.pocket == "off":
+        return np.zeros(4)
+    # Pocket and lips are cut for the nominal roller.
+    larger = radius - 0.5e-3 * scene.bearing.roller_diameter_mm
+    half, laws, result = 0.5e-3 * scene.cage.pocket_clearance_mm - larger, scene.model, np.zeros(4)
+    floor = laws.pocket_film_floor_um * 1e-6 if laws.pocket_film else 0.0
     for to_wall in (turned(mid_line), -turned(mid_line)):
-        approach = float((roller.centre - cage.centre) @ to_wall) - half
-        if approach <= 0.0:
-            continue
-        # The approach is measured against the wall's plane, which turns with the cage about the foot of the centre.
-        rate = float((roller.velocity - cage.velocity_at(roller.centre)) @ to_wall)
-        elastic = wall_load(scene, approach)
-        load = hunt_crossley(elastic, scene.model.pocket_damping_alpha_s_m, rate)
+        gap = half - float((roller.centre - cage.centre) @ to_wall)
         point = roller.centre + radius * to_wall
-        slip = float((cage.velocity_at(point) - roller.velocity_at(point)) @ mid_line)
-        friction = scene.model.pocket_friction * math.tanh(slip / scene.traction.blend_speed_m_s) * load
-        force = friction * mid_line - load * to_wall
-        roller.push(force, point)
-        cage.push(-force, point)
-        return load, friction * slip, (load - elastic) * rate
-    return 0.0, 0.0, 0.0
+        load, friction, damping = touch(scene, roller, cage, point, to_wall, mid_line, floor - gap)
+        film = film_on_wall(scene, roller, cage, point, to_wall, mid_line, gap) if laws.pocket_film else 0.0
+        result = np.array((max(result[0], load), *np.add(result[1:], (friction, damping, film))))
+    if scene.cage.lip_clearance_mm is not None:
+        play, orbit = 0.5e-3 * scene.cage.lip_clearance_mm - larger, 0.5 * sum(raceways(scene))
+        for side in (1.0, -1.0):
+            height = side * (float((roller.centre - cage.centre) @ mid_line) - orbit)
+            point = roller.centre + side * radius * mid_line
+            load, friction, damping = touch(
+                scene, roller, cage, point, side * mid_line, turned(mid_line), height - play
+            )
+            result = np.array((max(result[0], load), *np.add(result[1:], (friction, damping, 0.0))))
+    return result
 
 
-def guide(scene, oil, cage, ring):
+def guide(scene, cage, ring):
     """Land: film and dry contact. Returns (dry load, powers in film, friction, damping)."""
     laws, drawing = scene.model, scene.cage
     if laws.guide_land == "off" or drawing.guidance == "roller":
@@ -243,7 +235,7 @@ def guide(scene, oil, cage, ring):
     if laws.guide_land == "film":
         play = clearance - laws.land_film_floor_um * 1e-6
         epsilon = min(e, play) / clearance
-        width, factor = drawing.land_width_mm * 1e-3, drawing.lands * laws.land_fill * oil.viscosity
+        width, factor = drawing.land_width_mm * 1e-3, drawing.lands * laws.land_fill * oil_of(scene).viscosity
 
         # Short bearing, h = c (1 - eps cos): d/dz(h^3/(12 eta) dp/dz) = dh/dt + (sum of spins)/2 dh/dangle. Integrated
         # over the width: -eta L^3/h^3 times the right side, which is positive on exactly half the circle.
@@ -266,10 +258,9 @@ def guide(scene, oil, cage, ring):
     approach = e - play
     if approach <= 0.0:
         return 0.0, film_power, 0.0, 0.0
-    elastic = stiffness(scene, "cage", "rings", drawing.lands * drawing.land_width_mm * 1e-3) * approach ** (
-        10.0 / 9.0
-    )
-    load = hunt_crossley(elastic, laws.land_damping_alpha_s_m, closing)
+    length = drawing.lands * drawing.land_width_mm * 1e-3
+    elastic = palmgren_stiffness(scene, "cage", "rings", length) * approach ** (10.0 / 9.0)
+    load = hunt_crossley(elastic, alpha_of(scene, "land"), closing)
     point = journal.centre + radius * to_land
     slip = float((bush.velocity_at(point) - journal.velocity_at(point)) @ tangent)
     friction = laws.land_friction * math.tanh(slip / scene.traction.blend_speed_m_s) * load
@@ -287,53 +278,77 @@ def inertia_of_cage(scene):
     return scene.cage.mass_g * 1e-3 * (scene.land_diameter_mm**2 + rim**2) * 1e-6 / 8.0
 
 
+def cage_accelerations(scene, cage, gravity):
+    """Newton and Euler about the centre of mass, then back to the geometric centre as a rigid body."""
+    mass = scene.cage.mass_g * 1e-3
+    offset = scene.cage.imbalance_um * 1e-6 * np.array([math.cos(cage.angle), math.sin(cage.angle)])
+    spin_up = (cage.moment - cross(offset, cage.force)) / inertia_of_cage(scene)
+    acceleration = cage.force / mass + gravity
+    return acceleration - spin_up * turned(offset) + cage.spin**2 * offset, spin_up
+
+
 def twin(scene: Scene, y: Any) -> Twin:
     """The derivative of a state, the powers and the largest loads."""
-    drawing = scene.bearing
+    drawing, operation, support = scene.bearing, scene.operation, scene.support
     z = drawing.rollers
-    oil = oil_at(scene.lubricant.oil, scene.lubricant.temperature_C)
-    diameter, length = drawing.roller_diameter_mm * 1e-3, drawing.roller_length_mm * 1e-3
-    mass = scene.material("roller").density * math.pi * diameter**2 / 4.0 * length
-    inertia = mass * diameter**2 / 8.0
-    (cx, cy, cage_angle, cvx, cvy, cage_spin), (rx, ry, rvx, rvy) = y[5 * z : 5 * z + 6], y[5 * z + 6 :]
-    cage = Body((cx, cy), (cvx, cvy), cage_spin)
-    shaft = scene.operation.inner_speed_rpm * math.pi / 30.0
-    inner, outer = Body((rx, ry), (rvx, rvy), shaft), Body((0.0, 0.0), (0.0, 0.0), 0.0)
-    power, loads, dy = np.zeros(11), np.zeros(4), np.zeros(y.size)
+    oil, radii, mass = oil_of(scene), roller_errors(scene), roller_mass(scene)
+    inertia = mass * (drawing.roller_diameter_mm * 1e-3) ** 2 / 8.0
+    down = math.radians(operation.gravity_direction_deg)
+    gravity = operation.gravity_m_s2 * np.array([math.cos(down), math.sin(down)])
+
+    rest = list(y[5 * z + 10 :])
+    ring = [rest.pop(0) for _ in range(4)] if support is not None else [0.0] * 4
+    clocked = len(rest) == 3
+    time, inner_angle, outer_angle = rest if clocked else (0.0, 0.0, 0.0)
+    shaft = scheduled(scene, "inner_speed_rpm", time) * math.pi / 30.0
+    cage_state, inner_state = y[5 * z : 5 * z + 6], y[5 * z + 6 : 5 * z + 10]
+    cage = Body(cage_state[:2], cage_state[3:5], cage_state[5], cage_state[2])
+    inner = Body(inner_state[:2], inner_state[2:], shaft, inner_angle)
+    outer = Body(ring[:2], ring[2:], operation.outer_speed_rpm * math.pi / 30.0, outer_angle)
+
+    power, loads, dy = np.zeros(len(POWERS)), np.zeros(4), np.zeros(y.size)
     for j in range(z):
         roller = Body(y[[j, z + j]], y[[2 * z + j, 3 * z + j]], y[4 * z + j])
-        angle = cage_angle + 2.0 * math.pi * j / z
-        wall, friction, damping = pocket(scene, roller, cage, np.array([math.cos(angle), math.sin(angle)]))
-        loads[0] = max(loads[0], wall)
-        power[4] += friction
-        power[5] += damping
-        for term, ring, encloses in ((0, outer, True), (1, inner, False)):
-            load, slipping, rolling, damping = race(scene, oil, mass, ring, roller, encloses)
+        angle = cage.angle + 2.0 * math.pi * j / z
+        wall = pocket(scene, roller, cage, radii[j], np.array([math.cos(angle), math.sin(angle)]))
+        loads[0] = max(loads[0], wall[0])
+        power[4:7] += wall[1:]
+        for term, body, encloses in ((0, outer, True), (1, inner, False)):
+            load, slipping, rolling, damping = race(scene, mass, body, roller, radii[j], encloses)
             loads[1 + term] = max(loads[1 + term], load)
-            power[term] += slipping
-            power[2] += rolling
-            power[3] += damping
+            power[[term, 2, 3]] += slipping, rolling, damping
         if scene.model.drag == "cylinder":
             density = scene.lubricant.oil_fraction * oil.density + (1.0 - scene.lubricant.oil_fraction) * 1.2
-            area = diameter * length
+            area = drawing.roller_diameter_mm * drawing.roller_length_mm * 1e-6
             speed = math.hypot(*roller.velocity)
             resisted = -0.5 * density * scene.model.drag_coefficient * area * speed * roller.velocity
             roller.push(resisted, roller.centre)
-            power[9] -= float(resisted @ roller.velocity)
+            power[POWERS["roller_drag"]] -= float(resisted @ roller.velocity)
         dy[[j, z + j]] = roller.velocity
-        dy[[2 * z + j, 3 * z + j]] = roller.force / mass
+        dy[[2 * z + j, 3 * z + j]] = roller.force / mass + gravity
         dy[4 * z + j] = roller.moment / inertia
-    loads[3], power[6], power[7], power[8] = guide(
-        scene, oil, cage, outer if scene.cage.guidance == "outer" else inner
-    )
-    power[10] = -inner.moment * shaft
-    cage_mass, ring_mass = scene.cage.mass_g * 1e-3, drawing.inner_ring_mass_kg
-    load = np.array([scene.operation.radial_load_N, 0.0])
-    dy[5 * z : 5 * z + 6] = (
-        *cage.velocity,
-        cage.spin,
-        *(cage.force / cage_mass),
-        cage.moment / inertia_of_cage(scene),
-    )
-    dy[5 * z + 6 :] = (*inner.velocity, *((inner.force + load) / ring_mass))
+    loads[3], *land = guide(scene, cage, outer if scene.cage.guidance == "outer" else inner)
+    power[7:10] = land
+
+    whirling = operation.rotating_load_N + operation.unbalance_g_mm * 1e-6 * shaft**2
+    load = np.array([scheduled(scene, "radial_load_N", time), 0.0])
+    load = load + whirling * np.array([math.cos(inner_angle), math.sin(inner_angle)])
+    power[POWERS["shaft"]] = -inner.moment * inner.spin - outer.moment * outer.spin
+    power[POWERS["load"]] = float(load @ inner.velocity) if clocked else 0.0
+    acceleration, spin_up = cage_accelerations(scene, cage, gravity)
+    dy[5 * z : 5 * z + 6] = (*cage.velocity, cage.spin, *acceleration, spin_up)
+    inner_acceleration = (inner.force + load) / drawing.inner_ring_mass_kg + gravity
+    dy[5 * z + 6 : 5 * z + 10] = (*inner.velocity, *inner_acceleration)
+    extra = []
+    if support is not None:
+        held = outer.force - support.stiffness_N_m * outer.centre - support.damping_N_s_m * outer.velocity
+        extra = [*outer.velocity, *(held / support.outer_ring_mass_kg + gravity)]
+        power[POWERS["support_damping"]] = support.damping_N_s_m * float(outer.velocity @ outer.velocity)
+    dy[5 * z + 10 :] = extra + ([1.0, inner.spin, outer.spin] if clocked else [])
     return Twin(dy, power, loads)
+
+
+def roller_mass(scene):
+    drawing = scene.bearing
+    volume = math.pi * (drawing.roller_diameter_mm * 1e-3) ** 2 / 4.0 * drawing.roller_length_mm * 1e-3
+    return scene.material("roller").density * volume

@@ -10,8 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rbdyn.dynamics import runge_kutta as rk
-from rbdyn.dynamics.equations import POWERS, SHAFT, mechanical_energy
-from rbdyn.dynamics.model import roller_bearing, scales
+from rbdyn.dynamics.energy import mechanical_energy
+from rbdyn.dynamics.equations import POWERS, SHAFT
+from rbdyn.dynamics.geometry import scales
+from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import CancelledError, Run, Stop
 from rbdyn.faults import RunError
 
@@ -136,7 +138,7 @@ def test_oracle_quarter_turn(outer, evaluate):
     bearing, start = run.bearing, run.carry.y.copy()
     duration, n = 0.25 * outer.turn_s, start.size
     tolerance = 1e-11 / (run.control.inverse_tolerance * 1e-9)
-    scale = scales(bearing, outer)
+    scale = scales(outer)
 
     def augmented(_, y):
         found = evaluate(bearing, y[:n])
@@ -203,7 +205,7 @@ def test_unit_chunks_change_nothing(outer):
         parts.to(float(end))
     assert parts.carry.clock[0] == whole.carry.clock[0] == 0.5 * outer.turn_s
     assert parts.tally.whirl[0] == whole.tally.whirl[0] == 257  # 512 a turn, both ends counted
-    scale = scales(whole.bearing, outer)
+    scale = scales(outer)
     # Ten extra step ends at rtol 1e-8, over half a turn in which differences grow about tenfold.
     assert parts.tally.work == pytest.approx(whole.tally.work, rel=1e-5, abs=1e-5 * scale.load * scale.length)
     assert parts.tally.whirl[1:] == pytest.approx(whole.tally.whirl[1:], rel=1e-5)

@@ -9,10 +9,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, SHAFT
+from rbdyn.dynamics.equations import (
+    INNER_LOAD,
+    LAND_LOAD,
+    LOADS,
+    LOSSES,
+    OUTER_LOAD,
+    POCKET_LOAD,
+    POWERS,
+    SHAFT,
+)
+from rbdyn.dynamics.geometry import kinematics
+from rbdyn.dynamics.history import history
 from rbdyn.dynamics.metrics import Replicate, quantity, student_half_width
-from rbdyn.dynamics.model import kinematics, roller_bearing
-from rbdyn.dynamics.simulate import simulate, trace
+from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.simulate import Run, Stop, simulate
 from rbdyn.faults import InputError, RunError
 from rbdyn.result import Quantity, SimulationResult
 
@@ -169,15 +180,71 @@ def test_invariant_reversed_shaft(outer, outer_result):
     assert turned.power_loss.value == pytest.approx(outer_result.power_loss.value, rel=0.1)
 
 
-def test_unit_trace_is_the_first_replicate(outer):
+@pytest.fixture(scope="module")
+def past(outer):
+    """The first two counted turns of the first replicate."""
+    return history(outer, 2.0)
+
+
+def test_unit_history_is_the_first_replicate(outer, past):
     """Unit: uniform samples of the counted turns; the cage stays in its land; walls push both ways."""
-    history = trace(outer, 2.0)
-    assert len(history.time) == 2 * 512
-    assert np.diff(history.time) == pytest.approx(np.full(1023, outer.turn_s / 512), rel=1e-9)
-    assert history.pocket_load.shape == (1024, 10)
+    assert len(past.time) == 2 * 512
+    assert np.diff(past.time) == pytest.approx(np.full(1023, outer.turn_s / 512), rel=1e-9)
+    for name in ("pocket_load", "outer_load", "inner_slip", "outer_heat", "roller_x", "azimuth"):
+        assert getattr(past, name).shape == (1024, 10)
     # Dry contact indents the land by a micrometre or so.
-    assert np.hypot(history.cage_x, history.cage_y).max() < 1.05 * outer.guide_clearance_m
-    assert history.pocket_load.max() > 0.0 > history.pocket_load.min()
+    assert np.hypot(*past.guide_eccentricity).max() < 1.05 * outer.guide_clearance_m
+    assert past.pocket_load.max() > 0.0 > past.pocket_load.min()
+    assert (past.outer_x == 0.0).all() and (past.outer_y == 0.0).all()
+    # From the discarded turns on, both angles grow without bound, at the speeds of shaft and cage.
+    turned = past.inner_angle[-1] - past.inner_angle[0]
+    assert turned == pytest.approx(2.0 * np.pi * 1023 / 512, rel=1e-9)
+    assert past.inner_angle[0] == pytest.approx(2.0 * np.pi * outer.numerics.discard_turns, rel=1e-9)
+    orbits = past.azimuth[-1] - past.azimuth[0]
+    assert orbits == pytest.approx(np.full(10, turned * past.cage_speed.mean() / 2513.27), rel=0.02)
+
+
+def test_unit_history_agrees_with_the_tally(outer, past):
+    """Unit: sampled loads never pass the largest that the run keeps, and come close where loads change slowly."""
+    run = Run(outer, roller_bearing(outer), 0, outer.numerics.rtol, Stop())
+    run.to(outer.numerics.discard_turns)
+    run.forget()
+    # Steps end at the samples, as in the history: the same path, bit by bit.
+    for sample in range(len(past.time)):
+        run.to(outer.numerics.discard_turns + sample / outer.numerics.samples_per_turn)
+    kept = run.tally.largest
+    for name, index in (("outer_load", OUTER_LOAD), ("inner_load", INNER_LOAD)):
+        sampled = getattr(past, name)[1:].max()
+        assert 0.98 * kept[index] < sampled <= kept[index] * (1.0 + 1e-12)
+    # Impacts are shorter than a sample, and the tally looks inside the steps.
+    assert 0.0 < np.abs(past.pocket_load[1:]).max() <= kept[POCKET_LOAD] * (1.0 + 1e-9)
+    assert past.land_load[1:].max() <= kept[LAND_LOAD] * (1.0 + 1e-12)
+
+
+def test_unit_history_table(past):
+    """Unit: a row a sample; every column tells its unit and holds what the arrays hold."""
+    table = past.table()
+    assert len(table) == len(past.time) and not table.isna().to_numpy().any()
+    units = ("_s", "_um", "_rpm", "_N", "_m_s", "_rad", "_deg", "_W")
+    assert [name for name in table.columns if not name.endswith(units)] == []
+    assert table["cage_x_um"].to_numpy() == pytest.approx(past.cage_x * 1e6, rel=1e-12)
+    assert table["cage_speed_rpm"].mean() == pytest.approx(past.cage_speed.mean() * 30.0 / np.pi, rel=1e-12)
+    assert (table["pocket_3_N"].to_numpy() == past.pocket_load[:, 2]).all()
+    assert (table["inner_slip_10_m_s"].to_numpy() == past.inner_slip[:, 9]).all()
+
+
+def test_unit_a_result_keeps_no_time_series(outer_result):
+    """Unit: nothing is stored that was not asked for: no array in a result, and a record of some kilobytes."""
+
+    def arrays(value):
+        if isinstance(value, np.ndarray):
+            return 1
+        if isinstance(value, dict):
+            return sum(map(arrays, value.values()))
+        return sum(map(arrays, value)) if isinstance(value, list | tuple) else 0
+
+    assert arrays(list(vars(outer_result).values())) == 0
+    assert len(json.dumps(outer_result.as_dict())) < 50_000
 
 
 def test_unit_failing_replicate_raises(make_scene):

@@ -6,13 +6,16 @@ import math
 
 import numpy as np
 import pytest
+from numpy_twin import race_overlap
+from numpy_twin_laws import race_load, raceways, roller_errors
 from scipy.optimize import brentq
 
 from rbdyn.contact.hertz_line import LineContactOnBar
 from rbdyn.dynamics import state
-from rbdyn.dynamics.equations import mechanical_energy
+from rbdyn.dynamics.energy import mechanical_energy
+from rbdyn.dynamics.geometry import cage_inertia, kinematics, raceway_radii, scales
 from rbdyn.dynamics.guide_land import InnerGuide, NoFilm, NoGuide, OuterGuide
-from rbdyn.dynamics.model import cage_inertia, kinematics, raceway_radii, roller_bearing, scales
+from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.start import start_state, static_share
 
 
@@ -48,43 +51,92 @@ def test_literature_centrifugal_force(outer):
     assert bearing.roller_mass * 21.75e-3 * motion.cage_speed**2 == pytest.approx(54.0, abs=0.5)
 
 
-def equilibrium(bearing, angles, orbit_speed):
-    """Ring displacement and loads on the inner race by nested bracketing, from Palmgren's law and geometry alone."""
-    k = bearing.inner.contact.stiffness
+def equilibrium(scene, angles, orbit_speed):
+    """Ring displacement and loads on the inner race by nested bracketing, from the laws and geometry of the twin."""
+    radii, (outer_radius, _) = roller_errors(scene), raceways(scene)
+    mass, load = roller_bearing(scene).roller_mass, scene.operation.radial_load_N
 
-    def load(approach):
-        return k * max(approach, 0.0) ** (10.0 / 9.0)
+    def contact(j, centre, ring_x, encloses):
+        between = centre - np.array([0.0 if encloses else ring_x, 0.0])
+        overlap = float(race_overlap(scene, encloses, radii[j], between, 0.0))
+        return race_load(scene, encloses, overlap, math.atan2(between[1], between[0]))[0]
 
-    def roller_loads(ring_x, angle):
-        def inner(radius):
-            x, y = radius * math.cos(angle) - ring_x, radius * math.sin(angle)
-            return load(bearing.inner.radius + bearing.roller_radius - math.hypot(x, y))
+    def roller_load(j, ring_x):
+        direction = np.array([math.cos(angles[j]), math.sin(angles[j])])
 
         def unbalance(radius):
-            outside = load(radius + bearing.roller_radius - bearing.outer.radius)
-            return outside - inner(radius) - bearing.roller_mass * radius * orbit_speed**2
+            centre = radius * direction
+            held = contact(j, centre, ring_x, True) - contact(j, centre, ring_x, False)
+            return held - mass * radius * orbit_speed**2
 
-        seat = bearing.outer.radius - bearing.roller_radius
-        return inner(brentq(unbalance, seat - 1e-4, seat + 1e-4, xtol=1e-18, rtol=1e-15))
+        seat = outer_radius - radii[j]
+        radius = brentq(unbalance, seat - 1e-4, seat + 1e-4, xtol=1e-18, rtol=1e-15)
+        return contact(j, radius * direction, ring_x, False)
 
     def support(ring_x):
-        return sum(roller_loads(ring_x, angle) * math.cos(angle) for angle in angles) - bearing.radial_load
+        return sum(roller_load(j, ring_x) * math.cos(angles[j]) for j in range(len(angles))) - load
 
-    ring_x = brentq(support, 0.0, 1e-4, xtol=1e-18, rtol=1e-15)
-    return ring_x, [roller_loads(ring_x, angle) for angle in angles]
+    ring_x = brentq(support, 0.0, 1e-4, xtol=1e-15, rtol=1e-12)
+    return ring_x, [roller_load(j, ring_x) for j in range(len(angles))]
 
 
 def test_oracle_static_share(outer):
     """Oracle and literature: ring displacement as scipy finds it; 674/387/387 N on the three loaded rollers."""
     bearing, motion = roller_bearing(outer), kinematics(outer)
     angles = 2.0 * np.pi * np.arange(10) / 10
-    expected, loads = equilibrium(bearing, angles, motion.cage_speed)
+    expected, loads = equilibrium(outer, angles, motion.cage_speed)
     radii = np.empty(10)
     # Bisection stops at the round-off of the radii, 3e-18 m in a displacement of some 1e-5 m.
-    assert static_share(bearing, angles, motion.cage_speed, radii) == pytest.approx(expected, rel=1e-10)
+    found = static_share(bearing, angles, motion.cage_speed, 1300.0, radii)
+    assert found == pytest.approx(expected, rel=1e-10)
     assert loads[0] == pytest.approx(674.0, rel=0.01)
     assert [loads[1], loads[9]] == pytest.approx([387.0, 387.0], rel=0.01)
     assert loads[2:9] == [0.0] * 7
+
+
+def test_oracle_static_share_of_an_imperfect_bearing(everything):
+    """Oracle: the same with waviness, unequal rollers, a crown, a tilt and the logarithmic law."""
+    bearing, motion = roller_bearing(everything), kinematics(everything)
+    angles = 0.2 + 2.0 * np.pi * np.arange(10) / 10
+    expected, loads = equilibrium(everything, angles, motion.cage_speed)
+    radii = np.empty(10)
+    found = static_share(bearing, angles, motion.cage_speed, everything.operation.radial_load_N, radii)
+    assert found == pytest.approx(expected, rel=1e-9)
+    assert 2 <= np.count_nonzero(loads) < 10
+
+
+def test_literature_both_rings_turn(make_scene):
+    """Literature: cage speed (w_i R_i + w_o R_o)/(R_i + R_o); zero where race surfaces run against each other."""
+    scene = make_scene("bearing.radial_clearance_mm=0.0", "operation.outer_speed_rpm=9000.0")
+    shaft, housing = 24000.0 * math.pi / 30.0, 9000.0 * math.pi / 30.0
+    motion, roller = kinematics(scene), 4.5e-3
+    assert motion.cage_speed == pytest.approx((shaft * 17.25 + housing * 26.25) / 43.5, rel=1e-12)
+    orbit = motion.cage_speed * 21.75e-3
+    assert orbit + motion.roller_spin * roller == pytest.approx(housing * 26.25e-3, rel=1e-12)
+    assert orbit - motion.roller_spin * roller == pytest.approx(shaft * 17.25e-3, rel=1e-12)
+    assert (shaft - motion.cage_speed) * 17.25e-3 == pytest.approx(motion.entrainment, rel=1e-12)
+    assert (housing - motion.cage_speed) * 26.25e-3 == pytest.approx(-motion.entrainment, rel=1e-12)
+    counter = kinematics(scene, shaft, -shaft * 17.25 / 26.25)
+    assert counter.cage_speed == pytest.approx(0.0, abs=1e-12 * shaft)
+    assert counter.entrainment == pytest.approx(shaft * 17.25e-3, rel=1e-12)
+    together = kinematics(scene, shaft, shaft)
+    assert (together.cage_speed, together.roller_spin) == pytest.approx((shaft, shaft), rel=1e-12)
+    assert together.entrainment == pytest.approx(0.0, abs=1e-12 * shaft)
+
+
+def test_unit_start_on_a_support(everything):
+    """Unit: all sits on the outer ring, which gives way by load over stiffness; speeds are those of time zero."""
+    bearing = roller_bearing(everything)
+    y = start_state(everything, bearing, np.random.default_rng(5))
+    assert y.size == 67 and (y[61:] == 0.0).all()
+    # At rest the rotating load and the unbalance lie along the load.
+    shaft = 20000.0 * math.pi / 30.0
+    load = 900.0 + 150.0 + 3e-6 * shaft**2
+    assert y[60] == pytest.approx(load / 5e7, rel=1e-12)
+    motion = kinematics(everything, shaft, -6000.0 * math.pi / 30.0)
+    assert y[55] == pytest.approx(motion.cage_speed, rel=1e-12)
+    assert y[40:50] == pytest.approx(np.full(10, motion.roller_spin), rel=1e-12)
+    assert y[56] > y[60] and np.hypot(y[50] - y[60], y[51]) == pytest.approx(7.5e-6, rel=1e-9)
 
 
 def test_unit_start_is_in_equilibrium(outer, evaluate):
@@ -93,7 +145,7 @@ def test_unit_start_is_in_equilibrium(outer, evaluate):
     y = start_state(outer, bearing, np.random.default_rng(5))
     outcome = evaluate(bearing, y)
     # Traction and rolling resistance are not part of the static share: a few parts in a hundred of the load.
-    assert abs(outcome.dy[58]) < 0.05 * bearing.radial_load / bearing.ring_mass
+    assert abs(outcome.dy[58]) < 0.05 * bearing.drive.load_x / bearing.inner_ring_mass
     assert 400.0 < outcome.loads[2] < 900.0
     assert all(math.isfinite(part) for part in mechanical_energy(bearing, y))
 
@@ -113,10 +165,17 @@ def test_unit_seeds(outer):
 
 def test_unit_state_names():
     """Unit: components have the names of the layout, rollers counted from 1."""
-    assert state.size(10) == 60
-    assert [state.name(i, 10) for i in (0, 29, 43, 52, 59)] == [
-        "roller 1 x", "roller 10 vx", "roller 4 spin", "cage angle", "inner ring vy",
+    plain, full = state.layout(10, False, False), state.layout(10, True, True)
+    assert plain == (10, 60, None, None) and full == (10, 67, 60, 64)
+    assert state.layout(10, False, True) == (10, 63, None, 60)
+    for parts in (plain, full):
+        assert [state.name(i, parts) for i in (0, 29, 43, 52, 59)] == [
+            "roller 1 x", "roller 10 vx", "roller 4 spin", "cage angle", "inner ring vy",
+        ]  # fmt: skip
+    assert [state.name(i, full) for i in (60, 63, 64, 65, 66)] == [
+        "outer ring x", "outer ring vy", "time", "inner ring angle", "outer ring angle",
     ]  # fmt: skip
+    assert state.name(60, state.layout(10, False, True)) == "time"
 
 
 def test_unit_geometry_of_guides(make_scene, outer, inner):
@@ -136,7 +195,7 @@ def test_unit_geometry_of_guides(make_scene, outer, inner):
 def test_unit_scales(outer):
     """Unit: a contact's characteristic speed is its amplitude times its natural frequency."""
     bearing = roller_bearing(outer)
-    scale = scales(bearing, outer)
+    scale = scales(outer)
     assert scale.load == pytest.approx(130.0)  # 1300 N over ten rollers
     assert bearing.inner.contact.stiffness * scale.length ** (10.0 / 9.0) == pytest.approx(
         scale.load, rel=1e-12

@@ -1,9 +1,13 @@
 """Contact laws that rollers and balls share.
 
-- ``hertz_line``: load of a line contact against approach (Palmgren), whole, in slices, on an elastic bar
-- ``damping``: what a closing or opening contact adds to the elastic load
-- ``traction``: friction coefficient against sliding speed
+- ``hertz_line``: load of a line contact against approach (Palmgren and rivals), whole, in slices, on an elastic bar
+- ``profile``: roller profiles as drops over the length
+- ``damping``: what a closing or opening contact adds to the elastic load; restitution
+- ``traction``: friction coefficient against sliding speed and load, as compiled
+- ``rheology``: traction of an elastohydrodynamic film from the oil's behaviour under pressure and shear
+- ``film_thickness``: thickness of that film, its lambda ratio, the share that asperities bear
 - ``film``: rolling resistance of the lubricated line contact; the short-journal film
+- ``pocket_film``: wedge, squeeze and shear between a roller and a pocket wall
 
 Conventions: approach is positive when surfaces overlap, its rate positive when they close, loads are
 non-negative. A slip is the surface speed of the ring (or cage) minus that of the roller; the traction on the

@@ -15,8 +15,8 @@ class NoDamping(NamedTuple):
 class ViscousDamping(NamedTuple):
     """A fixed share of critical damping at every load, engaged smoothly over a short first approach.
 
-    c = 2 zeta sqrt(k m) with the tangent stiffness k = (10/9) Q/delta; the engagement stands for the oil film
-    that the surfaces press out before they touch.
+    c = 2 zeta sqrt(k m) with the tangent stiffness k; the engagement stands for the oil film that the surfaces press
+    out before they touch.
     """
 
     ratio: float  # zeta [-]
@@ -30,25 +30,49 @@ class HuntCrossleyDamping(NamedTuple):
     alpha: float  # [s/m]
 
 
+def alpha_of_restitution(restitution: float, speed: float) -> float:
+    """Hunt and Crossley's alpha [s/m] that gives a restitution in (0, 1] at an impact speed [m/s].
+
+    Exact, and the same for any power law: m v dv = -K x^n (1 + 1.5 alpha v) dx, integrated from v to -e v, gives
+    d (1 + e) = ln[(1 + d)/(1 - e d)] with d = 1.5 alpha v. Raises ValueError outside (0, 1] or for speed <= 0.
+    """
+    if not 0.0 < restitution <= 1.0 or not speed > 0.0:
+        raise ValueError("restitution must lie in (0, 1] and the speed above zero")
+    if restitution == 1.0:
+        return 0.0
+
+    def excess(d: float) -> float:
+        return math.log1p(d) - math.log1p(-restitution * d) - d * (1.0 + restitution)
+
+    # Below the root the linear term wins, towards d = 1/e the logarithm grows without bound: bisection cannot fail.
+    low, high = 0.0, 1.0 / restitution
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        if restitution * middle < 1.0 and excess(middle) < 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high) / (1.5 * speed)
+
+
 @law
-def damped_load(damping, elastic_load, approach, approach_rate):
-    """Load [N] >= 0 of a closed contact: elastic load [N], approach [m] > 0 and its rate [m/s]."""
+def damped_load(damping, elastic_load, stiffness, approach, approach_rate):
+    """Load [N] >= 0 of a closed contact: elastic load [N], tangent stiffness [N/m], approach [m] > 0, its rate [m/s]."""
 
 
 @damped_load.body(NoDamping)
-def _(damping, elastic_load, approach, approach_rate):
+def _(damping, elastic_load, stiffness, approach, approach_rate):
     return elastic_load
 
 
 @damped_load.body(ViscousDamping)
-def _(damping, elastic_load, approach, approach_rate):
-    tangent_stiffness = 10.0 / 9.0 * elastic_load / approach
-    coefficient = 2.0 * damping.ratio * math.sqrt(tangent_stiffness * damping.mass)
+def _(damping, elastic_load, stiffness, approach, approach_rate):
+    coefficient = 2.0 * damping.ratio * math.sqrt(stiffness * damping.mass)
     engaged = min(approach * damping.per_engagement, 1.0)
     engaged = engaged * engaged * (3.0 - 2.0 * engaged)
     return max(elastic_load + coefficient * engaged * approach_rate, 0.0)
 
 
 @damped_load.body(HuntCrossleyDamping)
-def _(damping, elastic_load, approach, approach_rate):
+def _(damping, elastic_load, stiffness, approach, approach_rate):
     return max(elastic_load * (1.0 + 1.5 * damping.alpha * approach_rate), 0.0)

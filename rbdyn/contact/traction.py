@@ -1,12 +1,25 @@
-"""Traction coefficient against sliding speed."""
+"""Traction coefficient against sliding speed and load."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
-from rbdyn.elementary import fast_exp
-from rbdyn.kernel import law
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.elementary import fast_exp, fast_log, fma
+from rbdyn.kernel import kernel, law
+
+SMALLEST_LOAD = 1e-30  # [N], keeps the logarithm finite
+LARGEST_SPEED_RATIO = 1e12  # slip over the speed scale of a surface; mu has long become constant
+
+Coefficient = Callable[[NDArray[np.float64], NDArray[np.float64]], Any]
+
+FEWEST_CELLS, MOST_CELLS = 12, 192
+# Step of the difference quotients, in cells: their error stays below 1e-6 of a derivative.
+DIFFERENCE = 1e-3
 
 
 class NoTraction(NamedTuple):
@@ -39,6 +52,36 @@ class CoulombTraction(NamedTuple):
     blend_speed: float  # u_r [m/s]
 
 
+class TractionSurface(NamedTuple):
+    """mu over slip u and load Q from a table: mu = x/(1 + x) exp(L), x = u/u_0.
+
+    L is bicubic (Hermite) and C1 over ln(1 + x) and sqrt(Q), in which it is smooth: it follows the pressure, which
+    goes as sqrt(Q). Cells are uniform. Past the table L lands on a constant within one cell, without a kink.
+    """
+
+    cells: NDArray[np.float64]  # (slip cells x load cells, 16): polynomial of each, load fastest
+    columns: int  # cells along sqrt(load)
+    speed_density: float  # 1/u_0 [s/m]
+    slip_density: float  # cells along ln(1 + x) [-]
+    last_slip: float  # where the cells end [cells]
+    load_origin: float  # sqrt(load) where they begin [sqrt(N)]
+    load_density: float  # cells along sqrt(load) [1/sqrt(N)]
+    last_load: float  # where the cells end [cells]
+
+
+class MixedTraction(NamedTuple):
+    """Asperities carry a share of the load and rub dry: f mu_b tanh(u/u_r) + (1 - f) mu_fluid.
+
+    f = exp(-b Lambda^c) with a film that thins as Q^-0.1, that is exp(-share_scale Q^-share_exponent).
+    """
+
+    fluid: Any  # traction of the film, any other model
+    boundary: float  # mu_b [-]
+    blend_speed: float  # u_r [m/s]
+    share_scale: float  # b Lambda_1^c, Lambda_1 at 1 N [N^share_exponent]
+    share_exponent: float  # 0.1 c [-]
+
+
 def four_constants(mu_0: float, mu_m: float, mu_inf: float, u_m: float) -> tuple[float, float, float, float]:
     """Gupta's A, B, C, D from mu at rest, the peak mu_m at the sliding speed u_m [m/s], and mu far beyond it.
 
@@ -66,28 +109,217 @@ def four_constants(mu_0: float, mu_m: float, mu_inf: float, u_m: float) -> tuple
 
 
 @law
-def traction(model, slip):
-    """Signed traction coefficient at a signed slip [m/s]; traction times slip is never negative."""
+def traction(model, slip, load):
+    """Signed traction coefficient at a signed slip [m/s] and a load [N] >= 0; traction times slip is never negative."""
 
 
 @traction.body(NoTraction)
-def _(model, slip):
+def _(model, slip, load):
     return 0.0
 
 
 @traction.body(FourConstantTraction)
-def _(model, slip):
+def _(model, slip, load):
     speed = abs(slip)
     return math.copysign((model.a + model.b * speed) * fast_exp(-model.c * speed) + model.d, slip)
 
 
 @traction.body(BlendedFourConstantTraction)
-def _(model, slip):
+def _(model, slip, load):
     speed = abs(slip)
     coefficient = (model.a + model.b * speed) * fast_exp(-model.c * speed) + model.d
     return coefficient * slip / math.sqrt(slip * slip + model.blend_speed * model.blend_speed)
 
 
 @traction.body(CoulombTraction)
-def _(model, slip):
+def _(model, slip, load):
     return model.coefficient * math.tanh(slip / model.blend_speed)
+
+
+@traction.body(TractionSurface)
+def _(model, slip, load):
+    # NaN of the slip comes through the ratio; both positions are within the table whatever comes in.
+    ratio = abs(slip) * model.speed_density
+    ratio = LARGEST_SPEED_RATIO if ratio > LARGEST_SPEED_RATIO else ratio
+    whole = 1.0 + ratio
+    along = fast_log(whole) * model.slip_density
+    along = along if along < model.last_slip else model.last_slip
+    across = (math.sqrt(load if load > 0.0 else 0.0) - model.load_origin) * model.load_density
+    across = across if across > 0.0 else 0.0
+    across = across if across < model.last_load else model.last_load
+    i, j = int(along), int(across)
+    exponent = bicubic(model.cells[i * model.columns + j], along - i, across - j)
+    return math.copysign(ratio / whole * fast_exp(exponent), slip)
+
+
+@kernel
+def bicubic(c, x, y):
+    """Sum of c[4 m + n] x^m y^n."""
+    first = fma(fma(fma(c[3], y, c[2]), y, c[1]), y, c[0])
+    second = fma(fma(fma(c[7], y, c[6]), y, c[5]), y, c[4])
+    third = fma(fma(fma(c[11], y, c[10]), y, c[9]), y, c[8])
+    fourth = fma(fma(fma(c[15], y, c[14]), y, c[13]), y, c[12])
+    return fma(fma(fma(fourth, x, third), x, second), x, first)
+
+
+@traction.body(MixedTraction)
+def _(model, slip, load):
+    share = asperity_load_share(model.share_scale, model.share_exponent, load)
+    # tanh, written without a call so that neighbouring contacts share vector instructions.
+    doubled = 2.0 * abs(slip) / model.blend_speed
+    doubled = 40.0 if doubled > 40.0 else doubled
+    rubbing = math.copysign(model.boundary * (1.0 - 2.0 / (fast_exp(doubled) + 1.0)), slip)
+    return share * rubbing + (1.0 - share) * traction(model.fluid, slip, load)
+
+
+@kernel
+def asperity_load_share(scale, exponent, load):
+    """Share of a load [N] that asperities carry, exp(-scale load^-exponent): nil at rest, growing towards one."""
+    held = load if load > SMALLEST_LOAD else SMALLEST_LOAD
+    return fast_exp(-scale * fast_exp(-exponent * fast_log(held)))
+
+
+class SurfaceFit(NamedTuple):
+    """A surface, and its largest error midway between nodes as a share of the largest coefficient."""
+
+    surface: TractionSurface
+    error: float
+
+
+def traction_surface(
+    coefficient: Coefficient,
+    largest_load: float,
+    smallest_load: float,
+    largest_slip: float,
+    tolerance: float = 5e-4,
+) -> SurfaceFit:
+    """Table of ``coefficient(slip, load)``, refined until its error is below ``tolerance`` of the largest value.
+
+    ``coefficient`` takes arrays of slip [m/s] > 0 and load [N] that broadcast, and is positive, linear in the slip
+    near rest. Below ``smallest_load`` and beyond the largest load and slip the coefficient soon stays constant. A
+    kink of the coefficient may keep the error above the tolerance: read it. Raises ValueError where the coefficient
+    is not positive and finite or the loads are not in order.
+    """
+    if not 0.0 < smallest_load < largest_load < math.inf:
+        raise ValueError(f"loads from {smallest_load:g} to {largest_load:g} N make no table")
+    scale = _speed_scale(coefficient, largest_load, largest_slip)
+    slips, loads = FEWEST_CELLS, FEWEST_CELLS
+    while True:
+        grid = _Grid(coefficient, scale, largest_slip, smallest_load, largest_load, slips, loads)
+        cells = _polynomials(grid.nodes())
+        along, across = (grid.error(cells, *shift) for shift in ((0.5, 0.0), (0.0, 0.5)))
+        error = max(along, across, grid.error(cells, 0.5, 0.5))
+        finest = max(slips, loads) >= MOST_CELLS
+        if error < tolerance or finest:
+            return SurfaceFit(grid.surface(cells), error)
+        slips, loads = _refined(slips, along, tolerance), _refined(loads, across, tolerance)
+
+
+def _refined(cells: int, error: float, tolerance: float) -> int:
+    """Cells of a direction whose error, which falls as their fourth power, is to come below half the tolerance."""
+    growth = (2.0 * error / tolerance) ** 0.25
+    return min(math.ceil(cells * min(max(growth, 1.1), 3.0)), MOST_CELLS)
+
+
+def _speed_scale(coefficient: Coefficient, load: float, largest_slip: float) -> float:
+    """Slip [m/s] at which the coefficient at a load has fallen to half its tangent at rest."""
+    slips = largest_slip * np.geomspace(1e-12, 1.0, 300)
+    secant = np.asarray(coefficient(slips, np.array(load))) / slips
+    fallen = secant < 0.5 * secant[0]
+    return float(slips[int(np.argmax(fallen))] if fallen.any() else largest_slip)
+
+
+class _Grid:
+    """Nodes of a surface; positions i along the slip and j along the load count cells."""
+
+    def __init__(
+        self,
+        coefficient: Coefficient,
+        scale: float,
+        largest_slip: float,
+        smallest_load: float,
+        largest_load: float,
+        slips: int,
+        loads: int,
+    ) -> None:
+        self.coefficient, self.scale = coefficient, scale
+        self.slip_cell = math.log1p(largest_slip / scale) / slips
+        self.load_start = math.sqrt(smallest_load)
+        self.load_cell = (math.sqrt(largest_load) - self.load_start) / loads
+        self.i = np.arange(slips + 1.0)[:, np.newaxis]
+        self.j = np.arange(loads + 1.0)[np.newaxis, :]
+
+    def exact(self, i: Any, j: Any) -> tuple[Any, Any]:
+        """The coefficient and x/(1 + x) at positions."""
+        ratio = np.expm1(
+            np.maximum(i * self.slip_cell, 1e-9)
+        )  # at rest both vanish: their quotient is sought
+        load = (self.load_start + j * self.load_cell) ** 2
+        return np.asarray(self.coefficient(ratio * self.scale, load)), ratio / (1.0 + ratio)
+
+    def exponent(self, i: Any, j: Any) -> Any:
+        """L at positions."""
+        mu, rise = self.exact(i, j)
+        if not (np.isfinite(mu).all() and (mu > 0.0).all()):
+            raise ValueError("the traction coefficient must be positive and finite at every slip above zero")
+        return np.log(mu / rise)
+
+    def nodes(self) -> NDArray[np.float64]:
+        """Value, slopes and twist of L at each node, (i, j, 4), with a row and two columns of landing."""
+        i, j, d = self.i, self.j, DIFFERENCE
+        low, high = np.maximum(i - d, 0.0), i + d  # no slip is smaller than rest
+        nodes = np.empty((i.size + 1, j.size + 2, 4))
+        inside = nodes[:-1, 1:-1]
+        inside[..., 0] = self.exponent(i, j)
+        inside[..., 1] = (self.exponent(high, j) - self.exponent(low, j)) / (high - low)
+        inside[..., 2] = (self.exponent(i, j + d) - self.exponent(i, j - d)) / (2.0 * d)
+        upper = self.exponent(high, j + d) - self.exponent(high, j - d)
+        lower = self.exponent(low, j + d) - self.exponent(low, j - d)
+        inside[..., 3] = (upper - lower) / (2.0 * d * (high - low))
+        # A landing goes on for half the slope of the edge, and ends level.
+        nodes[:, 0], nodes[:, -1] = nodes[:, 1], nodes[:, -2]
+        for column, way in ((0, -0.5), (-1, 0.5)):
+            nodes[:, column, :2] += way * nodes[:, column, 2:]
+            nodes[:, column, 2:] = 0.0
+        nodes[-1] = nodes[-2]
+        nodes[-1, :, ::2] += 0.5 * nodes[-1, :, 1::2]
+        nodes[-1, :, 1::2] = 0.0
+        return nodes
+
+    def error(self, cells: NDArray[np.float64], x: float, y: float) -> float:
+        """Largest error at (x, y) of every cell within the table, as a share of the largest coefficient."""
+        inside = cells.reshape(self.i.size, self.j.size + 1, 4, 4)[:-1, 1:-1]
+        found = x ** np.arange(4) @ inside @ y ** np.arange(4)
+        exact, rise = self.exact(self.i[:-1] + x, self.j[:, :-1] + y)
+        return float(np.abs(rise * np.exp(found) - exact).max() / exact.max())
+
+    def surface(self, cells: NDArray[np.float64]) -> TractionSurface:
+        """The law."""
+        within = 1.0 - 1e-12  # the last position still lies in the last cell
+        return TractionSurface(
+            cells=cells,
+            columns=self.j.size + 1,
+            speed_density=1.0 / self.scale,
+            slip_density=1.0 / self.slip_cell,
+            last_slip=self.i.size * within,
+            load_origin=self.load_start - self.load_cell,
+            load_density=1.0 / self.load_cell,
+            last_load=(self.j.size + 1) * within,
+        )
+
+
+def _polynomials(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Polynomial of each cell, (cells, 16), from value, slopes and twist at its corners, (i, j, 4) per cell size."""
+    # Values and slopes at both ends of an edge, times this, are the coefficients of its cubic.
+    cubic = np.array(
+        [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [-3.0, 3.0, -2.0, -1.0], [2.0, -2.0, 1.0, 1.0]]
+    )
+    value, along, across, twist = np.moveaxis(nodes, -1, 0)
+    near, far = slice(None, -1), slice(1, None)
+    corners = {(0, 0): (near, near), (0, 1): (near, far), (1, 0): (far, near), (1, 1): (far, far)}
+    # Rows: value at both x ends, slope along x at both; columns: value at both y ends, slope along y at both.
+    edges = np.empty((nodes.shape[0] - 1, nodes.shape[1] - 1, 4, 4))
+    for (row, column), corner in corners.items():
+        edges[..., row, column], edges[..., 2 + row, column] = value[corner], along[corner]
+        edges[..., row, 2 + column], edges[..., 2 + row, 2 + column] = across[corner], twist[corner]
+    return np.ascontiguousarray((cubic @ edges @ cubic.T).reshape(-1, 16))

@@ -1,15 +1,25 @@
 """Cylindrical roller bearing in time, in the plane of rotation.
 
-- ``model``: the parameters that the compiled code reads, built once from a scene
+From the scene:
+- ``geometry``: radii, masses, kinematic speeds, the sizes by which errors are measured
+- ``model``, ``race_traction``: the parameters and laws that the compiled code reads, built once
 - ``state``: the layout of the state vector and its units
-- ``races``, ``pocket``, ``guide_land``, ``drag``: one interaction each
-- ``equations``: forces gathered into accelerations, and the power that each loss takes
-- ``runge_kutta``: Dormand-Prince 5(4) with step control
 - ``start``: static load share, kinematic speeds, seeded pocket offsets
-- ``metrics``: impact force, whirl deviation ratio, power loss from what the integrator kept
-- ``simulate``: replicates, workers, error bars
 
-Frame: origin at the centre of the fixed outer ring, x along the radial load, y 90 degrees ahead in the sense of
-positive rotation, angles from x. Everything is SI. Roller j runs in pocket j, whose mid-line stands at the cage
+Compiled:
+- ``races``, ``race_form``, ``pocket``, ``guide_land``, ``drag``, ``gravity``: one interaction each
+- ``cage_body``, ``ring_motion``: how the cage and a supported outer ring move
+- ``drive``, ``schedule``: speeds and loads, steady or by the clock
+- ``equations``: forces gathered into accelerations, and the power that each loss takes; ``energy``: what balances it
+- ``runge_kutta``: Dormand-Prince 5(4) with step control
+
+Results:
+- ``simulate``: replicates, workers, error bars; ``metrics``: impact force, whirl deviation ratio, power loss
+- ``race_report``: pressure, half-width and film of each race
+- ``history``, ``observe``: every motion and contact over time, on request
+- ``orbit``, ``lyapunov``: what the cage does; ``life``, ``rating``, ``slice_loads``: ISO/TS 16281
+
+Frame: origin at the rest position of the outer ring's centre, x along the radial load, y 90 degrees ahead in the sense
+of positive rotation, angles from x. Everything is SI. Roller j runs in pocket j, whose mid-line stands at the cage
 angle plus 2 pi j/Z.
 """

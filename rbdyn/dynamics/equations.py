@@ -1,7 +1,7 @@
 """Equations of motion: forces gathered into accelerations, and the power each loss takes.
 
-Newton for rollers, cage and inner ring in Cartesian coordinates (Chen et al. 2022, eq 19-21 in the plane; free of
-their centrifugal terms because the frame does not turn), Euler for spins. The inner ring turns at prescribed speed.
+Newton for rollers, cage and rings in Cartesian coordinates (Chen et al. 2022, eq 19-21 in the plane; free of their
+centrifugal terms because the frame does not turn), Euler for spins. The rings turn at prescribed speeds.
 """
 
 from __future__ import annotations
@@ -12,11 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.contact.hertz_line import elastic_energy
+from rbdyn.dynamics.cage_body import cage_acceleration
 from rbdyn.dynamics.drag import drag_forces
-from rbdyn.dynamics.guide_land import guide_energy, guide_wrench
-from rbdyn.dynamics.pocket import pocket_contact, pocket_energy
-from rbdyn.dynamics.races import Race, inner_race_forces, outer_race_forces
+from rbdyn.dynamics.drive import action, load_power, tick
+from rbdyn.dynamics.gravity import add_weight
+from rbdyn.dynamics.guide_land import guide_forces
+from rbdyn.dynamics.pocket import pocket_contact
+from rbdyn.dynamics.races import Race, inner_race_forces, outer_race_forces, roller_radius
+from rbdyn.dynamics.ring_motion import RingMotion, outer_motion, support_motion
 from rbdyn.dynamics.state import (
     CAGE_ANGLE,
     CAGE_SPEED,
@@ -29,9 +32,10 @@ from rbdyn.dynamics.state import (
     RING_X,
     RING_Y,
 )
-from rbdyn.kernel import entry, kernel, routine
+from rbdyn.kernel import kernel, routine
 
-# Powers lost, in the order of the power vector; the power that drives the shaft stands behind them.
+# Powers lost, in the order of the power vector; behind them stand the powers that come in by the shafts and by loads
+# without a potential.
 LOSSES = (
     "outer_race_traction",
     "inner_race_traction",
@@ -39,13 +43,16 @@ LOSSES = (
     "race_damping",
     "pocket_friction",
     "pocket_damping",
+    "pocket_film",
     "land_film",
     "land_friction",
     "land_damping",
     "roller_drag",
+    "support_damping",
 )
 SHAFT = len(LOSSES)
-POWERS = SHAFT + 1
+LOAD = SHAFT + 1
+POWERS = SHAFT + 2
 # Extremes, in the order of the load vector.
 POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD = range(4)
 LOADS = 4
@@ -55,7 +62,7 @@ class RollerBearing(NamedTuple):
     """All that the compiled code reads. SI; laws are NamedTuples whose types choose the compiled bodies."""
 
     rollers: int
-    roller_radius: float
+    sizes: Any
     roller_mass: float
     roller_inertia: float
     outer: Race
@@ -65,11 +72,59 @@ class RollerBearing(NamedTuple):
     pocket_sin: NDArray[np.float64]
     guide: Any
     drag: Any
-    cage_mass: float
-    cage_inertia: float
-    ring_mass: float
-    ring_speed: float
-    radial_load: float
+    cage: Any
+    outer_ring: Any
+    inner_ring_mass: float
+    drive: Any
+    gravity: Any
+
+
+@kernel
+def pocket_direction(bearing, cosine, sine, j):
+    """Unit vector of the mid-line of pocket ``j``, for the cosine and sine of the cage angle."""
+    ex = cosine * bearing.pocket_cos[j] - sine * bearing.pocket_sin[j]
+    ey = sine * bearing.pocket_cos[j] + cosine * bearing.pocket_sin[j]
+    return ex, ey
+
+
+@kernel
+def cage_motion(y, body):
+    """Motion of the cage, whose coordinates stand from ``body`` on; its mark is the mid-line of the first pocket."""
+    angle = y[body + CAGE_ANGLE]
+    return RingMotion(
+        y[body + CAGE_X],
+        y[body + CAGE_Y],
+        y[body + CAGE_VX],
+        y[body + CAGE_VY],
+        y[body + CAGE_SPEED],
+        math.cos(angle),
+        math.sin(angle),
+    )
+
+
+@kernel
+def inner_motion(y, body, acting):
+    """Motion of the inner ring."""
+    return RingMotion(
+        y[body + RING_X],
+        y[body + RING_Y],
+        y[body + RING_VX],
+        y[body + RING_VY],
+        acting.inner_speed,
+        acting.inner_cos,
+        acting.inner_sin,
+    )
+
+
+@kernel
+def roller_pocket(bearing, y, cage, j):
+    """``pocket_contact`` of roller ``j``."""
+    z = bearing.rollers
+    ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)
+    return pocket_contact(
+        bearing.pocket, roller_radius(bearing.sizes, j), ex, ey,
+        y[j] - cage.x, y[z + j] - cage.y, y[2 * z + j] - cage.vx, y[3 * z + j] - cage.vy, y[4 * z + j], cage.speed,
+    )  # fmt: skip
 
 
 @routine
@@ -77,25 +132,17 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     """Fill row ``row`` of ``dy``, of the powers [W] and of the largest loads [N], for the state ``y``."""
     z = bearing.rollers
     body = 5 * z
-    cage_x, cage_y = y[body + CAGE_X], y[body + CAGE_Y]
-    cage_vx, cage_vy = y[body + CAGE_VX], y[body + CAGE_VY]
-    cage_speed = y[body + CAGE_SPEED]
-    ring_x, ring_y = y[body + RING_X], y[body + RING_Y]
-    ring_vx, ring_vy = y[body + RING_VX], y[body + RING_VY]
-    radius, ring_speed = bearing.roller_radius, bearing.ring_speed
-    cosine, sine = math.cos(y[body + CAGE_ANGLE]), math.sin(y[body + CAGE_ANGLE])
-    cage_fx = cage_fy = cage_moment = pocket_load = pocket_friction = pocket_damping = 0.0
+    acting = action(bearing.drive, y)
+    tick(bearing.drive, acting, row, dy)
+    cage = cage_motion(y, body)
+    inner = inner_motion(y, body, acting)
+    outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
+    cage_fx = cage_fy = cage_moment = pocket_load = pocket_friction = pocket_damping = pocket_film = 0.0
     drag_loss = drag_forces(bearing.drag, z, y, row, dy)
     for j in range(z):
-        vx, vy = y[2 * z + j], y[3 * z + j]
-        ex = cosine * bearing.pocket_cos[j] - sine * bearing.pocket_sin[j]
-        ey = sine * bearing.pocket_cos[j] + cosine * bearing.pocket_sin[j]
-        wall = pocket_contact(
-            bearing.pocket, radius, ex, ey,
-            y[j] - cage_x, y[z + j] - cage_y, vx - cage_vx, vy - cage_vy, y[4 * z + j], cage_speed,
-        )  # fmt: skip
-        dy[row, j] = vx
-        dy[row, z + j] = vy
+        wall = roller_pocket(bearing, y, cage, j)
+        dy[row, j] = y[2 * z + j]
+        dy[row, z + j] = y[3 * z + j]
         dy[row, 2 * z + j] += wall[0]
         dy[row, 3 * z + j] += wall[1]
         dy[row, 4 * z + j] = wall[2]
@@ -105,108 +152,62 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
         pocket_load = max(pocket_load, wall[4])
         pocket_friction += wall[5]
         pocket_damping += wall[6]
-    ring = (ring_x, ring_y, ring_vx, ring_vy, ring_speed)
-    outer = outer_race_forces(bearing.outer, radius, z, y, row, dy, scratch)
-    inner = inner_race_forces(bearing.inner, radius, ring, z, y, row, dy, scratch)
+        pocket_film += wall[7]
+    on_outer = outer_race_forces(bearing.outer, bearing.sizes, outer, z, y, row, dy, scratch)
+    on_inner = inner_race_forces(bearing.inner, bearing.sizes, inner, z, y, row, dy, scratch)
     per_mass, per_inertia = 1.0 / bearing.roller_mass, 1.0 / bearing.roller_inertia
     for i in range(2 * z, 4 * z):
         dy[row, i] *= per_mass
     for i in range(4 * z, 5 * z):
         dy[row, i] *= per_inertia
-    land = guide_wrench(
-        bearing.guide,
-        (cage_x, ring_x),
-        (cage_y, ring_y),
-        (cage_vx, ring_vx),
-        (cage_vy, ring_vy),
-        cage_speed,
-        bearing.ring_speed,
+    add_weight(bearing.gravity, 2 * z, z, row, dy)
+    land = guide_forces(bearing.guide, cage, inner, outer)
+    ax, ay, spin_up = cage_acceleration(
+        bearing.cage,
+        cage_fx + land.cage_x,
+        cage_fy + land.cage_y,
+        cage_moment + land.cage_moment,
+        cage.cos,
+        cage.sin,
+        cage.speed,
     )
-    dy[row, body + CAGE_X] = cage_vx
-    dy[row, body + CAGE_Y] = cage_vy
-    dy[row, body + CAGE_ANGLE] = cage_speed
-    dy[row, body + CAGE_VX] = (cage_fx + land[0]) / bearing.cage_mass
-    dy[row, body + CAGE_VY] = (cage_fy + land[1]) / bearing.cage_mass
-    dy[row, body + CAGE_SPEED] = (cage_moment + land[2]) / bearing.cage_inertia
-    dy[row, body + RING_X] = ring_vx
-    dy[row, body + RING_Y] = ring_vy
-    dy[row, body + RING_VX] = (inner[0] + land[4] + bearing.radial_load) / bearing.ring_mass
-    dy[row, body + RING_VY] = (inner[1] + land[5]) / bearing.ring_mass
-    power[row, 0] = outer[4]
-    power[row, 1] = inner[4]
-    power[row, 2] = outer[5] + inner[5]
-    power[row, 3] = outer[6] + inner[6]
+    dy[row, body + CAGE_X] = cage.vx
+    dy[row, body + CAGE_Y] = cage.vy
+    dy[row, body + CAGE_ANGLE] = cage.speed
+    dy[row, body + CAGE_VX] = ax
+    dy[row, body + CAGE_VY] = ay
+    dy[row, body + CAGE_SPEED] = spin_up
+    add_weight(bearing.gravity, body + CAGE_VX, 1, row, dy)
+    dy[row, body + RING_X] = inner.vx
+    dy[row, body + RING_Y] = inner.vy
+    dy[row, body + RING_VX] = (on_inner[0] + land.inner_x + acting.load_x) / bearing.inner_ring_mass
+    dy[row, body + RING_VY] = (on_inner[1] + land.inner_y + acting.load_y) / bearing.inner_ring_mass
+    add_weight(bearing.gravity, body + RING_VX, 1, row, dy)
+    support_loss = support_motion(
+        bearing.outer_ring,
+        bearing.gravity,
+        on_outer[0] + land.outer_x,
+        on_outer[1] + land.outer_y,
+        y,
+        row,
+        dy,
+    )
+    power[row, 0] = on_outer[4]
+    power[row, 1] = on_inner[4]
+    power[row, 2] = on_outer[5] + on_inner[5]
+    power[row, 3] = on_outer[6] + on_inner[6]
     power[row, 4] = pocket_friction
     power[row, 5] = pocket_damping
-    power[row, 6] = land[7]
-    power[row, 7] = land[8]
-    power[row, 8] = land[9]
-    power[row, 9] = drag_loss
-    power[row, SHAFT] = -(inner[2] + land[3]) * ring_speed
+    power[row, 6] = pocket_film
+    power[row, 7] = land.film
+    power[row, 8] = land.friction
+    power[row, 9] = land.damping
+    power[row, 10] = drag_loss
+    power[row, 11] = support_loss
+    inner_moment, outer_moment = on_inner[2] + land.inner_moment, on_outer[2] + land.outer_moment
+    power[row, SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
+    power[row, LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
     loads[row, POCKET_LOAD] = pocket_load
-    loads[row, OUTER_LOAD] = outer[3]
-    loads[row, INNER_LOAD] = inner[3]
-    loads[row, LAND_LOAD] = land[6]
-
-
-@kernel
-def race_energy(race, side, roller_radius, dx, dy):
-    """Elastic energy [J] of one race contact."""
-    approach = side * (math.sqrt(dx * dx + dy * dy) - race.radius) + roller_radius
-    return elastic_energy(race.contact, approach) if approach > 0.0 else 0.0
-
-
-@entry
-def mechanical_energy(bearing, y):
-    """(kinetic, elastic, load potential) energy [J] of a state. The ring's own rotation, being prescribed, is left out."""
-    z = bearing.rollers
-    body = 5 * z
-    cage_x, cage_y = y[body + CAGE_X], y[body + CAGE_Y]
-    ring_x, ring_y = y[body + RING_X], y[body + RING_Y]
-    cosine, sine = math.cos(y[body + CAGE_ANGLE]), math.sin(y[body + CAGE_ANGLE])
-    kinetic = 0.5 * bearing.cage_mass * (y[body + CAGE_VX] ** 2 + y[body + CAGE_VY] ** 2)
-    kinetic += 0.5 * bearing.cage_inertia * y[body + CAGE_SPEED] ** 2
-    kinetic += 0.5 * bearing.ring_mass * (y[body + RING_VX] ** 2 + y[body + RING_VY] ** 2)
-    elastic = guide_energy(bearing.guide, cage_x, cage_y, ring_x, ring_y)
-    for j in range(z):
-        px, py = y[j], y[z + j]
-        kinetic += 0.5 * bearing.roller_mass * (y[2 * z + j] ** 2 + y[3 * z + j] ** 2)
-        kinetic += 0.5 * bearing.roller_inertia * y[4 * z + j] ** 2
-        elastic += race_energy(bearing.outer, 1.0, bearing.roller_radius, px, py)
-        elastic += race_energy(bearing.inner, -1.0, bearing.roller_radius, px - ring_x, py - ring_y)
-        ex = cosine * bearing.pocket_cos[j] - sine * bearing.pocket_sin[j]
-        ey = sine * bearing.pocket_cos[j] + cosine * bearing.pocket_sin[j]
-        elastic += pocket_energy(bearing.pocket, ex, ey, px - cage_x, py - cage_y)
-    return kinetic, elastic, -bearing.radial_load * ring_x
-
-
-@entry
-def pocket_loads(bearing, states):
-    """Signed wall loads [N], shape (samples, rollers), of states (samples, 5 Z + 10).
-
-    Positive on the front wall (the roller drives the cage), negative on the rear wall.
-    """
-    z = bearing.rollers
-    body = 5 * z
-    result = np.empty((len(states), z))
-    for i in range(len(states)):
-        y = states[i]
-        cosine, sine = math.cos(y[body + CAGE_ANGLE]), math.sin(y[body + CAGE_ANGLE])
-        for j in range(z):
-            ex = cosine * bearing.pocket_cos[j] - sine * bearing.pocket_sin[j]
-            ey = sine * bearing.pocket_cos[j] + cosine * bearing.pocket_sin[j]
-            dx, dy = y[j] - y[body + CAGE_X], y[z + j] - y[body + CAGE_Y]
-            wall = pocket_contact(
-                bearing.pocket,
-                bearing.roller_radius,
-                ex,
-                ey,
-                dx,
-                dy,
-                y[2 * z + j] - y[body + CAGE_VX],
-                y[3 * z + j] - y[body + CAGE_VY],
-                y[4 * z + j],
-                y[body + CAGE_SPEED],
-            )
-            result[i, j] = math.copysign(wall[4], dy * ex - dx * ey)
-    return result
+    loads[row, OUTER_LOAD] = on_outer[3]
+    loads[row, INNER_LOAD] = on_inner[3]
+    loads[row, LAND_LOAD] = land.load

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.film import ShortJournalFilm, journal_film_force
-from rbdyn.contact.hertz_line import elastic_energy, elastic_load
+from rbdyn.contact.hertz_line import whole_energy, whole_load
 from rbdyn.contact.traction import traction
 from rbdyn.kernel import kernel, law
 
@@ -38,7 +38,7 @@ class NoGuide(NamedTuple):
 
 
 class OuterGuide(NamedTuple):
-    """Cage inside the fixed outer ring."""
+    """Cage inside the outer ring."""
 
     radius: float
     film: Any
@@ -97,10 +97,10 @@ def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     if approach <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     approach_rate = evx * ex + evy * ey
-    elastic = elastic_load(dry.contact, approach)
-    load = damped_load(dry.damping, elastic, approach, approach_rate)
+    elastic, stiffness = whole_load(dry.contact, approach)
+    load = damped_load(dry.damping, elastic, stiffness, approach, approach_rate)
     slip = bearing_speed * (e + radius) - journal_speed * radius - (evy * ex - evx * ey)
-    friction = traction(dry.friction, slip) * load
+    friction = traction(dry.friction, slip, load) * load
     return (
         -load * ex - friction * ey,
         -load * ey + friction * ex,
@@ -131,37 +131,50 @@ def journal_wrench(guide, dx, dy, dvx, dvy, journal_speed, bearing_speed):
     )
 
 
+class LandForces(NamedTuple):
+    """Forces [N] and moments [N m] on cage, inner and outer ring, dry load [N], powers lost [W]."""
+
+    cage_x: float
+    cage_y: float
+    cage_moment: float
+    inner_x: float
+    inner_y: float
+    inner_moment: float
+    outer_x: float
+    outer_y: float
+    outer_moment: float
+    load: float
+    film: float
+    friction: float
+    damping: float
+
+
 @law
-def guide_wrench(guide, dx, dy, dvx, dvy, cage_speed, ring_speed):
-    """Force on the cage (x, y), moments on cage and inner ring, force on the inner ring (x, y), dry load, powers.
-
-    ``dx ... dvy``: (cage centre, inner ring centre) positions and velocities are passed as the pairs
-    ``dx = (cage x, ring x)`` and so on; speeds in rad/s. Powers: film, friction, damping [W].
-    """
+def guide_forces(guide, cage, inner, outer):
+    """Land forces, from the motions (``RingMotion``) of cage, inner and outer ring."""
 
 
-@guide_wrench.body(NoGuide)
-def _(guide, dx, dy, dvx, dvy, cage_speed, ring_speed):
-    return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+@guide_forces.body(NoGuide)
+def _(guide, cage, inner, outer):
+    return LandForces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-@guide_wrench.body(OuterGuide)
-def _(guide, dx, dy, dvx, dvy, cage_speed, ring_speed):
-    on_cage = journal_wrench(guide, dx[0], dy[0], dvx[0], dvy[0], cage_speed, 0.0)
-    return (
-        on_cage[0], on_cage[1], on_cage[2], 0.0, 0.0, 0.0, on_cage[4], on_cage[5], on_cage[6], on_cage[7],
-    )  # fmt: skip
-
-
-@guide_wrench.body(InnerGuide)
-def _(guide, dx, dy, dvx, dvy, cage_speed, ring_speed):
-    on_ring = journal_wrench(
-        guide, dx[1] - dx[0], dy[1] - dy[0], dvx[1] - dvx[0], dvy[1] - dvy[0], ring_speed, cage_speed
+@guide_forces.body(OuterGuide)
+def _(guide, cage, inner, outer):
+    dx, dy, dvx, dvy = cage.x - outer.x, cage.y - outer.y, cage.vx - outer.vx, cage.vy - outer.vy
+    fx, fy, moment, ring_moment, load, film, friction, damping = journal_wrench(
+        guide, dx, dy, dvx, dvy, cage.speed, outer.speed
     )
-    return (
-        -on_ring[0], -on_ring[1], on_ring[3], on_ring[2], on_ring[0], on_ring[1], on_ring[4], on_ring[5],
-        on_ring[6], on_ring[7],
-    )  # fmt: skip
+    return LandForces(fx, fy, moment, 0.0, 0.0, 0.0, -fx, -fy, ring_moment, load, film, friction, damping)
+
+
+@guide_forces.body(InnerGuide)
+def _(guide, cage, inner, outer):
+    dx, dy, dvx, dvy = inner.x - cage.x, inner.y - cage.y, inner.vx - cage.vx, inner.vy - cage.vy
+    fx, fy, ring_moment, moment, load, film, friction, damping = journal_wrench(
+        guide, dx, dy, dvx, dvy, inner.speed, cage.speed
+    )
+    return LandForces(-fx, -fy, moment, fx, fy, ring_moment, 0.0, 0.0, 0.0, load, film, friction, damping)
 
 
 @law
@@ -176,24 +189,24 @@ def _(dry, e):
 
 @dry_energy.body(DryContact)
 def _(dry, e):
-    return elastic_energy(dry.contact, e - dry.play) if e > dry.play else 0.0
+    return whole_energy(dry.contact, e - dry.play) if e > dry.play else 0.0
 
 
 @law
-def guide_energy(guide, cage_x, cage_y, ring_x, ring_y):
-    """Elastic energy [J] stored in the guide land."""
+def guide_energy(guide, cage_x, cage_y, inner_x, inner_y, outer_x, outer_y):
+    """Elastic energy [J] stored in the guide land, from the centres [m]."""
 
 
 @guide_energy.body(NoGuide)
-def _(guide, cage_x, cage_y, ring_x, ring_y):
+def _(guide, cage_x, cage_y, inner_x, inner_y, outer_x, outer_y):
     return 0.0
 
 
 @guide_energy.body(OuterGuide)
-def _(guide, cage_x, cage_y, ring_x, ring_y):
-    return dry_energy(guide.dry, math.sqrt(cage_x**2 + cage_y**2))
+def _(guide, cage_x, cage_y, inner_x, inner_y, outer_x, outer_y):
+    return dry_energy(guide.dry, math.sqrt((cage_x - outer_x) ** 2 + (cage_y - outer_y) ** 2))
 
 
 @guide_energy.body(InnerGuide)
-def _(guide, cage_x, cage_y, ring_x, ring_y):
-    return dry_energy(guide.dry, math.sqrt((cage_x - ring_x) ** 2 + (cage_y - ring_y) ** 2))
+def _(guide, cage_x, cage_y, inner_x, inner_y, outer_x, outer_y):
+    return dry_energy(guide.dry, math.sqrt((cage_x - inner_x) ** 2 + (cage_y - inner_y) ** 2))

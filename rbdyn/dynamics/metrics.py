@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.equations import INNER_LOAD, LOSSES, OUTER_LOAD, SHAFT
+from rbdyn.dynamics.equations import INNER_LOAD, LAND_LOAD, LOAD, LOSSES, OUTER_LOAD, SHAFT
 from rbdyn.result import Quantity
+
+SLOWEST_CAGE = 1e-6  # [rad/s]
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,7 @@ class Replicate:
     """One counted run. Times in s, works in J, loads in N.
 
     ``impact_windows``: largest roller/cage force of each whole window; ``whirl``: samples, sum and sum of squares of
-    the cage centre's speed; ``work``: integrals of the loss powers, then of the shaft power; ``energy_change``: of
+    the cage centre's speed; ``work``: integrals of the loss powers, then of those that come in by shafts and loads; ``energy_change``: of
     kinetic, elastic and load energy together; ``energy_scale``: contact load times approach, at least.
     """
 
@@ -63,15 +65,17 @@ class Replicate:
 
     @property
     def cage_slip(self) -> float:
-        """1 - cage speed over kinematic cage speed."""
+        """1 - cage speed over kinematic cage speed; 0 where counter-rotation leaves the cage no speed to fall behind."""
+        if abs(self.kinematic_cage_speed) < SLOWEST_CAGE:
+            return 0.0
         return 1.0 - self.cage_speed / self.kinematic_cage_speed
 
     @property
     def power_gap(self) -> float:
-        """Shaft work less losses less change of energy, relative to the largest of them."""
-        shaft, lost = self.work[SHAFT], self.work[:SHAFT].sum()
-        gap = shaft - lost - self.energy_change
-        return float(abs(gap) / max(abs(shaft), abs(lost), abs(self.energy_change), self.energy_scale))
+        """Work put in less losses less change of energy, relative to the largest of them."""
+        put_in, lost = self.work[SHAFT] + self.work[LOAD], self.work[:SHAFT].sum()
+        gap = put_in - lost - self.energy_change
+        return float(abs(gap) / max(abs(put_in), abs(lost), abs(self.energy_change), self.energy_scale))
 
     def power(self, term: str) -> float:
         """Mean power [W] of one loss."""
@@ -86,6 +90,11 @@ class Replicate:
     def max_outer_load(self) -> float:
         """Largest load between a roller and the outer race [N]."""
         return float(self.largest[OUTER_LOAD])
+
+    @property
+    def max_land_load(self) -> float:
+        """Largest dry load between cage and guide land [N]."""
+        return float(self.largest[LAND_LOAD])
 
 
 def quantity(

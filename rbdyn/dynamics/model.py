@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,102 +17,78 @@ from rbdyn.contact.film import (
     short_journal_film,
 )
 from rbdyn.contact.hertz_line import (
-    LineContact,
     LineContactOnBar,
-    SlicedLineContact,
+    dowson_higginson,
+    houpert,
+    iso_16281,
+    palmgren,
+    sliced,
+)
+from rbdyn.contact.pocket_film import pocket_film
+from rbdyn.contact.profile import (
+    crowned_relief,
     logarithmic_relief,
-    palmgren_stiffness,
+    lundberg_relief,
     slice_centres,
+    table_relief,
 )
-from rbdyn.contact.traction import (
-    BlendedFourConstantTraction,
-    CoulombTraction,
-    FourConstantTraction,
-    NoTraction,
-    four_constants,
-)
+from rbdyn.contact.traction import CoulombTraction, NoTraction
+from rbdyn.dynamics.cage_body import BalancedCage, UnbalancedCage
 from rbdyn.dynamics.drag import NoDrag, cylinder_drag
+from rbdyn.dynamics.drive import ClockedDrive, SteadyDrive, TwoSpeedDrive
 from rbdyn.dynamics.equations import RollerBearing
+from rbdyn.dynamics.geometry import (
+    cage_inertia,
+    kinematics,
+    layout_of,
+    raceway_radii,
+    reduced_radii,
+    roller_mass,
+    roller_radii,
+    shaft_speeds,
+)
+from rbdyn.dynamics.gravity import Gravity, NoGravity
 from rbdyn.dynamics.guide_land import DryContact, InnerGuide, NoFilm, NoGuide, OuterGuide
-from rbdyn.dynamics.pocket import NoPocket, Pocket
-from rbdyn.dynamics.races import Race
+from rbdyn.dynamics.pocket import LippedPocket, LubricatedPocket, NoPocket, Pocket
+from rbdyn.dynamics.race_form import RoundRace, largest_rise, wavy_race
+from rbdyn.dynamics.race_traction import race_traction
+from rbdyn.dynamics.races import EqualRollers, Race, UnequalRollers
+from rbdyn.dynamics.ring_motion import HeldRing, SupportedRing
+from rbdyn.dynamics.schedule import Constant, Ramps, SmoothRamps, Steps
 from rbdyn.lubricants import Oil, oil_at
 from rbdyn.materials import equivalent_modulus
 from rbdyn.scene import Scene
+from rbdyn.scene.bearing import Harmonic
 
-# Slices where a profile needs them (ISO/TS 16281 asks for at least 30).
-PROFILE_SLICES = 31
-
-
-@dataclass(frozen=True)
-class Kinematics:
-    """Rolling without slip: orbit (cage) speed and roller spin [rad/s], entrainment speed at the races [m/s]."""
-
-    cage_speed: float
-    roller_spin: float
-    entrainment: float
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Characteristic load [N], approach [m] and speed [m/s] of a race contact, by which errors are measured."""
-
-    load: float
-    length: float
-    speed: float
+# The largest contact load that a traction surface must cover, in multiples of the largest load on the shaft.
+TRACTION_RANGE = 4.0
 
 
 def roller_bearing(scene: Scene) -> RollerBearing:
     """Parameters of the equations of motion."""
     drawing = scene.bearing
-    diameter, length = drawing.roller_diameter_mm * 1e-3, drawing.roller_length_mm * 1e-3
-    outer_radius, inner_radius = raceway_radii(scene)
-    mass = scene.material("roller").density * math.pi / 4.0 * diameter**2 * length
+    diameter, mass = drawing.roller_diameter_mm * 1e-3, roller_mass(scene)
     angles = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
     oil = lubricant(scene)
-    contact = _race_contact(scene)
-    damping = _race_damping(scene, mass)
-    traction = _race_traction(scene)
-    laws = scene.model
-    drag: Any = NoDrag()
-    if laws.drag == "cylinder" and laws.drag_coefficient > 0.0:
-        drag = cylinder_drag(
-            oil.density, scene.lubricant.oil_fraction, laws.drag_coefficient, diameter, length
-        )
+    radii = roller_radii(scene)
     return RollerBearing(
         rollers=drawing.rollers,
-        roller_radius=0.5 * diameter,
+        sizes=EqualRollers(0.5 * diameter) if radii is None else UnequalRollers(radii),
         roller_mass=mass,
         roller_inertia=mass * diameter**2 / 8.0,
-        outer=Race(outer_radius, contact, damping, traction, _rolling(scene, oil, outer_radius, -1.0)),
-        inner=Race(inner_radius, contact, damping, traction, _rolling(scene, oil, inner_radius, 1.0)),
-        pocket=_pocket(scene),
+        outer=_race(scene, oil, "outer"),
+        inner=_race(scene, oil, "inner"),
+        pocket=_pocket(scene, oil),
         pocket_cos=np.cos(angles),
         pocket_sin=np.sin(angles),
         guide=_guide(scene, oil),
-        drag=drag,
-        cage_mass=scene.cage.mass_g * 1e-3,
-        cage_inertia=cage_inertia(scene),
-        ring_mass=drawing.inner_ring_mass_kg,
-        ring_speed=scene.operation.inner_speed_rpm * math.pi / 30.0,
-        radial_load=float(scene.operation.radial_load_N),
+        drag=_drag(scene, oil),
+        cage=_cage(scene),
+        outer_ring=_outer_ring(scene),
+        inner_ring_mass=drawing.inner_ring_mass_kg,
+        drive=_drive(scene),
+        gravity=_gravity(scene),
     )
-
-
-def raceway_radii(scene: Scene) -> tuple[float, float]:
-    """Outer and inner raceway radius [m]; the radial clearance is split evenly about the pitch circle."""
-    pitch, roller = scene.bearing.pitch_diameter_mm, scene.bearing.roller_diameter_mm
-    half = 0.5 * scene.bearing.radial_clearance_mm
-    return 0.5e-3 * (pitch + roller + half), 0.5e-3 * (pitch - roller - half)
-
-
-def kinematics(scene: Scene) -> Kinematics:
-    """Epicyclic speeds: cage = inner speed R_i/(R_i + R_o) with a fixed outer ring."""
-    outer, inner = raceway_radii(scene)
-    shaft = scene.operation.inner_speed_rpm * math.pi / 30.0
-    cage = shaft * inner / (inner + outer)
-    radius = 0.5e-3 * scene.bearing.roller_diameter_mm
-    return Kinematics(cage, -cage * (outer - radius) / radius, (shaft - cage) * inner)
 
 
 def lubricant(scene: Scene) -> Oil:
@@ -124,78 +100,96 @@ def lubricant(scene: Scene) -> Oil:
     return replace(oil, viscosity=viscosity, viscosity_slope=oil.viscosity_slope * viscosity / oil.viscosity)
 
 
-def cage_inertia(scene: Scene) -> float:
-    """Given, or that of a plain ring between the land and the far rim of the estimated cage body [kg m^2]."""
-    if scene.cage.inertia_kg_mm2 is not None:
-        return scene.cage.inertia_kg_mm2 * 1e-6
-    side = {"outer": -1.0, "inner": 1.0, "roller": 1.0}[scene.cage.guidance]
-    rim = scene.bearing.pitch_diameter_mm + side * scene.bearing.roller_diameter_mm / 3.0
-    return scene.cage.mass_g * 1e-3 * (scene.land_diameter_mm**2 + rim**2) * 1e-6 / 8.0
+def _modulus(scene: Scene, first: str, second: str) -> float:
+    return equivalent_modulus(scene.material(first), scene.material(second))
 
 
-def scales(bearing: RollerBearing, scene: Scene) -> Scales:
-    """Size of a race contact: the mean load share, or the centrifugal force, or the roller's weight."""
-    cage = kinematics(scene).cage_speed
-    centrifugal = bearing.roller_mass * 0.5e-3 * scene.bearing.pitch_diameter_mm * cage**2
-    load = max(bearing.radial_load / bearing.rollers, centrifugal, 9.81 * bearing.roller_mass)
-    stiffness = _palmgren(scene, "roller", "rings", scene.bearing.effective_length_mm)
-    approach = (load / stiffness) ** 0.9
-    frequency = math.sqrt(10.0 / 9.0 * load / approach / bearing.roller_mass)
-    return Scales(load, approach, approach * frequency)
-
-
-def absolute_tolerance(bearing: RollerBearing, scene: Scene, rtol: float) -> NDArray[np.float64]:
-    """Tolerance of each state component: ``rtol`` of the approach or contact speed that the component can make."""
-    scale = scales(bearing, scene)
-    roller, cage = bearing.roller_radius, 0.5e-3 * scene.bearing.pitch_diameter_mm
-    rollers = np.repeat(
-        [scale.length, scale.length, scale.speed, scale.speed, scale.speed / roller], bearing.rollers
-    )
-    positions, speeds = [scale.length, scale.length], [scale.speed, scale.speed]
-    bodies = np.array([*positions, scale.length / cage, *speeds, scale.speed / cage, *positions, *speeds])
-    return rtol * np.concatenate((rollers, bodies))
-
-
-def _palmgren(scene: Scene, first: str, second: str, length_mm: float) -> float:
-    return palmgren_stiffness(
-        equivalent_modulus(scene.material(first), scene.material(second)), length_mm * 1e-3
+def _race(scene: Scene, oil: Oil, which: str) -> Race:
+    place = ("outer", "inner").index(which)
+    radius, reduced = raceway_radii(scene)[place], reduced_radii(scene)[place]
+    form = _form(getattr(scene.bearing, f"{which}_waviness"))
+    radii, tilt = roller_radii(scene), abs(scene.bearing.tilt_mrad) * 1e-3
+    largest_roller = 0.5e-3 * scene.bearing.roller_diameter_mm if radii is None else float(radii.max())
+    # A tilt may close the ends of a contact whose middle is open.
+    end_rise = 0.5e-3 * scene.bearing.effective_length_mm * tilt
+    return Race(
+        radius=radius,
+        reach=radius + largest_roller + largest_rise(form) + end_rise,
+        form=form,
+        contact=_race_contact(scene, which, reduced),
+        damping=_race_damping(scene),
+        traction=race_traction(
+            scene,
+            reduced,
+            abs(kinematics(scene).entrainment),
+            oil,
+            _modulus(scene, "roller", "rings"),
+            scene.bearing.effective_length_mm * 1e-3,
+            TRACTION_RANGE * max(scene.operation.largest_load_N, 1.0),
+        ),
+        rolling=_rolling(scene, oil, reduced),
     )
 
 
-def _race_contact(scene: Scene) -> LineContact | SlicedLineContact:
-    stiffness = _palmgren(scene, "roller", "rings", scene.bearing.effective_length_mm)
-    profiled = scene.bearing.roller_profile == "logarithmic"
-    slices = scene.model.slices or (PROFILE_SLICES if profiled else 1)
-    if slices == 1 and not profiled:
-        return LineContact(stiffness)
+def _form(harmonics: list[Harmonic]) -> Any:
+    if not harmonics:
+        return RoundRace()
+    return wavy_race(
+        np.array([harmonic.order for harmonic in harmonics]),
+        np.array([harmonic.amplitude_um * 1e-6 for harmonic in harmonics]),
+        np.radians([harmonic.phase_deg for harmonic in harmonics]),
+    )
+
+
+def _race_contact(scene: Scene, which: str, reduced_radius: float) -> Any:
     length = scene.bearing.effective_length_mm * 1e-3
-    relief = np.zeros(slices)
-    if profiled:
-        relief = logarithmic_relief(
-            slice_centres(slices, length), scene.bearing.roller_diameter_mm * 1e-3, length
-        )
-    return SlicedLineContact(stiffness / slices, relief)
+    modulus = _modulus(scene, "roller", "rings")
+    gamma = scene.bearing.roller_diameter_mm / scene.bearing.pitch_diameter_mm
+    law = scene.model.line_contact
+    whole: Any = palmgren(modulus, length)
+    if law == "iso16281":
+        whole = iso_16281(modulus, length)
+    elif law == "houpert":
+        whole = houpert(modulus, length, reduced_radius)
+    elif law == "dowson_higginson":
+        whole = dowson_higginson(modulus, length, gamma if which == "outer" else -gamma)
+    if scene.slices == 1:
+        return whole
+    share = scene.bearing.inner_tilt_share if which == "inner" else 1.0 - scene.bearing.inner_tilt_share
+    return sliced(
+        whole,
+        roller_relief(scene, scene.slices),
+        slice_centres(scene.slices, length),
+        scene.bearing.tilt_mrad * 1e-3 * share,
+        math.radians(scene.bearing.tilt_direction_deg),
+    )
 
 
-def _race_damping(scene: Scene, roller_mass: float) -> NoDamping | ViscousDamping | HuntCrossleyDamping:
+def roller_relief(scene: Scene, slices: int) -> NDArray[np.float64]:
+    """Profile drop of the roller at its slice centres [m]."""
+    drawing = scene.bearing
+    length = drawing.effective_length_mm * 1e-3
+    position = slice_centres(slices, length)
+    if drawing.crown_radius_mm is not None:
+        return crowned_relief(position, drawing.crown_radius_mm * 1e-3)
+    if drawing.lundberg_load_N is not None:
+        return lundberg_relief(position, length, drawing.lundberg_load_N, _modulus(scene, "roller", "rings"))
+    if drawing.profile_table_mm_um is not None:
+        return table_relief(position, [(x * 1e-3, drop * 1e-6) for x, drop in drawing.profile_table_mm_um])
+    if drawing.roller_profile == "logarithmic":
+        return logarithmic_relief(position, drawing.roller_diameter_mm * 1e-3, length)
+    return np.zeros(slices)
+
+
+def _race_damping(scene: Scene) -> NoDamping | ViscousDamping | HuntCrossleyDamping:
     laws = scene.model
     if laws.race_damping == "viscous":
-        return ViscousDamping(laws.race_damping_ratio, roller_mass, 1e6 / laws.race_damping_engagement_um)
+        return ViscousDamping(
+            laws.race_damping_ratio, roller_mass(scene), 1e6 / laws.race_damping_engagement_um
+        )
     if laws.race_damping == "hunt_crossley":
         return HuntCrossleyDamping(laws.race_damping_alpha_s_m)
     return NoDamping()
-
-
-def _race_traction(scene: Scene) -> Any:
-    table = scene.traction
-    if table.model == "four_constant":
-        constants = four_constants(table.mu_0, table.mu_m, table.mu_inf, table.u_m_m_s)
-        if table.mu_0 > 0.0:
-            return BlendedFourConstantTraction(*constants, table.blend_speed_m_s)
-        return FourConstantTraction(*constants)
-    if table.model == "coulomb":
-        return _friction(scene, table.coulomb)
-    return NoTraction()
 
 
 def _friction(scene: Scene, coefficient: float) -> NoTraction | CoulombTraction:
@@ -206,33 +200,40 @@ def _hunt_crossley(alpha: float) -> NoDamping | HuntCrossleyDamping:
     return HuntCrossleyDamping(alpha) if alpha > 0.0 else NoDamping()
 
 
-def _rolling(scene: Scene, oil: Oil, race_radius: float, curvature: float) -> Any:
+def _rolling(scene: Scene, oil: Oil, reduced_radius: float) -> Any:
     if scene.model.rolling_resistance == "off":
         return NoRollingResistance()
-    roller_radius = 0.5e-3 * scene.bearing.roller_diameter_mm
     # The entrainment speed varies little: the heating of the inlet is that at the kinematic speed.
-    heating = aihara_thermal_factor(oil.viscosity_slope, oil.conductivity, kinematics(scene).entrainment)
+    entrainment = abs(kinematics(scene).entrainment)
+    heating = aihara_thermal_factor(oil.viscosity_slope, oil.conductivity, entrainment)
+    length = scene.bearing.effective_length_mm * 1e-3
     return biboulet_houpert(
-        oil.viscosity,
-        equivalent_modulus(scene.material("roller"), scene.material("rings")),
-        1.0 / (1.0 / roller_radius + curvature / race_radius),
-        scene.bearing.effective_length_mm * 1e-3,
-        heating,
+        oil.viscosity, _modulus(scene, "roller", "rings"), reduced_radius, length, heating
     )
 
 
-def _pocket(scene: Scene) -> NoPocket | Pocket:
-    laws = scene.model
+def _pocket(scene: Scene, oil: Oil) -> Any:
+    laws, cage = scene.model, scene.cage
     if laws.pocket == "off":
         return NoPocket()
-    stiffness = _palmgren(scene, "roller", "cage", scene.bearing.effective_length_mm)
+    plain = palmgren(_modulus(scene, "roller", "cage"), scene.bearing.effective_length_mm * 1e-3)
     bar = laws.pocket_bar_stiffness_N_m
-    return Pocket(
-        0.5e-3 * scene.cage.pocket_clearance_mm,
-        LineContact(stiffness) if bar == "rigid" else LineContactOnBar(stiffness, float(bar)),
-        _hunt_crossley(laws.pocket_damping_alpha_s_m),
-        _friction(scene, laws.pocket_friction),
-    )
+    contact = plain if bar == "rigid" else LineContactOnBar(plain.stiffness, float(bar))
+    damping, friction = _hunt_crossley(laws.alpha("pocket")), _friction(scene, laws.pocket_friction)
+    clearance = 0.5e-3 * cage.pocket_clearance_mm
+    radius = 0.5e-3 * scene.bearing.roller_diameter_mm
+    pocket: Any = Pocket(clearance, radius, contact, damping, friction)
+    if laws.pocket_film:
+        floor = laws.pocket_film_floor_um * 1e-6
+        length = scene.bearing.roller_length_mm * 1e-3
+        film = pocket_film(oil.viscosity, radius, length, floor, laws.pocket_fill)
+        walls = Pocket(clearance - floor, radius, contact, damping, friction)
+        pocket = LubricatedPocket(walls, film, clearance, radius)
+    if cage.lip_clearance_mm is None:
+        return pocket
+    outer, inner = raceway_radii(scene)
+    play = 0.5e-3 * cage.lip_clearance_mm
+    return LippedPocket(pocket, 0.5 * (outer + inner), play, radius, contact, damping, friction)
 
 
 def _guide(scene: Scene, oil: Oil) -> NoGuide | OuterGuide | InnerGuide:
@@ -252,8 +253,67 @@ def _guide(scene: Scene, oil: Oil) -> NoGuide | OuterGuide | InnerGuide:
         )
     dry = DryContact(
         play,
-        LineContact(_palmgren(scene, "cage", "rings", cage.lands * cage.land_width_mm)),
-        _hunt_crossley(laws.land_damping_alpha_s_m),
+        palmgren(_modulus(scene, "cage", "rings"), cage.lands * cage.land_width_mm * 1e-3),
+        _hunt_crossley(laws.alpha("land")),
         _friction(scene, laws.land_friction),
     )
     return OuterGuide(journal, film, dry) if cage.guidance == "outer" else InnerGuide(journal, film, dry)
+
+
+def _drag(scene: Scene, oil: Oil) -> Any:
+    laws, drawing = scene.model, scene.bearing
+    if laws.drag == "off" or laws.drag_coefficient == 0.0:
+        return NoDrag()
+    return cylinder_drag(
+        oil.density,
+        scene.lubricant.oil_fraction,
+        laws.drag_coefficient,
+        drawing.roller_diameter_mm * 1e-3,
+        drawing.roller_length_mm * 1e-3,
+    )
+
+
+def _cage(scene: Scene) -> BalancedCage | UnbalancedCage:
+    mass, inertia = scene.cage.mass_g * 1e-3, cage_inertia(scene)
+    if scene.cage.imbalance_um == 0.0:
+        return BalancedCage(mass, inertia)
+    return UnbalancedCage(mass, inertia, scene.cage.imbalance_um * 1e-6)
+
+
+def _outer_ring(scene: Scene) -> HeldRing | SupportedRing:
+    support, start = scene.support, layout_of(scene).support
+    if support is None or start is None:
+        return HeldRing()
+    return SupportedRing(
+        start, support.outer_ring_mass_kg, float(support.stiffness_N_m), float(support.damping_N_s_m)
+    )
+
+
+def _gravity(scene: Scene) -> NoGravity | Gravity:
+    size, direction = scene.operation.gravity_m_s2, math.radians(scene.operation.gravity_direction_deg)
+    return Gravity(size * math.cos(direction), size * math.sin(direction)) if size > 0.0 else NoGravity()
+
+
+def _drive(scene: Scene) -> SteadyDrive | TwoSpeedDrive | ClockedDrive:
+    operation, clock = scene.operation, layout_of(scene).clock
+    inner, outer = shaft_speeds(scene)
+    load = float(operation.radial_load_N)
+    if clock is None:
+        return SteadyDrive(inner, load) if outer == 0.0 else TwoSpeedDrive(inner, outer, load)
+    return ClockedDrive(
+        clock,
+        _schedule(scene, "inner_speed_rpm", inner, math.pi / 30.0),
+        outer,
+        _schedule(scene, "radial_load_N", load, 1.0),
+        float(operation.rotating_load_N),
+        operation.unbalance_g_mm * 1e-6,
+    )
+
+
+def _schedule(scene: Scene, key: str, otherwise: float, unit: float) -> Any:
+    schedule = scene.operation.schedule
+    values = getattr(schedule, key, None)
+    if schedule is None or values is None:
+        return Constant(otherwise)
+    kinds: dict[str, Any] = {"step": Steps, "linear": Ramps, "smooth": SmoothRamps}
+    return kinds[schedule.shape](np.array(schedule.time_s, float), unit * np.array(values, float))

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.film import rolling_force
-from rbdyn.contact.hertz_line import elastic_load
+from rbdyn.contact.hertz_line import around, line_load
 from rbdyn.contact.traction import traction
-from rbdyn.kernel import kernel
+from rbdyn.dynamics.race_form import form_at, sloped
+from rbdyn.kernel import kernel, law
 
 # Contacts are worked through in blocks of LANES, VECTOR at a time; each quantity is a row of a block.
 LANES, VECTOR, INPUTS, OUTPUTS = 16, 4, 5, 8
 
-# Below these an overlap or a speed is round-off; they keep logarithms and roots of the laws finite.
-SMALLEST_APPROACH = 1e-18
+# Below this a speed is round-off; it keeps the roots of the laws finite.
 SMALLEST_SPEED = 1e-12
 
 
@@ -36,89 +36,152 @@ class Scratch(NamedTuple):
 
 def scratch() -> Scratch:
     """Work space for the race contacts."""
-    return Scratch(np.ones(INPUTS * LANES), np.empty(OUTPUTS * LANES), np.empty(LANES, np.int64))
+    return Scratch(np.ones(INPUTS * LANES), np.empty(OUTPUTS * LANES), np.zeros(LANES, np.int64))
+
+
+class InOrder(NamedTuple):
+    """Rollers from a first number on."""
+
+    first: int
+
+
+class Picked(NamedTuple):
+    """Rollers of any numbers."""
+
+    numbers: NDArray[np.int64]
+
+
+@law
+def roller_number(choice, i):
+    """Number of the roller in lane ``i``; past the last roller it may be any."""
+
+
+@roller_number.body(InOrder)
+def _(choice, i):
+    return choice.first + i
+
+
+@roller_number.body(Picked)
+def _(choice, i):
+    return choice.numbers[i]
 
 
 class Race(NamedTuple):
-    """One raceway: its radius [m] and its laws."""
+    """One raceway: its radius, the largest distance of ring and roller centres at which they may touch [m], its laws."""
 
     radius: float
+    reach: float
+    form: Any
     contact: Any
     damping: Any
     traction: Any
     rolling: Any
 
 
+class EqualRollers(NamedTuple):
+    """Rollers of one radius [m]."""
+
+    radius: float
+
+
+class UnequalRollers(NamedTuple):
+    """Each roller with its own radius [m]; masses are those of the mean."""
+
+    radii: NDArray[np.float64]
+
+
+@law
+def roller_radius(sizes, number):
+    """Radius of a roller [m]."""
+
+
+@roller_radius.body(EqualRollers)
+def _(sizes, number):
+    return sizes.radius
+
+
+@roller_radius.body(UnequalRollers)
+def _(sizes, number):
+    return sizes.radii[min(number, sizes.radii.size - 1)]
+
+
 @kernel
-def race_contact(race, side, roller_radius, dx, dy, dvx, dvy, roller_spin, ring_speed):
+def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin):
     """Wrench of one race on one roller; zero, but for round-off, where they do not touch.
 
     ``dx, dy, dvx, dvy``: position [m] and velocity [m/s] of the roller's centre less those of the ring's centre;
-    spins [rad/s]. Returns (force x, force y, moment on the roller, moment on the ring about its centre, load,
-    powers lost in traction, in rolling and in damping) in N, N m and W. The force on the ring is the opposite.
+    spins [rad/s]; ``ring_cos, ring_sin``: direction of the ring's mark. Returns (force x, force y, moment on the
+    roller, moment on the ring about its centre, load, powers lost in traction, in rolling and in damping, slip) in
+    N, N m, W and m/s. The force on the ring is the opposite.
 
     Load: Chen et al. 2022, eq 5-6; slip at the point that halves the approach: eq 7-10; rolling resistance with
-    the pressure offset 2 F_R R_x/R_b: Biboulet and Houpert 2010.
+    the pressure offset 2 F_R R_x/R_b: Biboulet and Houpert 2010. On a wavy race the load points along the gradient of
+    the overlap: through the roller's centre, past the ring's; so it does between tilted races, whose tilt, being
+    prescribed, bears the moment that this makes about the ring's centre.
     """
     distance = math.sqrt(dx * dx + dy * dy)
     inverse = 1.0 / distance
     nx, ny = dx * inverse, dy * inverse
-    overlap = side * (distance - race.radius) + roller_radius
-    # Written without a branch, so that neighbouring contacts share vector instructions; NaN counts as closed.
-    approach = SMALLEST_APPROACH if overlap < SMALLEST_APPROACH else overlap
-    approach_rate = side * (dvx * nx + dvy * ny)
-    elastic = elastic_load(race.contact, approach)
-    load = damped_load(race.damping, elastic, approach, approach_rate)
-    elastic = 0.0 if overlap <= 0.0 else elastic
-    load = 0.0 if overlap <= 0.0 else load
-
-    roller_lever = side * (roller_radius - 0.5 * approach)
-    ring_lever = distance + roller_lever
+    rise, slope = form_at(race.form, nx, ny, ring_cos, ring_sin)
+    # Terms that a round race lacks are subtracted: x - 0 is the one sum with zero that the compiler may drop.
+    overlap = side * (distance - race.radius - rise) + radius
     tangential = dvy * nx - dvx * ny
+    orbit_rate = tangential * inverse
+    elastic, stiffness, approach, lean = line_load(race.contact, overlap, nx, ny)
+    approach_rate = side * (dvx * nx + dvy * ny - sloped(race.form, slope, orbit_rate - ring_speed))
+    approach_rate -= around(race.contact, -lean, orbit_rate)
+    damped = damped_load(race.damping, elastic, stiffness, approach, approach_rate)
+    load = 0.0 if elastic == 0.0 else damped
+
+    roller_lever = side * (radius - 0.5 * approach)
+    ring_lever = distance + roller_lever
     slip = ring_speed * ring_lever - tangential - roller_spin * roller_lever
-    traction_force = traction(race.traction, slip) * load
+    traction_force = traction(race.traction, slip, load) * load
 
     # Seen from the line of centres both surfaces run the same way at the entrainment speed.
-    orbit_rate = tangential * inverse
     roller_surface = (roller_spin - orbit_rate) * roller_lever
     ring_surface = (ring_speed - orbit_rate) * ring_lever
     entrainment = 0.5 * (roller_surface + ring_surface)
     resistance = rolling_force(race.rolling, load, max(abs(entrainment), SMALLEST_SPEED))
     rolling = math.copysign(resistance, entrainment)
-    along = traction_force + rolling * (ring_lever + roller_lever) * inverse
     normal = -side * load
+    along = traction_force + rolling * (ring_lever + roller_lever) * inverse
+    along -= sloped(race.form, slope, normal * inverse) + around(race.contact, lean, load * inverse)
     return (
         normal * nx - along * ny,
         normal * ny + along * nx,
         roller_lever * (traction_force - rolling),
-        -ring_lever * (traction_force + rolling),
+        -ring_lever * (traction_force + rolling) - sloped(race.form, slope, -normal),
         load,
         traction_force * slip,
         2.0 * rolling * entrainment,
         (load - elastic) * approach_rate,
+        slip,
     )
 
 
 @kernel
-def race_block(race, side, roller_radius, ring, source, first, stride, lanes, count):
+def race_block(race, side, sizes, ring, source, first, stride, choice, lanes, count):
     """Contacts of ``count`` rollers, rounded up to whole vectors, into the rows of ``lanes``.
 
-    Roller i's x, y, vx, vy and spin stand at ``source[first + i + row * stride]``. Straight-line code over rows at
-    constant distances, which the compiler turns into vector instructions; the lanes past ``count`` hold nothing.
+    ``choice`` tells their numbers; x, y, vx, vy and spin of roller i stand at ``source[first + i + row * stride]``.
+    Straight-line code over rows at constant distances, which the compiler turns into vector instructions; the lanes
+    past ``count`` hold nothing.
     """
-    ring_x, ring_y, ring_vx, ring_vy, ring_speed = ring
     for i in range((count + VECTOR - 1) // VECTOR * VECTOR):
         j = first + i
         out = race_contact(
             race,
             side,
-            roller_radius,
-            source[j] - ring_x,
-            source[j + stride] - ring_y,
-            source[j + 2 * stride] - ring_vx,
-            source[j + 3 * stride] - ring_vy,
+            roller_radius(sizes, roller_number(choice, i)),
+            source[j] - ring.x,
+            source[j + stride] - ring.y,
+            source[j + 2 * stride] - ring.vx,
+            source[j + 3 * stride] - ring.vy,
             source[j + 4 * stride],
-            ring_speed,
+            ring.speed,
+            ring.cos,
+            ring.sin,
         )
         lanes[i] = out[0]
         lanes[LANES + i] = out[1]
@@ -131,7 +194,7 @@ def race_block(race, side, roller_radius, ring, source, first, stride, lanes, co
 
 
 @kernel
-def gather_touching(open_distance, ring, rollers, start, y, packed, index):
+def gather_touching(reach, ring, rollers, start, y, packed, index):
     """Copy the state of rollers that touch the inner race, from ``start`` on, until a block is full.
 
     Returns how many there are and where to go on.
@@ -139,8 +202,8 @@ def gather_touching(open_distance, ring, rollers, start, y, packed, index):
     count = 0
     j = start
     while j < rollers and count < LANES:
-        dx, dy = y[j] - ring[0], y[rollers + j] - ring[1]
-        if dx * dx + dy * dy < open_distance * open_distance:
+        dx, dy = y[j] - ring.x, y[rollers + j] - ring.y
+        if dx * dx + dy * dy < reach * reach:
             for row in range(INPUTS):
                 packed[row * LANES + count] = y[row * rollers + j]
             index[count] = j
@@ -168,18 +231,17 @@ def add_block(lanes, i, j, rollers, row, dy, sums):
 
 
 @kernel
-def outer_race_forces(race, radius, rollers, y, row, dy, scratch):
-    """All contacts of the fixed outer race: adds forces and moments on the rollers to row ``row`` of ``dy``.
+def outer_race_forces(race, sizes, ring, rollers, y, row, dy, scratch):
+    """All contacts of the outer race: adds forces and moments on the rollers to row ``row`` of ``dy``.
 
     Returns (force x, force y, moment on the ring, largest load, powers lost in traction, rolling and damping).
     Nearly every roller touches this race, so none is picked out.
     """
     sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    still = (0.0, 0.0, 0.0, 0.0, 0.0)
     start = 0
     while start < rollers:
         count = min(LANES, rollers - start)
-        race_block(race, 1.0, radius, still, y, start, rollers, scratch.lanes, count)
+        race_block(race, 1.0, sizes, ring, y, start, rollers, InOrder(start), scratch.lanes, count)
         for i in range(count):
             sums = add_block(scratch.lanes, i, start + i, rollers, row, dy, sums)
         start += LANES
@@ -187,18 +249,28 @@ def outer_race_forces(race, radius, rollers, y, row, dy, scratch):
 
 
 @kernel
-def inner_race_forces(race, radius, ring, rollers, y, row, dy, scratch):
-    """All contacts of the inner race, as ``outer_race_forces``; ``ring``: its x, y, vx, vy and speed.
+def inner_race_forces(race, sizes, ring, rollers, y, row, dy, scratch):
+    """All contacts of the inner race, as ``outer_race_forces``.
 
     Only rollers of the load zone touch this race: they are picked out first.
     """
     sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    open_distance = race.radius + radius
     start = 0
     while start < rollers:
-        count, start = gather_touching(open_distance, ring, rollers, start, y, scratch.packed, scratch.roller)
+        count, start = gather_touching(race.reach, ring, rollers, start, y, scratch.packed, scratch.roller)
         if count > 0:
-            race_block(race, -1.0, radius, ring, scratch.packed, 0, LANES, scratch.lanes, count)
+            race_block(
+                race,
+                -1.0,
+                sizes,
+                ring,
+                scratch.packed,
+                0,
+                LANES,
+                Picked(scratch.roller),
+                scratch.lanes,
+                count,
+            )
         for i in range(count):
             sums = add_block(scratch.lanes, i, scratch.roller[i], rollers, row, dy, sums)
     return sums

@@ -15,9 +15,12 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing, mechanical_energy, pocket_loads
+from rbdyn.dynamics.energy import mechanical_energy
+from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing
+from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, raceway_radii, scales, shaft_speeds
 from rbdyn.dynamics.metrics import Replicate, quantity
-from rbdyn.dynamics.model import absolute_tolerance, kinematics, roller_bearing, scales
+from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.race_report import race_report
 from rbdyn.dynamics.races import scratch
 from rbdyn.dynamics.runge_kutta import (
     FINISHED,
@@ -29,7 +32,7 @@ from rbdyn.dynamics.runge_kutta import (
     advance,
 )
 from rbdyn.dynamics.start import start_state
-from rbdyn.dynamics.state import CAGE_ANGLE, CAGE_X, CAGE_Y, name
+from rbdyn.dynamics.state import CAGE_ANGLE, INNER_ANGLE, OUTER_ANGLE, name
 from rbdyn.faults import RunError
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene
@@ -65,24 +68,15 @@ class Stop:
             self.outer.check()
 
 
-@dataclass(frozen=True)
-class Trace:
-    """A time history at uniform samples: time [s], cage centre [m], signed pocket wall loads [N] (samples, rollers)."""
-
-    time: NDArray[np.float64]
-    cage_x: NDArray[np.float64]
-    cage_y: NDArray[np.float64]
-    pocket_load: NDArray[np.float64]
-
-
 class Run:
     """One replicate under way: parameters, integrator memory and where it stands."""
 
     def __init__(self, scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> None:
         self.scene, self.bearing, self.replicate, self.stop = scene, bearing, replicate, stop
+        self.layout = layout_of(scene)
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
         y = start_state(scene, bearing, np.random.default_rng(seeds))
-        tolerance = absolute_tolerance(bearing, scene, rtol)
+        tolerance = absolute_tolerance(scene, rtol)
         numerics = scene.numerics
         turns = numerics.turns + numerics.discard_turns
         self.control = Control(
@@ -92,7 +86,7 @@ class Run:
             int(min(numerics.step_budget_per_turn * math.ceil(turns), 2**62)),
         )
         n = y.size
-        first_step = 1e-3 * scales(bearing, scene).length / scales(bearing, scene).speed
+        first_step = 1e-3 * scales(scene).length / scales(scene).speed
         self.carry = Carry(
             y=y,
             k=np.zeros((7, n)),
@@ -125,13 +119,20 @@ class Run:
             kept[:] = 0.0
         self.carry.clock[3] = self.carry.clock[0]
 
+    def clock_angles(self) -> NDArray[np.float64]:
+        """Angles of inner and outer ring [rad] since the start."""
+        clock = self.layout.clock
+        if clock is None:
+            return self.carry.clock[0] * np.array(shaft_speeds(self.scene))
+        return self.carry.y[clock + INNER_ANGLE : clock + OUTER_ANGLE + 1].copy()
+
     def _why(self, status: int) -> str:
         time_s = self.carry.clock[0]
         where = (
             f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s, "
             f"shaft turn {time_s / self.scene.turn_s:.4g}"
         )
-        component = name(int(self.carry.counts[3]), self.bearing.rollers)
+        component = name(int(self.carry.counts[3]), self.layout)
         if status == STEP_UNDERFLOW:
             return (
                 f"{where}: the step fell below {self.control.smallest_step:.2g} s because of {component}; "
@@ -145,6 +146,13 @@ class Run:
         )
 
 
+def kinematic_cage_speed(scene: Scene, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
+    """Mean epicyclic cage speed [rad/s] over the counted turns, from the ring angles before and after them."""
+    outer, inner = raceway_radii(scene)
+    turned = (after - before) / (scene.numerics.turns * scene.turn_s)
+    return float((turned[0] * inner + turned[1] * outer) / (inner + outer))
+
+
 def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> Replicate:
     """Run one replicate: discard the transient, then count. Raises RunError or CancelledError."""
     started = time.thread_time()
@@ -153,7 +161,7 @@ def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: fl
     run.to(numerics.discard_turns)
     run.forget()
     body = 5 * bearing.rollers
-    angle = run.carry.y[body + CAGE_ANGLE]
+    angle, clock = run.carry.y[body + CAGE_ANGLE], run.clock_angles()
     energy = sum(mechanical_energy(bearing, run.carry.y))
     window = scene.impact_window_turns
     impacts, largest = [], np.zeros(LOADS)
@@ -164,7 +172,7 @@ def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: fl
         largest = np.maximum(largest, run.tally.largest)
     run.to(numerics.discard_turns + numerics.turns)
     largest = np.maximum(largest, run.tally.largest)
-    scale = scales(bearing, scene)
+    scale = scales(scene)
     return Replicate(
         duration=numerics.turns * scene.turn_s,
         impact_windows=np.array(impacts),
@@ -172,34 +180,13 @@ def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: fl
         work=run.tally.work.copy(),
         largest=largest,
         cage_angle=float(run.carry.y[body + CAGE_ANGLE] - angle),
-        kinematic_cage_speed=kinematics(scene).cage_speed,
+        kinematic_cage_speed=kinematic_cage_speed(scene, clock, run.clock_angles()),
         energy_change=float(sum(mechanical_energy(bearing, run.carry.y)) - energy),
         energy_scale=scale.load * scale.length,
         accepted_steps=int(run.carry.counts[0]),
         rejected_steps=int(run.carry.counts[1]),
         derivatives=int(run.carry.counts[2]),
         cpu_s=time.thread_time() - started,
-    )
-
-
-def trace(scene: Scene, turns: float, replicate: int = 0) -> Trace:
-    """Time history of one replicate over the first ``turns`` counted turns. Raises RunError."""
-    bearing = roller_bearing(scene)
-    run = Run(scene, bearing, replicate, scene.numerics.rtol, Stop())
-    run.to(scene.numerics.discard_turns)
-    run.forget()
-    per_turn = scene.numerics.samples_per_turn
-    states = np.empty((int(turns * per_turn), run.carry.y.size))
-    for sample, state in enumerate(states):
-        # Steps end at the samples: what is recorded is what was integrated.
-        run.to(scene.numerics.discard_turns + sample / per_turn)
-        state[:] = run.carry.y
-    body = 5 * bearing.rollers
-    return Trace(
-        time=np.arange(len(states)) * scene.turn_s / per_turn,
-        cage_x=states[:, body + CAGE_X].copy(),
-        cage_y=states[:, body + CAGE_Y].copy(),
-        pocket_load=pocket_loads(bearing, states),
     )
 
 
@@ -285,6 +272,9 @@ def _gather(
 ) -> SimulationResult:
     everything = [*runs, *companions]
     per_run = scene.numerics.turns + scene.numerics.discard_turns
+    inner_load, outer_load = (
+        max(getattr(run, f"max_{race}_load") for run in runs) for race in ("inner", "outer")
+    )
     return SimulationResult(
         status="ok",
         impact_force=quantity(lambda run: run.impact_force, runs, companions),
@@ -294,8 +284,11 @@ def _gather(
         cage_slip=quantity(lambda run: run.cage_slip, runs, companions),
         power_gap=max(run.power_gap for run in runs),
         power_terms={term: float(np.mean([run.power(term) for run in runs])) for term in LOSSES},
-        max_inner_load=max(run.max_inner_load for run in runs),
-        max_outer_load=max(run.max_outer_load for run in runs),
+        max_inner_load=inner_load,
+        max_outer_load=outer_load,
+        max_land_load=max(run.max_land_load for run in runs),
+        races=race_report(scene, roller_bearing(scene), inner_load, outer_load),
+        clearance=clearance_report(scene),
         impact_window_turns=scene.impact_window_turns,
         cost={
             "wall_s": wall_s,
@@ -314,6 +307,16 @@ def _gather(
     )
 
 
+def clearance_report(scene: Scene) -> dict[str, float]:
+    """Diametral clearance as drawn and in operation, and what changed it [um]."""
+    drawn = scene.bearing.radial_clearance_mm * 1e3
+    mounted = scene.mounted_clearance
+    if mounted is None:
+        return {"drawn": drawn, "operating": drawn}
+    parts = ("inner_fit", "outer_fit", "temperature", "rotation", "operating")
+    return {"drawn": drawn, **{part: getattr(mounted, part) * 1e6 for part in parts}}
+
+
 def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
     notes = []
     if power_gap > LARGEST_POWER_GAP:
@@ -325,6 +328,11 @@ def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
         notes.append(
             "traction: one load-independent set of constants; lightly loaded rollers are driven too hard and "
             "skidding is under-predicted"
+        )
+    if scene.traction.model == "thermal_newtonian" and scene.lubricant.viscosity_mPas is not None:
+        notes.append(
+            "traction: follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use; choose "
+            "traction.rheology_oil to suit it"
         )
     if scene.numerics.replicates == 1:
         notes.append("one replicate: no statistical error can be given; raise numerics.replicates")

@@ -7,10 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.contact.hertz_line import elastic_load
+from rbdyn.contact.hertz_line import line_load
+from rbdyn.dynamics.drive import action
 from rbdyn.dynamics.equations import RollerBearing
-from rbdyn.dynamics.model import kinematics
-from rbdyn.dynamics.state import CAGE_SPEED, CAGE_X, CAGE_Y, RING_X, size
+from rbdyn.dynamics.geometry import kinematics, layout_of
+from rbdyn.dynamics.race_form import form_at
+from rbdyn.dynamics.races import roller_radius
+from rbdyn.dynamics.state import CAGE_SPEED, CAGE_X, CAGE_Y, RING_X
 from rbdyn.kernel import entry, kernel, routine
 from rbdyn.scene import Scene
 
@@ -18,24 +21,29 @@ BISECTIONS = 60
 
 
 @kernel
-def race_loads(bearing, radius, angle, ring_x):
-    """Static loads [N] of a roller at (radius, angle): outer race, inner race with the ring at (ring_x, 0)."""
-    outer_approach = radius + bearing.roller_radius - bearing.outer.radius
-    distance = math.sqrt(radius**2 - 2.0 * radius * ring_x * math.cos(angle) + ring_x**2)
-    inner_approach = bearing.inner.radius + bearing.roller_radius - distance
-    outer = elastic_load(bearing.outer.contact, outer_approach) if outer_approach > 0.0 else 0.0
-    inner = elastic_load(bearing.inner.contact, inner_approach) if inner_approach > 0.0 else 0.0
-    return outer, inner
+def race_loads(bearing, j, radius, angle, ring_x):
+    """Static loads [N] of roller ``j`` at (radius, angle): outer race, inner race with the ring at (ring_x, 0)."""
+    own_radius = roller_radius(bearing.sizes, j)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    rise, _ = form_at(bearing.outer.form, cosine, sine, 1.0, 0.0)
+    overlap = radius + own_radius - bearing.outer.radius - rise
+    outer = line_load(bearing.outer.contact, overlap, cosine, sine)[0]
+    dx, dy = radius * cosine - ring_x, radius * sine
+    distance = math.sqrt(dx * dx + dy * dy)
+    nx, ny = dx / distance, dy / distance
+    rise, _ = form_at(bearing.inner.form, nx, ny, 1.0, 0.0)
+    overlap = bearing.inner.radius + rise + own_radius - distance
+    return outer, line_load(bearing.inner.contact, overlap, nx, ny)[0]
 
 
 @routine
-def seated_radius(bearing, angle, ring_x, orbit_speed):
+def seated_radius(bearing, j, angle, ring_x, orbit_speed):
     """Orbit radius [m] at which outer load balances inner load and centrifugal force."""
     low = bearing.inner.radius
     high = 2.0 * bearing.outer.radius
     for _ in range(BISECTIONS):
         radius = 0.5 * (low + high)
-        outer, inner = race_loads(bearing, radius, angle, ring_x)
+        outer, inner = race_loads(bearing, j, radius, angle, ring_x)
         if outer > inner + bearing.roller_mass * radius * orbit_speed**2:
             high = radius
         else:
@@ -43,26 +51,31 @@ def seated_radius(bearing, angle, ring_x, orbit_speed):
     return high
 
 
+@routine
+def static_force(bearing, angles, orbit_speed, ring_x, radii):
+    """Force along x [N] that the rollers at ``angles`` hold against a ring at (ring_x, 0); fills their orbit radii."""
+    force = 0.0
+    for j in range(angles.size):
+        radii[j] = seated_radius(bearing, j, angles[j], ring_x, orbit_speed)
+        force += race_loads(bearing, j, radii[j], angles[j], ring_x)[1] * math.cos(angles[j])
+    return force
+
+
 @entry
-def static_share(bearing, angles, orbit_speed, radii):
-    """Ring displacement along x [m] under the radial load; fills the orbit radii [m] of rollers at ``angles``."""
-    low, high = 0.0, 1e-5
-    settled = False
-    while not settled:
-        force = 0.0
-        for j in range(angles.size):
-            radius = seated_radius(bearing, angles[j], high, orbit_speed)
-            force += race_loads(bearing, radius, angles[j], high)[1] * math.cos(angles[j])
-        settled = force >= bearing.radial_load or high > bearing.roller_radius
-        if not settled:
-            low, high = high, 2.0 * high
+def static_share(bearing, angles, orbit_speed, load, radii):
+    """Ring displacement along x [m] under a load [N] along x; fills the orbit radii [m] of rollers at ``angles``.
+
+    The force rises with the displacement, which is negative where the form of the races alone pushes harder.
+    """
+    reach = roller_radius(bearing.sizes, 0)
+    low, high = -1e-5, 1e-5
+    while static_force(bearing, angles, orbit_speed, high, radii) < load and high < reach:
+        low, high = high, 2.0 * high
+    while static_force(bearing, angles, orbit_speed, low, radii) > load and low > -reach:
+        low, high = 2.0 * low, low
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        force = 0.0
-        for j in range(angles.size):
-            radii[j] = seated_radius(bearing, angles[j], middle, orbit_speed)
-            force += race_loads(bearing, radii[j], angles[j], middle)[1] * math.cos(angles[j])
-        if force >= bearing.radial_load:
+        if static_force(bearing, angles, orbit_speed, middle, radii) >= load:
             high = middle
         else:
             low = middle
@@ -76,16 +89,18 @@ def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Gener
     (or pocket) clearance off centre, both at random; all move as if they rolled without slip.
     """
     z = bearing.rollers
-    motion = kinematics(scene)
+    state = layout_of(scene)
+    y = np.zeros(state.size)
+    acting = action(bearing.drive, y)
+    motion = kinematics(scene, acting.inner_speed, acting.outer_speed)
     pitch_radius = 0.5e-3 * scene.bearing.pitch_diameter_mm
     pocket = 1e-3 * scene.cage.pocket_clearance_mm
     angles = 2.0 * np.pi * np.arange(z) / z + generator.uniform(-0.2, 0.2, z) * pocket / pitch_radius
     direction = generator.uniform(0.0, 2.0 * np.pi)
     offset = 0.1 * min(0.5e-3 * scene.cage.guide_clearance_mm, 0.5 * pocket)
     radii = np.empty(z)
-    ring_x = static_share(bearing, angles, motion.cage_speed, radii)
+    ring_x = static_share(bearing, angles, motion.cage_speed, acting.load_x, radii)
     cosine, sine = np.cos(angles), np.sin(angles)
-    y = np.zeros(size(z))
     y[: 5 * z] = np.concatenate(
         (
             radii * cosine,
@@ -95,8 +110,15 @@ def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Gener
             np.full(z, motion.roller_spin),
         )
     )
-    body = y[5 * z :]
+    body = y[5 * z :]  # cage, ring and what the scene adds, which starts at rest at time zero
     body[CAGE_X], body[CAGE_Y] = offset * math.cos(direction), offset * math.sin(direction)
     body[CAGE_SPEED] = motion.cage_speed
     body[RING_X] = ring_x
+    if state.support is not None:
+        # All sits on the outer ring, which gives way under the load.
+        sag = acting.load_x / bearing.outer_ring.stiffness
+        y[:z] += sag
+        y[state.support] = sag
+        body[CAGE_X] += sag
+        body[RING_X] += sag
     return y

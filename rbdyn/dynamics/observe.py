@@ -1,0 +1,60 @@
+"""What happens at every contact in recorded states: loads, slips, heat. Compiled only where a history is asked for."""
+
+from __future__ import annotations
+
+from rbdyn.dynamics.drive import action
+from rbdyn.dynamics.equations import cage_motion, inner_motion, pocket_direction, roller_pocket
+from rbdyn.dynamics.guide_land import guide_forces
+from rbdyn.dynamics.races import race_contact, roller_radius
+from rbdyn.dynamics.ring_motion import outer_motion
+from rbdyn.kernel import entry, kernel
+
+# Rows of what is observed of each roller: loads [N] (that on the pocket is positive on the front wall, where the roller
+# drives the cage), slips [m/s], overlaps of the races [m] and heat [W] by traction and rolling.
+OUTER_LOAD, INNER_LOAD, POCKET_LOAD, OUTER_SLIP, INNER_SLIP, OUTER_HEAT, INNER_HEAT = range(7)
+OBSERVED = 7
+
+
+@kernel
+def race_observed(race, side, bearing, y, j, ring):
+    """``race_contact`` of roller ``j``."""
+    z = bearing.rollers
+    return race_contact(
+        race,
+        side,
+        roller_radius(bearing.sizes, j),
+        y[j] - ring.x,
+        y[z + j] - ring.y,
+        y[2 * z + j] - ring.vx,
+        y[3 * z + j] - ring.vy,
+        y[4 * z + j],
+        ring.speed,
+        ring.cos,
+        ring.sin,
+    )
+
+
+@entry
+def observe(bearing, states, rollers, land):
+    """Fill ``rollers`` (OBSERVED, samples, rollers) and ``land`` (samples,), the dry load of the land [N]."""
+    z = bearing.rollers
+    body = 5 * z
+    for i in range(states.shape[0]):
+        y = states[i]
+        acting = action(bearing.drive, y)
+        cage, inner = cage_motion(y, body), inner_motion(y, body, acting)
+        outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
+        land[i] = guide_forces(bearing.guide, cage, inner, outer).load
+        for j in range(z):
+            on_outer = race_observed(bearing.outer, 1.0, bearing, y, j, outer)
+            on_inner = race_observed(bearing.inner, -1.0, bearing, y, j, inner)
+            wall = roller_pocket(bearing, y, cage, j)
+            ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)
+            front = (y[z + j] - cage.y) * ex - (y[j] - cage.x) * ey >= 0.0
+            rollers[OUTER_LOAD, i, j] = on_outer[4]
+            rollers[INNER_LOAD, i, j] = on_inner[4]
+            rollers[POCKET_LOAD, i, j] = wall[4] if front else -wall[4]
+            rollers[OUTER_SLIP, i, j] = on_outer[8]
+            rollers[INNER_SLIP, i, j] = on_inner[8]
+            rollers[OUTER_HEAT, i, j] = on_outer[5] + on_outer[6]
+            rollers[INNER_HEAT, i, j] = on_inner[5] + on_inner[6]

@@ -1,0 +1,182 @@
+"""One validated scene: bearing, cage, lubricant, operation, laws and numerics.
+
+Keys carry their units; whatever a paper leaves out stands here as a default with its reason. Nothing in this package
+is compiled: ``rbdyn.dynamics.model`` turns a scene into the SI parameters of the kernels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from copy import deepcopy
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import model_validator
+
+from rbdyn.faults import Strict, read_toml, set_key, validated
+from rbdyn.materials import Material
+from rbdyn.scene.bearing import Bearing, Cage, Materials
+from rbdyn.scene.fields import or_refuse
+from rbdyn.scene.laws import Laws, Numerics
+from rbdyn.scene.lubricant import Lubricant, Traction
+from rbdyn.scene.mounting import Mounting, faults, material_of
+from rbdyn.scene.operation import Operation, Support
+
+if TYPE_CHECKING:
+    from rbdyn.ring_expansion import MountedClearance
+
+# Slices where a profile or a tilt needs them (ISO/TS 16281 asks for at least 30).
+PROFILE_SLICES = 31
+
+
+class Scene(Strict):
+    """Everything a simulation needs. Equal scenes of equal seed and version give equal bits."""
+
+    bearing: Bearing
+    cage: Cage
+    lubricant: Lubricant
+    operation: Operation
+    mounting: Mounting | None = None
+    support: Support | None = None
+    materials: Materials = Materials()
+    traction: Traction = Traction()
+    model: Laws = Laws()
+    numerics: Numerics = Numerics()
+
+    @classmethod
+    def load(cls, path: Path | str, overrides: Iterable[str] = ()) -> Scene:
+        """Read a TOML scene, with ``key.path=value`` overrides. Raises InputError with all faults at once."""
+        return cls.from_dict(read_toml(path), str(path), overrides)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], source: str = "scene", overrides: Iterable[str] = ()) -> Scene:
+        """Validate nested tables as TOML gives them; ``source`` stands in the messages. Raises InputError."""
+        data = deepcopy(data)
+        for override in overrides:
+            set_key(data, override)
+        return validated(cls, data, source)
+
+    @model_validator(mode="after")
+    def _assembles(self) -> Scene:
+        bearing, cage, laws = self.bearing, self.cage, self.model
+        found = []
+        chord = bearing.pitch_diameter_mm * math.sin(math.pi / bearing.rollers)
+        web = chord - bearing.roller_diameter_mm - cage.pocket_clearance_mm
+        if web <= 0.0:
+            found.append(
+                f"cage.pocket_clearance_mm = {cage.pocket_clearance_mm:g}: leaves no cross-bar between "
+                f"{bearing.rollers} pockets ({web:.4g} mm); make it smaller or take fewer rollers"
+            )
+        if laws.guide_land == "film" and cage.guidance != "roller":
+            radial_um = 500.0 * cage.guide_clearance_mm
+            if laws.land_film_floor_um >= radial_um:
+                found.append(
+                    f"model.land_film_floor_um = {laws.land_film_floor_um:g}: not below the radial guide clearance of "
+                    f"{radial_um:g} um; lower it, widen cage.guide_clearance_mm or set model.guide_land = 'dry'"
+                )
+        floor, half_pocket_um = laws.pocket_film_floor_um, 500.0 * cage.pocket_clearance_mm
+        if laws.pocket_film and floor >= half_pocket_um:
+            found.append(
+                f"model.pocket_film_floor_um = {floor:g}: not below half the pocket clearance of {half_pocket_um:g} um; "
+                "lower it or widen cage.pocket_clearance_mm"
+            )
+        if laws.slices == 1 and self.needs_slices:
+            found.append(
+                f"model.slices = 1 contradicts bearing.roller_profile = {bearing.roller_profile!r} with bearing.tilt_mrad = "
+                f"{bearing.tilt_mrad:g}: one slice shows neither profile nor tilt; leave model.slices out"
+            )
+        found += self._tilt_faults()
+        land = self.land_diameter_mm
+        inner = bearing.pitch_diameter_mm - bearing.roller_diameter_mm
+        outer = bearing.pitch_diameter_mm + bearing.roller_diameter_mm
+        if cage.guidance != "roller" and not inner < land < outer:
+            found.append(
+                f"cage.land_diameter_mm = {land:g}: not between the raceways of {inner:g} and {outer:g} mm; mend it"
+            )
+        numerics = self.numerics
+        if numerics.turns * numerics.samples_per_turn < 2:
+            found.append(f"numerics.turns = {numerics.turns:g}: shorter than two samples; lengthen the run")
+        if self.mounting is not None:
+            found += faults(self.mounting, bearing)
+        return or_refuse(self, found)
+
+    def _tilt_faults(self) -> list[str]:
+        """Whether a roller that bears the whole load between tilted races touches over less than a slice."""
+        from rbdyn.contact.hertz_line import palmgren
+        from rbdyn.materials import equivalent_modulus
+
+        bearing = self.bearing
+        share = max(bearing.inner_tilt_share, 1.0 - bearing.inner_tilt_share)
+        tilt, length = abs(bearing.tilt_mrad) * 1e-3 * share, bearing.effective_length_mm * 1e-3
+        load = self.operation.largest_load_N
+        if tilt < 1e-12 or load == 0.0:  # by then the ends move less than an atom
+            return []
+        stiffness = palmgren(
+            equivalent_modulus(self.material("roller"), self.material("rings")), length
+        ).stiffness
+        # Q = K/l int_0^c (tilt x)^(10/9) dx = (9/19) K/l tilt^(10/9) c^(19/9)
+        touching = (19.0 / 9.0 * load * length / (stiffness * tilt ** (10.0 / 9.0))) ** (9.0 / 19.0)
+        if touching >= length / (self.model.slices or PROFILE_SLICES):
+            return []
+        return [
+            f"bearing.tilt_mrad = {bearing.tilt_mrad:g}: even under {load:g} N a roller would touch over "
+            f"{touching * 1e3:.2g} mm of {bearing.effective_length_mm:g} mm; lessen the tilt"
+        ]
+
+    @property
+    def mounted_clearance_mm(self) -> float:
+        """Diametral clearance in operation: as drawn, or as mounting, temperature and speed leave it [mm]."""
+        mounted = self.mounted_clearance
+        return self.bearing.radial_clearance_mm if mounted is None else mounted.operating * 1e3
+
+    @property
+    def mounted_clearance(self) -> MountedClearance | None:
+        """What fits, temperatures and rotation do to the clearance; None where the scene tells no mounting."""
+        if self.mounting is None:
+            return None
+        from rbdyn.mounting import operating_clearance
+
+        speeds = (
+            self.operation.inner_speed_rpm * math.pi / 30.0,
+            self.operation.outer_speed_rpm * math.pi / 30.0,
+        )
+        return operating_clearance(self.mounting, self.bearing, self.materials, *speeds)
+
+    @property
+    def needs_slices(self) -> bool:
+        """Whether a roller must be cut into slices: it has a profile or its races are tilted."""
+        return self.bearing.roller_profile != "cylinder" or self.bearing.tilt_mrad != 0.0
+
+    @property
+    def slices(self) -> int:
+        """Number of slices of a roller: as given, else one, or as many as a profile or tilt needs."""
+        return self.model.slices or (PROFILE_SLICES if self.needs_slices else 1)
+
+    @property
+    def land_diameter_mm(self) -> float:
+        """Diameter of the guide land, given or estimated [mm]."""
+        if self.cage.land_diameter_mm is not None:
+            return self.cage.land_diameter_mm
+        side = {"outer": 1.0, "inner": -1.0, "roller": 0.0}[self.cage.guidance]
+        return self.bearing.pitch_diameter_mm + side * 2.0 / 3.0 * self.bearing.roller_diameter_mm
+
+    @property
+    def guide_clearance_m(self) -> float | None:
+        """Radial play of the cage in its land [m]; None where no land guides it."""
+        landless = self.cage.guidance == "roller" or self.model.guide_land == "off"
+        return None if landless else 0.5e-3 * self.cage.guide_clearance_mm
+
+    @property
+    def turn_s(self) -> float:
+        """Duration of one shaft turn [s]."""
+        return self.operation.turn_s
+
+    @property
+    def impact_window_turns(self) -> float:
+        """Window of the largest force: as given, or the whole run where that is shorter."""
+        return min(self.numerics.impact_window_turns, self.numerics.turns)
+
+    def material(self, part: str) -> Material:
+        """Material of 'roller', 'rings' or 'cage' in SI."""
+        return material_of(getattr(self.materials, part))

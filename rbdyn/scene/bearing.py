@@ -1,0 +1,213 @@
+"""Drawing of a roller bearing: bearing, cage, materials."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from rbdyn.faults import Strict
+from rbdyn.scene.fields import Fraction, Positive, or_refuse
+
+# Keys that belong to one roller profile each.
+PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "table": "profile_table_mm_um"}
+
+
+class Harmonic(Strict):
+    """One harmonic of a raceway's radius: amplitude cos(order (angle - phase)), angle and phase counted on the ring."""
+
+    order: Annotated[int, Field(ge=1, le=2000)]
+    amplitude_um: Annotated[float, Field(ge=-500.0, le=500.0)]
+    phase_deg: float = 0.0
+
+
+class Bearing(Strict):
+    """Geometry of a cylindrical roller bearing.
+
+    ``radial_clearance_mm`` is diametral: outer raceway less inner raceway less twice the roller. It is split evenly
+    about the pitch diameter; negative is a preload. ``roller_length_mm`` is the whole roller (mass, inertia, drag),
+    ``effective_length_mm`` the part that carries load.
+    """
+
+    kind: Literal["cylindrical_roller"]
+    rollers: Annotated[int, Field(ge=2, le=500)]
+    roller_diameter_mm: Annotated[float, Field(ge=0.5, le=500.0)]
+    roller_length_mm: Annotated[float, Field(ge=0.5, le=1000.0)]
+    effective_length_mm: Annotated[float, Field(ge=0.1, le=1000.0)]
+    pitch_diameter_mm: Annotated[float, Field(ge=2.0, le=5000.0)]
+    radial_clearance_mm: Annotated[float, Field(ge=-0.2, le=2.0)]
+    # "logarithmic" is the reference profile of ISO/TS 16281; the others take the key named after them.
+    roller_profile: Literal["cylinder", "crowned", "logarithmic", "lundberg", "table"] = "cylinder"
+    crown_radius_mm: Positive | None = None
+    # Load at which the Lundberg profile spreads its pressure evenly.
+    lundberg_load_N: Positive | None = None  # noqa: N815
+    # Points (distance from the middle in mm, drop in um), joined by straight lines; mirrored where all lie on one side.
+    profile_table_mm_um: Annotated[list[list[float]], Field(min_length=2)] | None = None
+    # Tilt of the inner against the outer ring, about the axis across ``tilt_direction_deg`` (counted from the load).
+    tilt_mrad: Annotated[float, Field(ge=-20.0, le=20.0)] = 0.0
+    tilt_direction_deg: float = 0.0
+    # Share of that tilt between roller and inner race: a roller between equal contacts settles half-way (Harris).
+    inner_tilt_share: Fraction = 0.5
+    # Each roller's diameter less the nominal one; or a seeded normal spread.
+    roller_diameter_errors_um: list[float] | None = None
+    roller_diameter_spread_um: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    # Harmonics of the raceway radii: out-of-round (orders 2, 3: lobes against skidding) and waviness.
+    outer_waviness: list[Harmonic] = []
+    inner_waviness: list[Harmonic] = []
+    # Basic dynamic capacity of the catalogue; by ISO 281 from the dimensions where left out.
+    dynamic_capacity_N: Positive | None = None  # noqa: N815
+    # Inner ring with its share of the shaft: 1 to 5 kg for a main shaft of this size.
+    inner_ring_mass_kg: Annotated[float, Field(gt=0.0, le=1e5)] = 1.0
+
+    @model_validator(mode="after")
+    def _fits(self) -> Bearing:
+        faults = []
+        chord = self.pitch_diameter_mm * math.sin(math.pi / self.rollers)
+        if chord <= self.roller_diameter_mm:
+            faults.append(
+                f"bearing.rollers = {self.rollers}: rollers of {self.roller_diameter_mm:g} mm do not fit on a pitch "
+                f"circle of {self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm; take fewer or smaller ones"
+            )
+        if self.roller_diameter_mm >= self.pitch_diameter_mm:
+            faults.append(
+                f"bearing.roller_diameter_mm = {self.roller_diameter_mm:g}: leaves no inner raceway on a pitch circle "
+                f"of {self.pitch_diameter_mm:g} mm; make the roller smaller"
+            )
+        if self.effective_length_mm > self.roller_length_mm:
+            faults.append(
+                f"bearing.effective_length_mm = {self.effective_length_mm:g}: contact longer than the roller of "
+                f"{self.roller_length_mm:g} mm; shorten it or lengthen bearing.roller_length_mm"
+            )
+        if abs(self.radial_clearance_mm) >= 0.1 * self.roller_diameter_mm:
+            faults.append(
+                f"bearing.radial_clearance_mm = {self.radial_clearance_mm:g}: out of proportion to a roller of "
+                f"{self.roller_diameter_mm:g} mm; give millimetres, below a tenth of the roller"
+            )
+        return or_refuse(self, faults + self._profile_faults() + self._form_faults())
+
+    def _profile_faults(self) -> list[str]:
+        faults = []
+        for profile, key in PROFILE_KEYS.items():
+            value = getattr(self, key)
+            if value is None and self.roller_profile == profile:
+                faults.append(f"bearing.{key}: missing; bearing.roller_profile = {profile!r} needs it")
+            if value is not None and self.roller_profile != profile:
+                faults.append(
+                    f"bearing.{key} and bearing.roller_profile = {self.roller_profile!r} contradict each other: take "
+                    f"away the one or set the other to {profile!r}"
+                )
+        half = 0.5 * self.roller_length_mm
+        if self.crown_radius_mm is not None and self.crown_radius_mm <= half:
+            faults.append(
+                f"bearing.crown_radius_mm = {self.crown_radius_mm:g}: a crown of a roller of {self.roller_length_mm:g} mm "
+                f"needs a radius above {half:g} mm, commonly metres; enlarge it"
+            )
+        for x, drop in self._points(faults):
+            if abs(x) > half:
+                faults.append(
+                    f"bearing.profile_table_mm_um: point ({x:g} mm, {drop:g} um) lies beyond the roller's end at "
+                    f"{half:g} mm; shorten the profile or lengthen bearing.roller_length_mm"
+                )
+        points = self._points([])
+        reach = max((abs(x) for x, _ in points), default=math.inf)
+        if reach < 0.5 * self.effective_length_mm:
+            faults.append(
+                f"bearing.profile_table_mm_um: ends at {reach:g} mm, within the contact of "
+                f"{0.5 * self.effective_length_mm:g} mm from the middle; carry the table on"
+            )
+        return faults
+
+    def _points(self, faults: list[str]) -> list[list[float]]:
+        points = self.profile_table_mm_um or []
+        if any(len(point) != 2 for point in points):
+            faults.append(
+                "bearing.profile_table_mm_um: each point is [position in mm, drop in um]; mend the list"
+            )
+            return []
+        if any(b[0] <= a[0] for a, b in pairwise(points)):
+            faults.append("bearing.profile_table_mm_um: positions must rise from point to point; sort them")
+        return points
+
+    def _form_faults(self) -> list[str]:
+        faults = []
+        errors = self.roller_diameter_errors_um
+        if errors is not None and len(errors) != self.rollers:
+            faults.append(
+                f"bearing.roller_diameter_errors_um: {len(errors)} values for {self.rollers} rollers; give one a roller"
+            )
+        if errors is not None and self.roller_diameter_spread_um > 0.0:
+            faults.append(
+                "bearing.roller_diameter_errors_um and bearing.roller_diameter_spread_um contradict each other: give the "
+                "errors or their spread, not both"
+            )
+        limit = 0.01 * self.roller_diameter_mm * 1e3
+        if errors is not None and any(abs(error) > limit for error in errors):
+            faults.append(
+                f"bearing.roller_diameter_errors_um: beyond {limit:g} um, a hundredth of the roller; give micrometres"
+            )
+        return faults
+
+
+class Cage(Strict):
+    """Cage and guide land. Clearances are diametral; ``pocket_clearance_mm`` is pocket width less roller diameter."""
+
+    guidance: Literal["outer", "inner", "roller"]
+    guide_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0)]
+    pocket_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0)]
+    mass_g: Annotated[float, Field(ge=0.01, le=1e6)]
+    # Without a drawing: land at the pitch diameter + 2/3 roller (outer) or - 2/3 roller (inner), cage body from there
+    # to the pitch diameter -+ 1/3 roller (49.5 mm and 40.5 mm for the bearing of Chen et al. 2022).
+    land_diameter_mm: Positive | None = None
+    inertia_kg_mm2: Positive | None = None
+    # Centre of mass off the middle, towards the first pocket; 0 to 100 um.
+    imbalance_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 0.0
+    # Radial play between roller and pocket lips, where rollers guide the cage; the pocket clearance where left out.
+    # Without lips nothing would hold such a cage: free rollers give way along their orbit.
+    pocket_radial_clearance_mm: Positive | None = None
+    lands: Annotated[int, Field(ge=1, le=4)] = 2
+    land_width_mm: Positive = 3.0
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Cage:
+        if self.pocket_clearance_mm > 5.0 or self.guide_clearance_mm > 5.0:
+            raise ValueError("cage: clearances above 5 mm are not clearances; give millimetres")
+        if self.pocket_radial_clearance_mm is not None and self.guidance != "roller":
+            raise ValueError(
+                f"cage.pocket_radial_clearance_mm and cage.guidance = {self.guidance!r} contradict each other: lips hold "
+                "the cage only under guidance by the rollers; take away the one or set the other to 'roller'"
+            )
+        return self
+
+    @property
+    def lip_clearance_mm(self) -> float | None:
+        """Radial play between roller and pocket lips [mm]; None where a ring guides the cage."""
+        if self.guidance != "roller":
+            return None
+        given = self.pocket_radial_clearance_mm
+        return self.pocket_clearance_mm if given is None else given
+
+
+class CustomMaterial(Strict):
+    """A material by its numbers."""
+
+    elastic_modulus_GPa: Annotated[float, Field(gt=0.0, le=2000.0)]  # noqa: N815
+    poisson_ratio: Annotated[float, Field(ge=0.0, lt=0.5)]
+    density_kg_m3: Annotated[float, Field(ge=100.0, le=30000.0)]
+    # That of steel unless given.
+    thermal_expansion_1e_6_K: Annotated[float, Field(ge=0.0, le=200.0)] = 12.0  # noqa: N815
+
+
+MaterialName = Literal[
+    "bearing_steel", "m50", "silicon_nitride", "aisi_4340", "bronze", "aluminium_bronze", "brass", "titanium_6al4v",
+    "peek", "phenolic_cotton",
+]  # fmt: skip
+
+
+class Materials(Strict):
+    """What each part is made of: a name, or a table of numbers."""
+
+    roller: MaterialName | CustomMaterial = "bearing_steel"
+    rings: MaterialName | CustomMaterial = "bearing_steel"
+    cage: MaterialName | CustomMaterial = "bronze"

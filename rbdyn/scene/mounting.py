@@ -1,0 +1,107 @@
+"""How a bearing is mounted: fits, temperatures, shaft and housing."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from rbdyn.faults import Strict
+from rbdyn.materials import MATERIALS, Material
+from rbdyn.scene.bearing import Bearing, CustomMaterial, MaterialName
+from rbdyn.scene.fields import NonNegative, Positive, or_refuse
+
+Celsius = Annotated[float, Field(ge=-200.0, le=1000.0)]
+# Beyond this share of its diameter a fit is a slip of the unit: a heavy press fit has a thousandth.
+LARGEST_FIT = 0.005
+
+
+class Mounting(Strict):
+    """Fits, temperatures, shaft and housing. With this table, bearing.radial_clearance_mm is that of the loose parts.
+
+    Interferences are diametral at the reference temperature, positive tight, negative loose. Each temperature is
+    that of a whole part.
+    """
+
+    bore_mm: Positive
+    outside_diameter_mm: Positive
+    # A solid shaft.
+    shaft_bore_mm: NonNegative = 0.0
+    # Outer diameter of the housing.
+    housing_diameter_mm: Positive
+    inner_interference_um: float = 0.0
+    outer_interference_um: float = 0.0
+    # Of the drawing: where the diameters, the interferences and the clearance were measured.
+    reference_temperature_C: Celsius = 20.0  # noqa: N815
+    # Both rings at the reference temperature unless given.
+    inner_ring_temperature_C: Celsius | None = None  # noqa: N815
+    outer_ring_temperature_C: Celsius | None = None  # noqa: N815
+    # The mean of the rings unless given.
+    roller_temperature_C: Celsius | None = None  # noqa: N815
+    # As their rings unless given.
+    shaft_temperature_C: Celsius | None = None  # noqa: N815
+    housing_temperature_C: Celsius | None = None  # noqa: N815
+    shaft_material: MaterialName | CustomMaterial = "bearing_steel"
+    housing_material: MaterialName | CustomMaterial = "bearing_steel"
+    # Whether rotation widens the rings.
+    rotation: bool = True
+
+    @model_validator(mode="after")
+    def _nests(self) -> Mounting:
+        faults = []
+        if self.shaft_bore_mm >= self.bore_mm:
+            faults.append(
+                f"mounting.shaft_bore_mm = {self.shaft_bore_mm:g}: leaves no shaft in a bearing bore of "
+                f"{self.bore_mm:g} mm; make it smaller, 0 for a solid shaft"
+            )
+        if self.outside_diameter_mm <= self.bore_mm:
+            faults.append(
+                f"mounting.outside_diameter_mm = {self.outside_diameter_mm:g}: not above the bore of "
+                f"{self.bore_mm:g} mm; make it larger"
+            )
+        if self.housing_diameter_mm <= self.outside_diameter_mm:
+            faults.append(
+                f"mounting.housing_diameter_mm = {self.housing_diameter_mm:g}: leaves no housing around a bearing of "
+                f"{self.outside_diameter_mm:g} mm; make it larger"
+            )
+        for key, diameter in (
+            ("inner_interference_um", self.bore_mm),
+            ("outer_interference_um", self.outside_diameter_mm),
+        ):
+            interference = getattr(self, key)
+            if abs(interference) > LARGEST_FIT * diameter * 1e3:
+                faults.append(
+                    f"mounting.{key} = {interference:g}: out of proportion to a fit of {diameter:g} mm; give "
+                    f"micrometres, at most {LARGEST_FIT * diameter * 1e3:g}"
+                )
+        return or_refuse(self, faults)
+
+
+def faults(mounting: Mounting, bearing: Bearing) -> list[str]:
+    """One sentence for each way in which the mounting does not suit the bearing."""
+    inner = bearing.pitch_diameter_mm - bearing.roller_diameter_mm
+    outer = bearing.pitch_diameter_mm + bearing.roller_diameter_mm
+    found = []
+    if mounting.bore_mm >= inner:
+        found.append(
+            f"mounting.bore_mm = {mounting.bore_mm:g}: leaves no inner ring under a raceway of {inner:g} mm; "
+            "make it smaller"
+        )
+    if mounting.outside_diameter_mm <= outer:
+        found.append(
+            f"mounting.outside_diameter_mm = {mounting.outside_diameter_mm:g}: leaves no outer ring over a raceway of "
+            f"{outer:g} mm; make it larger"
+        )
+    return found
+
+
+def material_of(chosen: MaterialName | CustomMaterial) -> Material:
+    """A material in SI, from its name or its numbers."""
+    if isinstance(chosen, CustomMaterial):
+        return Material(
+            chosen.elastic_modulus_GPa * 1e9,
+            chosen.poisson_ratio,
+            chosen.density_kg_m3,
+            chosen.thermal_expansion_1e_6_K * 1e-6,
+        )
+    return MATERIALS[chosen]

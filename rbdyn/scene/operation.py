@@ -1,0 +1,98 @@
+"""Running conditions: speeds, loads, how they change over time, and the support of the outer ring."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from rbdyn.faults import Strict
+from rbdyn.scene.fields import NonNegative, Positive, or_refuse
+
+Speed = Annotated[float, Field(ge=-1e6, le=1e6)]
+Load = Annotated[float, Field(ge=0.0, le=1e7)]
+SLOWEST_RPM = 0.1
+
+
+class Schedule(Strict):
+    """Inner speed and radial load over time from the start of the run, the discarded turns included.
+
+    "linear" and "smooth" (half cosines) run from point to point; "step" holds each value until the next time.
+    Before the first and after the last point values stay.
+    """
+
+    time_s: Annotated[list[NonNegative], Field(min_length=1)]
+    inner_speed_rpm: list[Speed] | None = None
+    radial_load_N: list[Load] | None = None  # noqa: N815
+    shape: Literal["linear", "smooth", "step"] = "smooth"
+
+    @model_validator(mode="after")
+    def _matches(self) -> Schedule:
+        faults = []
+        times = self.time_s
+        for i, (a, b) in enumerate(pairwise(times)):
+            if b <= a:
+                faults.append(
+                    f"operation.schedule.time_s: times must rise, but {b:g} s (point {i + 2}) follows {a:g} s; sort them"
+                )
+        for key in ("inner_speed_rpm", "radial_load_N"):
+            values = getattr(self, key)
+            if values is not None and len(values) != len(times):
+                faults.append(
+                    f"operation.schedule.{key}: {len(values)} values for {len(times)} times; give one a time"
+                )
+        if self.inner_speed_rpm is None and self.radial_load_N is None:
+            faults.append("operation.schedule: schedules nothing; give inner_speed_rpm or radial_load_N")
+        return or_refuse(self, faults)
+
+
+class Operation(Strict):
+    """Running conditions. The radial load acts on the inner ring along x.
+
+    Shaft turns, in which runs are counted, are those at ``inner_speed_rpm`` (or ``outer_speed_rpm`` where the inner
+    ring stands), also where a schedule changes the speed.
+    """
+
+    inner_speed_rpm: Speed
+    radial_load_N: Load  # noqa: N815
+    outer_speed_rpm: Speed = 0.0
+    # Turn with the inner ring: a load, and the unbalance of the shaft.
+    rotating_load_N: Load = 0.0  # noqa: N815
+    unbalance_g_mm: NonNegative = 0.0
+    # Weight is off unless asked for: beside centrifugal forces it is small. 9.81 where it counts.
+    gravity_m_s2: NonNegative = 0.0
+    gravity_direction_deg: float = 0.0
+    schedule: Schedule | None = None
+
+    @model_validator(mode="after")
+    def _turns(self) -> Operation:
+        if max(abs(self.inner_speed_rpm), abs(self.outer_speed_rpm)) < SLOWEST_RPM:
+            raise ValueError(
+                f"operation.inner_speed_rpm = {self.inner_speed_rpm:g}: a run is counted in shaft turns; give at least "
+                f"{SLOWEST_RPM:g}, or turn the outer ring"
+            )
+        return self
+
+    @property
+    def largest_load_N(self) -> float:  # noqa: N802
+        """Largest load along x at any time, with the rotating load in line [N]."""
+        scheduled = (self.schedule.radial_load_N if self.schedule else None) or [self.radial_load_N]
+        speeds = (self.schedule.inner_speed_rpm if self.schedule else None) or [self.inner_speed_rpm]
+        fastest = max(abs(speed) for speed in speeds) * math.pi / 30.0
+        return max(scheduled) + self.rotating_load_N + self.unbalance_g_mm * 1e-6 * fastest**2
+
+    @property
+    def turn_s(self) -> float:
+        """Duration of one shaft turn [s]."""
+        inner, outer = abs(self.inner_speed_rpm), abs(self.outer_speed_rpm)
+        return 60.0 / (inner if inner >= SLOWEST_RPM else outer)
+
+
+class Support(Strict):
+    """Flexible, damped support of the outer ring: a squirrel cage (1e7 to 1e8 N/m) with a squeeze film (1e3 to 1e4 N s/m)."""
+
+    stiffness_N_m: Positive  # noqa: N815
+    damping_N_s_m: NonNegative  # noqa: N815
+    outer_ring_mass_kg: Annotated[float, Field(gt=0.0, le=1e5)] = 0.5
