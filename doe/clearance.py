@@ -140,11 +140,10 @@ def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array,
 def draw_motion(study: Study, points: dict[str, Array], turns: float, folder: Path) -> list[str]:
     """Draw cage orbits and pocket forces at points; returns the names of the pictures."""
     from rbdyn import plots
-    from rbdyn.dynamics.simulate import trace
+    from rbdyn.dynamics.history import history
 
     scenes = {name: confirmation_scene(study, point) for name, point in points.items()}
-    traces = {name: trace(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
-    clearances = [scene.guide_clearance_m for scene in scenes.values()]
-    plots.cage_orbit(traces, clearances, folder / "cage_orbit.png")
-    plots.pocket_forces(traces, folder / "pocket_forces.png")
+    histories = {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
+    plots.cage_orbit(histories, folder / "cage_orbit.png")
+    plots.pocket_forces(histories, folder / "pocket_forces.png")
     return ["cage_orbit.png", "pocket_forces.png"]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rbdyn.terminal import guarded, output_folder, print_json, print_table, progress_bar
+from rbdyn.terminal import FAILED, guarded, output_folder, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from rbdyn.result import SimulationResult
@@ -56,12 +57,7 @@ def simulate(
     with guarded(as_json):
         from rbdyn.scene import Scene
 
-        shorthand = {"turns": turns, "replicates": replicates, "seed": seed}
-        overrides = [
-            *(assignments or []),
-            *(f"numerics.{k}={v}" for k, v in shorthand.items() if v is not None),
-        ]
-        loaded = Scene.load(scene, overrides)
+        loaded = Scene.load(scene, _overrides(assignments, turns, replicates, seed))
         folder = output_folder(out) if out else None
         from rbdyn.dynamics.simulate import simulate as run_scene
 
@@ -84,6 +80,7 @@ def accuracy(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write accuracy.json, .csv and .png here.")
     ] = None,
+    options: Annotated[bool, typer.Option("--options", help="What each option costs, instead.")] = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also versions.")] = False,
@@ -94,6 +91,9 @@ def accuracy(
 
         loaded = Scene.load(scene, assignments or [])
         folder = output_folder(out) if out else None
+        if options:
+            _options(loaded, folder, as_json, quiet)
+            return
         from rbdyn import accuracy as study
 
         with progress_bar("tolerances", quiet or as_json) as progress:
@@ -126,24 +126,101 @@ def accuracy(
             print(f"written to {folder}: {', '.join(files)}")
 
 
-def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:
-    import pandas as pd
+@app.command("map")
+def slip_map(
+    scene: SceneFile,
+    speed: Annotated[str, typer.Option(metavar="RPM", help="Inner speeds: start:stop:count or a,b,c.")],
+    load: Annotated[str, typer.Option(metavar="N", help="Radial loads: start:stop:count or a,b,c.")],
+    assignments: Set = None,
+    turns: Turns = None,
+    replicates: Replicates = None,
+    seed: Seed = None,
+    workers: Workers = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write map.json, map.csv and map.png here.")
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Map cage slip, power loss, impact and whirl over speed and load."""
+    with guarded(as_json):
+        from rbdyn.scene import Scene
 
+        loaded = Scene.load(scene, _overrides(assignments, turns, replicates, seed))
+        folder = output_folder(out) if out else None
+        from rbdyn import slip_map as study
+
+        axes = study.axis_values(speed, "--speed"), study.axis_values(load, "--load")
+        with progress_bar("mapping", quiet or as_json) as progress:
+            found = study.slip_map(loaded, *axes, workers, progress)
+        files = study.write(found, folder) if folder else []
+        if as_json:
+            print_json(found.as_dict())
+        else:
+            header = ("load [N]", *(f"{value:g} rpm" for value in found.speeds_rpm))
+            rows = [
+                (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
+                for value, row in zip(found.loads_N, found.grid("cage_slip"), strict=True)
+            ]
+            print_table("cage slip", header, rows)
+            print(f"{len(found.points)} points in {found.wall_s:.1f} s, seed {found.seed}")
+            if folder:
+                print(f"written to {folder}: {', '.join(files)}")
+        for point in found.failed:
+            print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
+    if found.failed:
+        raise typer.Exit(FAILED)
+
+
+def _overrides(
+    assignments: list[str] | None, turns: float | None, replicates: int | None, seed: int | None
+) -> list[str]:
+    shorthand = {"turns": turns, "replicates": replicates, "seed": seed}
+    return [
+        *(assignments or []),
+        *(f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None),
+    ]
+
+
+def _options(scene: Scene, folder: Path | None, as_json: bool, quiet: bool) -> None:
+    from rbdyn import option_cost
+
+    with progress_bar("options", quiet or as_json) as progress:
+        rows = option_cost.option_costs(scene, progress=progress)
+    files = option_cost.write(rows, folder) if folder else []
+    if as_json:
+        print_json(option_cost.record(rows))
+        return
+    cells = [
+        (
+            row.option,
+            f"{row.with_ns:.0f}",
+            f"{row.without_ns:.0f}",
+            f"{row.difference_ns:+.0f}",
+            f"{100.0 * row.power_gap:.2g} %",
+            f"{row.compile_s:.1f}",
+        )
+        for row in rows
+    ]
+    print_table(
+        "nanoseconds a right-hand side",
+        ("option", "with", "without", "difference", "power gap", "s to compile or load"),
+        cells,
+    )
+    if folder:
+        print(f"written to {folder}: {', '.join(files)}")
+
+
+def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:
     from rbdyn import plots
-    from rbdyn.dynamics.simulate import trace
+    from rbdyn.dynamics.history import history
 
     result.save(folder / "result.json")
-    history = trace(scene, min(TRACE_TURNS, scene.numerics.turns))
-    columns = {
-        "time_s": history.time,
-        "cage_x_um": history.cage_x * 1e6,
-        "cage_y_um": history.cage_y * 1e6,
-        **{f"pocket_{j + 1}_N": load for j, load in enumerate(history.pocket_load.T)},
-    }
-    pd.DataFrame(columns).to_csv(folder / "history.csv", index=False, float_format="%.6g")
+    shown = history(scene, min(TRACE_TURNS, scene.numerics.turns))
+    shown.table().to_csv(folder / "history.csv", index=False, float_format="%.6g")
     title = f"first {min(TRACE_TURNS, scene.numerics.turns):g} counted shaft turns"
-    plots.cage_orbit({title: history}, [scene.guide_clearance_m], folder / "cage_orbit.png")
-    plots.pocket_forces({title: history}, folder / "pocket_forces.png")
+    plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
+    plots.pocket_forces({title: shown}, folder / "pocket_forces.png")
 
 
 def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
@@ -167,6 +244,21 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
         f"closes to {100.0 * result.power_gap:.2g} %; {result.replicates} replicates, seed {result.seed}; "
         f"{result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to load or compile"
     )
+    for race, at in result.races.items():
+        film = (
+            f", film {at['central_film_um']:.2g} um, lambda {at['lambda_ratio']:.2g}"
+            if "lambda_ratio" in at
+            else ""
+        )
+        print(
+            f"{race} race at its largest load: {at['max_pressure_MPa']:.0f} MPa over {at['half_width_um']:.0f} um each way"
+            + film
+        )
+    if len(result.clearance) > 2:
+        parts = ", ".join(
+            f"{name.replace('_', ' ')} {value:+.1f} um" for name, value in result.clearance.items()
+        )
+        print(f"clearance: {parts}")
     if verbose:
         terms = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
         gap = result.power_gap * result.power_loss.value
@@ -175,6 +267,38 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
     if not quiet:
         for note in result.notes:
             print(f"note: {note}")
+
+
+@app.command()
+def show(
+    result: Annotated[
+        Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write here; by default in 'show' beside the result.")
+    ] = None,
+    turns: Annotated[
+        float | None, typer.Option(help="Counted shaft turns to show; at most 20 unless given.")
+    ] = None,
+    replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
+    animate: Annotated[bool, typer.Option("--animate", help="Also a moving picture and a player.")] = False,
+    lyapunov: Annotated[bool, typer.Option("--lyapunov", help="Also the largest Lyapunov exponent.")] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also peaks of the spectra.")] = False,
+) -> None:
+    """Show how the bearing of a saved result moves: pictures, history.csv and orbit.json."""
+    with guarded(as_json):
+        from rbdyn import show as motion
+
+        asked = motion.ask(result, turns, replicate)
+        folder = output_folder(out or asked.path.parent / "show")
+        with progress_bar("showing", quiet or as_json) as progress:
+            record = motion.write(asked, folder, animate, lyapunov, progress)
+        if as_json:
+            print_json(record)
+        else:
+            motion.print_record(record, folder, quiet, verbose)
 
 
 def run() -> None:

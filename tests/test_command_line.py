@@ -83,7 +83,9 @@ def test_command_line_out_writes_files(command, tmp_path):
     assert {path.name for path in folder.iterdir()} == names
     assert json.loads((folder / "result.json").read_text()) == json.loads(shown.stdout)
     lines = (folder / "history.csv").read_text().splitlines()
-    assert lines[0].split(",")[:4] == ["time_s", "cage_x_um", "cage_y_um", "pocket_1_N"]
+    columns = lines[0].split(",")
+    assert columns[:4] == ["time_s", "cage_x_um", "cage_y_um", "cage_speed_rpm"]
+    assert {"land_N", "pocket_1_N", "inner_10_N", "outer_slip_10_m_s"} <= set(columns)
     assert len(lines) == 1 + 4 * 512
     for picture in ("cage_orbit.png", "pocket_forces.png"):
         assert (folder / picture).read_bytes().startswith(b"\x89PNG")

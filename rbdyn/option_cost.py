@@ -1,0 +1,139 @@
+"""What each option of a scene costs: nanoseconds a right-hand side with it and without it, and the time to compile it.
+
+An option is a few assignments to the scene. Each is run in turn with the scene as it is, so that both see the same
+machine; a median over replicates is taken of the processor time per right-hand side, the integrator's own work included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.simulate import Stop, prepare, run_replicate
+from rbdyn.faults import InputError, set_key
+from rbdyn.result import versions
+from rbdyn.scene import Scene
+
+FORMAT = "rbdyn.options/1"
+TURNS, DISCARDED = 10, 2
+REPEATS = 3
+# What stands in the scene of Chen et al. 2022 is taken away; what does not is added, in a usual size.
+OPTIONS: dict[str, tuple[str, ...]] = {
+    "contact law of ISO/TS 16281": ('model.line_contact="iso16281"',),
+    "contact law of Houpert": ('model.line_contact="houpert"',),
+    "contact law of Dowson and Higginson": ('model.line_contact="dowson_higginson"',),
+    "logarithmic profile, 31 slices": ('bearing.roller_profile="logarithmic"',),
+    "tilt, 31 slices": ("bearing.tilt_mrad=0.5",),
+    "unequal rollers": ("bearing.roller_diameter_spread_um=0.5",),
+    "two-lobed outer race": ("bearing.outer_waviness=[{order=2,amplitude_um=10.0}]",),
+    "wavy inner race, with clock": ("bearing.inner_waviness=[{order=11,amplitude_um=0.2}]",),
+    "traction by pressure and temperature": ('traction.model="thermal_newtonian"',),
+    "mixed friction": ('traction.friction="mixed"',),
+    "dry traction": ('traction.model="coulomb"',),
+    "without traction": ('traction.model="off"',),
+    "without race damping": ('model.race_damping="off"',),
+    "without rolling resistance": ('model.rolling_resistance="off"',),
+    "pocket film": ("model.pocket_film=true",),
+    "rigid pocket bars": ('model.pocket_bar_stiffness_N_m="rigid"',),
+    "without pockets": ('model.pocket="off"',),
+    "guidance on the inner ring": ('cage.guidance="inner"',),
+    "guidance by the rollers": ('cage.guidance="roller"',),
+    "dry land": ('model.guide_land="dry"',),
+    "without land": ('model.guide_land="off"',),
+    "cage imbalance": ("cage.imbalance_um=20.0",),
+    "outer ring turns": ("operation.outer_speed_rpm=3000.0",),
+    "outer ring on a support": ("support.stiffness_N_m=2e7", "support.damping_N_s_m=2e3"),
+    "rotating load, with clock": ("operation.rotating_load_N=100.0",),
+    "speed and load by schedule": (
+        "operation.schedule={time_s=[0.0,0.01],inner_speed_rpm=[20000.0,24000.0],radial_load_N=[1000.0,1300.0]}",
+    ),
+    "gravity": ("operation.gravity_m_s2=9.81",),
+    "without drag": ('model.drag="off"',),
+}
+
+
+@dataclass(frozen=True)
+class OptionCost:
+    """Median processor time per right-hand side [ns] with the option and of the scene beside it, the largest relative
+    power gap, and the seconds it took to compile (or to load from disk)."""
+
+    option: str
+    with_ns: float
+    without_ns: float
+    power_gap: float
+    compile_s: float
+
+    @property
+    def difference_ns(self) -> float:
+        """What the option costs [ns]; negative where it saves."""
+        return self.with_ns - self.without_ns
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return {**self.__dict__, "difference_ns": self.difference_ns}
+
+
+def option_costs(
+    scene: Scene,
+    options: Mapping[str, Sequence[str]] = OPTIONS,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[OptionCost]:
+    """A row an option that the scene allows. Raises RunError, KeyboardInterrupt."""
+    plain = with_options(scene, (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}"))
+    prepare(plain)
+    rows = []
+    for done, (name, assignments) in enumerate(options.items(), 1):
+        try:
+            chosen = with_options(plain, assignments)
+        except InputError:
+            continue  # the option contradicts something that this scene has
+        compile_s = prepare(chosen)
+        bearings = roller_bearing(chosen), roller_bearing(plain)
+        times: tuple[list[float], list[float]] = ([], [])
+        gap = 0.0
+        for replicate in range(REPEATS):
+            for which, one in enumerate((chosen, plain)):
+                run = run_replicate(one, bearings[which], replicate, one.numerics.rtol, Stop())
+                times[which].append(run.cpu_s / run.derivatives * 1e9)
+                gap = run.power_gap if which == 0 else gap
+        rows.append(OptionCost(name, float(np.median(times[0])), float(np.median(times[1])), gap, compile_s))
+        if progress is not None:
+            progress(done, len(options))
+    return rows
+
+
+def with_options(scene: Scene, assignments: Sequence[str]) -> Scene:
+    """The scene with ``key.path=value`` assignments. Raises InputError where they contradict it."""
+    data = scene.model_dump(mode="json", exclude_none=True)
+    for assignment in assignments:
+        set_key(data, assignment)
+    return Scene.from_dict(data, " ".join(assignments))
+
+
+def record(rows: Sequence[OptionCost]) -> dict[str, Any]:
+    """JSON of ``rbdyn accuracy --options``."""
+    from rbdyn.accuracy import processor
+
+    return {
+        "format": FORMAT,
+        "status": "ok",
+        "options": [row.as_dict() for row in rows],
+        "machine": processor(),
+        "versions": versions(),
+    }
+
+
+def write(rows: Sequence[OptionCost], folder: Path) -> list[str]:
+    """Write options.json and options.csv; returns the file names."""
+    import pandas as pd
+
+    from rbdyn.result import write_json
+
+    write_json(folder / "options.json", record(rows))
+    pd.DataFrame([row.as_dict() for row in rows]).to_csv(folder / "options.csv", index=False)
+    return ["options.json", "options.csv"]

@@ -1,0 +1,24 @@
+"""Pictures. matplotlib is loaded in this package and nowhere else in ``rbdyn``.
+
+- ``motion``: cage orbit, pocket and land forces, whirl, sections, spectra, of a history
+- ``contacts``: load, slip and heat around the bearing; power by loss
+- ``accuracy``: error against run time
+- ``drawing``: the bearing at one moment, clearances magnified; shared by ``animation`` (GIF or MP4) and ``player`` (HTML)
+"""
+
+from rbdyn.plots.accuracy import work_precision
+from rbdyn.plots.contacts import power_by_loss, roller_loads, sliding
+from rbdyn.plots.motion import cage_orbit, forces, pocket_forces, section, spectra, whirl
+
+__all__ = [
+    "cage_orbit",
+    "forces",
+    "pocket_forces",
+    "power_by_loss",
+    "roller_loads",
+    "section",
+    "sliding",
+    "spectra",
+    "whirl",
+    "work_precision",
+]

@@ -1,0 +1,273 @@
+"""The bearing at one moment as circles, lines and arrows, its clearances magnified so that they can be seen.
+
+Clearances are a thousandth of the rollers. So every deviation from the ideal place (roller in the middle of its pocket
+and half-way between the raceways, cage and inner ring in the middle) is drawn ``magnification`` times too large, and
+so is every play; rollers are drawn smaller than they are to make room. Then what touches in the bearing touches in
+the drawing. The outer ring's centre is the origin. Paper coordinates: u to the right, v down, the load points down.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.dynamics.geometry import raceway_radii, shaft_speeds
+from rbdyn.dynamics.orbit import largest
+
+if TYPE_CHECKING:
+    from rbdyn.dynamics.history import History
+
+Array = NDArray[np.float64]
+
+# Of the true roller radius, and of the drawn one.
+ROLLER_SHARE, CAGE_SHARE, RING_SHARE = 0.62, 0.4, 0.45
+# The longest arrows, in pitch radii.
+RACE_ARROW, CAGE_ARROW = 0.32, 0.32
+TIDY = (1.0, 2.0, 5.0)
+
+
+class Shape(NamedTuple):
+    """``kind``: 'circle' (centre, then radius in ``radius``), 'polygon', 'line' or 'arrow' (tail, tip); points in mm."""
+
+    kind: str
+    role: str
+    points: list[tuple[float, float]]
+    radius: float = 0.0
+
+
+class Reference(NamedTuple):
+    """An arrow of a known force, and its words with the place where they begin [mm]."""
+
+    arrow: Shape
+    words: str
+    u: float
+    v: float
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Sizes [mm] of what is drawn, and its motion: (frames,) or (frames, rollers); deviations in mm, angles in rad."""
+
+    rollers: int
+    pitch: float
+    roller: float
+    cage_half: float
+    outer_gap: float
+    inner_gap: float
+    pocket_gap: float
+    guide_gap: float
+    guide_side: float  # +1 outer land, -1 inner land, 0 none
+    largest_magnification: float
+    race_scale: float  # N per mm of arrow
+    cage_scale: float
+    turns: float
+    start: float  # shaft turns after the transient
+    time: Array
+    inner_angle: Array
+    outer_angle: Array
+    cage_angle: Array
+    cage_x: Array
+    cage_y: Array
+    ring_x: Array
+    ring_y: Array
+    ahead: Array
+    out: Array
+    spin: Array
+    outer_load: Array
+    inner_load: Array
+    pocket_load: Array
+    land_load: Array
+
+    @property
+    def magnification(self) -> float:
+        """The largest round one that fits."""
+        return tidy(self.largest_magnification)
+
+    @property
+    def extent(self) -> float:
+        """Half the side of a square that holds all [mm]."""
+        gap = self.largest_magnification * max(self.outer_gap, 0.0)
+        return 1.03 * (self.pitch + (1.0 + RING_SHARE) * self.roller + gap + RACE_ARROW * self.pitch)
+
+    @property
+    def references(self) -> list[Reference]:
+        """Arrows at the lower left that tell force from length."""
+        left = -0.97 * self.extent
+        found = []
+        for line, (role, words, longest, scale) in enumerate(
+            (
+                ("outer_force", "outer race", RACE_ARROW, self.race_scale),
+                ("inner_force", "inner race", RACE_ARROW, self.race_scale),
+                ("cage_force", "on the cage", CAGE_ARROW, self.cage_scale),
+            )
+        ):
+            down = self.extent * (0.83 + 0.07 * line)
+            force = tidy(0.8 * longest * self.pitch * scale)
+            arrow = Shape("arrow", role, [(left, down), (left + force / scale, down)])
+            found.append(Reference(arrow, f"{words}, {force:g} N", left + 0.3 * self.pitch, down))
+        return found
+
+
+def tidy(value: float) -> float:
+    """The largest of 1, 2, 5, 10, ... not above ``value``."""
+    decade = 10.0 ** math.floor(math.log10(value) + 1e-12)
+    return max(digit * decade for digit in TIDY if digit * decade <= value * (1.0 + 1e-9))
+
+
+def drawing(history: History, turns: float, frames_per_turn: int, most_frames: int = 2000) -> Drawing:
+    """Frames at equal intervals from ``turns`` shaft turns about the largest pocket force."""
+    scene, z = history.scene, history.scene.bearing.rollers
+    interval = float(history.time[1] - history.time[0])
+    per_turn = scene.turn_s / interval
+    window = min(round(turns * per_turn), len(history.time))
+    stride = max(round(per_turn / frames_per_turn), math.ceil(window / most_frames), 1)
+    peak = round(largest(history, history.pocket_load).time / interval)
+    first = min(max(peak - window // 2, 0), len(history.time) - window)
+    kept = slice(first, first + window, stride)
+    sizes = _sizes(history)
+    pitch = sizes["pitch"]
+    place = np.arange(z) * (2.0 * np.pi / z)
+    x = history.roller_x[kept] - history.outer_x[kept, None]
+    y = history.roller_y[kept] - history.outer_y[kept, None]
+    lead = np.arctan2(y, x) - history.cage_angle[kept, None] - place
+    turned = np.cumsum(history.roller_spin, axis=0)[kept] * interval
+    race = max(float(history.outer_load.max()), float(history.inner_load.max()), 1e-9)
+    cage = max(float(np.abs(history.pocket_load).max()), float(history.land_load.max()), 1e-9)
+    return Drawing(
+        rollers=z,
+        **sizes,
+        race_scale=race / (RACE_ARROW * pitch),
+        cage_scale=cage / (CAGE_ARROW * pitch),
+        turns=window * interval / scene.turn_s,
+        start=first * interval / scene.turn_s,
+        time=history.time[kept],
+        inner_angle=history.inner_angle[kept],
+        outer_angle=shaft_speeds(scene)[1] * history.time[kept],
+        cage_angle=history.cage_angle[kept],
+        cage_x=1e3 * (history.cage_x - history.outer_x)[kept],
+        cage_y=1e3 * (history.cage_y - history.outer_y)[kept],
+        ring_x=1e3 * (history.ring_x - history.outer_x)[kept],
+        ring_y=1e3 * (history.ring_y - history.outer_y)[kept],
+        ahead=pitch * ((lead + np.pi) % (2.0 * np.pi) - np.pi),
+        out=1e3 * np.hypot(x, y) - pitch,
+        spin=turned,
+        outer_load=history.outer_load[kept],
+        inner_load=history.inner_load[kept],
+        pocket_load=history.pocket_load[kept],
+        land_load=history.land_load[kept],
+    )
+
+
+def _sizes(history: History) -> dict[str, float]:
+    scene = history.scene
+    pitch, true_roller = 0.5 * scene.bearing.pitch_diameter_mm, 0.5 * scene.bearing.roller_diameter_mm
+    outer, inner = (1e3 * radius for radius in raceway_radii(scene))
+    roller = ROLLER_SHARE * true_roller
+    cage_half = CAGE_SHARE * roller
+    pocket_gap = 0.5 * scene.cage.pocket_clearance_mm
+    clearance = scene.guide_clearance_m
+    guide_gap = 0.0 if clearance is None else 1e3 * clearance
+    # The pockets must leave a cross-bar at the inner rim, and the land must stay on its side of the raceway.
+    room = 0.93 * (pitch - cage_half) * math.sin(math.pi / scene.bearing.rollers) - roller
+    limits = [room / pocket_gap, 0.95 * (roller - cage_half) / guide_gap if guide_gap else math.inf]
+    return {
+        "pitch": pitch,
+        "roller": roller,
+        "cage_half": cage_half,
+        "outer_gap": outer - pitch - true_roller,
+        "inner_gap": pitch - true_roller - inner,
+        "pocket_gap": pocket_gap,
+        "guide_gap": guide_gap,
+        "guide_side": 0.0 if clearance is None else 1.0 if scene.cage.guidance == "outer" else -1.0,
+        "largest_magnification": max(min(limits), 1.0),
+    }
+
+
+def shapes(d: Drawing, frame: int, magnification: float) -> list[Shape]:
+    """What is to be drawn, back to front."""
+    m = magnification
+    outer = d.pitch + d.roller + m * d.outer_gap
+    inner = d.pitch - d.roller - m * d.inner_gap
+    thick = RING_SHARE * d.roller
+    cage = (m * float(d.cage_x[frame]), m * float(d.cage_y[frame]))
+    ring = (m * float(d.ring_x[frame]), m * float(d.ring_y[frame]))
+    found = [
+        Shape("circle", "ring", [(0.0, 0.0)], outer + thick),
+        Shape("circle", "space", [(0.0, 0.0)], outer),
+        Shape("circle", "ring", [_paper(ring)], inner),
+        Shape("circle", "space", [_paper(ring)], inner - 1.6 * thick),
+    ]
+    for middle, radius, angle in (
+        ((0.0, 0.0), outer + 0.5 * thick, d.outer_angle[frame]),
+        (ring, inner - 0.8 * thick, d.inner_angle[frame]),
+    ):
+        found.append(Shape("circle", "mark", [_paper(_polar(middle, radius, float(angle)))], 0.3 * thick))
+    land = d.pitch + d.guide_side * (d.cage_half + m * d.guide_gap)
+    if d.guide_side:
+        found.append(Shape("circle", "land", [_paper((0.0, 0.0) if d.guide_side > 0.0 else ring)], land))
+    found += [Shape("polygon", "cage", bar) for bar in _bars(d, frame, m, cage)]
+    for side in (-1.0, 1.0):
+        found.append(Shape("circle", "rim", [_paper(cage)], d.pitch + side * d.cage_half))
+    arrows = []
+    for j in range(d.rollers):
+        angle = float(d.cage_angle[frame] + 2.0 * np.pi * j / d.rollers + m * d.ahead[frame, j] / d.pitch)
+        centre = _polar((0.0, 0.0), d.pitch + m * float(d.out[frame, j]), angle)
+        spoke = _polar(centre, 0.8 * d.roller, float(d.spin[frame, j]))
+        found.append(Shape("circle", "roller", [_paper(centre)], d.roller))
+        found.append(Shape("line", "spoke", [_paper(centre), _paper(spoke)]))
+        for role, load, touch, away in (
+            ("outer_force", d.outer_load, d.roller, 1.0),
+            ("inner_force", d.inner_load, -d.roller, -1.0),
+        ):
+            size = float(load[frame, j]) / d.race_scale
+            if size > 0.0:
+                tail = _polar(centre, touch + away * size, angle)
+                arrows.append(Shape("arrow", role, [_paper(tail), _paper(_polar(centre, touch, angle))]))
+        size = float(d.pocket_load[frame, j]) / d.cage_scale
+        if size != 0.0:
+            tip = _polar(centre, size, angle + 0.5 * math.pi)
+            arrows.append(Shape("arrow", "cage_force", [_paper(centre), _paper(tip)]))
+    if d.land_load[frame] > 0.0:
+        arrows.append(_land_arrow(d, frame, cage, ring))
+    return found + arrows
+
+
+def _land_arrow(d: Drawing, frame: int, cage: tuple[float, float], ring: tuple[float, float]) -> Shape:
+    """Force of the land on the cage, where they touch."""
+    middle = (0.0, 0.0) if d.guide_side > 0.0 else ring
+    # Away from the guide's centre the cage meets an outer land; an inner one it meets on the other side.
+    angle = math.atan2(cage[1] - middle[1], cage[0] - middle[0]) + (math.pi if d.guide_side < 0.0 else 0.0)
+    touch = d.pitch + d.guide_side * d.cage_half
+    tail = touch + d.guide_side * float(d.land_load[frame]) / d.cage_scale
+    return Shape(
+        "arrow", "cage_force", [_paper(_polar(cage, tail, angle)), _paper(_polar(cage, touch, angle))]
+    )
+
+
+def _bars(d: Drawing, frame: int, m: float, cage: tuple[float, float]) -> list[list[tuple[float, float]]]:
+    """Cross-bars between the pockets: parallel walls, round rims."""
+    half = d.roller + m * d.pocket_gap
+    step = 2.0 * math.pi / d.rollers
+    rims = (d.pitch - d.cage_half, d.pitch + d.cage_half)
+    (inner, a), (outer, b) = ((rim, math.asin(min(half / rim, 1.0))) for rim in rims)
+    bars = []
+    for j in range(d.rollers):
+        here = float(d.cage_angle[frame]) + j * step
+        corners = (
+            (inner, here + a), (outer, here + b), (outer, here + 0.5 * step),
+            (outer, here + step - b), (inner, here + step - a), (inner, here + 0.5 * step),
+        )  # fmt: skip
+        bars.append([_paper(_polar(cage, radius, angle)) for radius, angle in corners])
+    return bars
+
+
+def _polar(middle: tuple[float, float], radius: float, angle: float) -> tuple[float, float]:
+    return middle[0] + radius * math.cos(angle), middle[1] + radius * math.sin(angle)
+
+
+def _paper(place: tuple[float, float]) -> tuple[float, float]:
+    return place[1], place[0]

@@ -1,0 +1,177 @@
+"""Pictures of how the cage moves and what hits it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from rbdyn.dynamics import orbit
+from rbdyn.plots.style import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, plain, plt, save
+
+if TYPE_CHECKING:
+    from rbdyn.dynamics.history import History
+
+SHOWN_POCKETS = 3
+POCKET_COLOURS = (BLUE, ORANGE, GREEN)
+SHOWN_PEAKS = 3
+# Above this many times the cage speed a whirl spectrum holds only noise.
+SHOWN_ORDERS = 30.0
+
+
+def _guide_circle(axis: Axes, history: History) -> None:
+    clearance = history.scene.guide_clearance_m
+    if clearance is not None:
+        angle = np.linspace(0.0, 2.0 * np.pi, 361)
+        x, y = clearance * 1e6 * np.cos(angle), clearance * 1e6 * np.sin(angle)
+        axis.plot(x, y, "--", color=GREY, linewidth=0.9, label="guide clearance")
+
+
+def _plane(axis: Axes) -> None:
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.set_xlabel("cage centre, along the load [µm]")
+    axis.set_ylabel("across [µm]")
+    plain(axis)
+
+
+def cage_orbit(histories: Mapping[str, History], path: Path) -> None:
+    """Path of the cage centre about that of its guide: in the guide clearance above, enlarged below, a column each."""
+    columns = len(histories)
+    figure, axes = plt.subplots(2, columns, figsize=(4.8 * columns, 9.0), squeeze=False)
+    for column, (title, history) in zip(axes.T, histories.items(), strict=True):
+        x, y = (1e6 * part for part in history.guide_eccentricity)
+        for axis in column:
+            axis.plot(x, y, linewidth=0.6, color=BLUE)
+            axis.plot(x[0], y[0], "o", markersize=5, color=GREEN, label="start")
+            axis.plot(x[-1], y[-1], "s", markersize=5, color=VERMILION, label="end")
+            _plane(axis)
+        _guide_circle(column[0], history)
+        column[0].set_title(title)
+        column[1].set_title("enlarged")
+    axes[0][0].legend(loc="upper right", fontsize=8)
+    save(figure, path)
+
+
+def _draw_pockets(axis: Axes, history: History) -> None:
+    order = np.argsort(-np.abs(history.pocket_load).max(axis=0))[:SHOWN_POCKETS]
+    for pocket, colour in zip(sorted(order), POCKET_COLOURS, strict=False):
+        load = history.pocket_load[:, pocket]
+        axis.plot(history.time * 1e3, load, linewidth=0.8, color=colour, label=f"pocket {pocket + 1}")
+    axis.axhline(0.0, color="black", linewidth=0.6)
+    axis.set_ylabel("wall force [N]\nfront +, rear −")
+    plain(axis)
+
+
+def _legend_above(axis: Axes) -> None:
+    """Outside the axes, where no curve runs."""
+    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=SHOWN_POCKETS, frameon=False, fontsize=8)
+
+
+def pocket_forces(histories: Mapping[str, History], path: Path) -> None:
+    """Wall forces of the pockets with the largest forces over time, a panel each."""
+    rows = len(histories)
+    figure, axes = plt.subplots(rows, 1, figsize=(9.0, 3.0 * rows), squeeze=False, sharex=True)
+    for axis, (title, history) in zip(axes[:, 0], histories.items(), strict=True):
+        _draw_pockets(axis, history)
+        axis.set_title(title, loc="left")
+        _legend_above(axis)
+    axes[-1, 0].set_xlabel("time after the transient [ms]")
+    save(figure, path)
+
+
+def forces(history: History, path: Path) -> None:
+    """Wall forces of the pockets with the largest forces, and the land's dry load, over time; the largest marked."""
+    touched = bool(history.land_load.any())
+    figure, axes = plt.subplots(
+        1 + touched, 1, figsize=(9.0, 3.4 + 2.2 * touched), squeeze=False, sharex=True
+    )
+    pockets = axes[0, 0]
+    _draw_pockets(pockets, history)
+    hit = orbit.largest(history, history.pocket_load)
+    sample = int(np.argmin(np.abs(history.time - hit.time)))
+    sign = -1.0 if hit.roller is not None and history.pocket_load[sample, hit.roller] < 0.0 else 1.0
+    _mark(pockets, history, hit, sign, f"{hit.force:.4g} N, pocket {(hit.roller or 0) + 1}")
+    _legend_above(pockets)
+    if touched:
+        land = axes[1, 0]
+        land.plot(history.time * 1e3, history.land_load, linewidth=0.8, color=BLUE)
+        land.set_ylabel("dry load of the\nguide land [N]")
+        plain(land)
+        hit = orbit.largest(history, history.land_load)
+        _mark(land, history, hit, 1.0, f"{hit.force:.4g} N")
+    elif history.scene.guide_clearance_m is not None:
+        pockets.set_title("the guide land is never touched", fontsize=9, color=GREY, loc="left")
+    axes[-1, 0].set_xlabel("time after the transient [ms]")
+    save(figure, path)
+
+
+def _mark(axis: Axes, history: History, hit: orbit.Largest, sign: float, words: str) -> None:
+    axis.plot(hit.time * 1e3, sign * hit.force, "v" if sign > 0.0 else "^", color=VERMILION, markersize=7)
+    late = hit.time > 0.75 * history.time[-1]
+    axis.annotate(f"largest: {words}", (hit.time * 1e3, sign * hit.force), xytext=(-10 if late else 10, -3),
+                  textcoords="offset points", ha="right" if late else "left", fontsize=8,
+                  bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0})  # fmt: skip
+    axis.margins(y=0.12)
+
+
+def whirl(history: History, path: Path) -> None:
+    """Distribution of the instantaneous whirl ratio, with its median, its quartiles and the mean ratio."""
+    edges, density = orbit.whirl_histogram(history)
+    quantiles = orbit.whirl_quantiles(history)
+    figure, axis = plt.subplots(figsize=(6.4, 4.0))
+    axis.stairs(density, edges, fill=True, color=SKY)
+    axis.axvspan(quantiles[0.25], quantiles[0.75], color=GREY, alpha=0.15, linewidth=0, label="middle half")
+    axis.axvline(quantiles[0.5], color=BLUE, linewidth=1.4, label=f"median {quantiles[0.5]:.3g}")
+    mean = orbit.whirl_ratio(history)
+    axis.axvline(mean, color=VERMILION, linewidth=1.4, linestyle="--", label=f"mean {mean:.3g}")
+    axis.set_xlabel("whirl speed of the cage centre over mean cage speed [-]")
+    axis.set_ylabel("probability density [-]")
+    plain(axis)
+    axis.legend(fontsize=8)
+    save(figure, path)
+
+
+def section(history: History, path: Path) -> None:
+    """Poincare sections: the cage centre once a shaft turn and once a cage turn, on its orbit."""
+    x, y = (1e6 * part for part in history.guide_eccentricity)
+    figure, axes = plt.subplots(1, 2, figsize=(9.6, 5.4))
+    turns: tuple[Literal["shaft", "cage"], ...] = ("shaft", "cage")
+    for axis, turn_of in zip(axes, turns, strict=True):
+        place_x, place_y = orbit.poincare(history, turn_of)
+        axis.plot(x, y, linewidth=0.4, color=SKY, alpha=0.7, label="orbit")
+        marks = axis.scatter(
+            place_x * 1e6, place_y * 1e6, c=np.arange(len(place_x)), cmap="viridis", s=22, zorder=3
+        )
+        _plane(axis)
+        axis.set_title(f"once a {turn_of} turn: {len(place_x)} points", fontsize=10)
+        figure.colorbar(marks, ax=axis, label=f"{turn_of} turn", orientation="horizontal", shrink=0.9)
+    save(figure, path)
+
+
+def spectra(history: History, path: Path) -> None:
+    """Amplitude spectra of cage eccentricity and cage speed; cage, shaft and roller-passing frequency marked."""
+    cage = abs(orbit.mean_cage_speed(history)) / (2.0 * np.pi)
+    passing = cage * history.scene.bearing.rollers
+    lines = {"cage": cage, "shaft": 1.0 / history.scene.turn_s, "roller passing": passing}
+    figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.2), sharex=True)
+    signals = (
+        (orbit.eccentricity_spectrum(history), 1e6, "eccentricity of the cage", "µm"),
+        (orbit.cage_speed_spectrum(history), 30.0 / np.pi, "cage speed", "rpm"),
+    )
+    reach = min(SHOWN_ORDERS * cage, float(signals[0][0].frequency[-1]))
+    for axis, (spectrum, factor, name, unit) in zip(axes, signals, strict=True):
+        shown = (spectrum.frequency > 0.0) & (spectrum.frequency <= reach)
+        amplitude = factor * spectrum.amplitude[shown]
+        axis.semilogy(spectrum.frequency[shown] * 1e-3, amplitude, color=BLUE, linewidth=1.0)
+        for colour, (_, frequency) in zip((GREEN, ORANGE, VERMILION), lines.items(), strict=True):
+            axis.axvline(frequency * 1e-3, color=colour, linewidth=0.9, linestyle="--", zorder=1)
+        axis.set_ylabel(f"amplitude of the\n{name} [{unit}]")
+        plain(axis)
+    for colour, (name, frequency) in zip((GREEN, ORANGE, VERMILION), lines.items(), strict=True):
+        axes[0].plot([], [], "--", color=colour, linewidth=0.9, label=f"{name}, {frequency:.0f} Hz")
+    axes[0].legend(fontsize=8, loc="upper right")
+    axes[1].set_xlabel("frequency [kHz]")
+    save(figure, path)

@@ -1,0 +1,201 @@
+"""Cage slip, loss, whirl and impact over speed and load: where a bearing skids.
+
+Every point is the same scene at another inner speed and radial load. A point that cannot go on is kept as a record of
+its cause, and the others go on.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rbdyn.dynamics.metrics import Replicate, quantity
+from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.simulate import COMPANION_FACTOR, Stop, as_they_end, prepare, run_replicate, thread_pool
+from rbdyn.faults import InputError, RunError
+from rbdyn.result import Quantity, versions
+from rbdyn.scene import Scene
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FORMAT = "rbdyn.map/1"
+FIGURES: dict[str, Callable[[Replicate], float]] = {
+    "cage_slip": lambda run: run.cage_slip,
+    "power_loss_W": lambda run: run.power_loss,
+    "impact_force_N": lambda run: run.impact_force,
+    "whirl_deviation_ratio": lambda run: run.whirl_deviation_ratio,
+}
+
+
+@dataclass(frozen=True)
+class Point:
+    """One speed and load; ``figures`` is empty where ``status`` tells why the run could not go on."""
+
+    inner_speed_rpm: float
+    radial_load_N: float  # noqa: N815
+    status: str
+    figures: dict[str, Quantity]
+    power_gap: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return {
+            "inner_speed_rpm": self.inner_speed_rpm,
+            "radial_load_N": self.radial_load_N,
+            "status": self.status,
+            **{name: figure.as_dict() for name, figure in self.figures.items()},
+            "power_balance": {"relative_gap": self.power_gap},
+        }
+
+
+@dataclass(frozen=True)
+class SlipMap:
+    """Points in rows of rising load, speeds rising within; ``wall_s`` is what they took."""
+
+    speeds_rpm: tuple[float, ...]
+    loads_N: tuple[float, ...]  # noqa: N815
+    points: tuple[Point, ...]
+    wall_s: float
+    seed: int
+
+    @property
+    def failed(self) -> list[Point]:
+        """Points without figures."""
+        return [point for point in self.points if not point.figures]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON of ``rbdyn map``."""
+        return {
+            "format": FORMAT,
+            "status": "ok" if not self.failed else f"{len(self.failed)} of {len(self.points)} points failed",
+            "speeds_rpm": list(self.speeds_rpm),
+            "loads_N": list(self.loads_N),
+            "points": [point.as_dict() for point in self.points],
+            "cost": {"wall_s": self.wall_s},
+            "seed": self.seed,
+            "versions": versions(),
+        }
+
+    def table(self) -> pd.DataFrame:
+        """A row a point; figures with their 95 % errors."""
+        import pandas as pd
+
+        rows = []
+        for point in self.points:
+            row: dict[str, Any] = {
+                "inner_speed_rpm": point.inner_speed_rpm,
+                "radial_load_N": point.radial_load_N,
+            }
+            for name, figure in point.figures.items():
+                row |= {
+                    name: figure.value,
+                    f"{name}_statistical_error": figure.statistical_error,
+                    f"{name}_numerical_error": figure.numerical_error,
+                }
+            rows.append(row | {"power_gap": point.power_gap, "status": point.status})
+        return pd.DataFrame(rows)
+
+    def grid(self, figure: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Values of a figure, shape (loads, speeds); NaN where a point failed."""
+        values = [point.figures[figure].value if point.figures else np.nan for point in self.points]
+        return np.array(values).reshape(len(self.loads_N), len(self.speeds_rpm))
+
+
+def axis_values(text: str, option: str) -> list[float]:
+    """Values of ``start:stop:count`` (evenly spaced) or ``a,b,c``. Raises InputError naming ``option``."""
+    mend = "write start:stop:count or values with commas, rising"
+    try:
+        if ":" in text:
+            start, stop, count = text.split(":")
+            values = [float(value) for value in np.linspace(float(start), float(stop), int(count))]
+        else:
+            values = [float(value) for value in text.split(",")]
+    except ValueError:
+        raise InputError([f"{option} {text}: not a list of numbers; {mend}"]) from None
+    if not values or not np.isfinite(values).all() or any(b <= a for a, b in pairwise(values)):
+        raise InputError([f"{option} {text}: the values must rise; {mend}"])
+    return values
+
+
+def slip_map(
+    scene: Scene,
+    speeds_rpm: Sequence[float],
+    loads_N: Sequence[float],  # noqa: N803
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> SlipMap:
+    """Run the scene at every pair of inner speed and radial load.
+
+    Raises InputError where a speed or load is impossible or the scene has a schedule, KeyboardInterrupt on Ctrl-C.
+    """
+    if scene.operation.schedule is not None:
+        raise InputError(["operation.schedule: a map sets speed and load itself; take the schedule away"])
+    scenes = [_at(scene, speed, load) for load in loads_N for speed in speeds_rpm]
+    prepare(scenes[0])
+    tolerances = [scene.numerics.rtol] + [COMPANION_FACTOR * scene.numerics.rtol] * scene.numerics.companion
+    tasks = [
+        (place, rtol, replicate)
+        for place in range(len(scenes))
+        for rtol in tolerances
+        for replicate in range(scene.numerics.replicates)
+    ]
+    bearings = [roller_bearing(point) for point in scenes]
+    runs: dict[tuple[int, float, int], Replicate] = {}
+    causes: dict[int, str] = {}
+    started = time.perf_counter()
+    stop = Stop()
+    with thread_pool(workers, stop) as pool:
+        futures = {
+            pool.submit(run_replicate, scenes[task[0]], bearings[task[0]], task[2], task[1], stop): task
+            for task in tasks
+        }
+        for done, future in enumerate(as_they_end(futures), 1):
+            task = futures[future]
+            try:
+                runs[task] = future.result()
+            except RunError as error:
+                causes[task[0]] = min(str(error), causes.get(task[0], str(error)))
+            if progress is not None:
+                progress(done, len(tasks))
+    points = []
+    for place, point in enumerate(scenes):
+        series = [
+            [runs[place, rtol, i] for i in range(scene.numerics.replicates)] if place not in causes else []
+            for rtol in tolerances
+        ]
+        points.append(_point(point, series, causes.get(place)))
+    wall_s = time.perf_counter() - started
+    return SlipMap(tuple(speeds_rpm), tuple(loads_N), tuple(points), wall_s, scene.numerics.seed)
+
+
+def write(slip_map: SlipMap, folder: Path) -> list[str]:
+    """Write map.json, map.csv and map.png; returns the file names."""
+    from rbdyn.plots.slip_map import draw
+    from rbdyn.result import write_json
+
+    write_json(folder / "map.json", slip_map.as_dict())
+    slip_map.table().to_csv(folder / "map.csv", index=False)
+    draw(slip_map, folder / "map.png")
+    return ["map.json", "map.csv", "map.png"]
+
+
+def _at(scene: Scene, speed: float, load: float) -> Scene:
+    data = scene.model_dump(mode="json", exclude_none=True)
+    data["operation"] |= {"inner_speed_rpm": speed, "radial_load_N": load}
+    return Scene.from_dict(data, f"--speed {speed:g} --load {load:g}")
+
+
+def _point(scene: Scene, series: list[list[Replicate]], cause: str | None) -> Point:
+    speed, load = scene.operation.inner_speed_rpm, scene.operation.radial_load_N
+    if cause is not None:
+        return Point(speed, load, f"failed: {cause}", {}, None)
+    runs, companions = series[0], series[1] if len(series) > 1 else []
+    figures = {name: quantity(figure, runs, companions) for name, figure in FIGURES.items()}
+    return Point(speed, load, "ok", figures, max(run.power_gap for run in runs))

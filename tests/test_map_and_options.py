@@ -1,0 +1,122 @@
+"""The slip map and the cost of options: points, failures, tables, files, and the command."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from rbdyn.faults import InputError
+from rbdyn.option_cost import OPTIONS, option_costs, record, with_options
+from rbdyn.option_cost import write as write_options
+from rbdyn.scene import Scene
+from rbdyn.slip_map import FIGURES, axis_values, slip_map, write
+
+SPEEDS, LOADS = (12000.0, 24000.0), (60.0, 1300.0)
+
+
+@pytest.fixture(scope="module")
+def found(outer):
+    """A map of four points."""
+    return slip_map(outer, SPEEDS, LOADS, workers=2)
+
+
+def test_unit_map_is_what_single_runs_give(found, outer):
+    """Unit: a point equals the simulation of that scene, bit for bit; rows are loads, columns speeds."""
+    from rbdyn.dynamics.simulate import simulate
+
+    alone = simulate(with_options(outer, ("operation.inner_speed_rpm=12000.0",)), workers=1)
+    point = next(p for p in found.points if (p.inner_speed_rpm, p.radial_load_N) == (12000.0, 1300.0))
+    assert point.figures["cage_slip"] == alone.cage_slip
+    assert point.figures["impact_force_N"] == alone.impact_force
+    assert found.grid("cage_slip")[1, 0] == alone.cage_slip.value
+    assert found.failed == []
+
+
+def test_physics_light_load_slips_more(found):
+    """Trend: at both speeds the cage slips more under 60 N than under 1300 N, beyond the errors of both."""
+    slips = {(p.inner_speed_rpm, p.radial_load_N): p.figures["cage_slip"] for p in found.points}
+    for speed in SPEEDS:
+        light, heavy = slips[speed, 60.0], slips[speed, 1300.0]
+        assert light.value - light.statistical_error > heavy.value + heavy.statistical_error
+
+
+def test_unit_map_saves_table_picture_and_json(found, tmp_path):
+    """Unit: files are whole; the table has a row a point and a column an error."""
+    files = write(found, tmp_path)
+    saved = json.loads((tmp_path / "map.json").read_text())
+    assert files == ["map.json", "map.csv", "map.png"] and (tmp_path / "map.png").stat().st_size > 10_000
+    assert saved["format"] == "rbdyn.map/1" and saved["status"] == "ok" and len(saved["points"]) == 4
+    table = found.table()
+    assert len(table) == 4 and {f"{name}_statistical_error" for name in FIGURES} <= set(table.columns)
+
+
+def test_unit_failed_points_are_records(make_scene):
+    """Unit: a point that cannot go on tells why, the others go on, and the grid has a gap there."""
+    # A steady scene takes about 400 steps a turn; where the rollers skid at high speed it takes more of them a turn.
+    scene = make_scene("numerics.step_budget_per_turn=700", "numerics.replicates=1")
+    found = slip_map(scene, (24000.0,), (1300.0, 400000.0), workers=1)
+    assert [point.status == "ok" for point in found.points] == [True, False]
+    assert "step budget" in found.failed[0].status
+    assert np.isnan(found.grid("cage_slip")[1, 0]) and np.isfinite(found.grid("cage_slip")[0, 0])
+    assert found.as_dict()["status"] == "1 of 2 points failed"
+
+
+def test_unit_axis_values():
+    """Unit: both ways to write an axis, and what is refused."""
+    assert axis_values("1000:3000:3", "--speed") == [1000.0, 2000.0, 3000.0]
+    assert axis_values("5,7.5", "--load") == [5.0, 7.5]
+    for wrong in ("1:2", "a,b", "3,2", "1:nan:2", "1,1", ""):
+        with pytest.raises(InputError, match="--load"):
+            axis_values(wrong, "--load")
+
+
+def test_unit_map_refuses_a_schedule(make_scene):
+    """Unit: a scene that schedules its own load cannot be mapped."""
+    scene = make_scene("operation.schedule={time_s=[0.0],radial_load_N=[100.0]}")
+    with pytest.raises(InputError, match=r"operation\.schedule"):
+        slip_map(scene, SPEEDS, LOADS)
+
+
+def test_command_map(command, tmp_path):
+    """Command line: JSON alone on standard output; an impossible load is refused by name."""
+    arguments = (
+        "map",
+        "examples/cylindrical_roller.toml",
+        "--speed",
+        "24000",
+        "--turns",
+        "2",
+        "--replicates",
+        "1",
+    )
+    short = ("--set", "numerics.discard_turns=1", "--set", "numerics.companion=false")
+    good = command(*arguments, *short, "--load", "300,1300", "--json")
+    assert good.returncode == 0, good.stderr
+    assert [point["radial_load_N"] for point in json.loads(good.stdout)["points"]] == [300.0, 1300.0]
+    bad = command(*arguments, *short, "--load", "-5,300")
+    assert bad.returncode == 2 and "radial_load_N" in bad.stderr and "Traceback" not in bad.stderr
+
+
+def test_unit_every_option_is_a_scene():
+    """Unit: every option, alone, is lawful for the bearing of the paper and changes the scene."""
+    scene = Scene.load("examples/cylindrical_roller.toml")
+    for name, assignments in OPTIONS.items():
+        assert with_options(scene, assignments) != scene, name
+
+
+def test_unit_option_costs(outer, tmp_path):
+    """Unit: an option is timed beside the scene; one that contradicts the scene is left out."""
+    options = {
+        "contact law of ISO/TS 16281": OPTIONS["contact law of ISO/TS 16281"],
+        "impossible": ("model.pocket_film_floor_um=1e6", "model.pocket_film=true"),
+    }
+    rows = option_costs(outer, options)
+    assert [row.option for row in rows] == ["contact law of ISO/TS 16281"]
+    row = rows[0]
+    assert row.with_ns > 0.0 and row.without_ns > 0.0 and 0.0 < row.power_gap < 0.01
+    # The same types of laws: the compiled code is shared, so both cost the same but for noise.
+    assert row.difference_ns == row.with_ns - row.without_ns
+    assert write_options(rows, tmp_path) == ["options.json", "options.csv"]
+    assert record(rows)["options"][0]["option"] == row.option
