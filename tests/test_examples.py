@@ -1,0 +1,134 @@
+"""The example scripts: each imports, and each published check gives its number in a quick variant."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+SCRIPTS = sorted(path.stem for path in EXAMPLES.glob("*.py"))
+
+
+@pytest.fixture(autouse=True)
+def examples_on_path(monkeypatch):
+    """Scripts find what lies beside them, as when they are run."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+
+
+def script(name):
+    """Import a script without running it."""
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def effort():
+    """Two short replicates: enough for the size of a figure."""
+    from published.common import Effort
+
+    return Effort(replicates=2, turns=20, discard_turns=4)
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_unit_script_imports(name):
+    """Unit: importing a script runs nothing and finds all it needs."""
+    assert script(name).__doc__
+
+
+def test_unit_published_checks_are_whole():
+    """Unit: the quick and the full run hold the same checks."""
+    module = script("published_checks")
+    assert list(module.FULL) == list(module.BRIEF)
+    assert set(module.FULL) == {"table4", "figure14", "nu215", "friction", "sensitivity", "whirl"}
+
+
+def test_literature_table4(effort):
+    """Literature: our loss is 0.57 of Chen et al.'s, ranks as theirs and falls with guide clearance as theirs does."""
+    from published.table4 import table4
+
+    frame = table4(effort, ("four_constant",)).frame.set_index("response")
+    assert frame["level_ratio"]["power_loss_W"] == pytest.approx(0.57, abs=0.05)
+    assert frame["sign_guide_clearance_mm"]["power_loss_W"] == "same"
+    assert frame["spearman"]["impact_force_N"] > 0.5
+
+
+def test_literature_friction_formulas(effort):
+    """Literature: SKF 151 W of rolling, Palmgren 117, 154 and 265 W at 24000 rpm and 1300 N; the races take as much."""
+    from published.operating import friction
+
+    row = (
+        friction(effort, (12000, 24000), (1300, 2600))
+        .frame.set_index(["speed_rpm", "load_N"])
+        .loc[(24000, 1300)]
+    )
+    assert row["skf_rolling_W"] == pytest.approx(151.0, abs=1.0)
+    assert row["palmgren_2_W"] == pytest.approx(117.0, abs=1.0)
+    assert row["palmgren_3_W"] == pytest.approx(154.0, abs=1.0)
+    assert row["palmgren_6_W"] == pytest.approx(265.0, abs=1.0)
+    assert row["races_W"] == pytest.approx(row["skf_rolling_W"] + row["skf_sliding_W"], rel=0.25)
+
+
+def test_literature_figure14(effort):
+    """Literature: loss and impact rise with speed, as Chen et al. say of their Fig. 14."""
+    from published.operating import figure14
+
+    frame = figure14(effort, ("four_constant",), (24000, 30000), (1300,)).frame
+    part = frame[(frame["design"] == "design") & (frame["sweep"] == "speed")].set_index("speed_rpm")
+    assert part["power_loss_W"][30000] / part["power_loss_W"][24000] == pytest.approx(1.58, abs=0.1)
+    assert part["impact_force_N"][30000] > part["impact_force_N"][24000]
+
+
+def test_literature_nu215():
+    """Literature: the NU215 skids at 5000 rpm and 1000 N and rolls at 5000 N."""
+    from published.common import Effort
+    from published.skidding import NU215, slip
+
+    from rbdyn import Scene
+    from rbdyn.dynamics.geometry import raceway_radii
+
+    assert [2e3 * r for r in raceway_radii(Scene.load(NU215))] == pytest.approx([118.57, 88.5])
+    # One traction curve, which is compiled already; the check itself takes the one that follows pressure.
+    curve = ("traction.model=four_constant",)
+    short = Effort(replicates=2, turns=10, discard_turns=10)
+    skidding, rolling = (slip(short, 5000, load, curve)[0] for load in (1000, 5000))
+    assert skidding > 2.0 * rolling
+    assert abs(rolling) < 0.05
+
+
+def test_unit_sensitivity(effort):
+    """Unit: more oil in the air moves the power nearer; the distance is the mean of |ln ratio|."""
+    from published.common import RESPONSES
+    from published.sensitivity import sensitivity
+
+    frame = sensitivity(effort, ("oil fraction 5 %",), whole_design=False).frame
+    shipped, oily = frame.loc["as shipped"], frame.loc["oil fraction 5 %"]
+    assert oily["power_loss_W"] - shipped["power_loss_W"] == pytest.approx(0.16, abs=0.03)
+    assert shipped["distance"] == pytest.approx(sum(abs(math.log(shipped[r])) for r in RESPONSES) / 3.0)
+
+
+def test_literature_whirl(effort):
+    """Literature: a flooded land carries the cage; one that is all but dry is struck."""
+    from published.whirl import whirl
+
+    frame = whirl(effort, (1.0, 0.002), ("four_constant",), history_turns=3.0).frame
+    assert list(frame["regime"]) == ["in the film", "strikes the land"]
+    assert frame["contacts_per_turn"].iloc[1] > 1.0
+    assert frame["eccentricity"].iloc[0] < 0.96
+
+
+def test_unit_trend_words():
+    """Unit: a trend is called by name only beyond its errors."""
+    from published.common import trend
+
+    assert trend((1.0, 2.0, 3.0), (0.1, 0.1, 0.1)) == "rises"
+    assert trend((3.0, 2.0, 1.0), (0.1, 0.1, 0.1)) == "falls"
+    assert trend((3.0, 1.0, 3.0), (0.1, 0.1, 0.1)) == "falls, then rises"
+    assert trend((1.0, 3.0, 1.0), (0.1, 0.1, 0.1)) == "rises, then falls"
+    assert trend((1.0, 0.5, 1.2), (1.0, 1.0, 1.0)) == "level"
