@@ -27,10 +27,10 @@ from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_form import RoundRace, WavyRace
 from rbdyn.dynamics.races import (
     EqualRollers,
-    UnequalRollers,
     inner_race_forces,
     outer_race_forces,
     scratch,
+    unequal_rollers,
 )
 from rbdyn.dynamics.ring_motion import outer_motion
 from rbdyn.dynamics.schedule import Constant
@@ -228,7 +228,7 @@ REWRITTEN = {
     "31 slices": lambda b: on_both(b, contact=lambda race: flat_slices(race.contact, False)),
     "31 slices, tilt of nothing": lambda b: on_both(b, contact=lambda race: flat_slices(race.contact, True)),
     "waves of no height": lambda b: on_both(b, form=lambda race: no_waves()),
-    "rollers of equal radii": lambda b: b._replace(sizes=UnequalRollers(np.full(b.rollers, b.sizes.radius))),
+    "rollers of equal radii": lambda b: b._replace(sizes=unequal_rollers(np.full(b.rollers, b.sizes.radius))),
     "no imbalance": lambda b: b._replace(cage=UnbalancedCage(*b.cage, 0.0)),
     "no weight": lambda b: b._replace(gravity=Gravity(0.0, 0.0)),
     "outer ring at no speed": lambda b: b._replace(

@@ -52,7 +52,7 @@ from rbdyn.dynamics.guide_land import DryContact, InnerGuide, NoFilm, NoGuide, O
 from rbdyn.dynamics.pocket import LippedPocket, LubricatedPocket, NoPocket, Pocket
 from rbdyn.dynamics.race_form import RoundRace, largest_rise, wavy_race
 from rbdyn.dynamics.race_traction import race_traction
-from rbdyn.dynamics.races import EqualRollers, Race, UnequalRollers
+from rbdyn.dynamics.races import EqualRollers, Race, unequal_rollers
 from rbdyn.dynamics.ring_motion import HeldRing, SupportedRing
 from rbdyn.dynamics.schedule import Constant, Ramps, SmoothRamps, Steps
 from rbdyn.lubricants import Oil, oil_at
@@ -73,7 +73,7 @@ def roller_bearing(scene: Scene) -> RollerBearing:
     radii = roller_radii(scene)
     return RollerBearing(
         rollers=drawing.rollers,
-        sizes=EqualRollers(0.5 * diameter) if radii is None else UnequalRollers(radii),
+        sizes=EqualRollers(0.5 * diameter) if radii is None else unequal_rollers(radii),
         roller_mass=mass,
         roller_inertia=mass * diameter**2 / 8.0,
         outer=_race(scene, oil, "outer"),

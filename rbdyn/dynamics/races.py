@@ -19,8 +19,10 @@ from rbdyn.contact.traction import traction
 from rbdyn.dynamics.race_form import form_at, sloped
 from rbdyn.kernel import kernel, law
 
-# Contacts are worked through in blocks of LANES, VECTOR at a time; each quantity is a row of a block.
-LANES, VECTOR, INPUTS, OUTPUTS = 16, 4, 5, 8
+# Contacts are worked through in blocks of LANES, VECTOR at a time; each quantity is a row of a block. Rollers that are
+# picked out bring their coordinates and, as one row more, their radii.
+LANES, VECTOR, COORDINATES, OUTPUTS = 16, 4, 5, 8
+RADII = COORDINATES * LANES
 
 # Below this a speed is round-off; it keeps the roots of the laws finite.
 SMALLEST_SPEED = 1e-12
@@ -29,41 +31,14 @@ SMALLEST_SPEED = 1e-12
 class Scratch(NamedTuple):
     """Work space of one thread."""
 
-    packed: NDArray[np.float64]  # (INPUTS * LANES,)
+    packed: NDArray[np.float64]  # ((COORDINATES + 1) * LANES,)
     lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
 
 
 def scratch() -> Scratch:
     """Work space for the race contacts."""
-    return Scratch(np.ones(INPUTS * LANES), np.empty(OUTPUTS * LANES), np.zeros(LANES, np.int64))
-
-
-class InOrder(NamedTuple):
-    """Rollers from a first number on."""
-
-    first: int
-
-
-class Picked(NamedTuple):
-    """Rollers of any numbers."""
-
-    numbers: NDArray[np.int64]
-
-
-@law
-def roller_number(choice, i):
-    """Number of the roller in lane ``i``; past the last roller it may be any."""
-
-
-@roller_number.body(InOrder)
-def _(choice, i):
-    return choice.first + i
-
-
-@roller_number.body(Picked)
-def _(choice, i):
-    return choice.numbers[i]
+    return Scratch(np.ones((COORDINATES + 1) * LANES), np.empty(OUTPUTS * LANES), np.zeros(LANES, np.int64))
 
 
 class Race(NamedTuple):
@@ -87,7 +62,12 @@ class EqualRollers(NamedTuple):
 class UnequalRollers(NamedTuple):
     """Each roller with its own radius [m]; masses are those of the mean."""
 
-    radii: NDArray[np.float64]
+    radii: NDArray[np.float64]  # padded to whole vectors
+
+
+def unequal_rollers(radii: NDArray[np.float64]) -> UnequalRollers:
+    """Rollers of these radii [m]."""
+    return UnequalRollers(np.concatenate((radii, np.full(-len(radii) % VECTOR, radii[0]))))
 
 
 @law
@@ -102,7 +82,37 @@ def _(sizes, number):
 
 @roller_radius.body(UnequalRollers)
 def _(sizes, number):
-    return sizes.radii[min(number, sizes.radii.size - 1)]
+    return sizes.radii[number]
+
+
+@law
+def radii_in_order(sizes, unused):
+    """Where the radii of all rollers stand; ``unused`` where there are none to read."""
+
+
+@radii_in_order.body(EqualRollers)
+def _(sizes, unused):
+    return unused
+
+
+@radii_in_order.body(UnequalRollers)
+def _(sizes, unused):
+    return sizes.radii
+
+
+@law
+def lane_radius(sizes, radii, place):
+    """Radius of the roller in a lane, from ``radii`` where rollers differ [m]."""
+
+
+@lane_radius.body(EqualRollers)
+def _(sizes, radii, place):
+    return sizes.radius
+
+
+@lane_radius.body(UnequalRollers)
+def _(sizes, radii, place):
+    return radii[place]
 
 
 @kernel
@@ -161,10 +171,11 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
 
 
 @kernel
-def race_block(race, side, sizes, ring, source, first, stride, choice, lanes, count):
+def race_block(race, side, sizes, ring, source, first, stride, radii, first_radius, lanes, count):
     """Contacts of ``count`` rollers, rounded up to whole vectors, into the rows of ``lanes``.
 
-    ``choice`` tells their numbers; x, y, vx, vy and spin of roller i stand at ``source[first + i + row * stride]``.
+    x, y, vx, vy and spin of roller i stand at ``source[first + i + row * stride]``, its radius at
+    ``radii[first_radius + i]``.
     Straight-line code over rows at constant distances, which the compiler turns into vector instructions; the lanes
     past ``count`` hold nothing.
     """
@@ -173,7 +184,7 @@ def race_block(race, side, sizes, ring, source, first, stride, choice, lanes, co
         out = race_contact(
             race,
             side,
-            roller_radius(sizes, roller_number(choice, i)),
+            lane_radius(sizes, radii, first_radius + i),
             source[j] - ring.x,
             source[j + stride] - ring.y,
             source[j + 2 * stride] - ring.vx,
@@ -194,7 +205,7 @@ def race_block(race, side, sizes, ring, source, first, stride, choice, lanes, co
 
 
 @kernel
-def gather_touching(reach, ring, rollers, start, y, packed, index):
+def gather_touching(reach, sizes, ring, rollers, start, y, packed, index):
     """Copy the state of rollers that touch the inner race, from ``start`` on, until a block is full.
 
     Returns how many there are and where to go on.
@@ -204,8 +215,9 @@ def gather_touching(reach, ring, rollers, start, y, packed, index):
     while j < rollers and count < LANES:
         dx, dy = y[j] - ring.x, y[rollers + j] - ring.y
         if dx * dx + dy * dy < reach * reach:
-            for row in range(INPUTS):
+            for row in range(COORDINATES):
                 packed[row * LANES + count] = y[row * rollers + j]
+            packed[RADII + count] = roller_radius(sizes, j)
             index[count] = j
             count += 1
         j += 1
@@ -238,10 +250,11 @@ def outer_race_forces(race, sizes, ring, rollers, y, row, dy, scratch):
     Nearly every roller touches this race, so none is picked out.
     """
     sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    radii = radii_in_order(sizes, scratch.packed)
     start = 0
     while start < rollers:
         count = min(LANES, rollers - start)
-        race_block(race, 1.0, sizes, ring, y, start, rollers, InOrder(start), scratch.lanes, count)
+        race_block(race, 1.0, sizes, ring, y, start, rollers, radii, start, scratch.lanes, count)
         for i in range(count):
             sums = add_block(scratch.lanes, i, start + i, rollers, row, dy, sums)
         start += LANES
@@ -257,20 +270,12 @@ def inner_race_forces(race, sizes, ring, rollers, y, row, dy, scratch):
     sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     start = 0
     while start < rollers:
-        count, start = gather_touching(race.reach, ring, rollers, start, y, scratch.packed, scratch.roller)
+        count, start = gather_touching(
+            race.reach, sizes, ring, rollers, start, y, scratch.packed, scratch.roller
+        )
         if count > 0:
-            race_block(
-                race,
-                -1.0,
-                sizes,
-                ring,
-                scratch.packed,
-                0,
-                LANES,
-                Picked(scratch.roller),
-                scratch.lanes,
-                count,
-            )
+            packed, lanes = scratch.packed, scratch.lanes
+            race_block(race, -1.0, sizes, ring, packed, 0, LANES, packed, RADII, lanes, count)
         for i in range(count):
             sums = add_block(scratch.lanes, i, scratch.roller[i], rollers, row, dy, sums)
     return sums
