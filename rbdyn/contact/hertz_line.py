@@ -13,13 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.elementary import fast_exp, fast_log, reordered_sum
-from rbdyn.kernel import kernel, law
+from rbdyn.kernel import VECTOR, kernel, law
 
 EXPONENT = 10.0 / 9.0
 # Below this an overlap is round-off; it keeps logarithms and roots finite.
 SMALLEST_APPROACH = 1e-18
-# Slices are filled up with empty ones to whole vectors.
-VECTOR = 4
 
 
 class LineContact(NamedTuple):
@@ -105,7 +103,10 @@ def dowson_higginson(equivalent_modulus: float, length: float, gamma: float) -> 
 def sliced(
     whole: Any, relief: NDArray[np.float64], position: NDArray[np.float64], tilt: float, direction: float
 ) -> SlicedLineContact | TiltedLineContact:
-    """Cut a plain law into slices with profile drops and axial positions [m], tilted by ``tilt`` [rad]."""
+    """Cut a plain law into slices with profile drops and axial positions [m], tilted by ``tilt`` [rad].
+
+    Empty slices fill them up to whole vectors.
+    """
     padding = -len(relief) % VECTOR
     drop = np.concatenate((relief, np.zeros(padding)))
     share = np.concatenate((np.full(len(relief), 1.0 / len(relief)), np.zeros(padding)))

@@ -14,14 +14,30 @@ from numpy.typing import NDArray
 
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.film import rolling_force
-from rbdyn.contact.hertz_line import around, line_load
-from rbdyn.contact.traction import traction
-from rbdyn.dynamics.race_form import form_at, sloped
-from rbdyn.kernel import kernel, law
+from rbdyn.contact.hertz_line import (
+    LineContact,
+    LogarithmicLineContact,
+    PowerLineContact,
+    SlicedLineContact,
+    TiltedLineContact,
+    around,
+    line_load,
+)
+from rbdyn.contact.traction import (
+    BlendedFourConstantTraction,
+    CoulombTraction,
+    FourConstantTraction,
+    MixedTraction,
+    NoTraction,
+    TractionSurface,
+    traction,
+)
+from rbdyn.dynamics.race_form import RoundRace, WavyRace, form_at, sloped
+from rbdyn.kernel import VECTOR, kernel, law
 
 # Contacts are worked through in blocks of LANES, VECTOR at a time; each quantity is a row of a block. Rollers that are
 # picked out bring their coordinates and, as one row more, their radii.
-LANES, VECTOR, COORDINATES, OUTPUTS = 16, 4, 5, 8
+LANES, COORDINATES, OUTPUTS = 16, 5, 8
 RADII = COORDINATES * LANES
 
 # Below this a speed is round-off; it keeps the roots of the laws finite.
@@ -170,16 +186,50 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
     )
 
 
+@law
+def in_vectors(parameters):
+    """Whether neighbouring contacts with this law share vector instructions."""
+
+
+@in_vectors.body(
+    LineContact,
+    PowerLineContact,
+    LogarithmicLineContact,
+    RoundRace,
+    NoTraction,
+    FourConstantTraction,
+    BlendedFourConstantTraction,
+)
+def _(parameters):
+    return True
+
+
+# Loops within, table look-ups and calls of the C library keep a contact to itself.
+@in_vectors.body(
+    SlicedLineContact, TiltedLineContact, WavyRace, CoulombTraction, TractionSurface, MixedTraction
+)
+def _(parameters):
+    return False
+
+
+@kernel
+def lanes_to_fill(race, count):
+    """Whole vectors, where contacts run in vectors and a scalar rest would cost as much; else just ``count``."""
+    if in_vectors(race.contact) and in_vectors(race.form) and in_vectors(race.traction):
+        return (count + VECTOR - 1) // VECTOR * VECTOR
+    return count
+
+
 @kernel
 def race_block(race, side, sizes, ring, source, first, stride, radii, first_radius, lanes, count):
-    """Contacts of ``count`` rollers, rounded up to whole vectors, into the rows of ``lanes``.
+    """Contacts of ``count`` rollers, maybe rounded up to whole vectors, into the rows of ``lanes``.
 
     x, y, vx, vy and spin of roller i stand at ``source[first + i + row * stride]``, its radius at
     ``radii[first_radius + i]``.
     Straight-line code over rows at constant distances, which the compiler turns into vector instructions; the lanes
     past ``count`` hold nothing.
     """
-    for i in range((count + VECTOR - 1) // VECTOR * VECTOR):
+    for i in range(lanes_to_fill(race, count)):
         j = first + i
         out = race_contact(
             race,
