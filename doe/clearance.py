@@ -105,10 +105,12 @@ def run_scenes(
     progress(len(results), len(stored))
     failures = {}
     if missing:
+        from rbdyn.dynamics.model import roller_bearing
         from rbdyn.dynamics.simulate import Stop, as_they_end, prepare, simulate, thread_pool
 
         # Compiled once here, lest every thread wait for the same compilation.
-        prepare(next(iter(missing.values())))
+        first = next(iter(missing.values()))
+        prepare(first, roller_bearing(first))
         stop = Stop()
         with thread_pool(workers or os.cpu_count(), stop) as pool:
             futures = {pool.submit(simulate, scene, 1, None, stop): key for key, scene in missing.items()}

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from rbdyn.dynamics.metrics import Replicate, student_half_width
+from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import Stop, prepare, run_series
 from rbdyn.result import versions
 from rbdyn.scene import Scene
@@ -53,9 +54,10 @@ def work_precision(
     scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Callable[[int, int], None] | None = None
 ) -> list[Row]:
     """A row a tolerance, loosest first. Runs one replicate at a time. Raises RunError, KeyboardInterrupt."""
-    prepare(scene)
+    bearing = roller_bearing(scene)
+    prepare(scene, bearing)
     ordered = sorted(tolerances, reverse=True)
-    series = run_series(scene, ordered, 1, progress, Stop())
+    series = run_series(scene, bearing, ordered, 1, progress, Stop())
     return [_row(scene, rtol, runs, series[-1]) for rtol, runs in zip(ordered, series, strict=True)]
 
 

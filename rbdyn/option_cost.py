@@ -85,15 +85,16 @@ def option_costs(
 ) -> list[OptionCost]:
     """A row an option that the scene allows. Raises RunError, KeyboardInterrupt."""
     plain = with_options(scene, (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}"))
-    prepare(plain)
+    plain_bearing = roller_bearing(plain)
+    prepare(plain, plain_bearing)
     rows = []
     for done, (name, assignments) in enumerate(options.items(), 1):
         try:
             chosen = with_options(plain, assignments)
         except InputError:
             continue  # the option contradicts something that this scene has
-        compile_s = prepare(chosen)
-        bearings = roller_bearing(chosen), roller_bearing(plain)
+        bearings = roller_bearing(chosen), plain_bearing
+        compile_s = prepare(chosen, bearings[0])
         times: tuple[list[float], list[float]] = ([], [])
         gap = 0.0
         for replicate in range(REPEATS):

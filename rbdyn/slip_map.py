@@ -17,7 +17,7 @@ import numpy as np
 
 from rbdyn.dynamics.metrics import Replicate, quantity
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import COMPANION_FACTOR, Stop, as_they_end, prepare, run_replicate, thread_pool
+from rbdyn.dynamics.simulate import Stop, as_they_end, prepare, run_replicate, thread_pool, tolerances_of
 from rbdyn.faults import InputError, RunError
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene
@@ -138,15 +138,15 @@ def slip_map(
     if scene.operation.schedule is not None:
         raise InputError(["operation.schedule: a map sets speed and load itself; take the schedule away"])
     scenes = [_at(scene, speed, load) for load in loads_N for speed in speeds_rpm]
-    prepare(scenes[0])
-    tolerances = [scene.numerics.rtol] + [COMPANION_FACTOR * scene.numerics.rtol] * scene.numerics.companion
+    bearings = [roller_bearing(point) for point in scenes]
+    prepare(scenes[0], bearings[0])
+    tolerances = tolerances_of(scene)
     tasks = [
         (place, rtol, replicate)
         for place in range(len(scenes))
         for rtol in tolerances
         for replicate in range(scene.numerics.replicates)
     ]
-    bearings = [roller_bearing(point) for point in scenes]
     runs: dict[tuple[int, float, int], Replicate] = {}
     causes: dict[int, str] = {}
     started = time.perf_counter()

@@ -82,6 +82,11 @@ class MixedTraction(NamedTuple):
     share_exponent: float  # 0.1 c [-]
 
 
+def dry_friction(coefficient: float, blend_speed: float) -> NoTraction | CoulombTraction:
+    """Dry friction that changes sign over ``blend_speed`` [m/s]; none where the coefficient is zero."""
+    return CoulombTraction(coefficient, blend_speed) if coefficient > 0.0 else NoTraction()
+
+
 def four_constants(mu_0: float, mu_m: float, mu_inf: float, u_m: float) -> tuple[float, float, float, float]:
     """Gupta's A, B, C, D from mu at rest, the peak mu_m at the sliding speed u_m [m/s], and mu far beyond it.
 

@@ -6,14 +6,14 @@ import math
 
 from rbdyn.contact.hertz_line import line_energy
 from rbdyn.dynamics.cage_body import cage_kinetic_energy, mass_centre
-from rbdyn.dynamics.drive import action, load_potential
-from rbdyn.dynamics.equations import cage_motion, inner_motion, pocket_direction
+from rbdyn.dynamics.drive import load_potential
+from rbdyn.dynamics.equations import motions, pocket_direction
 from rbdyn.dynamics.gravity import height_energy
 from rbdyn.dynamics.guide_land import guide_energy
 from rbdyn.dynamics.pocket import pocket_energy
 from rbdyn.dynamics.race_form import form_at
 from rbdyn.dynamics.races import roller_radius
-from rbdyn.dynamics.ring_motion import outer_motion, support_energy
+from rbdyn.dynamics.ring_motion import support_energy
 from rbdyn.kernel import entry, kernel
 
 
@@ -30,10 +30,7 @@ def race_energy(race, side, radius, dx, dy, ring):
 def mechanical_energy(bearing, y):
     """(kinetic, elastic, potential) energy [J] of a state. The rotation of the rings, being prescribed, is left out."""
     z = bearing.rollers
-    body = 5 * z
-    acting = action(bearing.drive, y)
-    cage, inner = cage_motion(y, body), inner_motion(y, body, acting)
-    outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
+    _, cage, inner, outer = motions(bearing, y)
     kinetic, elastic, potential = support_energy(bearing.outer_ring, bearing.gravity, y)
     kinetic += cage_kinetic_energy(bearing.cage, cage.vx, cage.vy, cage.cos, cage.sin, cage.speed)
     kinetic += 0.5 * bearing.inner_ring_mass * (inner.vx**2 + inner.vy**2)

@@ -117,6 +117,15 @@ def inner_motion(y, body, acting):
 
 
 @kernel
+def motions(bearing, y):
+    """What acts on the bearing in a state, and the motions of cage, inner and outer ring."""
+    body = 5 * bearing.rollers
+    acting = action(bearing.drive, y)
+    outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
+    return acting, cage_motion(y, body), inner_motion(y, body, acting), outer
+
+
+@kernel
 def roller_pocket(bearing, y, cage, j):
     """``pocket_contact`` of roller ``j``."""
     z = bearing.rollers
@@ -132,11 +141,8 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     """Fill row ``row`` of ``dy``, of the powers [W] and of the largest loads [N], for the state ``y``."""
     z = bearing.rollers
     body = 5 * z
-    acting = action(bearing.drive, y)
+    acting, cage, inner, outer = motions(bearing, y)
     tick(bearing.drive, acting, row, dy)
-    cage = cage_motion(y, body)
-    inner = inner_motion(y, body, acting)
-    outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
     cage_fx = cage_fy = cage_moment = pocket_load = pocket_friction = pocket_damping = pocket_film = 0.0
     drag_loss = drag_forces(bearing.drag, z, y, row, dy)
     for j in range(z):

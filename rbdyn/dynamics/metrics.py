@@ -20,8 +20,8 @@ class Replicate:
     """One counted run. Times in s, works in J, loads in N.
 
     ``impact_windows``: largest roller/cage force of each whole window; ``whirl``: samples, sum and sum of squares of
-    the cage centre's speed; ``work``: integrals of the loss powers, then of those that come in by shafts and loads; ``energy_change``: of
-    kinetic, elastic and load energy together; ``energy_scale``: contact load times approach, at least.
+    the cage centre's speed; ``work``: integrals of the loss powers, then of those that come in by shafts and loads;
+    ``energy_change``: of kinetic, elastic and load energy together; ``energy_scale``: contact load times approach, at least.
     """
 
     duration: float

@@ -32,7 +32,7 @@ from rbdyn.contact.profile import (
     slice_centres,
     table_relief,
 )
-from rbdyn.contact.traction import CoulombTraction, NoTraction
+from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.cage_body import BalancedCage, UnbalancedCage
 from rbdyn.dynamics.drag import NoDrag, cylinder_drag
 from rbdyn.dynamics.drive import ClockedDrive, SteadyDrive, TwoSpeedDrive
@@ -92,12 +92,16 @@ def roller_bearing(scene: Scene) -> RollerBearing:
 
 
 def lubricant(scene: Scene) -> Oil:
-    """The oil of the scene at its temperature."""
+    """The oil of the scene at its temperature, with what the scene replaces."""
     oil = oil_at(scene.lubricant.oil, scene.lubricant.temperature_C)
-    if scene.lubricant.viscosity_mPas is None:
-        return oil
-    viscosity = scene.lubricant.viscosity_mPas * 1e-3
-    return replace(oil, viscosity=viscosity, viscosity_slope=oil.viscosity_slope * viscosity / oil.viscosity)
+    given = scene.lubricant
+    if given.viscosity_mPas is not None:
+        viscosity = given.viscosity_mPas * 1e-3
+        slope = oil.viscosity_slope * viscosity / oil.viscosity
+        oil = replace(oil, viscosity=viscosity, viscosity_slope=slope)
+    if given.pressure_coefficient_1_GPa is not None:
+        oil = replace(oil, pressure_coefficient=given.pressure_coefficient_1_GPa * 1e-9)
+    return oil
 
 
 def _modulus(scene: Scene, first: str, second: str) -> float:
@@ -116,7 +120,7 @@ def _race(scene: Scene, oil: Oil, which: str) -> Race:
         radius=radius,
         reach=radius + largest_roller + largest_rise(form) + end_rise,
         form=form,
-        contact=_race_contact(scene, which, reduced),
+        contact=race_contact_law(scene, which),
         damping=_race_damping(scene),
         traction=race_traction(
             scene,
@@ -141,7 +145,8 @@ def _form(harmonics: list[Harmonic]) -> Any:
     )
 
 
-def _race_contact(scene: Scene, which: str, reduced_radius: float) -> Any:
+def race_contact_law(scene: Scene, which: str) -> Any:
+    """Load law of a roller on the "outer" or the "inner" race."""
     length = scene.bearing.effective_length_mm * 1e-3
     modulus = _modulus(scene, "roller", "rings")
     gamma = scene.bearing.roller_diameter_mm / scene.bearing.pitch_diameter_mm
@@ -150,7 +155,7 @@ def _race_contact(scene: Scene, which: str, reduced_radius: float) -> Any:
     if law == "iso16281":
         whole = iso_16281(modulus, length)
     elif law == "houpert":
-        whole = houpert(modulus, length, reduced_radius)
+        whole = houpert(modulus, length, reduced_radii(scene)[("outer", "inner").index(which)])
     elif law == "dowson_higginson":
         whole = dowson_higginson(modulus, length, gamma if which == "outer" else -gamma)
     if scene.slices == 1:
@@ -193,7 +198,7 @@ def _race_damping(scene: Scene) -> NoDamping | ViscousDamping | HuntCrossleyDamp
 
 
 def _friction(scene: Scene, coefficient: float) -> NoTraction | CoulombTraction:
-    return CoulombTraction(coefficient, scene.traction.blend_speed_m_s) if coefficient > 0.0 else NoTraction()
+    return dry_friction(coefficient, scene.traction.blend_speed_m_s)
 
 
 def _hunt_crossley(alpha: float) -> NoDamping | HuntCrossleyDamping:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from rbdyn.dynamics.drive import action
-from rbdyn.dynamics.equations import cage_motion, inner_motion, pocket_direction, roller_pocket
+from rbdyn.dynamics.equations import motions, pocket_direction, roller_pocket
 from rbdyn.dynamics.guide_land import guide_forces
 from rbdyn.dynamics.races import race_contact, roller_radius
-from rbdyn.dynamics.ring_motion import outer_motion
 from rbdyn.kernel import entry, kernel
 
 # Rows of what is observed of each roller: loads [N] (that on the pocket is positive on the front wall, where the roller
-# drives the cage), slips [m/s], overlaps of the races [m] and heat [W] by traction and rolling.
+# drives the cage), slips [m/s] and heat [W] by traction and rolling.
 OUTER_LOAD, INNER_LOAD, POCKET_LOAD, OUTER_SLIP, INNER_SLIP, OUTER_HEAT, INNER_HEAT = range(7)
 OBSERVED = 7
 
@@ -38,12 +36,9 @@ def race_observed(race, side, bearing, y, j, ring):
 def observe(bearing, states, rollers, land):
     """Fill ``rollers`` (OBSERVED, samples, rollers) and ``land`` (samples,), the dry load of the land [N]."""
     z = bearing.rollers
-    body = 5 * z
     for i in range(states.shape[0]):
         y = states[i]
-        acting = action(bearing.drive, y)
-        cage, inner = cage_motion(y, body), inner_motion(y, body, acting)
-        outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
+        _, cage, inner, outer = motions(bearing, y)
         land[i] = guide_forces(bearing.guide, cage, inner, outer).load
         for j in range(z):
             on_outer = race_observed(bearing.outer, 1.0, bearing, y, j, outer)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.geometry import reduced_radii
-from rbdyn.materials import equivalent_modulus
+from rbdyn.contact.film_thickness import hertz_pressure
+from rbdyn.dynamics.race_traction import rolling_contacts
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.history import History
@@ -191,12 +191,8 @@ def contact_pressure(history: History, race: Race) -> Array:
     E' = 2/((1 - nu1^2)/E1 + (1 - nu2^2)/E2), l the effective length, R the reduced radius (Johnson 1985, 4.2c). A
     profile or a tilt raises it locally.
     """
-    scene = history.scene
-    modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
-    radius = reduced_radii(scene)[0 if race == "outer" else 1]
-    length = scene.bearing.effective_length_mm * 1e-3
     load = history.outer_load if race == "outer" else history.inner_load
-    return np.sqrt(load * (modulus / (2.0 * math.pi * length * radius)))
+    return np.asarray(hertz_pressure(rolling_contacts(history.scene)[race], load))
 
 
 def pressure_velocity(history: History, race: Race) -> Array:

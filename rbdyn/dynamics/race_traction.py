@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 from rbdyn.contact.film_thickness import (
@@ -26,10 +25,10 @@ from rbdyn.contact.rheology import (
 )
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
-    CoulombTraction,
     FourConstantTraction,
     MixedTraction,
     NoTraction,
+    dry_friction,
     four_constants,
     traction_surface,
 )
@@ -70,12 +69,21 @@ def race_traction(
     if not entrainment_speed > 0.0:
         key = f"model = '{table.model}'" if table.model in RHEOLOGIES else "friction = 'mixed'"
         raise InputError([f"traction.{key}: needs a film, but the races do not roll; choose another"])
-    oil = _pressed(scene, oil)
     contact = RollingContact(reduced_radius, length, equivalent_modulus, entrainment_speed)
     law = (
         _surface(scene, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)
     )
     return _mixed(scene, law, contact, oil) if table.friction == "mixed" else law
+
+
+def rolling_contacts(scene: Scene) -> dict[str, RollingContact]:
+    """The "outer" and "inner" contact of a whole roller, rolling at the nominal speed."""
+    modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
+    length, speed = scene.bearing.effective_length_mm * 1e-3, abs(kinematics(scene).entrainment)
+    return {
+        race: RollingContact(radius, length, modulus, speed)
+        for race, radius in zip(("outer", "inner"), reduced_radii(scene), strict=True)
+    }
 
 
 def film_report(scene: Scene, oil: Oil, inner_load: float, outer_load: float) -> dict[str, dict[str, float]]:
@@ -85,17 +93,10 @@ def film_report(scene: Scene, oil: Oil, inner_load: float, outer_load: float) ->
     heating; the first with starvation where asked), thermal_factor, lambda_ratio (of the central film) and
     asperity_share (what mixed friction would take). Empty where the races do not roll.
     """
-    speed = abs(kinematics(scene).entrainment)
-    if speed == 0.0:
-        return {}
-    oil = _pressed(scene, oil)
-    modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
-    length = scene.bearing.effective_length_mm * 1e-3
     report = {}
-    for race, radius, load in zip(
-        ("outer", "inner"), reduced_radii(scene), (outer_load, inner_load), strict=True
-    ):
-        contact = RollingContact(radius, length, modulus, speed)
+    for (race, contact), load in zip(rolling_contacts(scene).items(), (outer_load, inner_load), strict=True):
+        if contact.entrainment_speed == 0.0:
+            continue
         factor = thermal_factor(contact, oil, load)
         film = film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
         ratio = _lambda(scene, film)
@@ -112,15 +113,10 @@ def film_report(scene: Scene, oil: Oil, inner_load: float, outer_load: float) ->
     return report
 
 
-def _pressed(scene: Scene, oil: Oil) -> Oil:
-    given = scene.lubricant.pressure_coefficient_1_GPa
-    return oil if given is None else replace(oil, pressure_coefficient=given * 1e-9)
-
-
 def _load_independent(scene: Scene) -> Any:
     table = scene.traction
     if table.model == "coulomb":
-        return CoulombTraction(table.coulomb, table.blend_speed_m_s) if table.coulomb > 0.0 else NoTraction()
+        return dry_friction(table.coulomb, table.blend_speed_m_s)
     if table.model == "off":
         return NoTraction()
     if table.constants is not None:

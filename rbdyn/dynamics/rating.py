@@ -8,7 +8,7 @@ import numpy as np
 
 from rbdyn.dynamics.history import History
 from rbdyn.dynamics.life import ReferenceLife, Turning, dynamic_capacity, reference_life
-from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.model import race_contact_law
 from rbdyn.dynamics.slice_loads import slice_loads
 
 
@@ -19,15 +19,14 @@ def rating_life(history: History) -> ReferenceLife:
     ends would need a half-space solution. Rings that turn see the mean over all rollers, a ring at rest each place.
     """
     scene, drawing = history.scene, history.scene.bearing
-    bearing = roller_bearing(scene)
     diameter, pitch = drawing.roller_diameter_mm * 1e-3, drawing.pitch_diameter_mm * 1e-3
     capacity = drawing.dynamic_capacity_N or dynamic_capacity(
         drawing.rollers, diameter, drawing.effective_length_mm * 1e-3, pitch
     )
     nx, ny = np.cos(history.azimuth), np.sin(history.azimuth)
     inner, outer = (
-        slice_loads(race.contact, scene.slices, 0.5 * diameter, loads, nx, ny)
-        for race, loads in ((bearing.inner, history.inner_load), (bearing.outer, history.outer_load))
+        slice_loads(race_contact_law(scene, race), scene.slices, 0.5 * diameter, loads, nx, ny)
+        for race, loads in (("inner", history.inner_load), ("outer", history.outer_load))
     )
     inner_turns, outer_turns = scene.operation.inner_speed_rpm != 0.0, scene.operation.outer_speed_rpm != 0.0
     turning: Turning = "inner" if not outer_turns else "both" if inner_turns else "outer"

@@ -190,10 +190,9 @@ def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: fl
     )
 
 
-def prepare(scene: Scene) -> float:
+def prepare(scene: Scene, bearing: RollerBearing) -> float:
     """Compile, or fetch from disk, what the scene needs; returns the seconds it took."""
     started = time.perf_counter()
-    bearing = roller_bearing(scene)
     run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
     run.to(0.0)
     mechanical_energy(bearing, run.carry.y)
@@ -212,24 +211,31 @@ def simulate(
     called after every run. Raises RunError when a replicate cannot go on, KeyboardInterrupt on Ctrl-C.
     """
     stop = Stop(outer=stop)
-    compile_s = prepare(scene)
+    bearing = roller_bearing(scene)
+    compile_s = prepare(scene, bearing)
     numerics = scene.numerics
-    tolerances = [numerics.rtol] + [COMPANION_FACTOR * numerics.rtol] * numerics.companion
+    tolerances = tolerances_of(scene)
     started = time.perf_counter()
-    series = run_series(scene, tolerances, workers, progress, stop)
+    series = run_series(scene, bearing, tolerances, workers, progress, stop)
     wall_s = time.perf_counter() - started
     return _gather(scene, series[0], series[1] if numerics.companion else [], wall_s, compile_s)
 
 
+def tolerances_of(scene: Scene) -> list[float]:
+    """Tolerance of the replicates and, where they have companions, of these."""
+    rtol = scene.numerics.rtol
+    return [rtol] + [COMPANION_FACTOR * rtol] * scene.numerics.companion
+
+
 def run_series(
     scene: Scene,
+    bearing: RollerBearing,
     tolerances: Sequence[float],
     workers: int | None,
     progress: Callable[[int, int], None] | None,
     stop: Stop,
 ) -> list[list[Replicate]]:
     """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""
-    bearing = roller_bearing(scene)
     tasks = [(place, index) for place in range(len(tolerances)) for index in range(scene.numerics.replicates)]
     runs: dict[tuple[int, int], Replicate] = {}
     with thread_pool(workers, stop) as pool:
@@ -287,7 +293,7 @@ def _gather(
         max_inner_load=inner_load,
         max_outer_load=outer_load,
         max_land_load=max(run.max_land_load for run in runs),
-        races=race_report(scene, roller_bearing(scene), inner_load, outer_load),
+        races=race_report(scene, inner_load, outer_load),
         clearance=clearance_report(scene),
         impact_window_turns=scene.impact_window_turns,
         cost={
