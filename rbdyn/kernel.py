@@ -72,6 +72,48 @@ def law(declaration: Callable[..., Any]) -> Any:
     return chosen
 
 
+def _leaves(of: Any) -> list[types.Type]:
+    if isinstance(of, types.BaseNamedTuple):
+        return [leaf for field in of.types for leaf in _leaves(field)]
+    return [of]
+
+
+def alike(one: Any, other: Any) -> bool:
+    """Whether two sets of parameters are of one type, and made of numbers only; known at compile time."""
+    return type(one) is type(other) and all(
+        alike(x, y) if isinstance(x, tuple) else isinstance(x, float) for x, y in zip(one, other, strict=True)
+    )
+
+
+@numba.extending.overload(alike, jit_options=INLINED)  # type: ignore[arg-type]
+def _alike(one, other):
+    answer = one == other and all(isinstance(leaf, types.Float) for leaf in _leaves(one))
+
+    def body(one, other):
+        return answer
+
+    return body
+
+
+def either(first: bool, one: Any, other: Any) -> Any:
+    """``one`` or ``other``, number by number, so that neighbouring lanes may choose differently without a branch."""
+    return one if first else other
+
+
+@numba.extending.overload(either, jit_options=INLINED)  # type: ignore[arg-type]
+def _either(first, one, other):
+    if isinstance(one, types.BaseNamedTuple):
+        fields = "".join(f"either(first, one.{name}, other.{name})," for name in one.fields)
+        made: dict[str, Any] = {"either": either, "made": one.instance_class}
+        exec(f"def body(first, one, other): return made({fields})", made)
+        return made["body"]
+
+    def body(first, one, other):
+        return one if first else other
+
+    return body
+
+
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls: releases the GIL and keeps its machine code on disk."""
     config: Any = numba.core.config

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rbdyn.dynamics.equations import LOADS, POWERS, derivative
 from rbdyn.dynamics.geometry import kinematics, layout_of, raceway_radii, roller_radii
-from rbdyn.dynamics.races import scratch
+from rbdyn.dynamics.race_lanes import scratch
 from rbdyn.faults import read_toml
 from rbdyn.kernel import entry
 from rbdyn.scene import Scene
@@ -95,8 +95,8 @@ def compiled_right_hand_side(bearing: Any, y: Any, dy: Any, power: Any, loads: A
 def right_hand_side(bearing: Any, y: NDArray[np.float64]) -> Outcome:
     """The right-hand side under test; the work space is poisoned so that nothing stale can pass for a result."""
     dy, power, loads = (np.full((1, size), np.nan) for size in (y.size, POWERS, LOADS))
-    work = scratch()
-    work.lanes[:] = np.nan
+    work = scratch(bearing.rollers)
+    work.lanes[:] = work.gap[:] = np.nan
     compiled_right_hand_side(bearing, y, dy, power, loads, work)
     return Outcome(dy[0], power[0], loads[0])
 

@@ -25,13 +25,8 @@ from rbdyn.dynamics.gravity import Gravity, NoGravity
 from rbdyn.dynamics.guide_land import guide_forces
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_form import RoundRace, WavyRace
-from rbdyn.dynamics.races import (
-    EqualRollers,
-    inner_race_forces,
-    outer_race_forces,
-    scratch,
-    unequal_rollers,
-)
+from rbdyn.dynamics.race_lanes import race_forces, scratch
+from rbdyn.dynamics.races import EqualRollers, unequal_rollers
 from rbdyn.dynamics.ring_motion import outer_motion
 from rbdyn.dynamics.schedule import Constant
 
@@ -81,8 +76,8 @@ def rings_of(bearing, y):
     cage, inner = cage_motion(y, 5 * z), inner_motion(y, 5 * z, acting)
     outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
     dy = np.zeros((1, y.size))
-    on_outer = outer_race_forces(bearing.outer, bearing.sizes, outer, z, y, 0, dy, scratch())
-    on_inner = inner_race_forces(bearing.inner, bearing.sizes, inner, z, y, 0, dy, scratch())
+    races = (bearing.outer, bearing.inner, bearing.sizes, outer, inner)
+    on_outer, on_inner = race_forces(*races, z, y, 0, dy, scratch(z))
     land = guide_forces(bearing.guide, cage, inner, outer)
     on_outer = np.add(on_outer[:3], (land.outer_x, land.outer_y, land.outer_moment))
     on_inner = np.add(on_inner[:3], (land.inner_x, land.inner_y, land.inner_moment))

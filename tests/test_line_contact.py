@@ -277,9 +277,18 @@ def test_unit_contact_compiled_equals_interpreted(name):
         assert found == pytest.approx(expected, rel=1e-12)
 
 
-@given(approach=st.floats(1e-15, 1.0))
-@settings(max_examples=100, deadline=None)
-def test_unit_power_compiled_equals_interpreted(approach):
-    """Unit: x^(10/9) by one exp and one log is the general power to a few ulps, compiled and interpreted."""
-    assert hertz_line.power_10_9(approach) == pytest.approx(approach ** (10.0 / 9.0), rel=1e-14)
-    assert hertz_line.power_10_9.py_func(approach) == pytest.approx(approach ** (10.0 / 9.0), rel=1e-14)
+@njit
+def compiled_root(contact, approach):
+    load, stiffness = hertz_line.whole_load(contact, approach)
+    return load, stiffness, hertz_line.root_stiffness(contact, stiffness, approach)
+
+
+@pytest.mark.parametrize("name", PLAIN)
+@given(approach=st.floats(1e-12, 1e-4))
+@settings(max_examples=40, deadline=None)
+def test_unit_root_stiffness_is_the_root(name, approach):
+    """Unit: the root of the stiffness, by whatever way a law has it, squares to the stiffness to a few ulps."""
+    load, stiffness, root = compiled_root(PLAIN[name], approach)
+    assert root * root == pytest.approx(stiffness, rel=4e-15)
+    if isinstance(PLAIN[name], hertz_line.LineContact):
+        assert load == pytest.approx(PLAIN[name].stiffness * approach ** (10.0 / 9.0), rel=1e-14)

@@ -19,8 +19,7 @@ class ViscousDamping(NamedTuple):
     out before they touch.
     """
 
-    ratio: float  # zeta [-]
-    mass: float  # [kg]
+    scale: float  # 2 zeta sqrt(m) [sqrt(kg)]
     per_engagement: float  # 1/(approach at which it is fully engaged) [1/m]
 
 
@@ -56,23 +55,25 @@ def alpha_of_restitution(restitution: float, speed: float) -> float:
 
 
 @law
-def damped_load(damping, elastic_load, stiffness, approach, approach_rate):
-    """Load [N] >= 0 of a closed contact: elastic load [N], tangent stiffness [N/m], approach [m] > 0, its rate [m/s]."""
+def damped_load(damping, elastic_load, root_stiffness, approach, approach_rate):
+    """Load [N] >= 0 of a closed contact, from its elastic load [N], the root of its tangent stiffness [sqrt(N/m)], its
+    approach [m] > 0 and the rate of that [m/s].
+    """
 
 
 @damped_load.body(NoDamping)
-def _(damping, elastic_load, stiffness, approach, approach_rate):
+def _(damping, elastic_load, root_stiffness, approach, approach_rate):
     return elastic_load
 
 
 @damped_load.body(ViscousDamping)
-def _(damping, elastic_load, stiffness, approach, approach_rate):
-    coefficient = 2.0 * damping.ratio * math.sqrt(stiffness * damping.mass)
+def _(damping, elastic_load, root_stiffness, approach, approach_rate):
+    coefficient = damping.scale * root_stiffness
     engaged = min(approach * damping.per_engagement, 1.0)
     engaged = engaged * engaged * (3.0 - 2.0 * engaged)
     return max(elastic_load + coefficient * engaged * approach_rate, 0.0)
 
 
 @damped_load.body(HuntCrossleyDamping)
-def _(damping, elastic_load, stiffness, approach, approach_rate):
+def _(damping, elastic_load, root_stiffness, approach, approach_rate):
     return max(elastic_load * (1.0 + 1.5 * damping.alpha * approach_rate), 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rbdyn.elementary import fast_exp, fast_log
+from rbdyn.elementary import fast_atan, tenth_root
 from rbdyn.kernel import kernel, law
 
 SMALLEST_LOAD = 1e-30  # [N], keeps the logarithm finite
@@ -60,7 +60,7 @@ def _(film, load, entrainment_speed):
     q5 = q * q * q * q * q
     u25 = entrainment_speed * entrainment_speed * math.sqrt(entrainment_speed)
     u75 = u25 * u25 * u25
-    return film.force_scale * fast_exp(0.1 * fast_log(q5 * u75 / (u25 + film.regime_scale * q5)))
+    return film.force_scale * tenth_root(q5 * u75 / (u25 + film.regime_scale * q5))
 
 
 class ShortJournalFilm(NamedTuple):
@@ -103,22 +103,24 @@ def journal_film_force(
     if size == 0.0:
         return 0.0, 0.0
     # The half circle of positive pressure starts at theta_1, where (cos, sin) = (b, -a)/size, ends opposite.
-    cos_1, sin_1 = b / size, -a / size
+    inverse_size = 1.0 / size
+    cos_1, sin_1 = b * inverse_size, -a * inverse_size
     root = math.sqrt(1.0 - eccentricity * eccentricity)
-    scale_1 = 1.0 / (1.0 - eccentricity * cos_1)
-    scale_2 = 1.0 / (1.0 + eccentricity * cos_1)
-    c_1, s_1 = (cos_1 - eccentricity) * scale_1, root * sin_1 * scale_1
-    c_2, s_2 = (-cos_1 - eccentricity) * scale_2, -root * sin_1 * scale_2
-    gamma = math.atan2(s_2 * c_1 - c_2 * s_1, c_2 * c_1 + s_2 * s_1)
-    if gamma < 0.0:
-        gamma += 2.0 * math.pi
+    inverse_root = 1.0 / root
+    shift, rise = eccentricity * cos_1, root * sin_1
+    both = 1.0 / (1.0 - shift * shift)
+    scale_1, scale_2 = (1.0 + shift) * both, (1.0 - shift) * both
+    c_1, s_1 = (cos_1 - eccentricity) * scale_1, rise * scale_1
+    c_2, s_2 = (-cos_1 - eccentricity) * scale_2, -rise * scale_2
+    # tan(gamma/2) = sqrt((1 + e)/(1 - e)) tan(theta/2), taken at both ends.
+    gamma = math.pi - 2.0 * fast_atan(eccentricity * sin_1, root)
     sine, double_sine = s_2 - s_1, s_2 * c_2 - s_1 * c_1
-    inverse = 1.0 / (root * root)
+    inverse = inverse_root * inverse_root
     along = 0.5 * (gamma + double_sine) + eccentricity * (2.0 * sine + eccentricity * gamma)
     mixed = 0.5 * (s_2 * s_2 - s_1 * s_1) - eccentricity * (c_2 - c_1)
     across = 0.5 * (gamma - double_sine)
-    integral_cc = along * inverse * inverse / root
+    integral_cc = along * inverse * inverse * inverse_root
     integral_sc = mixed * inverse * inverse
-    integral_ss = across * inverse / root
+    integral_ss = across * inverse * inverse_root
     half = -0.5 * force_scale
     return half * (a * integral_cc + b * integral_sc), half * (a * integral_sc + b * integral_ss)

@@ -11,6 +11,7 @@ Compiled:
 - ``cage_body``, ``ring_motion``: how the cage and a supported outer ring move
 - ``drive``, ``schedule``: speeds and loads, steady or by the clock
 - ``equations``: forces gathered into accelerations, and the power that each loss takes; ``energy``: what balances it
+- ``orbit_frame``: the frame in which the rollers are integrated
 - ``runge_kutta``: Dormand-Prince 5(4) with step control
 
 Results:

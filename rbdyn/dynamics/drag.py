@@ -49,6 +49,6 @@ def _(drag, rollers, y, row, dy):
         dy[row, 3 * rollers + j] = -per_speed * vy
     # A sum in a loop of its own leaves the one above free to vectorise.
     power = 0.0
-    for i in range(2 * rollers, 4 * rollers):
-        power -= dy[row, i] * y[i]
+    for j in range(2 * rollers, 3 * rollers):
+        power -= dy[row, j] * y[j] + dy[row, rollers + j] * y[rollers + j]
     return power

@@ -6,7 +6,6 @@ centrifugal terms because the frame does not turn), Euler for spins. The rings t
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,8 +16,9 @@ from rbdyn.dynamics.drag import drag_forces
 from rbdyn.dynamics.drive import action, load_power, tick
 from rbdyn.dynamics.gravity import add_weight
 from rbdyn.dynamics.guide_land import guide_forces
-from rbdyn.dynamics.pocket import pocket_contact
-from rbdyn.dynamics.races import Race, inner_race_forces, outer_race_forces, roller_radius
+from rbdyn.dynamics.pocket import pocket_contact, pocket_gap
+from rbdyn.dynamics.race_lanes import race_forces
+from rbdyn.dynamics.races import Race, roller_radius
 from rbdyn.dynamics.ring_motion import RingMotion, outer_motion, support_motion
 from rbdyn.dynamics.state import (
     CAGE_ANGLE,
@@ -32,6 +32,7 @@ from rbdyn.dynamics.state import (
     RING_X,
     RING_Y,
 )
+from rbdyn.elementary import fast_cos_sin
 from rbdyn.kernel import kernel, routine
 
 # Powers lost, in the order of the power vector; behind them stand the powers that come in by the shafts and by loads
@@ -80,6 +81,12 @@ class RollerBearing(NamedTuple):
 
 
 @kernel
+def roller_count(bearing):
+    """Number of rollers, known not to be negative: so neighbours are read and written as vectors, not one by one."""
+    return max(bearing.rollers, 0)
+
+
+@kernel
 def pocket_direction(bearing, cosine, sine, j):
     """Unit vector of the mid-line of pocket ``j``, for the cosine and sine of the cage angle."""
     ex = cosine * bearing.pocket_cos[j] - sine * bearing.pocket_sin[j]
@@ -90,15 +97,15 @@ def pocket_direction(bearing, cosine, sine, j):
 @kernel
 def cage_motion(y, body):
     """Motion of the cage, whose coordinates stand from ``body`` on; its mark is the mid-line of the first pocket."""
-    angle = y[body + CAGE_ANGLE]
+    cosine, sine = fast_cos_sin(y[body + CAGE_ANGLE])
     return RingMotion(
         y[body + CAGE_X],
         y[body + CAGE_Y],
         y[body + CAGE_VX],
         y[body + CAGE_VY],
         y[body + CAGE_SPEED],
-        math.cos(angle),
-        math.sin(angle),
+        cosine,
+        sine,
     )
 
 
@@ -119,7 +126,7 @@ def inner_motion(y, body, acting):
 @kernel
 def motions(bearing, y):
     """What acts on the bearing in a state, and the motions of cage, inner and outer ring."""
-    body = 5 * bearing.rollers
+    body = 5 * roller_count(bearing)
     acting = action(bearing.drive, y)
     outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
     return acting, cage_motion(y, body), inner_motion(y, body, acting), outer
@@ -128,7 +135,7 @@ def motions(bearing, y):
 @kernel
 def roller_pocket(bearing, y, cage, j):
     """``pocket_contact`` of roller ``j``."""
-    z = bearing.rollers
+    z = roller_count(bearing)
     ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)
     return pocket_contact(
         bearing.pocket, roller_radius(bearing.sizes, j), ex, ey,
@@ -136,22 +143,39 @@ def roller_pocket(bearing, y, cage, j):
     )  # fmt: skip
 
 
-@routine
+@kernel
+def roller_gap(bearing, y, cage, j):
+    """``pocket_gap`` of roller ``j``."""
+    z = roller_count(bearing)
+    ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)
+    dx, dy = y[j] - cage.x, y[z + j] - cage.y
+    return pocket_gap(bearing.pocket, roller_radius(bearing.sizes, j), dy * ex - dx * ey, dx * ex + dy * ey)
+
+
+@kernel
 def derivative(bearing, y, row, dy, power, loads, scratch):
     """Fill row ``row`` of ``dy``, of the powers [W] and of the largest loads [N], for the state ``y``."""
-    z = bearing.rollers
+    z = roller_count(bearing)
     body = 5 * z
     acting, cage, inner, outer = motions(bearing, y)
+    # A long chain of roots and quotients: begun first, it runs beside what follows.
+    land = guide_forces(bearing.guide, cage, inner, outer)
     tick(bearing.drive, acting, row, dy)
     cage_fx = cage_fy = cage_moment = pocket_load = pocket_friction = pocket_damping = pocket_film = 0.0
     drag_loss = drag_forces(bearing.drag, z, y, row, dy)
+    for i in range(2 * z):
+        dy[row, i] = y[2 * z + i]
+    for i in range(4 * z, 5 * z):
+        dy[row, i] = 0.0
     for j in range(z):
+        scratch.gap[j] = roller_gap(bearing, y, cage, j)
+    for j in range(z):
+        if scratch.gap[j] > 0.0:
+            continue
         wall = roller_pocket(bearing, y, cage, j)
-        dy[row, j] = y[2 * z + j]
-        dy[row, z + j] = y[3 * z + j]
         dy[row, 2 * z + j] += wall[0]
         dy[row, 3 * z + j] += wall[1]
-        dy[row, 4 * z + j] = wall[2]
+        dy[row, 4 * z + j] += wall[2]
         cage_fx -= wall[0]
         cage_fy -= wall[1]
         cage_moment += wall[3]
@@ -159,15 +183,15 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
         pocket_friction += wall[5]
         pocket_damping += wall[6]
         pocket_film += wall[7]
-    on_outer = outer_race_forces(bearing.outer, bearing.sizes, outer, z, y, row, dy, scratch)
-    on_inner = inner_race_forces(bearing.inner, bearing.sizes, inner, z, y, row, dy, scratch)
+    on_outer, on_inner = race_forces(
+        bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch
+    )
     per_mass, per_inertia = 1.0 / bearing.roller_mass, 1.0 / bearing.roller_inertia
     for i in range(2 * z, 4 * z):
         dy[row, i] *= per_mass
     for i in range(4 * z, 5 * z):
         dy[row, i] *= per_inertia
     add_weight(bearing.gravity, 2 * z, z, row, dy)
-    land = guide_forces(bearing.guide, cage, inner, outer)
     ax, ay, spin_up = cage_acceleration(
         bearing.cage,
         cage_fx + land.cage_x,
@@ -217,3 +241,12 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     loads[row, OUTER_LOAD] = on_outer[3]
     loads[row, INNER_LOAD] = on_inner[3]
     loads[row, LAND_LOAD] = land.load
+
+
+@routine
+def derivative_once(bearing, y, row, dy, power, loads, scratch):
+    """``derivative`` for calls outside the innermost loop, of which it would otherwise be a copy each.
+
+    Its parameters, more than a hundred numbers, are handed over one by one, which costs a quarter of the evaluation.
+    """
+    derivative(bearing, y, row, dy, power, loads, scratch)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.film import ShortJournalFilm, journal_film_force
-from rbdyn.contact.hertz_line import whole_energy, whole_load
+from rbdyn.contact.hertz_line import root_stiffness, whole_energy, whole_load
 from rbdyn.contact.traction import traction
 from rbdyn.kernel import kernel, law
 
@@ -68,9 +68,10 @@ def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
 
 @film_wrench.body(ShortJournalFilm)
 def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
-    eccentricity = min(e / film.clearance, film.largest_eccentricity)
-    radial_rate = (evx * ex + evy * ey) / film.clearance
-    whirl_rate = 2.0 * (evy * ex - evx * ey) / film.clearance
+    per_clearance = 1.0 / film.clearance
+    eccentricity = min(e * per_clearance, film.largest_eccentricity)
+    radial_rate = (evx * ex + evy * ey) * per_clearance
+    whirl_rate = 2.0 * (evy * ex - evx * ey) * per_clearance
     wedge_rate = eccentricity * (journal_speed + bearing_speed) - whirl_rate
     radial, across = journal_film_force(film.force_scale, eccentricity, radial_rate, wedge_rate)
     shear = film.shear_scale * (journal_speed - bearing_speed) / math.sqrt(1.0 - eccentricity * eccentricity)
@@ -98,7 +99,8 @@ def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     approach_rate = evx * ex + evy * ey
     elastic, stiffness = whole_load(dry.contact, approach)
-    load = damped_load(dry.damping, elastic, stiffness, approach, approach_rate)
+    root = root_stiffness(dry.contact, stiffness, approach)
+    load = damped_load(dry.damping, elastic, root, approach, approach_rate)
     slip = bearing_speed * (e + radius) - journal_speed * radius - (evy * ex - evx * ey)
     friction = traction(dry.friction, slip, load) * load
     return (
@@ -116,7 +118,8 @@ def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
 def journal_wrench(guide, dx, dy, dvx, dvy, journal_speed, bearing_speed):
     """Film and dry contact together: force on the journal, two moments, dry load, three powers (film, friction, damping)."""
     e = math.sqrt(dx * dx + dy * dy)
-    ex, ey = (dx / e, dy / e) if e > 0.0 else (1.0, 0.0)
+    inverse = 1.0 / e if e > 0.0 else 0.0
+    ex, ey = (dx * inverse, dy * inverse) if e > 0.0 else (1.0, 0.0)
     film = film_wrench(guide.film, ex, ey, e, dvx, dvy, journal_speed, bearing_speed)
     dry = dry_wrench(guide.dry, guide.radius, ex, ey, e, dvx, dvy, journal_speed, bearing_speed)
     return (

@@ -189,9 +189,8 @@ def roller_relief(scene: Scene, slices: int) -> NDArray[np.float64]:
 def _race_damping(scene: Scene) -> NoDamping | ViscousDamping | HuntCrossleyDamping:
     laws = scene.model
     if laws.race_damping == "viscous":
-        return ViscousDamping(
-            laws.race_damping_ratio, roller_mass(scene), 1e6 / laws.race_damping_engagement_um
-        )
+        scale = 2.0 * laws.race_damping_ratio * math.sqrt(roller_mass(scene))
+        return ViscousDamping(scale, 1e6 / laws.race_damping_engagement_um)
     if laws.race_damping == "hunt_crossley":
         return HuntCrossleyDamping(laws.race_damping_alpha_s_m)
     return NoDamping()

@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from rbdyn.contact.damping import damped_load
-from rbdyn.contact.hertz_line import whole_energy, whole_load
+from rbdyn.contact.hertz_line import root_stiffness, whole_energy, whole_load
 from rbdyn.contact.pocket_film import PocketFilm, wall_film
 from rbdyn.contact.traction import traction
 from rbdyn.kernel import kernel, law
@@ -57,6 +57,35 @@ def clearance_of(pocket, radius):
 
 
 @law
+def pocket_gap(pocket, radius, offset, height):
+    """Way that a roller has left until its pocket acts on it [m]; ``pocket_contact`` is zero where this is positive.
+
+    ``offset, height``: centre of the roller less that of the cage, across and along the pocket's mid-line [m].
+    """
+
+
+@pocket_gap.body(NoPocket)
+def _(pocket, radius, offset, height):
+    return 1.0
+
+
+@pocket_gap.body(Pocket)
+def _(pocket, radius, offset, height):
+    return clearance_of(pocket, radius) - abs(offset)
+
+
+@pocket_gap.body(LubricatedPocket)
+def _(pocket, radius, offset, height):
+    return 0.0  # the film acts always
+
+
+@pocket_gap.body(LippedPocket)
+def _(pocket, radius, offset, height):
+    walls = pocket_gap(pocket.walls, radius, offset, height)
+    return min(walls, clearance_of(pocket, radius) - abs(height - pocket.orbit_radius))
+
+
+@law
 def pocket_contact(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
     """Wrench of a pocket on its roller.
 
@@ -88,7 +117,8 @@ def dry_walls(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed)
     height = dx * ex + dy * ey
     approach_rate = wall * (dvy * ex - dvx * ey - cage_speed * height)
     elastic, stiffness = whole_load(pocket.contact, approach)
-    load = damped_load(pocket.damping, elastic, stiffness, approach, approach_rate)
+    root = root_stiffness(pocket.contact, stiffness, approach)
+    load = damped_load(pocket.damping, elastic, root, approach, approach_rate)
 
     lever = wall * radius
     roller_surface = dvx * ex + dvy * ey - roller_spin * lever
@@ -164,7 +194,8 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
     lip = math.copysign(1.0, height - pocket.orbit_radius)
     approach_rate = lip * (dvx * ex + dvy * ey + cage_speed * offset)
     elastic, stiffness = whole_load(pocket.contact, approach)
-    load = damped_load(pocket.damping, elastic, stiffness, approach, approach_rate)
+    root = root_stiffness(pocket.contact, stiffness, approach)
+    load = damped_load(pocket.damping, elastic, root, approach, approach_rate)
     lever = lip * radius
     roller_surface = dvy * ex - dvx * ey + roller_spin * lever
     slip = cage_speed * (height + lever) - roller_surface

@@ -5,6 +5,7 @@ Dormand and Prince 1980; controller and continuous extension after Hairer, Norse
 The error of a step is the Euclidean norm of all components, each over its own absolute tolerance, and not averaged
 over them: it is never smaller than that of the worst component, however many rollers there are. Loss powers are
 integrated with the fifth-order weights from the same stages, so that the power balance tests the integrator too.
+The rollers are integrated in a frame that turns with them (``orbit_frame``).
 """
 
 from __future__ import annotations
@@ -15,8 +16,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.equations import LOADS, POCKET_LOAD, POWERS, derivative
-from rbdyn.dynamics.races import Scratch
+from rbdyn.dynamics.equations import LOADS, POCKET_LOAD, POWERS, derivative, derivative_once, roller_count
+from rbdyn.dynamics.orbit_frame import (
+    mean_orbit_rate,
+    rates_to_fixed_axes,
+    rates_to_frame,
+    to_fixed_axes,
+    turn_of,
+)
+from rbdyn.dynamics.race_lanes import Scratch
 from rbdyn.dynamics.state import CAGE_VX, CAGE_VY
 from rbdyn.elementary import fma
 from rbdyn.kernel import entry, kernel, routine
@@ -35,6 +43,7 @@ A = np.array(
         [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
     ]
 )
+C = np.array([0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1])
 B1, B3, B4, B5, B6 = 35 / 384, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
 E1, E3, E4, E5, E6, E7 = 71 / 57600, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40
 D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
@@ -59,12 +68,12 @@ class Carry(NamedTuple):
     """What one call hands to the next. Arrays, changed in place."""
 
     y: NDArray[np.float64]  # state
-    k: NDArray[np.float64]  # (7, n) stage derivatives; row 0 belongs to y
-    stage: NDArray[np.float64]  # (n,) scratch
+    k: NDArray[np.float64]  # (7, n) stage derivatives, rollers' in the frame of the step; row 0 belongs to y
+    stage: NDArray[np.float64]  # (n,) state of the stage in hand, in the end that at the end of the step
     power: NDArray[np.float64]  # (7, POWERS)
     loads: NDArray[np.float64]  # (7, LOADS)
     scratch: Scratch
-    clock: NDArray[np.float64]  # time, next step, previous error, next sample time
+    clock: NDArray[np.float64]  # time, next step, previous error, next sample time, rate of the frame
     counts: NDArray[np.int64]  # accepted, rejected, right-hand sides, worst component
 
 
@@ -78,10 +87,10 @@ class Tally(NamedTuple):
 
 
 @kernel
-def interpolate(carry, y_new, h, theta, i):
-    """Component ``i`` at the fraction ``theta`` of the step, fourth-order accurate."""
+def interpolate(carry, h, theta, i):
+    """Component ``i`` at the fraction ``theta`` of the step, fourth-order accurate; rollers' in the frame of the step."""
     k = carry.k
-    difference = y_new[i] - carry.y[i]
+    difference = h * (B1 * k[0, i] + B3 * k[2, i] + B4 * k[3, i] + B5 * k[4, i] + B6 * k[5, i])
     slope = h * k[0, i] - difference
     curve = difference - h * k[6, i] - slope
     quartic = h * (D1 * k[0, i] + D3 * k[2, i] + D4 * k[3, i] + D5 * k[4, i] + D6 * k[5, i] + D7 * k[6, i])
@@ -145,15 +154,24 @@ def stage_state(s, y, k, h, state):
             state[i] = y[i] + fma(w5, k[5, i], fma(w4, k[4, i], early))
 
 
-@routine
-def trial_step(bearing, carry, y_new, h):
-    """Stages 2 to 7 of a step of size ``h`` from ``carry.y``; the end state goes to ``y_new``."""
+@kernel
+def trial_step(bearing, carry, h):
+    """Stages 2 to 7 of a step of size ``h`` from ``carry.y``; the end state is left in ``carry.stage``."""
     # One loop of a length the compiler does not know: unrolled, six derivatives overflow the instruction cache.
-    stages = carry.k.shape[0]
-    for s in range(1, stages):
-        state = y_new if s == stages - 1 else carry.stage
-        stage_state(s, carry.y, carry.k, h, state)
-        derivative(bearing, state, s, carry.k, carry.power, carry.loads, carry.scratch)
+    z = roller_count(bearing)
+    for s in range(1, carry.k.shape[0]):
+        turn = turn_of(carry.clock[4], C[s] * h)
+        stage_state(s, carry.y, carry.k, h, carry.stage)
+        to_fixed_axes(turn, z, carry.stage)
+        derivative(bearing, carry.stage, s, carry.k, carry.power, carry.loads, carry.scratch)
+        rates_to_frame(turn, z, carry.stage, s, carry.k)
+
+
+@kernel
+def begin_step(bearing, carry):
+    """Choose the frame of the next step from ``carry.y``, and turn the first stage, given in fixed axes, into it."""
+    carry.clock[4] = mean_orbit_rate(bearing.rollers, carry.y)
+    rates_to_frame(turn_of(carry.clock[4], 0.0), bearing.rollers, carry.y, 0, carry.k)
 
 
 @routine
@@ -170,18 +188,20 @@ def worst_component(carry, h, inverse_tolerance):
 
 
 @routine
-def refine_peak(bearing, carry, y_new, h, tally):
+def refine_peak(bearing, carry, h, tally):
     """Look inside a step for its largest pocket load: eight points, then the vertex of a parabola."""
     best, place = 0.0, 0
     values = np.empty(PEAK_POINTS + 2)
+    inside = np.empty_like(carry.y)
     values[0] = carry.loads[0, POCKET_LOAD]
     values[PEAK_POINTS + 1] = carry.loads[6, POCKET_LOAD]
     spacing = 1.0 / (PEAK_POINTS + 1)
     for p in range(1, PEAK_POINTS + 1):
         for i in range(carry.y.size):
-            carry.stage[i] = interpolate(carry, y_new, h, p * spacing, i)
+            inside[i] = interpolate(carry, h, p * spacing, i)
+        to_fixed_axes(turn_of(carry.clock[4], p * spacing * h), bearing.rollers, inside)
         # Row 1 of the stages is free once the step is accepted: b_2 = e_2 = d_2 = 0.
-        derivative(bearing, carry.stage, 1, carry.k, carry.power, carry.loads, carry.scratch)
+        derivative_once(bearing, inside, 1, carry.k, carry.power, carry.loads, carry.scratch)
         values[p] = carry.loads[1, POCKET_LOAD]
     for p in range(PEAK_POINTS + 2):
         if values[p] > best:
@@ -199,8 +219,8 @@ def refine_peak(bearing, carry, y_new, h, tally):
         tally.largest_time[POCKET_LOAD] = carry.clock[0] + theta * h
 
 
-@routine
-def keep(bearing, carry, y_new, h, tally, sample_step):
+@kernel
+def keep(bearing, carry, h, tally, sample_step):
     """Book an accepted step: work, largest loads, samples."""
     power, loads, work = carry.power, carry.loads, tally.work
     for p in range(POWERS):
@@ -218,15 +238,15 @@ def keep(bearing, carry, y_new, h, tally, sample_step):
     body = 5 * bearing.rollers
     while carry.clock[3] <= time + h:
         theta = (carry.clock[3] - time) / h
-        vx = interpolate(carry, y_new, h, theta, body + CAGE_VX)
-        vy = interpolate(carry, y_new, h, theta, body + CAGE_VY)
+        vx = interpolate(carry, h, theta, body + CAGE_VX)
+        vy = interpolate(carry, h, theta, body + CAGE_VY)
         square = vx * vx + vy * vy
         tally.whirl[0] += 1.0
         tally.whirl[1] += math.sqrt(square)
         tally.whirl[2] += square
         carry.clock[3] += sample_step
     if suspected > tally.largest[POCKET_LOAD]:
-        refine_peak(bearing, carry, y_new, h, tally)
+        refine_peak(bearing, carry, h, tally)
         carry.counts[2] += PEAK_POINTS
 
 
@@ -238,14 +258,14 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
     ``carry.counts[3]`` the component that made it impossible.
     """
     clock, counts = carry.clock, carry.counts
-    y_new = np.empty_like(carry.y)
     if counts[2] == 0:
-        derivative(bearing, carry.y, 0, carry.k, carry.power, carry.loads, carry.scratch)
+        derivative_once(bearing, carry.y, 0, carry.k, carry.power, carry.loads, carry.scratch)
         counts[2] = 1
         for i in range(carry.y.size):
             if not math.isfinite(carry.k[0, i]):
                 counts[3] = i
                 return NOT_FINITE
+        begin_step(bearing, carry)
     grow = GROW
     while clock[0] < t_end:
         if counts[0] + counts[1] >= control.step_budget:
@@ -253,20 +273,22 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
         remaining = t_end - clock[0]
         last = clock[1] >= remaining
         h = remaining if last else clock[1]
-        trial_step(bearing, carry, y_new, h)
+        trial_step(bearing, carry, h)
         counts[2] += 6
         error = error_norm(carry.k, h, control.inverse_tolerance)
         if error <= 1.0:
-            keep(bearing, carry, y_new, h, tally, sample_step)
+            keep(bearing, carry, h, tally, sample_step)
             counts[0] += 1
+            rates_to_fixed_axes(turn_of(clock[4], h), bearing.rollers, carry.stage, 6, carry.k)
             clock[0] = t_end if last else clock[0] + h
             for i in range(carry.y.size):
-                carry.y[i] = y_new[i]
+                carry.y[i] = carry.stage[i]
                 carry.k[0, i] = carry.k[6, i]
             for p in range(POWERS):
                 carry.power[0, p] = carry.power[6, p]
             for force in range(LOADS):
                 carry.loads[0, force] = carry.loads[6, force]
+            begin_step(bearing, carry)
             error = max(error, 1e-4)
             factor = SAFETY * error**-EXPONENT * clock[2] ** BETA
             # A step cut short by t_end says nothing against the step it was cut from.

@@ -20,8 +20,8 @@ from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing
 from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, raceway_radii, scales, shaft_speeds
 from rbdyn.dynamics.metrics import Replicate, quantity
 from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.race_lanes import scratch
 from rbdyn.dynamics.race_report import race_report
-from rbdyn.dynamics.races import scratch
 from rbdyn.dynamics.runge_kutta import (
     FINISHED,
     NOT_FINITE,
@@ -93,8 +93,8 @@ class Run:
             stage=np.zeros(n),
             power=np.zeros((7, POWERS)),
             loads=np.zeros((7, LOADS)),
-            scratch=scratch(),
-            clock=np.array([0.0, first_step, PI_START_ERROR, 0.0]),
+            scratch=scratch(bearing.rollers),
+            clock=np.array([0.0, first_step, PI_START_ERROR, 0.0, 0.0]),
             counts=np.zeros(4, dtype=np.int64),
         )
         self.tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
