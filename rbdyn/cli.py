@@ -81,6 +81,9 @@ def accuracy(
         Path | None, typer.Option(metavar="DIR", help="Write accuracy.json, .csv and .png here.")
     ] = None,
     options: Annotated[bool, typer.Option("--options", help="What each option costs, instead.")] = False,
+    scaling: Annotated[
+        bool, typer.Option("--scaling", help="Time by rollers and slices, memory by turns, instead.")
+    ] = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also versions.")] = False,
@@ -93,6 +96,9 @@ def accuracy(
         folder = output_folder(out) if out else None
         if options:
             _options(loaded, folder, as_json, quiet)
+            return
+        if scaling:
+            _scaling(loaded, folder, as_json, quiet)
             return
         from rbdyn import accuracy as study
 
@@ -199,14 +205,55 @@ def _options(scene: Scene, folder: Path | None, as_json: bool, quiet: bool) -> N
             f"{row.difference_ns:+.0f}",
             f"{100.0 * row.power_gap:.2g} %",
             f"{row.compile_s:.1f}",
+            f"{row.holds.state - row.plain_holds.state:+d}",
+            f"{row.holds.parameter_bytes - row.plain_holds.parameter_bytes:+d}",
+            f"{row.holds.instructions - row.plain_holds.instructions:+d}",
+            " ".join(module.rpartition(".")[2] for module in row.modules),
         )
         for row in rows
     ]
-    print_table(
-        "nanoseconds a right-hand side",
-        ("option", "with", "without", "difference", "power gap", "s to compile or load"),
-        cells,
-    )
+    header = ("option", "with", "without", "difference", "power gap", "s to compile or load")
+    held = ("state", "parameters [B]", "instructions", "modules")
+    print_table("nanoseconds a right-hand side; what the option adds to the program", (*header, *held), cells)
+    if rows:
+        plain = rows[0].plain_holds
+        print(
+            f"without any: {plain.state} numbers of state, {plain.parameter_bytes} B of parameters, "
+            f"{plain.instructions} instructions compiled (LLVM)"
+        )
+    if folder:
+        print(f"written to {folder}: {', '.join(files)}")
+
+
+def _scaling(scene: Scene, folder: Path | None, as_json: bool, quiet: bool) -> None:
+    from rbdyn import scaling as study
+
+    with progress_bar("sizes", quiet or as_json) as progress:
+        found = study.scaling(scene, progress=progress)
+    files = study.write(found, folder) if folder else []
+    if as_json:
+        print_json(found.as_dict())
+        return
+    for kind, points in found.points.items():
+        header = (kind, "ns a right-hand side", "right-hand sides a turn", "ms a turn", "s a simulated s")
+        cells = [
+            (
+                f"{point.size}",
+                f"{point.rhs_ns:.0f}",
+                f"{point.rhs_per_turn:.0f}",
+                f"{point.turn_ms:.2f}",
+                f"{point.of_real_time:.2f}",
+            )
+            for point in points
+        ]
+        print_table("", header, cells)
+        line = found.lines[kind]
+        print(
+            f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f}); "
+            f"as a power: n^{line.exponent:.2f}"
+        )
+    for memory in found.memory:
+        print(f"{memory.turns} counted turns: at most {memory.peak_MiB:.1f} MiB in a process of its own")
     if folder:
         print(f"written to {folder}: {', '.join(files)}")
 

@@ -44,7 +44,8 @@ def routine(function: Callable[..., Any]) -> Any:
 
 
 def law(declaration: Callable[..., Any]) -> Any:
-    """Declare a law. Register a body for one or more parameter types with ``@declared.body(ParameterType)``.
+    """Declare a law. Register a body for one or more parameter types with ``@declared.body(ParameterType)``; ``.bodies``
+    holds them by type.
 
     Works compiled (the choice costs nothing) and interpreted. Raises TypeError where no body is registered.
     """
@@ -66,7 +67,7 @@ def law(declaration: Callable[..., Any]) -> Any:
     def choose_at_compile_time(parameters: types.Type, *arguments: types.Type) -> Callable[..., Any] | None:
         return bodies.get(getattr(parameters, "instance_class", type(None)))
 
-    chosen.body = body  # type: ignore[attr-defined]
+    chosen.body, chosen.bodies = body, bodies  # type: ignore[attr-defined]
     overload: Any = numba.extending.overload
     overload(chosen, jit_options=INLINED, strict=False)(choose_at_compile_time)
     return chosen

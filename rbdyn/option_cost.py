@@ -1,4 +1,5 @@
-"""What each option of a scene costs: nanoseconds a right-hand side with it and without it, and the time to compile it.
+"""What each option of a scene costs: nanoseconds a right-hand side with it and without it, the time to compile it, and
+what it adds to state, parameters, compiled code and loaded modules.
 
 An option is a few assignments to the scene. Each is run in turn with the scene as it is, so that both see the same
 machine; a median over replicates is taken of the processor time per right-hand side, the integrator's own work included.
@@ -7,6 +8,7 @@ machine; a median over replicates is taken of the processor time per right-hand 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ import numpy as np
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import Stop, prepare, run_replicate
 from rbdyn.faults import InputError, set_key
+from rbdyn.footprint import Footprint, added_modules, footprint
 from rbdyn.result import versions
 from rbdyn.scene import Scene
 
@@ -60,13 +63,17 @@ OPTIONS: dict[str, tuple[str, ...]] = {
 @dataclass(frozen=True)
 class OptionCost:
     """Median processor time per right-hand side [ns] with the option and of the scene beside it, the largest relative
-    power gap, and the seconds it took to compile (or to load from disk)."""
+    power gap, the seconds it took to compile (or to load from disk), what the program holds with the option and without
+    it, and the modules that only the option loads."""
 
     option: str
     with_ns: float
     without_ns: float
     power_gap: float
     compile_s: float
+    holds: Footprint
+    plain_holds: Footprint
+    modules: tuple[str, ...]
 
     @property
     def difference_ns(self) -> float:
@@ -75,7 +82,13 @@ class OptionCost:
 
     def as_dict(self) -> dict[str, Any]:
         """JSON form."""
-        return {**self.__dict__, "difference_ns": self.difference_ns}
+        times = ("option", "with_ns", "without_ns", "difference_ns", "power_gap", "compile_s")
+        sizes = {
+            f"{which}{name}": size
+            for which, held in (("with_", self.holds), ("without_", self.plain_holds))
+            for name, size in held.__dict__.items()
+        }
+        return {name: getattr(self, name) for name in times} | sizes | {"modules": list(self.modules)}
 
 
 def option_costs(
@@ -87,25 +100,35 @@ def option_costs(
     plain = with_options(scene, (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}"))
     plain_bearing = roller_bearing(plain)
     prepare(plain, plain_bearing)
+    plain_holds = footprint(plain, plain_bearing)
+    chosen = _allowed(plain, options)
+    bearings = [roller_bearing(option) for option in chosen.values()]
+    modules = added_modules(plain, list(chosen.values()))
     rows = []
-    for done, (name, assignments) in enumerate(options.items(), 1):
-        try:
-            chosen = with_options(plain, assignments)
-        except InputError:
-            continue  # the option contradicts something that this scene has
-        bearings = roller_bearing(chosen), plain_bearing
-        compile_s = prepare(chosen, bearings[0])
+    for (name, option), bearing, needed in zip(chosen.items(), bearings, modules, strict=True):
+        compile_s = prepare(option, bearing)
         times: tuple[list[float], list[float]] = ([], [])
         gap = 0.0
         for replicate in range(REPEATS):
-            for which, one in enumerate((chosen, plain)):
-                run = run_replicate(one, bearings[which], replicate, one.numerics.rtol, Stop())
+            for which, (one, parameters) in enumerate(((option, bearing), (plain, plain_bearing))):
+                run = run_replicate(one, parameters, replicate, one.numerics.rtol, Stop())
                 times[which].append(run.cpu_s / run.derivatives * 1e9)
                 gap = run.power_gap if which == 0 else gap
-        rows.append(OptionCost(name, float(np.median(times[0])), float(np.median(times[1])), gap, compile_s))
+        with_ns, without_ns = (float(np.median(found)) for found in times)
+        holds = footprint(option, bearing)
+        rows.append(OptionCost(name, with_ns, without_ns, gap, compile_s, holds, plain_holds, needed))
         if progress is not None:
-            progress(done, len(options))
+            progress(len(rows), len(chosen))
     return rows
+
+
+def _allowed(scene: Scene, options: Mapping[str, Sequence[str]]) -> dict[str, Scene]:
+    """The scene with each option, but for options that contradict something it has."""
+    allowed = {}
+    for name, assignments in options.items():
+        with suppress(InputError):
+            allowed[name] = with_options(scene, assignments)
+    return allowed
 
 
 def with_options(scene: Scene, assignments: Sequence[str]) -> Scene:
@@ -136,5 +159,6 @@ def write(rows: Sequence[OptionCost], folder: Path) -> list[str]:
     from rbdyn.result import write_json
 
     write_json(folder / "options.json", record(rows))
-    pd.DataFrame([row.as_dict() for row in rows]).to_csv(folder / "options.csv", index=False)
+    table = [row.as_dict() | {"modules": " ".join(row.modules)} for row in rows]
+    pd.DataFrame(table).to_csv(folder / "options.csv", index=False)
     return ["options.json", "options.csv"]

@@ -17,7 +17,8 @@ from rbdyn.contact.hertz_line import SlicedLineContact, TiltedLineContact
 from rbdyn.contact.traction import MixedTraction
 from rbdyn.dynamics import equations
 from rbdyn.dynamics.cage_body import BalancedCage, UnbalancedCage, mass_centre
-from rbdyn.dynamics.drive import ClockedDrive, SteadyDrive, TwoSpeedDrive, action
+from rbdyn.dynamics.clock import ClockedDrive
+from rbdyn.dynamics.drive import SteadyDrive, TwoSpeedDrive, action
 from rbdyn.dynamics.energy import mechanical_energy
 from rbdyn.dynamics.equations import LOAD, SHAFT, cage_motion, inner_motion
 from rbdyn.dynamics.geometry import layout_of

@@ -30,6 +30,7 @@ def test_command_line_help_and_import_load_nothing_heavy():
         == []
     )
     assert loaded_by("from rbdyn import Scene, SimulationResult, InputError, RunError") == []
+    assert loaded_by(f"from rbdyn import Scene; Scene.load({str(EXAMPLE)!r})") == []
     # A simulation needs numba, and no response surface, front, table or picture.
     assert set(loaded_by("from rbdyn import simulate")) <= {"numba", "scipy"}
 

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbdyn.dynamics.drive import ClockedDrive
+from rbdyn.dynamics.clock import ClockedDrive
 from rbdyn.dynamics.energy import mechanical_energy
 from rbdyn.dynamics.equations import LOAD, SHAFT
 from rbdyn.dynamics.geometry import layout_of

@@ -118,5 +118,9 @@ def test_unit_option_costs(outer, tmp_path):
     assert row.with_ns > 0.0 and row.without_ns > 0.0 and 0.0 < row.power_gap < 0.01
     # The same types of laws: the compiled code is shared, so both cost the same but for noise.
     assert row.difference_ns == row.with_ns - row.without_ns
+    assert row.holds == row.plain_holds and row.modules == ()
+    assert row.holds.state == 60 and row.holds.instructions > 1000
     assert write_options(rows, tmp_path) == ["options.json", "options.csv"]
-    assert record(rows)["options"][0]["option"] == row.option
+    saved = record(rows)["options"][0]
+    assert saved["option"] == row.option
+    assert saved["with_parameter_bytes"] == saved["without_parameter_bytes"] > 0

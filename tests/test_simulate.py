@@ -21,7 +21,7 @@ from rbdyn.dynamics.equations import (
 )
 from rbdyn.dynamics.geometry import kinematics
 from rbdyn.dynamics.history import history
-from rbdyn.dynamics.metrics import Replicate, quantity, student_half_width
+from rbdyn.dynamics.metrics import Replicate, quantity, student_factor, student_half_width
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import Run, Stop, simulate
 from rbdyn.faults import InputError, RunError
@@ -313,6 +313,8 @@ def test_oracle_student_coverage():
     low, high = stats.t.interval(0.95, 7, samples[0].mean(), stats.sem(samples[0]))
     assert widths[0] == pytest.approx(0.5 * (high - low), rel=1e-10)
     assert student_half_width(np.array([1.0])) is None
+    for freedom in (1, 2, 3, 4, 15, 200, 9999):
+        assert student_factor(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=1e-12)
 
 
 def test_unit_quantity(outer):

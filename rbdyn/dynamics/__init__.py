@@ -8,8 +8,8 @@ From the scene:
 
 Compiled:
 - ``races``, ``race_form``, ``pocket``, ``guide_land``, ``drag``, ``gravity``: one interaction each
-- ``cage_body``, ``ring_motion``: how the cage and a supported outer ring move
-- ``drive``, ``schedule``: speeds and loads, steady or by the clock
+- ``cage_body``, ``ring_motion``, ``support``: how the cage and a supported outer ring move
+- ``drive``, ``clock``, ``schedule``: speeds and loads, steady or by the clock
 - ``equations``: forces gathered into accelerations, and the power that each loss takes; ``energy``: what balances it
 - ``orbit_frame``: the frame in which the rollers are integrated
 - ``runge_kutta``: Dormand-Prince 5(4) with step control

@@ -117,9 +117,29 @@ def quantity(
 
 def student_half_width(values: NDArray[np.float64]) -> float | None:
     """Half-width of the 95 % interval of a mean of independent values; None for fewer than two."""
-    from scipy.special import stdtrit
-
     count = len(values)
     if count < 2:
         return None
-    return float(stdtrit(count - 1, 0.975) * values.std(ddof=1) / math.sqrt(count))
+    return float(student_factor(count - 1) * values.std(ddof=1) / math.sqrt(count))
+
+
+def student_factor(freedom: int) -> float:
+    """The t that holds 95 % of Student's distribution with ``freedom`` > 0 degrees of freedom between -t and t.
+
+    Bisection of the finite sums of Abramowitz and Stegun, eq 26.7.3 and 26.7.4, in theta = atan(t/sqrt(freedom)).
+    """
+
+    def held(theta: float) -> float:
+        cosine, sine = math.cos(theta), math.sin(theta)
+        even = freedom % 2 == 0
+        term, total = (1.0, 0.0) if even else (cosine, 0.0)
+        for k in range(1 if even else 2, freedom, 2):
+            total += term
+            term *= cosine * cosine * k / (k + 1)
+        return sine * total if even else 2.0 / math.pi * (theta + sine * total)
+
+    low, high = 0.0, 0.5 * math.pi
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if held(middle) < 0.95 else (low, middle)
+    return math.sqrt(freedom) * math.tan(0.5 * (low + high))

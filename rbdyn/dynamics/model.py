@@ -1,10 +1,13 @@
-"""From a scene to what the kernels read: geometry, masses and the chosen laws, in SI."""
+"""From a scene to what the kernels read: geometry, masses and the chosen laws, in SI.
+
+What only some scenes need is imported where it is built: a scene without it never loads it.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,18 +27,10 @@ from rbdyn.contact.hertz_line import (
     palmgren,
     sliced,
 )
-from rbdyn.contact.pocket_film import pocket_film
-from rbdyn.contact.profile import (
-    crowned_relief,
-    logarithmic_relief,
-    lundberg_relief,
-    slice_centres,
-    table_relief,
-)
 from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.cage_body import BalancedCage, UnbalancedCage
 from rbdyn.dynamics.drag import NoDrag, cylinder_drag
-from rbdyn.dynamics.drive import ClockedDrive, SteadyDrive, TwoSpeedDrive
+from rbdyn.dynamics.drive import SteadyDrive, TwoSpeedDrive
 from rbdyn.dynamics.equations import RollerBearing
 from rbdyn.dynamics.geometry import (
     cage_inertia,
@@ -53,12 +48,15 @@ from rbdyn.dynamics.pocket import LippedPocket, LubricatedPocket, NoPocket, Pock
 from rbdyn.dynamics.race_form import RoundRace, largest_rise, wavy_race
 from rbdyn.dynamics.race_traction import race_traction
 from rbdyn.dynamics.races import EqualRollers, Race, unequal_rollers
-from rbdyn.dynamics.ring_motion import HeldRing, SupportedRing
-from rbdyn.dynamics.schedule import Constant, Ramps, SmoothRamps, Steps
+from rbdyn.dynamics.ring_motion import HeldRing
 from rbdyn.lubricants import Oil, oil_at
 from rbdyn.materials import equivalent_modulus
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Harmonic
+
+if TYPE_CHECKING:
+    from rbdyn.dynamics.clock import ClockedDrive
+    from rbdyn.dynamics.support import SupportedRing
 
 # The largest contact load that a traction surface must cover, in multiples of the largest load on the shaft.
 TRACTION_RANGE = 4.0
@@ -160,6 +158,8 @@ def race_contact_law(scene: Scene, which: str) -> Any:
         whole = dowson_higginson(modulus, length, gamma if which == "outer" else -gamma)
     if scene.slices == 1:
         return whole
+    from rbdyn.contact.profile import slice_centres
+
     share = scene.bearing.inner_tilt_share if which == "inner" else 1.0 - scene.bearing.inner_tilt_share
     return sliced(
         whole,
@@ -172,17 +172,23 @@ def race_contact_law(scene: Scene, which: str) -> Any:
 
 def roller_relief(scene: Scene, slices: int) -> NDArray[np.float64]:
     """Profile drop of the roller at its slice centres [m]."""
+    from rbdyn.contact import profile
+
     drawing = scene.bearing
     length = drawing.effective_length_mm * 1e-3
-    position = slice_centres(slices, length)
+    position = profile.slice_centres(slices, length)
     if drawing.crown_radius_mm is not None:
-        return crowned_relief(position, drawing.crown_radius_mm * 1e-3)
+        return profile.crowned_relief(position, drawing.crown_radius_mm * 1e-3)
     if drawing.lundberg_load_N is not None:
-        return lundberg_relief(position, length, drawing.lundberg_load_N, _modulus(scene, "roller", "rings"))
+        return profile.lundberg_relief(
+            position, length, drawing.lundberg_load_N, _modulus(scene, "roller", "rings")
+        )
     if drawing.profile_table_mm_um is not None:
-        return table_relief(position, [(x * 1e-3, drop * 1e-6) for x, drop in drawing.profile_table_mm_um])
+        return profile.table_relief(
+            position, [(x * 1e-3, drop * 1e-6) for x, drop in drawing.profile_table_mm_um]
+        )
     if drawing.roller_profile == "logarithmic":
-        return logarithmic_relief(position, drawing.roller_diameter_mm * 1e-3, length)
+        return profile.logarithmic_relief(position, drawing.roller_diameter_mm * 1e-3, length)
     return np.zeros(slices)
 
 
@@ -228,6 +234,8 @@ def _pocket(scene: Scene, oil: Oil) -> Any:
     radius = 0.5e-3 * scene.bearing.roller_diameter_mm
     pocket: Any = Pocket(clearance, radius, contact, damping, friction)
     if laws.pocket_film:
+        from rbdyn.contact.pocket_film import pocket_film
+
         floor = laws.pocket_film_floor_um * 1e-6
         length = scene.bearing.roller_length_mm * 1e-3
         film = pocket_film(oil.viscosity, radius, length, floor, laws.pocket_fill)
@@ -288,6 +296,8 @@ def _outer_ring(scene: Scene) -> HeldRing | SupportedRing:
     support, start = scene.support, layout_of(scene).support
     if support is None or start is None:
         return HeldRing()
+    from rbdyn.dynamics.support import SupportedRing
+
     return SupportedRing(
         start, support.outer_ring_mass_kg, float(support.stiffness_N_m), float(support.damping_N_s_m)
     )
@@ -304,6 +314,8 @@ def _drive(scene: Scene) -> SteadyDrive | TwoSpeedDrive | ClockedDrive:
     load = float(operation.radial_load_N)
     if clock is None:
         return SteadyDrive(inner, load) if outer == 0.0 else TwoSpeedDrive(inner, outer, load)
+    from rbdyn.dynamics.clock import ClockedDrive
+
     return ClockedDrive(
         clock,
         _schedule(scene, "inner_speed_rpm", inner, math.pi / 30.0),
@@ -315,6 +327,8 @@ def _drive(scene: Scene) -> SteadyDrive | TwoSpeedDrive | ClockedDrive:
 
 
 def _schedule(scene: Scene, key: str, otherwise: float, unit: float) -> Any:
+    from rbdyn.dynamics.schedule import Constant, Ramps, SmoothRamps, Steps
+
     schedule = scene.operation.schedule
     values = getattr(schedule, key, None)
     if schedule is None or values is None:

@@ -9,7 +9,6 @@ import numpy as np
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
 from rbdyn.dynamics.model import lubricant, race_contact_law
 from rbdyn.dynamics.race_traction import film_report, rolling_contacts
-from rbdyn.dynamics.slice_loads import slice_loads
 from rbdyn.scene import Scene
 
 SMALLEST_LOAD = 1e-3  # [N]: below this a race counts as unloaded
@@ -24,16 +23,14 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
     films = film_report(
         scene, lubricant(scene), max(inner_load, SMALLEST_LOAD), max(outer_load, SMALLEST_LOAD)
     )
-    direction = math.radians(scene.bearing.tilt_direction_deg)
-    nx, ny = np.array([math.cos(direction)]), np.array([math.sin(direction)])
-    count, roller = scene.slices, 0.5e-3 * scene.bearing.roller_diameter_mm
+    count = scene.slices
     contacts = rolling_contacts(scene)
     report = {}
     for name, load in (("inner", inner_load), ("outer", outer_load)):
         if load < SMALLEST_LOAD:
             continue
-        law, whole = race_contact_law(scene, name), contacts[name]
-        most = float(slice_loads(law, count, roller, np.array([load]), nx, ny).max())
+        whole = contacts[name]
+        most = load if count == 1 else _most_loaded_slice(scene, name, load)
         contact = whole._replace(length=whole.length / count)
         report[name] = {
             "max_pressure_MPa": float(hertz_pressure(contact, most)) * 1e-6,
@@ -46,3 +43,14 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
                 "lambda_ratio": films[name]["lambda_ratio"],
             }
     return report
+
+
+def _most_loaded_slice(scene: Scene, race: str, load: float) -> float:
+    """Load [N] of the slice that bears most of ``load`` [N] on a race, where the tilt is largest."""
+    from rbdyn.dynamics.slice_loads import slice_loads
+
+    direction = math.radians(scene.bearing.tilt_direction_deg)
+    nx, ny = np.array([math.cos(direction)]), np.array([math.sin(direction)])
+    roller = 0.5e-3 * scene.bearing.roller_diameter_mm
+    law = race_contact_law(scene, race)
+    return float(slice_loads(law, scene.slices, roller, np.array([load]), nx, ny).max())

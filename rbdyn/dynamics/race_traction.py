@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rbdyn.contact.film_thickness import (
     RollingContact,
@@ -14,14 +14,6 @@ from rbdyn.contact.film_thickness import (
     lightest_load,
     minimum_film,
     thermal_factor,
-)
-from rbdyn.contact.rheology import (
-    Eyring,
-    LimitingShear,
-    Rheology,
-    thermal_newtonian,
-    traction_coefficient,
-    with_body_creep,
 )
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
@@ -38,6 +30,9 @@ from rbdyn.lubricants import Oil
 from rbdyn.materials import equivalent_modulus
 from rbdyn.scene import Scene
 from rbdyn.scene.lubricant import RHEOLOGIES
+
+if TYPE_CHECKING:
+    from rbdyn.contact.rheology import Rheology
 
 # The slip of rollers that stand still is twice the entrainment speed.
 LARGEST_SLIP_RATIO = 2.0
@@ -131,6 +126,8 @@ def _load_independent(scene: Scene) -> Any:
 
 
 def _surface(scene: Scene, contact: RollingContact, oil: Oil, largest_load: float) -> Any:
+    from rbdyn.contact.rheology import traction_coefficient, with_body_creep
+
     rheology = _rheology(scene, oil)
 
     def coefficient(slip: Any, load: Any) -> Any:
@@ -154,6 +151,8 @@ def _surface(scene: Scene, contact: RollingContact, oil: Oil, largest_load: floa
 
 
 def _rheology(scene: Scene, oil: Oil) -> Rheology:
+    from rbdyn.contact.rheology import Eyring, LimitingShear, thermal_newtonian
+
     table = scene.traction
     if table.model == "thermal_newtonian":
         name = table.rheology_oil or scene.lubricant.oil

@@ -103,15 +103,15 @@ class Scene(Strict):
 
     def _tilt_faults(self) -> list[str]:
         """Whether a roller that bears the whole load between tilted races touches over less than a slice."""
-        from rbdyn.contact.hertz_line import palmgren
-        from rbdyn.materials import equivalent_modulus
-
         bearing = self.bearing
         share = max(bearing.inner_tilt_share, 1.0 - bearing.inner_tilt_share)
         tilt, length = abs(bearing.tilt_mrad) * 1e-3 * share, bearing.effective_length_mm * 1e-3
         load = self.operation.largest_load_N
         if tilt < 1e-12 or load == 0.0:  # by then the ends move less than an atom
             return []
+        from rbdyn.contact.hertz_line import palmgren
+        from rbdyn.materials import equivalent_modulus
+
         stiffness = palmgren(
             equivalent_modulus(self.material("roller"), self.material("rings")), length
         ).stiffness

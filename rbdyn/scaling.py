@@ -1,0 +1,253 @@
+"""How run time grows with rollers and slices, and memory with the turns.
+
+More rollers stand on a pitch circle larger in proportion; load, cage and inner ring grow with them, so that each roller
+bears the same, and the speed falls so that surface speeds stay; a turn then takes longer, in proportion. More slices
+cut the same roller finer. Times are the
+least of several of a single-threaded run, taken in turns over the sizes, after everything was compiled.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rbdyn.dynamics.metrics import Replicate
+from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.simulate import Stop, prepare, run_replicate
+from rbdyn.faults import InputError, RunError
+from rbdyn.footprint import last_line
+from rbdyn.option_cost import with_options
+from rbdyn.result import versions
+from rbdyn.scene import Scene
+
+FORMAT = "rbdyn.scaling/1"
+ROLLERS = (10, 20, 30, 50, 70, 100)
+SLICES = (1, 11, 31, 61, 101, 201)
+MEMORY_TURNS = (40, 4000)
+TURNS, DISCARDED = 4, 1
+REPEATS = 5
+
+
+@dataclass(frozen=True)
+class Point:
+    """One size: least processor time per right-hand side [ns], per shaft turn [ms] and over the time simulated [-],
+    right-hand sides per turn."""
+
+    size: int
+    rhs_ns: float
+    turn_ms: float
+    of_real_time: float
+    rhs_per_turn: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """Time of a right-hand side over the size n: straight line [ns], its r2, and p of the power law n^p."""
+
+    fixed_ns: float
+    each_ns: float
+    r2: float
+    exponent: float
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Largest memory [MiB] of a process that simulates so many counted turns and keeps no history."""
+
+    turns: int
+    peak_MiB: float  # noqa: N815
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Times over "rollers" and "slices" with their fits, and memory over turns."""
+
+    points: dict[str, list[Point]]
+    memory: list[Memory]
+
+    @property
+    def lines(self) -> dict[str, Line]:
+        """Fits of the time of a right-hand side."""
+        return {kind: fit(points) for kind, points in self.points.items()}
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        from rbdyn.accuracy import processor
+
+        return {
+            "format": FORMAT,
+            "status": "ok",
+            **{kind: [point.__dict__ for point in points] for kind, points in self.points.items()},
+            "fits": {kind: line.__dict__ for kind, line in self.lines.items()},
+            "memory": [memory.__dict__ for memory in self.memory],
+            "machine": processor(),
+            "versions": versions(),
+        }
+
+
+def scaling(
+    scene: Scene,
+    rollers: Sequence[int] = ROLLERS,
+    slices: Sequence[int] = SLICES,
+    memory_turns: Sequence[int] = MEMORY_TURNS,
+    progress: Callable[[int, int], None] | None = None,
+) -> Scaling:
+    """Measure a scene. Raises InputError where it cannot be enlarged or cut, RunError, KeyboardInterrupt."""
+    scenes = {
+        "rollers": {count: with_rollers(scene, count) for count in rollers},
+        "slices": {count: with_slices(scene, count) for count in slices},
+    }
+    steps = len(rollers) + len(slices) + len(memory_turns)
+    done = 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done, steps)
+
+    points = {kind: _times(sizes, step) for kind, sizes in scenes.items()}
+    prepare(scene, roller_bearing(scene))  # so that no process compiles, which takes memory too
+    memory = []
+    for turns in memory_turns:
+        memory.append(Memory(turns, peak_memory(scene, turns)))
+        step()
+    return Scaling(points, memory)
+
+
+def with_rollers(scene: Scene, count: int) -> Scene:
+    """The bearing with so many rollers, each as far from the next and loaded as before, at the same surface speeds.
+
+    Raises InputError where each roller has an error of its own.
+    """
+    bearing, cage, operation = scene.bearing, scene.cage, scene.operation
+    if bearing.roller_diameter_errors_um is not None:
+        raise InputError(
+            [
+                "bearing.roller_diameter_errors_um: holds for its own number of rollers only; leave it out to scale"
+            ]
+        )
+    if operation.schedule is not None:
+        raise InputError(
+            ["operation.schedule: would have to be scaled with the rollers; leave it out to scale"]
+        )
+    ratio = count / bearing.rollers
+    keys = {
+        "bearing.rollers": count,
+        "bearing.pitch_diameter_mm": bearing.pitch_diameter_mm * ratio,
+        "bearing.inner_ring_mass_kg": bearing.inner_ring_mass_kg * ratio,
+        "cage.mass_g": cage.mass_g * ratio,
+        "operation.inner_speed_rpm": operation.inner_speed_rpm / ratio,
+        "operation.outer_speed_rpm": operation.outer_speed_rpm / ratio,
+        "operation.radial_load_N": operation.radial_load_N * ratio,
+    }
+    if cage.land_diameter_mm is not None:
+        # As far from the pitch circle as before.
+        keys["cage.land_diameter_mm"] = cage.land_diameter_mm + bearing.pitch_diameter_mm * (ratio - 1.0)
+    if cage.inertia_kg_mm2 is not None:
+        keys["cage.inertia_kg_mm2"] = cage.inertia_kg_mm2 * ratio**3
+    return with_options(scene, _short([f"{key}={value!r}" for key, value in keys.items()]))
+
+
+def with_slices(scene: Scene, count: int) -> Scene:
+    """The bearing with its rollers cut into so many slices. Raises InputError where one slice cannot show a profile."""
+    return with_options(scene, _short([f"model.slices={count}"]))
+
+
+def _short(assignments: list[str]) -> list[str]:
+    return [*assignments, f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}"]
+
+
+def _times(scenes: dict[int, Scene], step: Callable[[], None]) -> list[Point]:
+    bearings = {size: roller_bearing(scene) for size, scene in scenes.items()}
+    for size, scene in scenes.items():
+        prepare(scene, bearings[size])
+    runs: dict[int, list[Replicate]] = {size: [] for size in scenes}
+    for repeat in range(REPEATS):
+        for size, scene in scenes.items():
+            runs[size].append(run_replicate(scene, bearings[size], 0, scene.numerics.rtol, Stop()))
+            if repeat == REPEATS - 1:
+                step()
+    return [_point(size, scenes[size].turn_s, found) for size, found in runs.items()]
+
+
+def _point(size: int, turn_s: float, runs: list[Replicate]) -> Point:
+    turns, evaluations = TURNS + DISCARDED, runs[0].derivatives
+    least = min(run.cpu_s for run in runs)
+    per_turn = least / turns
+    return Point(size, least / evaluations * 1e9, per_turn * 1e3, per_turn / turn_s, evaluations / turns)
+
+
+def fit(points: Sequence[Point]) -> Line:
+    """Least squares: the line by relative errors, so that every size counts alike; the power by logarithms.
+
+    A size of one is left out: a whole roller runs through no slices.
+    """
+    size, time = np.array([(point.size, point.rhs_ns) for point in points if point.size > 1]).T
+    each, fixed = np.polyfit(size, time, 1, w=1.0 / time)
+    rest = time - fixed - each * size
+    r2 = 1.0 - float(rest @ rest) / float(((time - time.mean()) ** 2).sum())
+    exponent = np.polyfit(np.log(size), np.log(time), 1)[0]
+    return Line(float(fixed), float(each), r2, float(exponent))
+
+
+def peak_memory(scene: Scene, turns: int) -> float:
+    """Largest memory [MiB] of a fresh process that simulates one replicate over so many counted turns; that of the
+    compiler too, where the scene was not yet compiled.
+
+    Raises RunError where that process fails.
+    """
+    chosen = with_options(
+        scene, [f"numerics.turns={turns}", "numerics.replicates=1", "numerics.companion=false"]
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", "from rbdyn.scaling import print_peak_memory; print_peak_memory()"],
+        input=json.dumps(chosen.model_dump(mode="json", exclude_none=True)),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if found.returncode != 0:
+        raise RunError(f"the memory of {turns} turns could not be measured: {last_line(found.stderr)}")
+    return float(found.stdout)
+
+
+def print_peak_memory() -> None:
+    """Simulate the scene on standard input; print the largest memory of this process [MiB]."""
+    from rbdyn.dynamics.simulate import simulate
+
+    simulate(Scene.from_dict(json.load(sys.stdin)), workers=1)
+    print(_largest_memory())
+
+
+def _largest_memory() -> float:
+    status = Path("/proc/self/status")
+    if status.exists():
+        # On Linux getrusage starts from the memory of the process that started this one.
+        lines = status.read_text(encoding="utf-8").splitlines()
+        return float(next(line.split()[1] for line in lines if line.startswith("VmHWM:"))) / 1024.0
+    import resource
+
+    per_unit = 1.0 if sys.platform == "darwin" else 1024.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * per_unit / 1024.0**2
+
+
+def write(found: Scaling, folder: Path) -> list[str]:
+    """Write scaling.json, scaling.csv and scaling.png; returns the file names."""
+    import pandas as pd
+
+    from rbdyn.plots.scaling import draw
+    from rbdyn.result import write_json
+
+    write_json(folder / "scaling.json", found.as_dict())
+    rows = [{"of": kind, **point.__dict__} for kind, points in found.points.items() for point in points]
+    pd.DataFrame(rows).to_csv(folder / "scaling.csv", index=False)
+    draw(found, folder / "scaling.png")
+    return ["scaling.json", "scaling.csv", "scaling.png"]
