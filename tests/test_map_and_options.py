@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
+from rbdyn import accuracy
 from rbdyn.faults import InputError
-from rbdyn.option_cost import OPTIONS, option_costs, record, with_options
-from rbdyn.option_cost import write as write_options
+from rbdyn.option_cost import OPTIONS, option_costs, study, with_options
 from rbdyn.scene import Scene
 from rbdyn.slip_map import FIGURES, axis_values, slip_map, write
 
@@ -118,5 +118,7 @@ def test_unit_option_costs(outer, tmp_path):
     assert row.with_ns > 0.0 and row.without_ns > 0.0 and 0.0 < row.power_gap < 0.01
     # The same types of laws: the compiled code is shared, so both cost the same but for noise.
     assert row.difference_ns == row.with_ns - row.without_ns
-    assert write_options(rows, tmp_path) == ["options.json", "options.csv"]
-    assert record(rows)["options"][0]["option"] == row.option
+    found = study(outer, options=options)
+    assert accuracy.write(found, tmp_path) == ["options.json", "options.csv"]
+    assert found.record["format"] == "rbdyn.options/1"
+    assert [option["option"] for option in found.record["options"]] == [row.option]
