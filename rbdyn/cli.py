@@ -78,58 +78,66 @@ def accuracy(
     scene: SceneFile,
     assignments: Set = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write accuracy.json, .csv and .png here.")
+        Path | None, typer.Option(metavar="DIR", help="Write the study as JSON, CSV and pictures here.")
     ] = None,
+    methods: Annotated[
+        bool, typer.Option("--methods", help="Other integrators beside ours, instead.")
+    ] = False,
+    slices: Annotated[bool, typer.Option("--slices", help="Slices of a profiled roller, instead.")] = False,
+    replicates: Annotated[
+        bool, typer.Option("--replicates", help="Statistical error against run time, instead.")
+    ] = False,
     options: Annotated[bool, typer.Option("--options", help="What each option costs, instead.")] = False,
     scaling: Annotated[
         bool, typer.Option("--scaling", help="Time by rollers and slices, memory by turns, instead.")
     ] = False,
+    trajectory: Annotated[
+        float | None,
+        typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25."),
+    ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also versions.")] = False,
 ) -> None:
-    """Show error against run time: bias of every output and cost at each tolerance."""
+    """Show error against run time: of every output at each tolerance and of the motion itself."""
     with guarded(as_json):
+        from rbdyn import accuracy as studies
         from rbdyn.scene import Scene
 
+        asked = {
+            "methods": methods,
+            "slices": slices,
+            "replicates": replicates,
+            "options": options,
+            "scaling": scaling,
+        }
+        name = _study(asked, trajectory)
         loaded = Scene.load(scene, assignments or [])
         folder = output_folder(out) if out else None
-        if options:
-            _options(loaded, folder, as_json, quiet)
-            return
-        if scaling:
-            _scaling(loaded, folder, as_json, quiet)
-            return
-        from rbdyn import accuracy as study
-
-        with progress_bar("tolerances", quiet or as_json) as progress:
-            rows = study.work_precision(loaded, progress=progress)
-        files = study.write(rows, loaded, folder) if folder else []
+        limits = {} if trajectory is None else {"turns": trajectory}
+        with progress_bar(name, quiet or as_json) as progress:
+            found = studies.study(name, loaded, progress, **limits)
+        files = studies.write(found, folder) if folder else []
         if as_json:
-            print_json(study.record(rows, loaded))
+            print_json(found.record)
             return
-        header = ("rtol", "ms a turn", "ns a right-hand side", "steps a turn", "power gap", *study.OUTPUTS)
-        cells = [
-            (
-                f"{row.rtol:g}",
-                f"{row.turn_ms:.2f}",
-                f"{row.rhs_ns:.0f}",
-                f"{row.steps_per_turn:.0f}",
-                f"{100.0 * row.power_gap:.2g} %",
-                *(
-                    f"{100.0 * row.bias[name]:+.2f} ± {100.0 * row.bias_error[name]:.2f} %"
-                    for name in study.OUTPUTS
-                ),
-            )
-            for row in rows
-        ]
-        print_table(f"bias against rtol {rows[-1].rtol:g}, 95 % errors", header, cells)
-        print(study.conclusion(rows, loaded))
-        print(
-            f"{loaded.numerics.replicates} replicates of {loaded.numerics.turns:g} turns; {study.processor()}"
-        )
+        studies.show(found, verbose)
         if folder:
             print(f"written to {folder}: {', '.join(files)}")
+
+
+def _study(asked: dict[str, bool], trajectory: float | None) -> str:
+    """Name of the one study asked for. Raises InputError for two, or for trajectories in a study without them."""
+    from rbdyn.faults import InputError
+
+    chosen = [name for name, wished in asked.items() if wished]
+    flags = " and ".join(f"--{name}" for name in chosen)
+    if len(chosen) > 1:
+        raise InputError([f"{flags}: are studies of their own; choose one"])
+    name = chosen[0] if chosen else "tolerances"
+    if trajectory is not None and name not in ("tolerances", "methods"):
+        raise InputError([f"--trajectory {trajectory:g}: {flags} integrates no trajectories; leave it out"])
+    return name
 
 
 @app.command("map")
@@ -186,76 +194,6 @@ def _overrides(
         *(assignments or []),
         *(f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None),
     ]
-
-
-def _options(scene: Scene, folder: Path | None, as_json: bool, quiet: bool) -> None:
-    from rbdyn import option_cost
-
-    with progress_bar("options", quiet or as_json) as progress:
-        rows = option_cost.option_costs(scene, progress=progress)
-    files = option_cost.write(rows, folder) if folder else []
-    if as_json:
-        print_json(option_cost.record(rows))
-        return
-    cells = [
-        (
-            row.option,
-            f"{row.with_ns:.0f}",
-            f"{row.without_ns:.0f}",
-            f"{row.difference_ns:+.0f}",
-            f"{100.0 * row.power_gap:.2g} %",
-            f"{row.compile_s:.1f}",
-            f"{row.holds.state - row.plain_holds.state:+d}",
-            f"{row.holds.parameter_bytes - row.plain_holds.parameter_bytes:+d}",
-            f"{row.holds.instructions - row.plain_holds.instructions:+d}",
-            " ".join(module.rpartition(".")[2] for module in row.modules),
-        )
-        for row in rows
-    ]
-    header = ("option", "with", "without", "difference", "power gap", "s to compile or load")
-    held = ("state", "parameters [B]", "instructions", "modules")
-    print_table("nanoseconds a right-hand side; what the option adds to the program", (*header, *held), cells)
-    if rows:
-        plain = rows[0].plain_holds
-        print(
-            f"without any: {plain.state} numbers of state, {plain.parameter_bytes} B of parameters, "
-            f"{plain.instructions} instructions compiled (LLVM)"
-        )
-    if folder:
-        print(f"written to {folder}: {', '.join(files)}")
-
-
-def _scaling(scene: Scene, folder: Path | None, as_json: bool, quiet: bool) -> None:
-    from rbdyn import scaling as study
-
-    with progress_bar("sizes", quiet or as_json) as progress:
-        found = study.scaling(scene, progress=progress)
-    files = study.write(found, folder) if folder else []
-    if as_json:
-        print_json(found.as_dict())
-        return
-    for kind, points in found.points.items():
-        header = (kind, "ns a right-hand side", "right-hand sides a turn", "ms a turn", "s a simulated s")
-        cells = [
-            (
-                f"{point.size}",
-                f"{point.rhs_ns:.0f}",
-                f"{point.rhs_per_turn:.0f}",
-                f"{point.turn_ms:.2f}",
-                f"{point.of_real_time:.2f}",
-            )
-            for point in points
-        ]
-        print_table("", header, cells)
-        line = found.lines[kind]
-        print(
-            f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f}); "
-            f"as a power: n^{line.exponent:.2f}"
-        )
-    for memory in found.memory:
-        print(f"{memory.turns} counted turns: at most {memory.peak_MiB:.1f} MiB in a process of its own")
-    if folder:
-        print(f"written to {folder}: {', '.join(files)}")
 
 
 def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:

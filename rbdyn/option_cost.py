@@ -10,16 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rbdyn.accuracy.report import Report, Table, record
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import Stop, prepare, run_replicate
 from rbdyn.faults import InputError, set_key
 from rbdyn.footprint import Footprint, added_modules, footprint
-from rbdyn.result import versions
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.options/1"
@@ -139,26 +138,41 @@ def with_options(scene: Scene, assignments: Sequence[str]) -> Scene:
     return Scene.from_dict(data, " ".join(assignments))
 
 
-def record(rows: Sequence[OptionCost]) -> dict[str, Any]:
-    """JSON of ``rbdyn accuracy --options``."""
-    from rbdyn.accuracy import processor
-
-    return {
-        "format": FORMAT,
-        "status": "ok",
-        "options": [row.as_dict() for row in rows],
-        "machine": processor(),
-        "versions": versions(),
-    }
-
-
-def write(rows: Sequence[OptionCost], folder: Path) -> list[str]:
-    """Write options.json and options.csv; returns the file names."""
-    import pandas as pd
-
-    from rbdyn.result import write_json
-
-    write_json(folder / "options.json", record(rows))
-    table = [row.as_dict() | {"modules": " ".join(row.modules)} for row in rows]
-    pd.DataFrame(table).to_csv(folder / "options.csv", index=False)
-    return ["options.json", "options.csv"]
+def study(
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    options: Mapping[str, Sequence[str]] = OPTIONS,
+) -> Report:
+    """``rbdyn accuracy --options``. Raises RunError, KeyboardInterrupt."""
+    rows = [row.as_dict() for row in option_costs(scene, options, progress)]
+    cells = [
+        (
+            row["option"],
+            f"{row['with_ns']:.0f}",
+            f"{row['without_ns']:.0f}",
+            f"{row['difference_ns']:+.0f}",
+            f"{100.0 * row['power_gap']:.2g} %",
+            f"{row['compile_s']:.1f}",
+            f"{row['with_state'] - row['without_state']:+d}",
+            f"{row['with_parameter_bytes'] - row['without_parameter_bytes']:+d}",
+            f"{row['with_instructions'] - row['without_instructions']:+d}",
+            " ".join(module.rpartition(".")[2] for module in row["modules"]),
+        )
+        for row in rows
+    ]
+    header = (
+        *("option", "with", "without", "difference", "power gap", "s to compile or load"),
+        *("state", "parameters [B]", "instructions", "modules"),
+    )
+    plain = [
+        f"without any: {row['without_state']} numbers of state, {row['without_parameter_bytes']} B of parameters, "
+        f"{row['without_instructions']} instructions compiled (LLVM)"
+        for row in rows[:1]
+    ]
+    return Report(
+        stem="options",
+        record=record(FORMAT, options=rows),
+        tables=(Table("nanoseconds a right-hand side; what the option adds to the program", header, cells),),
+        sentences=plain,
+        sheets={"options": [row | {"modules": " ".join(row["modules"])} for row in rows]},
+    )

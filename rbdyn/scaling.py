@@ -14,17 +14,16 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from rbdyn.accuracy.report import Report, Table, record
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import Stop, prepare, run_replicate
 from rbdyn.faults import InputError, RunError
 from rbdyn.footprint import last_line
 from rbdyn.option_cost import with_options
-from rbdyn.result import versions
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.scaling/1"
@@ -76,20 +75,6 @@ class Scaling:
     def lines(self) -> dict[str, Line]:
         """Fits of the time of a right-hand side."""
         return {kind: fit(points) for kind, points in self.points.items()}
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        from rbdyn.accuracy import processor
-
-        return {
-            "format": FORMAT,
-            "status": "ok",
-            **{kind: [point.__dict__ for point in points] for kind, points in self.points.items()},
-            "fits": {kind: line.__dict__ for kind, line in self.lines.items()},
-            "memory": [memory.__dict__ for memory in self.memory],
-            "machine": processor(),
-            "versions": versions(),
-        }
 
 
 def scaling(
@@ -239,15 +224,56 @@ def _largest_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * per_unit / 1024.0**2
 
 
-def write(found: Scaling, folder: Path) -> list[str]:
-    """Write scaling.json, scaling.csv and scaling.png; returns the file names."""
-    import pandas as pd
+def study(scene: Scene, progress: Callable[[int, int], None] | None = None) -> Report:
+    """``rbdyn accuracy --scaling``. Raises InputError, RunError, KeyboardInterrupt."""
+    return report(scaling(scene, progress=progress))
 
+
+def report(found: Scaling) -> Report:
+    """Tables, fits and picture of what was measured."""
+    tables, sentences = [], []
+    for kind, points in found.points.items():
+        header = (kind, "ns a right-hand side", "right-hand sides a turn", "ms a turn", "s a simulated s")
+        cells = [
+            (
+                f"{point.size}",
+                f"{point.rhs_ns:.0f}",
+                f"{point.rhs_per_turn:.0f}",
+                f"{point.turn_ms:.2f}",
+                f"{point.of_real_time:.2f}",
+            )
+            for point in points
+        ]
+        tables.append(Table("", header, cells))
+        line = found.lines[kind]
+        sentences.append(
+            f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f}); "
+            f"as a power: n^{line.exponent:.2f}"
+        )
+    sentences += [
+        f"{memory.turns} counted turns: at most {memory.peak_MiB:.1f} MiB in a process of its own"
+        for memory in found.memory
+    ]
+    return Report(
+        stem="scaling",
+        record=record(
+            FORMAT,
+            **{kind: [point.__dict__ for point in points] for kind, points in found.points.items()},
+            fits={kind: line.__dict__ for kind, line in found.lines.items()},
+            memory=[memory.__dict__ for memory in found.memory],
+        ),
+        tables=tables,
+        sentences=sentences,
+        sheets={
+            "scaling": [
+                {"of": kind, **point.__dict__} for kind, points in found.points.items() for point in points
+            ]
+        },
+        pictures={"scaling": lambda path: _draw(found, path)},
+    )
+
+
+def _draw(found: Scaling, path: Path) -> None:
     from rbdyn.plots.scaling import draw
-    from rbdyn.result import write_json
 
-    write_json(folder / "scaling.json", found.as_dict())
-    rows = [{"of": kind, **point.__dict__} for kind, points in found.points.items() for point in points]
-    pd.DataFrame(rows).to_csv(folder / "scaling.csv", index=False)
-    draw(found, folder / "scaling.png")
-    return ["scaling.json", "scaling.csv", "scaling.png"]
+    draw(found, path)

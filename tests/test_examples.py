@@ -7,7 +7,10 @@ import math
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from rbdyn.dynamics.guide_land import NoGuide
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SCRIPTS = sorted(path.stem for path in EXAMPLES.glob("*.py"))
@@ -121,6 +124,28 @@ def test_literature_whirl(effort):
     assert list(frame["regime"]) == ["in the film", "strikes the land"]
     assert frame["contacts_per_turn"].iloc[1] > 1.0
     assert frame["eccentricity"].iloc[0] < 0.96
+
+
+def test_oracle_numpy_right_hand_side(outer, evaluate, random_state):
+    """Oracle: the page of numpy gives the derivative of the compiled code; other laws are refused by name."""
+    from rbdyn.dynamics.model import roller_bearing
+    from rbdyn.faults import InputError
+
+    module = script("numpy_right_hand_side")
+    bearing = roller_bearing(outer)
+    z, function = bearing.rollers, module.NumpyRightHandSide(bearing)
+    kinds = [0, 2 * z, 4 * z, 5 * z, 5 * z + 3, 5 * z + 5, 5 * z + 6, 5 * z + 8]
+    touching = 0.0
+    for seed in range(12):
+        y = random_state(outer, seed)
+        compiled = evaluate(bearing, y)
+        touching = max(touching, compiled.loads[0])
+        for ours, theirs in zip(np.split(function(0.0, y), kinds), np.split(compiled.dy, kinds), strict=True):
+            assert ours == pytest.approx(theirs, rel=1e-10, abs=1e-10 * np.abs(theirs).max(initial=0.0))
+    assert touching > 10.0 and function.calls == 12
+    rigid = bearing._replace(pocket=bearing.pocket._replace(contact=bearing.outer.contact), guide=NoGuide())
+    with pytest.raises(InputError, match="NoGuide"):
+        module.NumpyRightHandSide(rigid)
 
 
 def test_unit_trend_words():

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
+from rbdyn import accuracy
 from rbdyn.faults import InputError
-from rbdyn.option_cost import OPTIONS, option_costs, record, with_options
-from rbdyn.option_cost import write as write_options
+from rbdyn.option_cost import OPTIONS, option_costs, study, with_options
 from rbdyn.scene import Scene
 from rbdyn.slip_map import FIGURES, axis_values, slip_map, write
 
@@ -120,7 +120,9 @@ def test_unit_option_costs(outer, tmp_path):
     assert row.difference_ns == row.with_ns - row.without_ns
     assert row.holds == row.plain_holds and row.modules == ()
     assert row.holds.state == 60 and row.holds.instructions > 1000
-    assert write_options(rows, tmp_path) == ["options.json", "options.csv"]
-    saved = record(rows)["options"][0]
+    found = study(outer, options=options)
+    assert accuracy.write(found, tmp_path) == ["options.json", "options.csv"]
+    assert found.record["format"] == "rbdyn.options/1"
+    saved = found.record["options"][0]
     assert saved["option"] == row.option
     assert saved["with_parameter_bytes"] == saved["without_parameter_bytes"] > 0

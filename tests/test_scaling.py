@@ -7,11 +7,12 @@ import json
 import numpy as np
 import pytest
 
+from rbdyn.accuracy import write
 from rbdyn.dynamics.geometry import raceway_radii, shaft_speeds
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import prepare
 from rbdyn.faults import InputError
-from rbdyn.scaling import Memory, Point, Scaling, fit, peak_memory, scaling, with_rollers, with_slices, write
+from rbdyn.scaling import Memory, Point, Scaling, fit, peak_memory, report, scaling, with_rollers, with_slices
 
 SOME = (10, 20)
 
@@ -72,7 +73,7 @@ def test_unit_times_are_measured_and_written(found, tmp_path):
     whole = Scaling(
         {**found.points, "slices": list(found.points["rollers"])}, [Memory(4, 100.0), Memory(8, 100.0)]
     )
-    assert write(whole, tmp_path) == ["scaling.json", "scaling.csv", "scaling.png"]
+    assert write(report(whole), tmp_path) == ["scaling.json", "scaling.csv", "scaling.png"]
     saved = json.loads((tmp_path / "scaling.json").read_text())
     assert saved["format"] == "rbdyn.scaling/1" and set(saved["fits"]) == {"rollers", "slices"}
     assert (tmp_path / "scaling.png").stat().st_size > 10_000

@@ -155,9 +155,13 @@ def kinematic_cage_speed(scene: Scene, before: NDArray[np.float64], after: NDArr
 
 def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> Replicate:
     """Run one replicate: discard the transient, then count. Raises RunError or CancelledError."""
+    return counted(Run(scene, bearing, replicate, rtol, stop))
+
+
+def counted(run: Run) -> Replicate:
+    """Take a run that is about to start to its end. Raises RunError or CancelledError."""
     started = time.thread_time()
-    run = Run(scene, bearing, replicate, rtol, stop)
-    numerics = scene.numerics
+    scene, bearing, numerics = run.scene, run.bearing, run.scene.numerics
     run.to(numerics.discard_turns)
     run.forget()
     body = 5 * bearing.rollers

@@ -1,4 +1,4 @@
-"""Error against run time."""
+"""Error against run time: error to the right, time upwards, both logarithmic; lower left is better."""
 
 from __future__ import annotations
 
@@ -6,33 +6,167 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rbdyn.plots.style import plt, save
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from rbdyn.plots.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, label_ends, plain, plt, save
 
 if TYPE_CHECKING:
-    from rbdyn.accuracy import Row
+    from rbdyn.accuracy.comparison import Attempt
+    from rbdyn.accuracy.replication import Row as ReplicationRow
+    from rbdyn.accuracy.slicing import Row as SliceRow
+    from rbdyn.accuracy.tolerances import Row
+
+COLOURS = {"impact_force_N": VERMILION, "whirl_deviation_ratio": ORANGE, "power_loss_W": BLUE}
+NAMES = {
+    "impact_force_N": "impact force",
+    "whirl_deviation_ratio": "whirl ratio",
+    "power_loss_W": "power loss",
+}
+# Ours stands out; the others share a colour a family and differ by mark.
+MARKS = ("o", "s", "D", "^", "v", "P", "X", "<", ">", "h")
+METHOD_COLOURS = ("black", GREEN, SKY, BLUE, PURPLE, VERMILION, ORANGE, "#8C510A", GREY, "#7A6BB0")
+SMALLEST_BIAS = 1e-6
+
+Named = tuple[Sequence[tuple[float, float]], str, str]  # points, text and colour of a line
+
+
+def logarithmic(axis: Axes, across: str, up: str) -> None:
+    """Both axes logarithmic, named."""
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_xlabel(across)
+    axis.set_ylabel(up)
+    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
+    axis.yaxis.set_minor_formatter(NullFormatter())
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    plain(axis)
 
 
 def work_precision(rows: Sequence[Row], path: Path) -> None:
-    """Bias of each output, with its 95 % error, against the time of a shaft turn."""
-    figure, axis = plt.subplots(figsize=(7.0, 4.8))
-    for name in rows[0].bias:
-        time = [row.turn_ms for row in rows[:-1]]
-        bias = [max(abs(row.bias[name]), 1e-6) for row in rows[:-1]]
-        line = axis.plot(bias, time, "o-", markersize=4, label=name.replace("_", " "))[0]
-        floor = max(row.bias_error[name] for row in rows)
-        axis.axvline(floor, color=line.get_color(), linestyle=":", linewidth=0.9)
-    axis.plot(
-        [max(row.power_gap, 1e-6) for row in rows], [row.turn_ms for row in rows], "k^-", label="power gap"
-    )
-    for row in rows:
-        axis.annotate(f"{row.rtol:g}", (max(row.power_gap, 1e-6), row.turn_ms), fontsize=7, xytext=(4, 3),
-                      textcoords="offset points")  # fmt: skip
-    axis.set_xscale("log")
-    axis.set_yscale("log")
-    axis.set_xlabel(
-        "relative bias (dotted: its 95 % statistical error); relative power gap, marked with rtol"
-    )
-    axis.set_ylabel("processor time of a shaft turn [ms]")
-    axis.grid(alpha=0.3, which="both")
-    axis.legend(fontsize=8)
+    """Bias of each output and gap of the power balance against the time of a shaft turn, marked with rtol."""
+    figure, axis = plt.subplots(figsize=(7.6, 5.0))
+    logarithmic(axis, "relative bias, or gap of the power balance", "processor time of a shaft turn [ms]")
+    times = [row.turn_ms for row in rows]
+    ends = _outputs(axis, rows, times)
+    marks = [f"{row.rtol:g}" for row in rows]
+    ends.append(_marked(axis, "gap of the power balance", [row.power_gap for row in rows], times, marks))
+    _finish_biased(axis, "rtol", ends)
     save(figure, path)
+
+
+def methods_at_work(attempts: Sequence[Attempt], floor: float, turns: float, path: Path) -> None:
+    """Position error of each method against the time of a shaft turn; crosses at the right edge failed."""
+    figure, axis = plt.subplots(figsize=(8.6, 6.0))
+    logarithmic(
+        axis,
+        f"largest position error after {turns:g} shaft turns, worst of the starts [m]",
+        "processor time of a shaft turn [ms]",
+    )
+    ends = []
+    failures: dict[str, tuple[list[float], str]] = {}
+    names = list(dict.fromkeys(attempt.method for attempt in attempts))
+    for name, mark, colour in zip(names, MARKS, METHOD_COLOURS, strict=False):
+        own = [attempt for attempt in attempts if attempt.method == name]
+        points = [(a.position_error_m, a.turn_ms) for a in own if a.position_error_m and a.turn_ms]
+        failed = [a.turn_ms for a in own if not a.position_error_m and a.turn_ms]
+        if points:
+            axis.plot(*zip(*points, strict=True), mark, linestyle="-", color=colour, markersize=4.5,
+                      linewidth=2.0 if name == names[0] else 1.0)  # fmt: skip
+            ends.append((points, name, colour))
+        if failed:
+            failures[name] = failed, colour
+    axis.margins(0.08)
+    left, right = axis.get_xlim()
+    if floor > left:
+        axis.axvspan(left, floor, color="0.93", zorder=0)
+        axis.annotate("not resolved", (floor, 0.02), xycoords=axis.get_xaxis_transform(), fontsize=8,
+                      color=GREY, ha="right", rotation=90, xytext=(-3, 0), textcoords="offset points")  # fmt: skip
+    axis.set_xlim(left, right)
+    axis.set_ylim(top=axis.get_ylim()[1] * 1.6)
+    _failed(axis, failures)
+    label_ends(axis, ends)
+    save(figure, path)
+
+
+def _failed(axis: Axes, failures: dict[str, tuple[list[float], str]]) -> None:
+    """Crosses at the right edge, at the time it took to fail; names beside them, one above the other."""
+    edge = axis.get_yaxis_transform()
+    lowest = 0.0
+    for name, (times, colour) in sorted(failures.items(), key=lambda failure: max(failure[1][0])):
+        axis.plot([1.0] * len(times), times, "x", color=colour, clip_on=False, transform=edge)
+        height = max(axis.transAxes.inverted().transform(edge.transform((1.0, max(times))))[1], lowest)
+        axis.annotate(f"{name} failed", (1.0, height), xycoords="axes fraction", fontsize=7, color=colour,
+                      va="center", xytext=(6, 0), textcoords="offset points", annotation_clip=False)  # fmt: skip
+        lowest = height + 0.025
+
+
+def slices_at_work(rows: Sequence[SliceRow], path: Path) -> None:
+    """Error of the load and bias of each output against the time of a right-hand side, marked with slices."""
+    figure, axis = plt.subplots(figsize=(7.6, 5.0))
+    logarithmic(axis, "relative error", "processor time of a right-hand side [ns]")
+    times = [row.rhs_ns for row in rows]
+    ends = _outputs(axis, rows, times)
+    marks = [f"{row.slices}" for row in rows]
+    ends.append(_marked(axis, "load at equal approach", [row.load_error for row in rows], times, marks))
+    _finish_biased(axis, "slices", ends)
+    save(figure, path)
+
+
+def replicates_at_work(rows: Sequence[ReplicationRow], path: Path) -> None:
+    """Half-width of each output against processor time, a line a length of run; dashed: one over root of time."""
+    names = list(rows[0].half_width)
+    lengths = list(dict.fromkeys(row.turns for row in rows))
+    figure, axes = plt.subplots(1, len(names), figsize=(12.0, 4.6), sharey=True)
+    ends: list[list[Named]] = []
+    for axis, name in zip(axes, names, strict=True):
+        logarithmic(axis, "relative 95 % half-width", "processor time [s]" if axis is axes[0] else "")
+        ends.append([])
+        for length, colour in zip(lengths, (SKY, BLUE, GREEN, ORANGE, VERMILION, PURPLE), strict=False):
+            points = [(row.half_width[name], row.cpu_s) for row in rows if row.turns == length]
+            axis.plot(*zip(*points, strict=True), "o-", color=colour, markersize=4)
+            ends[-1].append((points, f"{length:g} turns", colour))
+        width, time = points[-1]
+        axis.plot([width, 8.0 * width], [time, time / 64.0], "--", color=GREY, linewidth=0.9, zorder=0)
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        axis.xaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
+        axis.set_title(NAMES[name], fontsize=10)
+        axis.margins(0.12)
+    axes[0].set_ylim(top=axes[0].get_ylim()[1] * 2.0)
+    for axis, own in zip(axes, ends, strict=True):
+        label_ends(axis, own)
+    save(figure, path)
+
+
+def _outputs(axis: Axes, rows: Sequence[Row] | Sequence[SliceRow], times: Sequence[float]) -> list[Named]:
+    """Bias of each output of all rows but the last, the reference; open marks where it is within its error."""
+    ends: list[Named] = []
+    for name, colour in COLOURS.items():
+        points = [
+            (max(abs(row.bias[name]), SMALLEST_BIAS), time) for row, time in zip(rows, times, strict=True)
+        ]
+        axis.plot(*zip(*points[:-1], strict=True), color=colour, linewidth=0.8)
+        for point, row in zip(points[:-1], rows, strict=False):
+            filled = point[0] > row.bias_error[name]
+            axis.plot(*point, "o", color=colour, markersize=5, markerfacecolor=colour if filled else "white")
+        ends.append((points[:-1], NAMES[name], colour))
+    return ends
+
+
+def _marked(
+    axis: Axes, name: str, errors: Sequence[float], times: Sequence[float], marks: Sequence[str]
+) -> Named:
+    """A black line whose points bear marks."""
+    errors = [max(error, SMALLEST_BIAS) for error in errors]
+    axis.plot(errors, times, "k^-", linewidth=1.2, markersize=5)
+    for error, time, mark in zip(errors, times, marks, strict=True):
+        axis.annotate(mark, (error, time), fontsize=7, color=GREY, xytext=(-5, -9),
+                      textcoords="offset points", ha="right")  # fmt: skip
+    return list(zip(errors, times, strict=True)), name, "black"
+
+
+def _finish_biased(axis: Axes, mark: str, ends: list[Named]) -> None:
+    axis.margins(0.12)
+    axis.set_title(f"grey: {mark}; open marks: within the 95 % statistical error", fontsize=9, color=GREY)
+    label_ends(axis, ends)

@@ -1,0 +1,189 @@
+"""Statistical error against run time: how many replicates, and how many turns of each.
+
+From one pool of replicates at each length: the half-width of the 95 % interval of a mean over n of them, with the
+scatter of the whole pool (expected, not that of one lucky draw of n), and the time they take with the turns that each
+discards. Independent samples narrow it as one over the root of all counted turns; the slopes tell whether they do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.accuracy.tolerances import OUTPUTS
+from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.simulate import Stop, prepare, run_series
+from rbdyn.scene import Scene
+
+FORMAT = "rbdyn.replicates/1"
+POOL = 32
+TURNS = (10.0, 20.0, 40.0, 80.0)
+COUNTS = (2, 4, 8, 16, 32)
+
+
+@dataclass(frozen=True)
+class Row:
+    """So many replicates of so many counted turns: processor time [s], per output the relative half-width."""
+
+    replicates: int
+    turns: float
+    cpu_s: float
+    half_width: dict[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return dict(self.__dict__)
+
+
+@dataclass(frozen=True)
+class Slope:
+    """Power of the counted turns with which the scatter between replicates falls, and its 95 % half-width; -0.5 where
+    pieces of a run are independent."""
+
+    power: float
+    half_width: float
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether -0.5 lies within the error."""
+        return abs(self.power + 0.5) <= self.half_width
+
+
+def study(
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    turns: Sequence[float] = TURNS,
+    pool: int = POOL,
+) -> Report:
+    """``rbdyn accuracy --replicates``. Raises RunError, KeyboardInterrupt."""
+    values, cpu_s = pool_of_runs(scene, turns, pool, progress)
+    rows = replication_rows(values, cpu_s, [count for count in COUNTS if count <= pool])
+    slopes = {name: slope(turns, [values[length][name] for length in turns]) for name in OUTPUTS}
+    sentences = conclusion(rows, slopes, scene)
+    header = ("replicates", "turns each", "processor s", *(f"{name} ±" for name in OUTPUTS))
+    cells = [
+        (
+            f"{row.replicates}",
+            f"{row.turns:g}",
+            f"{row.cpu_s:.2f}",
+            *(f"{100.0 * row.half_width[name]:.2g} %" for name in OUTPUTS),
+        )
+        for row in rows
+    ]
+    return Report(
+        stem="replicates",
+        record=record(
+            FORMAT,
+            rows=[row.as_dict() for row in rows],
+            slopes={name: found.__dict__ for name, found in slopes.items()},
+            conclusion=" ".join(sentences),
+            pool=pool,
+            discard_turns=scene.numerics.discard_turns,
+        ),
+        tables=(Table("95 % half-widths, relative", header, cells),),
+        sentences=sentences,
+        sheets={
+            "replicates": [
+                {"replicates": row.replicates, "turns": row.turns, "cpu_s": row.cpu_s} | row.half_width
+                for row in rows
+            ]
+        },
+        pictures={"replicates": lambda path: _draw(rows, path)},
+    )
+
+
+def pool_of_runs(
+    scene: Scene, turns: Sequence[float], pool: int, progress: Callable[[int, int], None] | None = None
+) -> tuple[dict[float, dict[str, NDArray[np.float64]]], dict[float, float]]:
+    """Per length the outputs of every replicate, and the mean processor time of one [s], discarded turns included.
+
+    The window of the impact force is the shortest length throughout: over another the force would be another figure.
+    """
+    counted = Progress(progress, len(turns) * pool)
+    values, cpu_s = {}, {}
+    for length in turns:
+        update = {"turns": length, "replicates": pool, "impact_window_turns": min(turns)}
+        numerics = scene.numerics.model_copy(update=update)
+        longer = scene.model_copy(update={"numerics": numerics})
+        bearing = roller_bearing(longer)
+        prepare(longer, bearing)
+        runs = run_series(longer, bearing, [numerics.rtol], None, lambda done, total: counted.step(), Stop())[
+            0
+        ]
+        values[length] = {name: np.array([figure(run) for run in runs]) for name, figure in OUTPUTS.items()}
+        cpu_s[length] = float(np.mean([run.cpu_s for run in runs]))
+    return values, cpu_s
+
+
+def replication_rows(
+    values: dict[float, dict[str, NDArray[np.float64]]], cpu_s: dict[float, float], counts: Sequence[int]
+) -> list[Row]:
+    """Expected half-widths of means over each number of replicates of each length."""
+    return [
+        Row(
+            replicates=count,
+            turns=length,
+            cpu_s=count * cpu_s[length],
+            half_width={name: expected_half_width(sample, count) for name, sample in values[length].items()},
+        )
+        for length in values
+        for count in counts
+    ]
+
+
+def expected_half_width(sample: NDArray[np.float64], count: int) -> float:
+    """Half-width for ``count`` replicates that scatter as the whole sample does, over the sample's mean."""
+    from scipy.special import stdtrit
+
+    relative = float(sample.std(ddof=1) / (abs(sample.mean()) or 1.0))
+    return float(stdtrit(count - 1, 0.975)) * relative / math.sqrt(count)
+
+
+def slope(turns: Sequence[float], samples: Sequence[NDArray[np.float64]]) -> Slope:
+    """Least squares of log scatter over log turns; ln s scatters by 1/sqrt(2 (n - 1)) for n normal values.
+
+    The lengths share their beginnings, so their scatters do not err independently and the half-width is a rough one.
+    """
+    x = np.log(turns)
+    y = [math.log(sample.std(ddof=1) / abs(sample.mean())) for sample in samples]
+    centred = x - x.mean()
+    error = 1.0 / math.sqrt(2.0 * (len(samples[0]) - 1))
+    return Slope(
+        float(centred @ np.array(y) / (centred @ centred)), 1.96 * error / math.sqrt(float(centred @ centred))
+    )
+
+
+def conclusion(rows: Sequence[Row], slopes: dict[str, Slope], scene: Scene) -> list[str]:
+    """Whether the error falls as it should, and what the scene's choice among the rows buys."""
+    sentences = []
+    for name, found in slopes.items():
+        verdict = "as independent turns do" if found.as_expected else "not as independent turns do (-0.5)"
+        sentences.append(
+            f"{name}: scatter falls with counted turns to the power {found.power:.2f} ± {found.half_width:.2f}, {verdict}."
+        )
+    for name in OUTPUTS:
+        good = [row for row in rows if row.half_width[name] <= 0.01]
+        if good:
+            best = min(good, key=lambda row: row.cpu_s)
+            sentences.append(
+                f"{name} within 1 %: {best.replicates} replicates of {best.turns:g} turns, {best.cpu_s:.2g} s."
+            )
+        else:
+            sentences.append(
+                f"{name} within 1 %: more than {rows[-1].replicates} replicates of {rows[-1].turns:g} turns."
+            )
+    numerics = scene.numerics
+    sentences.append(f"The scene has {numerics.replicates} of {numerics.turns:g}.")
+    return sentences
+
+
+def _draw(rows: Sequence[Row], path: Any) -> None:
+    from rbdyn import plots
+
+    plots.replicates_at_work(rows, path)

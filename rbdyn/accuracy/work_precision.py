@@ -1,0 +1,67 @@
+"""Error against run time of the time integration: of the statistics at each tolerance, and of the motion itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rbdyn.accuracy import comparison, tolerances
+from rbdyn.accuracy.methods import COMPILED
+from rbdyn.accuracy.report import Report, record
+from rbdyn.accuracy.trajectory import DEFAULT_TURNS
+from rbdyn.scene import Scene
+
+FORMAT = "rbdyn.accuracy/1"
+
+
+def study(
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    turns: float = DEFAULT_TURNS,
+    rtols: Sequence[float] = tolerances.TOLERANCES,
+) -> Report:
+    """``rbdyn accuracy``: bias of the statistics, then the trajectories of the compiled methods over ``turns``.
+
+    Raises InputError, RunError where a reference fails, KeyboardInterrupt.
+    """
+    motion = comparison.trajectories(scene, progress, turns, COMPILED)
+    found = tolerances.statistics_bias(scene, rtols, progress)
+    chosen = tolerances.conclusion(found.rows, scene)
+    numerics = scene.numerics
+    agreement, trajectories, _ = motion.tables
+    return Report(
+        stem="accuracy",
+        record=record(
+            FORMAT,
+            rows=[row.as_dict() for row in found.rows],
+            failures={f"{rtol:g}": why for rtol, why in found.failures.items()},
+            conclusion=chosen,
+            turns=numerics.turns,
+            replicates=numerics.replicates,
+            trajectory={key: motion.record[key] for key in _MOTION},
+        ),
+        tables=(agreement, trajectories, tolerances.table(found)),
+        sentences=(
+            *motion.sentences,
+            chosen,
+            *(f"rtol {rtol:g} failed: {why}" for rtol, why in found.failures.items()),
+            f"{numerics.replicates} replicates of {numerics.turns:g} turns",
+        ),
+        sheets={
+            "accuracy": [tolerances.flat(row) for row in found.rows],
+            "trajectory": motion.record["rows"],
+        },
+        pictures={
+            "accuracy": lambda path: _draw(found.rows, path),
+            "trajectory": motion.pictures["methods"],
+        },
+    )
+
+
+_MOTION = ("rows", "conclusion", "turns", "starts", "reference", "resolved_m", "times_faster", "compile_s")
+
+
+def _draw(rows: Sequence[tolerances.Row], path: Any) -> None:
+    from rbdyn import plots
+
+    plots.work_precision(rows, path)
