@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from rbdyn.dynamics.metrics import Replicate, student_half_width
+from rbdyn.dynamics.batch_means import student_half_width
+from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import Stop, prepare, run_series
 from rbdyn.result import versions
@@ -120,7 +121,7 @@ def processor() -> str:
 
 
 def _row(scene: Scene, rtol: float, runs: list[Replicate], reference: list[Replicate]) -> Row:
-    turns = scene.numerics.turns + scene.numerics.discard_turns
+    turns = scene.numerics.turns + scene.numerics.warm_up_turns
     value, bias, bias_error = {}, {}, {}
     for name, figure in OUTPUTS.items():
         ours, theirs = (np.array([figure(run) for run in series]) for series in (runs, reference))
