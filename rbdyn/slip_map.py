@@ -168,10 +168,10 @@ def slip_map(
     points = []
     for place, point in enumerate(scenes):
         cause = causes.get(place)
-        of_point = [
+        ours, theirs = (
             [runs[place, rtol, i] for i in range(count)] if cause is None else [] for rtol, count in series
-        ]
-        points.append(_point(point, *of_point, cause))
+        )
+        points.append(_point(point, ours, theirs, cause))
     wall_s = time.perf_counter() - started
     return SlipMap(tuple(speeds_rpm), tuple(loads_N), tuple(points), wall_s, scene.numerics.seed)
 
