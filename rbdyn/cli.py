@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -48,6 +48,13 @@ def simulate(
     replicates: Replicates = None,
     seed: Seed = None,
     workers: Workers = None,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            metavar="2%",
+            help="Choose tolerance, turns and replicates so that impact, whirl and loss are known to this.",
+        ),
+    ] = None,
     out: Out = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -58,11 +65,13 @@ def simulate(
         from rbdyn.scene import Scene
 
         loaded = Scene.load(scene, _overrides(assignments, turns, replicates, seed))
+        aim = None if target is None else _aim(target, turns, replicates)
         folder = output_folder(out) if out else None
         from rbdyn.dynamics.simulate import simulate as run_scene
 
         with progress_bar("simulating", quiet or as_json) as progress:
-            result = run_scene(loaded, workers, progress)
+            result = run_scene(loaded, workers, progress, target=aim)
+        loaded = Scene.from_dict(result.scene)
         if folder:
             _write(loaded, result, folder)
         if as_json:
@@ -196,6 +205,18 @@ def _overrides(
     ]
 
 
+def _aim(target: str, turns: float | None, replicates: int | None) -> float:
+    """Relative error that ``--target`` asks for. Raises InputError."""
+    from rbdyn.dynamics.target import target_of
+    from rbdyn.faults import InputError
+
+    if turns is not None or replicates is not None:
+        raise InputError(
+            [f"--target {target}: chooses turns and replicates itself; drop --turns and --replicates"]
+        )
+    return target_of(target)
+
+
 def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:
     from rbdyn import plots
     from rbdyn.dynamics.history import history
@@ -219,11 +240,18 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
         "cage speed [rpm]": result.cage_speed_rpm,
         "cage slip": result.cage_slip,
     }
+    header = ["figure", "value", "statistical error (95 %)", "numerical error (95 %)"]
     rows = [
-        (label, f"{figure.value:.5g}", shown(figure.statistical_error), shown(figure.numerical_error))
+        [label, f"{figure.value:.5g}", shown(figure.statistical_error), shown(figure.numerical_error)]
         for label, figure in figures.items()
     ]
-    print_table("", ("figure", "value", "statistical error (95 %)", "numerical error (95 %)"), rows)
+    if verbose:
+        header.append("effective samples")
+        for row, figure in zip(rows, figures.values(), strict=True):
+            row.append(f"{figure.effective_samples:.0f}")
+    print_table("", header, rows)
+    if result.target is not None:
+        _print_target(result.target)
     print(
         f"race loads up to {result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer); power balance "
         f"closes to {100.0 * result.power_gap:.2g} %; {result.replicates} replicates, seed {result.seed}; "
@@ -245,6 +273,8 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
         )
         print(f"clearance: {parts}")
     if verbose:
+        if result.transient_turns is not None:
+            print(f"transient: {result.transient_turns:g} shaft turns")
         terms = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
         gap = result.power_gap * result.power_loss.value
         print_table(f"power lost, each to ± {gap:.2g} W (gap of the power balance)", ("term", "W"), terms)
@@ -252,6 +282,20 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
     if not quiet:
         for note in result.notes:
             print(f"note: {note}")
+
+
+def _print_target(target: dict[str, Any]) -> None:
+    chosen, cost = target["chosen"], target["cost"]
+    reached = ", ".join(
+        f"{name} {'unknown' if error is None else f'{100.0 * error:.2g} %'}"
+        for name, error in target["relative_error"].items()
+    )
+    print(
+        f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached}) by "
+        f"{chosen['replicates']} replicates of {chosen['turns']:g} turns at rtol {chosen['rtol']:g}; "
+        f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides, "
+        f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots"
+    )
 
 
 @app.command()

@@ -74,7 +74,7 @@ def law(declaration: Callable[..., Any]) -> Any:
 
 
 def _leaves(of: Any) -> list[types.Type]:
-    if isinstance(of, types.BaseNamedTuple):
+    if isinstance(of, types.NamedTuple | types.NamedUniTuple):
         return [leaf for field in of.types for leaf in _leaves(field)]
     return [of]
 

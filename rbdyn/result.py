@@ -15,16 +15,20 @@ from rbdyn.faults import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMAT = "rbdyn.simulation/1"
+FORMAT = "rbdyn.simulation/2"
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A figure with the half-widths of its 95 % intervals; None where an error was not estimated."""
+    """A figure with the half-widths of its 95 % intervals; None where an error was not estimated.
+
+    ``effective_samples``: how many independent batches would tell as much of it as the correlated ones of the run.
+    """
 
     value: float
     statistical_error: float | None
     numerical_error: float | None
+    effective_samples: float
 
     def as_dict(self) -> dict[str, float | None]:
         """JSON form."""
@@ -32,6 +36,7 @@ class Quantity:
             "value": self.value,
             "statistical_error": self.statistical_error,
             "numerical_error": self.numerical_error,
+            "effective_samples": self.effective_samples,
         }
 
     def __str__(self) -> str:
@@ -47,7 +52,9 @@ class SimulationResult:
     """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input.
 
     ``races``: pressure, half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and
-    operating diametral clearance [um], with what fits, temperature and rotation take of it where a mounting is given.
+    operating diametral clearance [um], with what fits, temperature and rotation take of it where a mounting is given;
+    ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not tell;
+    ``target``: what a run to a target accuracy chose, reached and cost, None for any other.
     """
 
     status: str
@@ -64,12 +71,14 @@ class SimulationResult:
     races: dict[str, dict[str, float]]
     clearance: dict[str, float]
     impact_window_turns: float
+    transient_turns: float | None
     cost: dict[str, float]
     replicates: int
     seed: int
     notes: tuple[str, ...]
     versions: dict[str, str]
     scene: dict[str, Any]
+    target: dict[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """JSON form."""
@@ -91,6 +100,8 @@ class SimulationResult:
             "races": self.races,
             "clearance_um": self.clearance,
             "impact_window_turns": self.impact_window_turns,
+            "transient_turns": self.transient_turns,
+            "target": self.target,
             "cost": self.cost,
             "replicates": self.replicates,
             "seed": self.seed,
@@ -117,6 +128,8 @@ class SimulationResult:
             races=data["races"],
             clearance=data["clearance_um"],
             impact_window_turns=data["impact_window_turns"],
+            transient_turns=data["transient_turns"],
+            target=data["target"],
             cost=data["cost"],
             replicates=data["replicates"],
             seed=data["seed"],
@@ -126,7 +139,7 @@ class SimulationResult:
         )
 
     def table(self) -> pd.DataFrame:
-        """A row a figure: value and the half-widths of its 95 % errors; units in the names."""
+        """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 
         figures = {

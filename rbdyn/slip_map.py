@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rbdyn.dynamics.metrics import Replicate, quantity
+from rbdyn.dynamics.bias import companion_tolerance
+from rbdyn.dynamics.error_bars import quantities, settled
+from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Stop, as_they_end, prepare, run_replicate, thread_pool, tolerances_of
+from rbdyn.dynamics.simulate import Stop, as_they_end, prepare, run_replicate, thread_pool
 from rbdyn.faults import InputError, RunError
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene
@@ -26,12 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FORMAT = "rbdyn.map/1"
-FIGURES: dict[str, Callable[[Replicate], float]] = {
-    "cage_slip": lambda run: run.cage_slip,
-    "power_loss_W": lambda run: run.power_loss,
-    "impact_force_N": lambda run: run.impact_force,
-    "whirl_deviation_ratio": lambda run: run.whirl_deviation_ratio,
-}
+FIGURES = ("cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio")
 
 
 @dataclass(frozen=True)
@@ -140,12 +137,16 @@ def slip_map(
     scenes = [_at(scene, speed, load) for load in loads_N for speed in speeds_rpm]
     bearings = [roller_bearing(point) for point in scenes]
     prepare(scenes[0], bearings[0])
-    tolerances = tolerances_of(scene)
+    numerics = scene.numerics
+    series = (
+        (numerics.rtol, numerics.replicates),
+        (companion_tolerance(numerics.rtol), numerics.companions),
+    )
     tasks = [
         (place, rtol, replicate)
         for place in range(len(scenes))
-        for rtol in tolerances
-        for replicate in range(scene.numerics.replicates)
+        for rtol, count in series
+        for replicate in range(count)
     ]
     runs: dict[tuple[int, float, int], Replicate] = {}
     causes: dict[int, str] = {}
@@ -166,11 +167,11 @@ def slip_map(
                 progress(done, len(tasks))
     points = []
     for place, point in enumerate(scenes):
-        series = [
-            [runs[place, rtol, i] for i in range(scene.numerics.replicates)] if place not in causes else []
-            for rtol in tolerances
-        ]
-        points.append(_point(point, series, causes.get(place)))
+        cause = causes.get(place)
+        ours, theirs = (
+            [runs[place, rtol, i] for i in range(count)] if cause is None else [] for rtol, count in series
+        )
+        points.append(_point(point, ours, theirs, cause))
     wall_s = time.perf_counter() - started
     return SlipMap(tuple(speeds_rpm), tuple(loads_N), tuple(points), wall_s, scene.numerics.seed)
 
@@ -192,10 +193,12 @@ def _at(scene: Scene, speed: float, load: float) -> Scene:
     return Scene.from_dict(data, f"--speed {speed:g} --load {load:g}")
 
 
-def _point(scene: Scene, series: list[list[Replicate]], cause: str | None) -> Point:
+def _point(scene: Scene, runs: list[Replicate], companions: list[Replicate], cause: str | None) -> Point:
     speed, load = scene.operation.inner_speed_rpm, scene.operation.radial_load_N
     if cause is not None:
         return Point(speed, load, f"failed: {cause}", {}, None)
-    runs, companions = series[0], series[1] if len(series) > 1 else []
-    figures = {name: quantity(figure, runs, companions) for name, figure in FIGURES.items()}
-    return Point(speed, load, "ok", figures, max(run.power_gap for run in runs))
+    runs, companions, _ = settled(scene, runs, companions)
+    found = quantities(scene, runs, companions)
+    return Point(
+        speed, load, "ok", {name: found[name] for name in FIGURES}, max(run.power_gap for run in runs)
+    )

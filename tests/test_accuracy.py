@@ -9,7 +9,7 @@ import pytest
 
 from rbdyn import accuracy
 from rbdyn.accuracy import replication, slicing, tolerances, work_precision
-from rbdyn.dynamics.metrics import student_half_width
+from rbdyn.dynamics.batch_means import student_half_width
 from rbdyn.faults import InputError, RunError
 
 EXAMPLE = "examples/cylindrical_roller.toml"

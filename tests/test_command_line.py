@@ -66,7 +66,7 @@ def test_command_line_table_and_options(command):
         "not estimated",
         "1 replicates, seed 5",
         "rolling resistance",
-        "note: one replicate",
+        "effective samples",
     ):
         assert words in shown.stdout
     quiet = command("simulate", EXAMPLE, *QUICK, *options, "-q")

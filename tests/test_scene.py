@@ -130,6 +130,9 @@ def test_unit_numbers_must_be_finite(key, value):
         ("bearing.pitch_diameter_mm", "43.5", "number without quotes"),
         ("cage.guidance", 3, "choose one of"),
         ("numerics.companion", "yes", "true or false"),
+        ("numerics.companion_share", 0.0, "greater than 0"),
+        ("numerics.discard_turns", "some", "choose one of 'auto'"),
+        ("numerics.discard_turns", -1.0, "at least 0"),
         ("materials.cage", {"elastic_modulus_GPa": 100.0}, "missing"),
     ],
 )

@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rbdyn.dynamics.batch_means import student_factor, student_half_width
+from rbdyn.dynamics.bias import Comparison
 from rbdyn.dynamics.equations import (
     INNER_LOAD,
     LAND_LOAD,
@@ -21,7 +23,7 @@ from rbdyn.dynamics.equations import (
 )
 from rbdyn.dynamics.geometry import kinematics
 from rbdyn.dynamics.history import history
-from rbdyn.dynamics.metrics import Replicate, quantity, student_factor, student_half_width
+from rbdyn.dynamics.metrics import IMPACT_FORCE, POWER_LOSS, Replicate, quantity
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import Run, Stop, simulate
 from rbdyn.faults import InputError, RunError
@@ -30,7 +32,7 @@ from rbdyn.result import Quantity, SimulationResult
 # The contract of `rbdyn simulate --json`; more keys may be added.
 KEYS = {
     "format", "status", "impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip",
-    "power_balance", "power_terms_W", "loads", "cost", "replicates", "seed", "versions",
+    "power_balance", "power_terms_W", "loads", "cost", "replicates", "seed", "versions", "transient_turns", "target",
 }  # fmt: skip
 QUANTITIES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
 COST_KEYS = {"wall_s", "compile_s", "steps", "rejected_steps", "rhs_evaluations", "turns"}
@@ -65,11 +67,13 @@ def test_unit_seeds_differ(outer, outer_result):
 
 
 def test_unit_replicates_are_independent_of_their_number(outer, outer_result):
-    """Unit: the first replicate alone gives no statistical error, and says that it does not."""
+    """Unit: the first replicate alone has a statistical error from its batches, and says that these are few."""
     one = simulate(changed(outer, replicates=1))
-    assert one.impact_force.statistical_error is None
-    assert one.as_dict()["power_loss_W"]["statistical_error"] is None
-    assert any("one replicate" in note for note in one.notes)
+    assert one.power_loss.statistical_error > 0.0
+    assert one.power_loss.effective_samples <= 4.0
+    assert any("fewer than 10 effective samples" in note for note in one.notes)
+    window = simulate(changed(outer, replicates=1, impact_window_turns=4.0))
+    assert window.as_dict()["impact_force_N"]["statistical_error"] is None
     # Two values a, b: mean of both lies half way between.
     assert outer_result.power_loss.value != one.power_loss.value
     assert outer_result.power_loss.statistical_error is not None
@@ -79,17 +83,38 @@ def test_unit_companions_give_a_numerical_error(outer, outer_result):
     """Unit: with companions there is a numerical error, and the values stay those of the asked tolerance."""
     both = simulate(changed(outer, companion=True))
     assert both.power_loss.value == outer_result.power_loss.value
-    assert both.power_loss.numerical_error > 0.0
-    assert outer_result.power_loss.numerical_error is None
+    assert both.impact_force.numerical_error > 0.0
+    assert outer_result.impact_force.numerical_error is None
+    # Of the loss the power balance tells without companions.
+    assert both.power_loss.numerical_error == outer_result.power_loss.numerical_error > 0.0
+    # A quarter of the replicates, at least one.
+    assert both.cost["turns"] == outer_result.cost["turns"] + 4 + 2
+
+
+def test_unit_a_failing_companion_leaves_the_figures(outer, outer_result, monkeypatch):
+    """Unit: where only a companion cannot go on, figures stay and the note says why there is no numerical error."""
+    import rbdyn.dynamics.simulate as module
+
+    run_series = module.run_series
+
+    def failing(scene, bearing, tolerances, *rest):
+        if tolerances[0] > outer.numerics.rtol:
+            raise RunError("replicate 1 stopped")
+        return run_series(scene, bearing, tolerances, *rest)
+
+    monkeypatch.setattr(module, "run_series", failing)
+    alone = simulate(changed(outer, companion=True))
+    assert alone.impact_force == outer_result.impact_force
+    assert any("not estimated" in note and "replicate 1 stopped" in note for note in alone.notes)
 
 
 def test_unit_json_keys_and_values(outer_result):
     """Unit: keys, their form, and plain JSON without NaN."""
     record = json.loads(json.dumps(outer_result.as_dict(), allow_nan=False))
     assert record.keys() >= KEYS
-    assert (record["format"], record["status"]) == ("rbdyn.simulation/1", "ok")
+    assert (record["format"], record["status"]) == ("rbdyn.simulation/2", "ok")
     for name in QUANTITIES:
-        assert record[name].keys() == {"value", "statistical_error", "numerical_error"}
+        assert record[name].keys() == {"value", "statistical_error", "numerical_error", "effective_samples"}
     assert record["power_balance"].keys() >= {"relative_gap"}
     assert record["loads"].keys() >= {"max_inner_N", "max_outer_N"}
     assert record["cost"].keys() >= COST_KEYS
@@ -257,14 +282,15 @@ def record_of(speeds, scene, **changes):
     """A replicate whose cage centre had these speeds [m/s]."""
     speeds = np.asarray(speeds)
     blank = Replicate(
-        duration=1.0,
-        impact_windows=np.ones(1),
-        whirl=np.array([len(speeds), speeds.sum(), (speeds**2).sum()]),
-        work=np.zeros(POWERS),
-        largest=np.zeros(LOADS),
-        cage_angle=kinematics(scene).cage_speed,
-        kinematic_cage_speed=kinematics(scene).cage_speed,
-        energy_change=0.0,
+        first=0,
+        per_window=1,
+        durations=np.ones(1),
+        whirl=np.array([[len(speeds), speeds.sum(), (speeds**2).sum()]]),
+        work=np.zeros((1, POWERS)),
+        largest=np.zeros((1, LOADS)),
+        cage_angle=np.array([kinematics(scene).cage_speed]),
+        kinematic_angle=np.array([kinematics(scene).cage_speed]),
+        energy=np.zeros(2),
         energy_scale=1.0,
         accepted_steps=1,
         rejected_steps=0,
@@ -291,15 +317,27 @@ def test_literature_whirl_deviation_ratio(outer):
 
 def test_unit_replicate_figures(outer):
     """Unit: means over windows, slip, and the gap of the power balance."""
-    work = np.zeros(POWERS)
-    work[0], work[2], work[SHAFT] = 3.0, 1.0, 5.0
+    work = np.zeros((2, POWERS))
+    work[:, 0], work[:, 2], work[:, SHAFT] = 1.5, 0.5, 2.5
+    loads = np.zeros((2, LOADS))
+    loads[:, POCKET_LOAD] = 10.0, 20.0
     run = record_of(
-        [1.0], outer, duration=2.0, work=work, energy_change=0.9, impact_windows=np.array([10.0, 20.0])
+        [1.0],
+        outer,
+        durations=np.ones(2),
+        work=work,
+        energy=np.array([0.0, 5.0, 0.9]),
+        largest=loads,
+        cage_angle=np.full(2, 0.5 * kinematics(outer).cage_speed),
+        kinematic_angle=np.full(2, kinematics(outer).cage_speed),
     )
     assert (run.impact_force, run.power_loss) == (15.0, 2.0)
     assert run.power("outer_race_traction") == 1.5
     assert run.power_gap == pytest.approx(0.02)
     assert run.cage_slip == pytest.approx(0.5)
+    later = run.counted_from(1)
+    assert (later.impact_force, later.duration) == (20.0, 1.0)
+    assert later.missing_work == pytest.approx(2.5 - 2.0 + 4.1)
 
 
 def test_oracle_student_coverage():
@@ -318,12 +356,21 @@ def test_oracle_student_coverage():
 
 
 def test_unit_quantity(outer):
-    """Unit: the numerical error is the mean change plus its own half-width."""
-    runs = [record_of([1.0], outer, impact_windows=np.array([v])) for v in (1.0, 2.0, 3.0)]
-    pairs = [record_of([1.0], outer, impact_windows=np.array([v])) for v in (1.5, 2.5, 3.5)]
-    found = quantity(lambda run: run.impact_force, runs, pairs)
-    assert found.value == 2.0
-    assert found.statistical_error == pytest.approx(4.302652729911275 / math.sqrt(3.0))  # t(2, 0.975)
-    assert found.numerical_error == pytest.approx(0.5)
-    assert str(Quantity(2.0, None, None)) == "2"
-    assert "± 0.5 (numerical)" in str(found)
+    """Unit: the statistical error of independent replicates is Student's; the numerical one comes from companions."""
+
+    def series(*forces):
+        loads = np.zeros((len(forces), 1, LOADS))
+        loads[:, 0, POCKET_LOAD] = forces
+        return [record_of([1.0], outer, largest=each) for each in loads]
+
+    runs = series(1.0, 2.0, 3.0)
+    comparison = Comparison(0.001, 0.02, True)
+    found = quantity(IMPACT_FORCE, runs, series(11.0, 12.0, 13.0), comparison, 2.0)
+    assert found.value == 4.0
+    student = 4.302652729911275 / math.sqrt(3.0)  # t(2, 0.975)
+    assert found.statistical_error == pytest.approx(2.0 * student)
+    assert found.numerical_error == pytest.approx(2.0 * (10.0 + math.sqrt(2.0) * student) * 3.0 / 9.0)
+    assert quantity(IMPACT_FORCE, runs, [], None).numerical_error is None
+    assert quantity(POWER_LOSS, runs, [], None).numerical_error == 0.0
+    assert str(Quantity(2.0, None, None, 1.0)) == "2"
+    assert "(numerical)" in str(found)

@@ -24,7 +24,8 @@ from rbdyn.accuracy.report import Progress, Table
 from rbdyn.accuracy.tolerances import NEGLIGIBLE, OUTPUTS, Bias, bias_cells, bias_of
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Run, Stop, counted, prepare
+from rbdyn.dynamics.recording import record
+from rbdyn.dynamics.simulate import Run, Stop, prepare
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 
@@ -133,13 +134,13 @@ def _steps(scene: Scene, contact_times: float) -> float:
 
 
 def _replicates(scene: Scene, start: Callable[[int], Run]) -> list[Replicate]:
-    return [counted(start(index)) for index in range(scene.numerics.replicates)]
+    return [record(start(index)) for index in range(scene.numerics.replicates)]
 
 
 def _row(
     scene: Scene, method: str, setting: str, runs: Sequence[Replicate], reference: Sequence[Replicate]
 ) -> Row:
-    turns = scene.numerics.turns + scene.numerics.discard_turns
+    turns = scene.numerics.turns + scene.numerics.warm_up_turns
     return Row(
         method=method,
         setting=setting,

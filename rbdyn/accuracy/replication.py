@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rbdyn.accuracy.report import Progress, Report, Table, record
 from rbdyn.accuracy.tolerances import OUTPUTS
+from rbdyn.dynamics.batch_means import student_factor
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import Stop, prepare, run_series
 from rbdyn.scene import Scene
@@ -84,7 +85,7 @@ def study(
             slopes={name: found.__dict__ for name, found in slopes.items()},
             conclusion=" ".join(sentences),
             pool=pool,
-            discard_turns=scene.numerics.discard_turns,
+            discard_turns=scene.numerics.warm_up_turns,
         ),
         tables=(Table("95 % half-widths, relative", header, cells),),
         sentences=sentences,
@@ -139,10 +140,8 @@ def replication_rows(
 
 def expected_half_width(sample: NDArray[np.float64], count: int) -> float:
     """Half-width for ``count`` replicates that scatter as the whole sample does, over the sample's mean."""
-    from scipy.special import stdtrit
-
     relative = float(sample.std(ddof=1) / (abs(sample.mean()) or 1.0))
-    return float(stdtrit(count - 1, 0.975)) * relative / math.sqrt(count)
+    return student_factor(count - 1) * relative / math.sqrt(count)
 
 
 def slope(turns: Sequence[float], samples: Sequence[NDArray[np.float64]]) -> Slope:

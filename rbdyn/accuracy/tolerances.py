@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from rbdyn.accuracy.report import Progress, Table
-from rbdyn.dynamics.metrics import Replicate, student_half_width
+from rbdyn.dynamics.batch_means import student_half_width
+from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import Stop, prepare, run_series
 from rbdyn.faults import RunError
@@ -144,7 +145,7 @@ def flat(row: Row | Any) -> dict[str, Any]:
 
 
 def _row(scene: Scene, rtol: float, runs: list[Replicate], reference: list[Replicate]) -> Row:
-    turns = scene.numerics.turns + scene.numerics.discard_turns
+    turns = scene.numerics.turns + scene.numerics.warm_up_turns
     return Row(
         **bias_of(runs, reference).__dict__,
         rtol=rtol,

@@ -103,14 +103,14 @@ def history(
     bearing = roller_bearing(scene)
     z = bearing.rollers
     run = Run(scene, bearing, replicate, scene.numerics.rtol, stop or Stop())
-    run.to(scene.numerics.discard_turns)
+    run.to(scene.numerics.warm_up_turns)
     run.forget()
     per_turn = samples_per_turn or scene.numerics.samples_per_turn
     states = np.empty((int(turns * per_turn), run.carry.y.size))
     clock = np.empty((len(states), 2))
     for sample, state in enumerate(states):
         # Steps end at the samples: what is recorded is what was integrated.
-        run.to(scene.numerics.discard_turns + sample / per_turn)
+        run.to(scene.numerics.warm_up_turns + sample / per_turn)
         state[:] = run.carry.y
         clock[sample] = run.clock_angles()
     seen = np.empty((OBSERVED, len(states), z))

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.dynamics.batch_means import student_half_width
 from rbdyn.dynamics.geometry import absolute_tolerance
-from rbdyn.dynamics.metrics import student_half_width
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.simulate import Run, Stop
 from rbdyn.scene import Scene
@@ -93,7 +93,7 @@ def lyapunov_exponent(
     bearing, stop = roller_bearing(scene), stop or Stop()
     leader = Run(scene, bearing, replicate, rtol, stop)
     follower = Run(scene, bearing, replicate, rtol, stop)
-    begin = numerics.discard_turns
+    begin = numerics.warm_up_turns
     leader.to(begin)
     follower.carry.clock[:] = leader.carry.clock
     # The clock of a scene that depends on time has no scale, and is not moved apart.

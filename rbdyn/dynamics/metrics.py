@@ -1,42 +1,64 @@
-"""From what one replicate kept to the figures that are reported."""
+"""From what one replicate kept, batch by batch, to the figures that are reported."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.equations import INNER_LOAD, LAND_LOAD, LOAD, LOSSES, OUTER_LOAD, SHAFT
+from rbdyn.dynamics.batch_means import estimate
+from rbdyn.dynamics.bias import Comparison, companion_error, missing_power
+from rbdyn.dynamics.equations import INNER_LOAD, LAND_LOAD, LOAD, LOSSES, OUTER_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.result import Quantity
+
+Array = NDArray[np.float64]
 
 SLOWEST_CAGE = 1e-6  # [rad/s]
 
 
 @dataclass(frozen=True)
 class Replicate:
-    """One counted run. Times in s, works in J, loads in N.
+    """One run in batches. Times in s, works and energies in J, loads in N, angles in rad.
 
-    ``impact_windows``: largest roller/cage force of each whole window; ``whirl``: samples, sum and sum of squares of
-    the cage centre's speed; ``work``: integrals of the loss powers, then of those that come in by shafts and loads;
-    ``energy_change``: of kinetic, elastic and load energy together; ``energy_scale``: contact load times approach, at least.
+    Arrays over batches, from the start on; figures count from the batch ``first``, and ``per_window`` batches make an
+    impact window. ``whirl``: samples, sum and sum of squares of the cage centre's speed; ``work``: integrals of the
+    loss powers, then of those that come in by shafts and loads; ``largest``: loads; ``energy``: kinetic, elastic and
+    load energy together, at the start and at the end of each batch; ``energy_scale``: contact load times approach.
     """
 
-    duration: float
-    impact_windows: NDArray[np.float64]
-    whirl: NDArray[np.float64]
-    work: NDArray[np.float64]
-    largest: NDArray[np.float64]
-    cage_angle: float
-    kinematic_cage_speed: float
-    energy_change: float
+    first: int
+    per_window: int
+    durations: Array
+    whirl: Array
+    work: Array
+    largest: Array
+    cage_angle: Array
+    kinematic_angle: Array
+    energy: Array
     energy_scale: float
     accepted_steps: int
     rejected_steps: int
     derivatives: int
     cpu_s: float
+
+    def counted_from(self, first: int) -> Replicate:
+        """The same run, counted from another batch."""
+        return replace(self, first=first)
+
+    @property
+    def duration(self) -> float:
+        """Time counted [s]."""
+        return float(self.durations[self.first :].sum())
+
+    @property
+    def impact_windows(self) -> Array:
+        """Largest roller/cage force of each whole window [N]."""
+        forces = self.largest[self.first :, POCKET_LOAD]
+        whole = len(forces) // self.per_window
+        return forces[: whole * self.per_window].reshape(whole, self.per_window).max(axis=1)
 
     @property
     def impact_force(self) -> float:
@@ -45,101 +67,133 @@ class Replicate:
 
     @property
     def whirl_deviation_ratio(self) -> float:
-        """Standard deviation over mean of the cage centre's speed (Ghaisas et al. 2004); 0 for a cage at rest."""
-        samples, total, squares = self.whirl
-        if samples < 2 or total == 0.0:
-            return 0.0
-        mean = total / samples
-        variance = max(squares / samples - mean**2, 0.0) * samples / (samples - 1)
-        return float(math.sqrt(variance) / mean)
+        """Standard deviation over mean of the cage centre's speed; 0 for a cage at rest."""
+        return self._figure(WHIRL_DEVIATION_RATIO)
 
     @property
     def power_loss(self) -> float:
         """Mean power turned into heat [W]."""
-        return float(self.work[:SHAFT].sum() / self.duration)
+        return self._figure(POWER_LOSS)
 
     @property
     def cage_speed(self) -> float:
         """Mean cage speed [rad/s]."""
-        return self.cage_angle / self.duration
+        return float(self.cage_angle[self.first :].sum()) / self.duration
 
     @property
     def cage_slip(self) -> float:
-        """1 - cage speed over kinematic cage speed; 0 where counter-rotation leaves the cage no speed to fall behind."""
-        if abs(self.kinematic_cage_speed) < SLOWEST_CAGE:
-            return 0.0
-        return 1.0 - self.cage_speed / self.kinematic_cage_speed
+        """1 - cage speed over kinematic cage speed."""
+        return self._figure(CAGE_SLIP)
+
+    def _figure(self, figure: Figure) -> float:
+        return float(figure.of_sums(figure.moments(self).sum(axis=0)))
+
+    def _works(self) -> tuple[float, float, float]:
+        """Work put in, work lost, change of energy [J]."""
+        work = self.work[self.first :].sum(axis=0)
+        return work[SHAFT] + work[LOAD], work[:SHAFT].sum(), self.energy[-1] - self.energy[self.first]
+
+    @property
+    def missing_work(self) -> float:
+        """Work put in less losses less change of energy [J]."""
+        put_in, lost, change = self._works()
+        return float(put_in - lost - change)
+
+    @property
+    def signed_power_gap(self) -> float:
+        """Missing work relative to the largest of its terms."""
+        return self.missing_work / max(*map(abs, self._works()), self.energy_scale)
 
     @property
     def power_gap(self) -> float:
-        """Work put in less losses less change of energy, relative to the largest of them."""
-        put_in, lost = self.work[SHAFT] + self.work[LOAD], self.work[:SHAFT].sum()
-        gap = put_in - lost - self.energy_change
-        return float(abs(gap) / max(abs(put_in), abs(lost), abs(self.energy_change), self.energy_scale))
+        """Size of the gap of the power balance."""
+        return abs(self.signed_power_gap)
 
     def power(self, term: str) -> float:
         """Mean power [W] of one loss."""
-        return float(self.work[LOSSES.index(term)] / self.duration)
+        return float(self.work[self.first :, LOSSES.index(term)].sum() / self.duration)
 
     @property
     def max_inner_load(self) -> float:
         """Largest load between a roller and the inner race [N]."""
-        return float(self.largest[INNER_LOAD])
+        return float(self.largest[self.first :, INNER_LOAD].max())
 
     @property
     def max_outer_load(self) -> float:
         """Largest load between a roller and the outer race [N]."""
-        return float(self.largest[OUTER_LOAD])
+        return float(self.largest[self.first :, OUTER_LOAD].max())
 
     @property
     def max_land_load(self) -> float:
         """Largest dry load between cage and guide land [N]."""
-        return float(self.largest[LAND_LOAD])
+        return float(self.largest[self.first :, LAND_LOAD].max())
+
+
+class Figure(NamedTuple):
+    """A figure as a function of sums over batches (or impact windows), so that any set of batches has one.
+
+    ``moments``: (batches, sums) of the counted part of a replicate; ``of_sums``: from sums on the last axis.
+    """
+
+    moments: Callable[[Replicate], Array]
+    of_sums: Callable[[Array], Array]
+
+
+def _mean(sums: Array) -> Array:
+    return sums[..., 1] / sums[..., 0]
+
+
+def _deviation_ratio(sums: Array) -> Array:
+    """Standard deviation over mean (Ghaisas et al. 2004); 0 for a cage at rest."""
+    samples, total, squares = np.moveaxis(sums, -1, 0)
+    known = (samples > 1.5) & (total > 0.0)
+    samples, total = np.where(known, samples, 2.0), np.where(known, total, 1.0)
+    mean = total / samples
+    variance = np.maximum(squares / samples - mean**2, 0.0) * samples / (samples - 1.0)
+    return np.where(known, np.sqrt(variance) / mean, 0.0)
+
+
+def _slip(sums: Array) -> Array:
+    """0 where counter-rotation leaves the cage no speed to fall behind."""
+    duration, rolling, turned = np.moveaxis(sums, -1, 0)
+    known = np.abs(rolling) > SLOWEST_CAGE * duration
+    return np.where(known, 1.0 - turned / np.where(known, rolling, 1.0), 0.0)
+
+
+def _windows(run: Replicate) -> Array:
+    return np.column_stack((np.ones(len(run.impact_windows)), run.impact_windows))
+
+
+def _timed(values: Callable[[Replicate], Array]) -> Callable[[Replicate], Array]:
+    return lambda run: np.column_stack((run.durations, values(run)))[run.first :]
+
+
+IMPACT_FORCE = Figure(_windows, _mean)
+WHIRL_DEVIATION_RATIO = Figure(lambda run: run.whirl[run.first :], _deviation_ratio)
+POWER_LOSS = Figure(_timed(lambda run: run.work[:, :SHAFT].sum(axis=1)), _mean)
+CAGE_SPEED = Figure(_timed(lambda run: run.cage_angle), _mean)
+CAGE_SLIP = Figure(_timed(lambda run: np.column_stack((run.kinematic_angle, run.cage_angle))), _slip)
 
 
 def quantity(
-    figure: Callable[[Replicate], float], replicates: Sequence[Replicate], companions: Sequence[Replicate]
+    figure: Figure,
+    runs: Sequence[Replicate],
+    companions: Sequence[Replicate],
+    comparison: Comparison | None,
+    unit: float = 1.0,
 ) -> Quantity:
-    """A figure with its 95 % errors.
+    """A figure with its 95 % errors, times ``unit``.
 
-    Statistical: Student's t over replicates, which are independent (each has its own seeded start). Numerical: the
-    mean change when every replicate is repeated at a tenth of the tolerance, plus the 95 % half-width of that mean,
-    since chaos makes the two runs of a pair all but independent; so an upper bound. None where it was not estimated.
+    Statistical: batch means over all replicates (``rbdyn.dynamics.batch_means``). Numerical: of the power loss what
+    the power balance misses, of all else from companions and how they ``compare`` (``rbdyn.dynamics.bias``). None where
+    it was not estimated.
     """
-    values = np.array([figure(run) for run in replicates])
-    statistical = student_half_width(values)
+    ours = estimate([figure.moments(run) for run in runs], figure.of_sums)
     numerical = None
-    if companions:
-        change = np.array([figure(run) for run in companions]) - values
-        numerical = float(abs(change.mean())) + (student_half_width(change) or 0.0)
-    return Quantity(float(values.mean()), statistical, numerical)
-
-
-def student_half_width(values: NDArray[np.float64]) -> float | None:
-    """Half-width of the 95 % interval of a mean of independent values; None for fewer than two."""
-    count = len(values)
-    if count < 2:
-        return None
-    return float(student_factor(count - 1) * values.std(ddof=1) / math.sqrt(count))
-
-
-def student_factor(freedom: int) -> float:
-    """The t that holds 95 % of Student's distribution with ``freedom`` > 0 degrees of freedom between -t and t.
-
-    Bisection of the finite sums of Abramowitz and Stegun, eq 26.7.3 and 26.7.4, in theta = atan(t/sqrt(freedom)).
-    """
-
-    def held(theta: float) -> float:
-        cosine, sine = math.cos(theta), math.sin(theta)
-        even = freedom % 2 == 0
-        term, total = (1.0, 0.0) if even else (cosine, 0.0)
-        for k in range(1 if even else 2, freedom, 2):
-            total += term
-            term *= cosine * cosine * k / (k + 1)
-        return sine * total if even else 2.0 / math.pi * (theta + sine * total)
-
-    low, high = 0.0, 0.5 * math.pi
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if held(middle) < 0.95 else (low, middle)
-    return math.sqrt(freedom) * math.tan(0.5 * (low + high))
+    if figure is POWER_LOSS:
+        numerical = missing_power(runs)
+    elif comparison is not None:
+        theirs = estimate([figure.moments(run) for run in companions], figure.of_sums)
+        numerical = companion_error(ours, theirs, comparison)
+    statistical, numerical = (None if x is None else unit * x for x in (ours.half_width, numerical))
+    return Quantity(unit * ours.value, statistical, numerical, ours.effective_samples)

@@ -15,13 +15,16 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.dynamics.bias import companion_tolerance
 from rbdyn.dynamics.energy import mechanical_energy
 from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing
-from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, raceway_radii, scales, shaft_speeds
-from rbdyn.dynamics.metrics import Replicate, quantity
+from rbdyn.dynamics.error_bars import error_notes, quantities, settled
+from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
+from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_lanes import scratch
 from rbdyn.dynamics.race_report import race_report
+from rbdyn.dynamics.recording import record
 from rbdyn.dynamics.runge_kutta import (
     FINISHED,
     NOT_FINITE,
@@ -32,7 +35,7 @@ from rbdyn.dynamics.runge_kutta import (
     advance,
 )
 from rbdyn.dynamics.start import start_state
-from rbdyn.dynamics.state import CAGE_ANGLE, INNER_ANGLE, OUTER_ANGLE, name
+from rbdyn.dynamics.state import INNER_ANGLE, OUTER_ANGLE, name
 from rbdyn.faults import RunError
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene
@@ -43,7 +46,6 @@ T = TypeVar("T")
 CHUNK_TURNS = 10.0
 LARGEST_STEP_TURNS = 0.02
 SMALLEST_STEP_TURNS = 1e-12
-COMPANION_FACTOR = 0.1
 PI_START_ERROR = 1e-4
 # Beyond this relative gap of the power balance a result warns of its tolerance.
 LARGEST_POWER_GAP = 0.005
@@ -78,7 +80,7 @@ class Run:
         y = start_state(scene, bearing, np.random.default_rng(seeds))
         tolerance = absolute_tolerance(scene, rtol)
         numerics = scene.numerics
-        turns = numerics.turns + numerics.discard_turns
+        turns = numerics.turns + numerics.warm_up_turns
         self.control = Control(
             1.0 / tolerance,
             SMALLEST_STEP_TURNS * scene.turn_s,
@@ -146,52 +148,9 @@ class Run:
         )
 
 
-def kinematic_cage_speed(scene: Scene, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
-    """Mean epicyclic cage speed [rad/s] over the counted turns, from the ring angles before and after them."""
-    outer, inner = raceway_radii(scene)
-    turned = (after - before) / (scene.numerics.turns * scene.turn_s)
-    return float((turned[0] * inner + turned[1] * outer) / (inner + outer))
-
-
 def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> Replicate:
-    """Run one replicate: discard the transient, then count. Raises RunError or CancelledError."""
-    return counted(Run(scene, bearing, replicate, rtol, stop))
-
-
-def counted(run: Run) -> Replicate:
-    """Take a run that is about to start to its end. Raises RunError or CancelledError."""
-    started = time.thread_time()
-    scene, bearing, numerics = run.scene, run.bearing, run.scene.numerics
-    run.to(numerics.discard_turns)
-    run.forget()
-    body = 5 * bearing.rollers
-    angle, clock = run.carry.y[body + CAGE_ANGLE], run.clock_angles()
-    energy = sum(mechanical_energy(bearing, run.carry.y))
-    window = scene.impact_window_turns
-    impacts, largest = [], np.zeros(LOADS)
-    for index in range(int(numerics.turns / window + 1e-9)):
-        run.tally.largest[:] = 0.0
-        run.to(numerics.discard_turns + (index + 1) * window)
-        impacts.append(run.tally.largest[0])
-        largest = np.maximum(largest, run.tally.largest)
-    run.to(numerics.discard_turns + numerics.turns)
-    largest = np.maximum(largest, run.tally.largest)
-    scale = scales(scene)
-    return Replicate(
-        duration=numerics.turns * scene.turn_s,
-        impact_windows=np.array(impacts),
-        whirl=run.tally.whirl.copy(),
-        work=run.tally.work.copy(),
-        largest=largest,
-        cage_angle=float(run.carry.y[body + CAGE_ANGLE] - angle),
-        kinematic_cage_speed=kinematic_cage_speed(scene, clock, run.clock_angles()),
-        energy_change=float(sum(mechanical_energy(bearing, run.carry.y)) - energy),
-        energy_scale=scale.load * scale.length,
-        accepted_steps=int(run.carry.counts[0]),
-        rejected_steps=int(run.carry.counts[1]),
-        derivatives=int(run.carry.counts[2]),
-        cpu_s=time.thread_time() - started,
-    )
+    """Run one replicate, the transient included. Raises RunError or CancelledError."""
+    return record(Run(scene, bearing, replicate, rtol, stop))
 
 
 def prepare(scene: Scene, bearing: RollerBearing) -> float:
@@ -208,27 +167,59 @@ def simulate(
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
     stop: Stop | None = None,
+    target: float | None = None,
 ) -> SimulationResult:
     """Simulate all replicates of a scene.
 
     ``workers``: threads, all processors by default; the result does not depend on it. ``progress(done, total)`` is
-    called after every run. Raises RunError when a replicate cannot go on, KeyboardInterrupt on Ctrl-C.
+    called after every run. ``target``: relative error to reach, for which tolerance, turns and replicates are chosen
+    (``rbdyn.dynamics.target``). Raises RunError when a replicate cannot go on, InputError for an impossible target,
+    KeyboardInterrupt on Ctrl-C.
     """
+    if target is not None:
+        from rbdyn.dynamics.target import reach
+
+        return reach(scene, target, workers, progress, stop)
     stop = Stop(outer=stop)
     bearing = roller_bearing(scene)
     compile_s = prepare(scene, bearing)
-    numerics = scene.numerics
-    tolerances = tolerances_of(scene)
     started = time.perf_counter()
-    series = run_series(scene, bearing, tolerances, workers, progress, stop)
+    runs, companions, fault = with_companions(scene, bearing, workers, progress, stop)
     wall_s = time.perf_counter() - started
-    return _gather(scene, series[0], series[1] if numerics.companion else [], wall_s, compile_s)
+    return _gather(scene, runs, companions, fault, wall_s, compile_s)
 
 
-def tolerances_of(scene: Scene) -> list[float]:
-    """Tolerance of the replicates and, where they have companions, of these."""
-    rtol = scene.numerics.rtol
-    return [rtol] + [COMPANION_FACTOR * rtol] * scene.numerics.companion
+def with_companions(
+    scene: Scene,
+    bearing: RollerBearing,
+    workers: int | None,
+    progress: Callable[[int, int], None] | None,
+    stop: Stop,
+) -> tuple[list[Replicate], list[Replicate], str | None]:
+    """Replicates, their companions, and why there are none of these although asked for.
+
+    Raises RunError when a replicate cannot go on, KeyboardInterrupt.
+    """
+    numerics = scene.numerics
+    total = numerics.replicates + numerics.companions
+
+    def after(before: int) -> Callable[[int, int], None] | None:
+        return None if progress is None else lambda done, _: progress(before + done, total)
+
+    (runs,) = run_series(scene, bearing, [numerics.rtol], workers, after(0), stop)
+    if not numerics.companions:
+        return runs, [], None
+    fewer = scene.model_copy(
+        update={"numerics": numerics.model_copy(update={"replicates": numerics.companions})}
+    )
+    rtol = companion_tolerance(numerics.rtol)
+    try:
+        (companions,) = run_series(
+            fewer, bearing, [rtol], workers, after(numerics.replicates), Stop(outer=stop)
+        )
+    except RunError as error:
+        return runs, [], f"a companion at numerics.rtol = {rtol:g} could not go on ({error})"
+    return runs, companions, None
 
 
 def run_series(
@@ -278,28 +269,40 @@ def as_they_end(futures: Iterable[Future[T]]) -> Iterator[Future[T]]:
 
 
 def _gather(
-    scene: Scene, runs: list[Replicate], companions: list[Replicate], wall_s: float, compile_s: float
+    scene: Scene,
+    runs: list[Replicate],
+    companions: list[Replicate],
+    fault: str | None,
+    wall_s: float,
+    compile_s: float,
 ) -> SimulationResult:
     everything = [*runs, *companions]
-    per_run = scene.numerics.turns + scene.numerics.discard_turns
+    per_run = scene.numerics.turns + scene.numerics.warm_up_turns
+    runs, companions, start = settled(scene, runs, companions)
+    figures = quantities(scene, runs, companions)
+    power_gap = max(run.power_gap for run in runs)
     inner_load, outer_load = (
         max(getattr(run, f"max_{race}_load") for run in runs) for race in ("inner", "outer")
     )
     return SimulationResult(
         status="ok",
-        impact_force=quantity(lambda run: run.impact_force, runs, companions),
-        whirl_deviation_ratio=quantity(lambda run: run.whirl_deviation_ratio, runs, companions),
-        power_loss=quantity(lambda run: run.power_loss, runs, companions),
-        cage_speed_rpm=quantity(lambda run: run.cage_speed * 30.0 / math.pi, runs, companions),
-        cage_slip=quantity(lambda run: run.cage_slip, runs, companions),
-        power_gap=max(run.power_gap for run in runs),
-        power_terms={term: float(np.mean([run.power(term) for run in runs])) for term in LOSSES},
+        impact_force=figures["impact_force_N"],
+        whirl_deviation_ratio=figures["whirl_deviation_ratio"],
+        power_loss=figures["power_loss_W"],
+        cage_speed_rpm=figures["cage_speed_rpm"],
+        cage_slip=figures["cage_slip"],
+        power_gap=power_gap,
+        power_terms={
+            term: float(np.average([run.power(term) for run in runs], weights=[run.duration for run in runs]))
+            for term in LOSSES
+        },
         max_inner_load=inner_load,
         max_outer_load=outer_load,
         max_land_load=max(run.max_land_load for run in runs),
         races=race_report(scene, inner_load, outer_load),
         clearance=clearance_report(scene),
         impact_window_turns=scene.impact_window_turns,
+        transient_turns=start.turns,
         cost={
             "wall_s": wall_s,
             "compile_s": compile_s,
@@ -311,7 +314,7 @@ def _gather(
         },
         replicates=scene.numerics.replicates,
         seed=scene.numerics.seed,
-        notes=_notes(scene, max(run.power_gap for run in runs)),
+        notes=(*_notes(scene, power_gap), *start.notes, *error_notes(scene, figures, fault)),
         versions=versions(),
         scene=scene.model_dump(mode="json"),
     )
@@ -332,7 +335,7 @@ def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
     if power_gap > LARGEST_POWER_GAP:
         notes.append(
             f"power balance closes only to {100.0 * power_gap:.2g} %: numerics.rtol = {scene.numerics.rtol:g} is too "
-            "loose for this scene, and loose tolerances bias outputs upward; tighten it tenfold"
+            "loose for this scene; loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
         )
     if scene.traction.model == "four_constant":
         notes.append(
@@ -344,6 +347,4 @@ def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
             "traction: follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use; choose "
             "traction.rheology_oil to suit it"
         )
-    if scene.numerics.replicates == 1:
-        notes.append("one replicate: no statistical error can be given; raise numerics.replicates")
     return tuple(notes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -10,6 +11,7 @@ from rbdyn.faults import Strict
 from rbdyn.scene.fields import NonNegative, Positive, or_refuse
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
+AUTO_WARM_UP_TURNS = 20.0
 Restitution = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
@@ -87,12 +89,24 @@ class Numerics(Strict):
     # of Chen et al. 2022 is off by more than 0.2 %; looser ones add spurious power.
     rtol: Annotated[float, Field(ge=1e-13, le=0.1)] = 1e-2
     turns: Annotated[float, Field(gt=0.0, le=1e6)] = 100
-    discard_turns: Annotated[float, Field(ge=0.0, le=1e6)] = 20
+    # "auto": what the series of the run show to be its transient, at least a batch; else so many turns.
+    discard_turns: Annotated[float, Field(ge=0.0, le=1e6)] | Literal["auto"] = 20.0
     replicates: Annotated[int, Field(ge=1, le=10000)] = 8
     seed: Annotated[int, Field(ge=0)] = 1
     # The largest force grows with the time one waits for it, so it is taken over windows of a fixed length.
     impact_window_turns: Annotated[float, Field(gt=0.0)] = 20
     samples_per_turn: Annotated[int, Field(ge=8, le=100000)] = 512
-    # Repeats every replicate at a tenth of rtol to find the numerical error.
+    # Repeats a share of the replicates at another tolerance to find the numerical error.
     companion: bool = True
+    companion_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.25
     step_budget_per_turn: Annotated[int, Field(ge=100)] = 100_000
+
+    @property
+    def warm_up_turns(self) -> float:
+        """Turns run before the counted ones; with "auto" some of them may count after all, or more be dropped."""
+        return AUTO_WARM_UP_TURNS if self.discard_turns == "auto" else float(self.discard_turns)
+
+    @property
+    def companions(self) -> int:
+        """How many replicates are repeated."""
+        return math.ceil(self.companion_share * self.replicates - 1e-9) if self.companion else 0

@@ -1,0 +1,131 @@
+"""Error of a mean over correlated series: batch means over several independent replicates, and the jackknife.
+
+A run is cut into short equal batches, of which each keeps sums (moments). A figure is a function of the sums over all
+batches of all replicates: a mean, a ratio, a standard deviation over a mean. Its error is found in two steps:
+
+- how long the series remembers: the integrated autocorrelation time of the figure's pseudo-values, by the initial
+  monotone sequence of Geyer (1992, *Statistical Science* 7, 473);
+- batches are joined until they are several such times long (Schmeiser 1982, *Operations Research* 30, 556), and
+  leaving out one after the other (jackknife: Quenouille 1956, Tukey 1958) gives the variance of the figure with one
+  degree of freedom less than there are joined batches.
+
+Both look at deviations from the mean over all replicates, so replicates that differ lengthen the memory and widen the
+interval; where one remembers its start to its end the joined batches are whole replicates, and the interval is
+Student's over replicates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Joined batches are 1 + MEMORIES (tau - 1) batches long: independent batches stay as they are.
+MEMORIES = 8.0
+# More joined batches would hardly narrow Student's t, longer ones are less correlated.
+MOST_BATCHES = 64
+# A single replicate is cut into so many at least.
+FEWEST_BATCHES = 4
+
+
+class Estimate(NamedTuple):
+    """A figure, the half-width of its 95 % interval (None for fewer than two batches), and how many independent
+    batches would tell as much."""
+
+    value: float
+    half_width: float | None
+    effective_samples: float
+
+
+def estimate(moments: Sequence[Array], figure: Callable[[Array], Array]) -> Estimate:
+    """Figure of the summed moments with its 95 % error.
+
+    ``moments``: one array (batches, sums) a replicate; ``figure``: from sums on the last axis to the figure.
+    """
+    total = np.sum([part.sum(axis=0) for part in moments], axis=0)
+    value = float(figure(total))
+    batches = sum(len(part) for part in moments)
+    if batches < 2:
+        return Estimate(value, None, float(batches))
+    series = _pseudo_values(np.concatenate(moments), total, figure)
+    lengths = np.cumsum([len(part) for part in moments])[:-1]
+    memory = autocorrelation_time(np.split(series, lengths))
+    joined = np.concatenate([_joined(part, memory, batches, len(moments)) for part in moments])
+    half_width = student_half_width(_pseudo_values(joined, total, figure))
+    return Estimate(value, half_width, min(batches / memory, float(batches)))
+
+
+def autocorrelation_time(series: Sequence[Array]) -> float:
+    """Integrated autocorrelation time in batches, 1 for independent ones, over replicates about their common mean.
+
+    Geyer's initial monotone sequence: autocovariances are summed in pairs as long as a pair is positive, no pair
+    counting for more than the one before. Lags run to the end of the longest replicate.
+    """
+    mean = np.concatenate(series).mean()
+    longest = max(len(part) for part in series)
+    size = 1 << (2 * longest - 1).bit_length()
+    covariance = np.zeros(longest)
+    for part in series:
+        spectrum = np.fft.rfft(part - mean, size)
+        covariance[: len(part)] += np.fft.irfft(np.abs(spectrum) ** 2, size)[: len(part)]
+    # Each lag has its own number of pairs: without that, short replicates would seem to forget.
+    pairs = sum(np.maximum(len(part) - np.arange(longest), 0) for part in series)
+    covariance /= pairs
+    if covariance[0] <= np.finfo(float).eps ** 2 * mean**2 * longest:
+        return 1.0
+    if longest % 2:
+        covariance = np.append(covariance, 0.0)
+    couples = covariance.reshape(-1, 2).sum(axis=1)
+    positive = len(couples) if (couples > 0.0).all() else int(np.argmin(couples > 0.0))
+    kept = np.minimum.accumulate(couples[:positive])
+    weights = 1.0 - 2.0 * np.arange(positive) / longest
+    return max(1.0, float(2.0 * (weights * kept).sum() / covariance[0] - 1.0))
+
+
+def student_half_width(values: Array) -> float | None:
+    """Half-width of the 95 % interval of a mean of independent values; None for fewer than two."""
+    count = len(values)
+    if count < 2:
+        return None
+    return float(student_factor(count - 1) * values.std(ddof=1) / math.sqrt(count))
+
+
+def student_factor(freedom: int) -> float:
+    """The t that holds 95 % of Student's distribution with ``freedom`` > 0 degrees of freedom between -t and t.
+
+    Bisection of the finite sums of Abramowitz and Stegun, eq 26.7.3 and 26.7.4, in theta = atan(t/sqrt(freedom)).
+    """
+
+    def held(theta: float) -> float:
+        cosine, sine = math.cos(theta), math.sin(theta)
+        even = freedom % 2 == 0
+        term, total = (1.0, 0.0) if even else (cosine, 0.0)
+        for k in range(1 if even else 2, freedom, 2):
+            total += term
+            term *= cosine * cosine * k / (k + 1)
+        return sine * total if even else 2.0 / math.pi * (theta + sine * total)
+
+    low, high = 0.0, 0.5 * math.pi
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if held(middle) < 0.95 else (low, middle)
+    return math.sqrt(freedom) * math.tan(0.5 * (low + high))
+
+
+def _pseudo_values(moments: Array, total: Array, figure: Callable[[Array], Array]) -> Array:
+    """What each batch says of the figure: ``n`` figures less ``n - 1`` figures without that batch."""
+    count = len(moments)
+    return count * figure(total) - (count - 1) * figure(total - moments)
+
+
+def _joined(moments: Array, memory: float, batches: int, replicates: int) -> Array:
+    """Neighbouring batches of one replicate summed into as many as its memory allows."""
+    length = max(math.ceil(1.0 + MEMORIES * (memory - 1.0)), batches // MOST_BATCHES)
+    fewest = FEWEST_BATCHES if replicates == 1 else 1
+    count = min(max(len(moments) // length, fewest), len(moments))
+    return np.stack([part.sum(axis=0) for part in np.array_split(moments, count)])

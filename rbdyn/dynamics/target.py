@@ -1,0 +1,324 @@
+"""A run to a target accuracy: tolerance, turns and replicates at least cost for a total error asked of three figures.
+
+Pilots over a ladder of tolerances measure the scatter of a turn, the bias over the tolerance, the power gap and the
+right-hand sides a turn takes. From these follow, for each tolerance, the turns that bring numerical plus statistical
+error of each figure below the target, and what they cost; the cheapest is run and judged by its own error bars. If
+they are too wide, what it measured goes into the model and a longer or tighter run follows. Cost is counted in
+right-hand sides, not seconds: equal scenes choose equally on any machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.dynamics.batch_means import estimate
+from rbdyn.dynamics.bias import FACTOR, SAFETY, companion_tolerance, mean_gap
+from rbdyn.dynamics.error_bars import FIGURES, settled
+from rbdyn.dynamics.metrics import Replicate
+from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.simulate import Stop, prepare, run_series, simulate
+from rbdyn.faults import InputError
+from rbdyn.result import Quantity, SimulationResult
+from rbdyn.scene import Scene
+
+Array = NDArray[np.float64]
+
+AIMED = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
+SCATTERED = AIMED[:2]  # their numerical error comes from companions, that of the loss from the power balance
+LARGEST_TARGET = 0.5
+
+LADDER = (0.1, 0.03, 0.01, 0.003)
+PILOT_REPLICATES, PILOT_WINDOWS, PILOT_TURNS = 8, 2, 40.0
+TOLERANCES = (0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 1e-5, 1e-6)
+# A cage may stay in one of several kinds of whirl for as long as one cares to wait, so replicates tell more than turns:
+# they are as short as lets transients take no more than a sixth of the turns.
+FEWEST_REPLICATES, WARM_UPS = 4, 5.0
+# A first short run may misjudge the scatter; the next is no more than so many times as long.
+GROWTH = (1.2, 4.0)
+# The plan aims lower than it was asked, as pilots tell the scatter to a tenth or two.
+MARGIN = 0.9
+MOST_RUNS = 3
+# Counted turns of one run at most: minutes.
+MOST_TURNS = 100_000.0
+NORMAL = 1.96
+# Mean size of a difference that is all scatter, over its 95 % half-width: sqrt(2 / pi) / 1.96.
+MEAN_SIZE = 0.407
+
+
+def target_of(text: str) -> float:
+    """``2%`` or ``0.02`` as a fraction. Raises InputError for anything else."""
+    number, percent = (text.strip()[:-1], 0.01) if text.strip().endswith("%") else (text, 1.0)
+    try:
+        return checked(float(number) * percent, text)
+    except ValueError:
+        raise InputError([f"--target {text}: not a number; write it as 2% or 0.02"]) from None
+
+
+def checked(target: float, shown: str | None = None) -> float:
+    """The target. Raises InputError unless it is a fraction above 0 and at most a half."""
+    if not 0.0 < target <= LARGEST_TARGET:
+        raise InputError(
+            [
+                f"--target {shown or f'{target:g}'}: must be above 0 and at most {100.0 * LARGEST_TARGET:g} %; write it as 2% or 0.02"
+            ]
+        )
+    return target
+
+
+class Choice(NamedTuple):
+    """How a run is to be made, and the right-hand sides that it should take."""
+
+    rtol: float
+    turns: float
+    replicates: int
+    rhs_evaluations: float
+
+    def applied(self, scene: Scene) -> Scene:
+        """The scene with this choice."""
+        numbers = {"rtol": self.rtol, "turns": self.turns, "replicates": self.replicates, "companion": True}
+        return scene.model_copy(update={"numerics": scene.numerics.model_copy(update=numbers)})
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is known of a scene. Relative to the figures, by name: ``scatter``: standard error of the mean of one turn;
+    ``bias``: bound of the bias over rtol. ``ladder``: tolerances, falling, with their power gaps and right-hand sides a
+    turn."""
+
+    scatter: dict[str, float]
+    bias: dict[str, float]
+    ladder: Array
+    gaps: Array
+    rhs_per_turn: Array
+
+    def cost(self, rtol: float) -> float:
+        """Right-hand sides a turn."""
+        return _along(rtol, self.ladder, self.rhs_per_turn)
+
+    def systematic(self, name: str, rtol: float) -> float:
+        """Part of the numerical error that no longer run lessens."""
+        if name in SCATTERED:
+            return self.bias[name] * rtol
+        return _along(rtol, self.ladder, np.maximum(self.gaps, 1e-12))
+
+
+def reach(
+    scene: Scene,
+    target: float,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    stop: Stop | None = None,
+) -> SimulationResult:
+    """Simulate until the total relative 95 % error of impact force, whirl ratio and power loss is at most ``target``.
+
+    Tolerance, turns and replicates of the scene are replaced. What was chosen, reached and spent stands under
+    ``target`` of the result, and in its notes where the target was not met. Raises InputError, RunError,
+    KeyboardInterrupt.
+    """
+    checked(target)
+    model, spent = measure(scene, workers, progress, stop)
+    pilots = spent
+    shortest, longest = 0.0, MOST_TURNS
+    runs, met = 0, False
+    while runs < MOST_RUNS and not met and shortest < MOST_TURNS:
+        runs += 1
+        choice = choose(model, scene, MARGIN * target, shortest, longest)
+        result = simulate(choice.applied(scene), workers, progress, stop)
+        spent += int(result.cost["rhs_evaluations"])
+        errors = {name: total_error(quantities_of(result)[name]) for name in AIMED}
+        met = all(error is not None and error <= target for error in errors.values())
+        model = learned(model, scene, choice, result)
+        shortest, longest = (min(factor * choice.turns * choice.replicates, MOST_TURNS) for factor in GROWTH)
+    record = {
+        "asked": target,
+        "met": met,
+        "relative_error": errors,
+        "chosen": {"rtol": choice.rtol, "turns": choice.turns, "replicates": choice.replicates},
+        "runs": runs,
+        "cost": {"rhs_evaluations": spent, "pilot_rhs_evaluations": pilots},
+    }
+    notes = result.notes if met else (*result.notes, _shortfall(target, errors, result, choice))
+    return replace(result, target=record, notes=notes)
+
+
+def total_error(figure: Quantity) -> float | None:
+    """Statistical plus numerical error over the value; None where one is unknown, 0 where both are nothing."""
+    if figure.statistical_error is None or figure.numerical_error is None:
+        return None
+    error = figure.statistical_error + figure.numerical_error
+    if error == 0.0:
+        return 0.0
+    return error / abs(figure.value) if figure.value != 0.0 else None
+
+
+def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
+    """The figures that a target is asked of, by name."""
+    figures = (result.impact_force, result.whirl_deviation_ratio, result.power_loss)
+    return dict(zip(AIMED, figures, strict=True))
+
+
+def measure(
+    scene: Scene,
+    workers: int | None,
+    progress: Callable[[int, int], None] | None,
+    stop: Stop | None,
+) -> tuple[Model, int]:
+    """Pilots over the ladder of tolerances: what they tell, and the right-hand sides they took. Raises RunError."""
+    turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)
+    numbers = {"turns": turns, "replicates": PILOT_REPLICATES}
+    pilot = scene.model_copy(update={"numerics": scene.numerics.model_copy(update=numbers)})
+    bearing = roller_bearing(pilot)
+    prepare(pilot, bearing)
+    series = run_series(pilot, bearing, LADDER, workers, progress, Stop(outer=stop))
+    per_turn = PILOT_REPLICATES * (turns + scene.numerics.warm_up_turns)
+    derivatives = [sum(run.derivatives for run in runs) for runs in series]
+    series = [settled(pilot, runs, [])[0] for runs in series]
+    scatter = {name: _scatter(name, series, scene) for name in AIMED}
+    model = Model(
+        scatter=scatter,
+        bias={name: _bias(name, series, scatter[name], PILOT_REPLICATES * turns) for name in SCATTERED},
+        ladder=np.array(LADDER),
+        gaps=np.array([mean_gap(runs) for runs in series]),
+        rhs_per_turn=np.array(derivatives) / per_turn,
+    )
+    return model, sum(derivatives)
+
+
+def choose(
+    model: Model, scene: Scene, target: float, shortest: float = 0.0, longest: float = MOST_TURNS
+) -> Choice:
+    """The cheapest choice that meets the target with counted turns, in all, between ``shortest`` and ``longest``; where
+    none does, the one that comes closest."""
+    able = []
+    for rtol in TOLERANCES:
+        needed = max(turns_needed(model, scene, rtol, target), shortest)
+        if needed <= longest:
+            able.append(_choice(model, scene, rtol, needed))
+    if able:
+        return min(able, key=lambda choice: choice.rhs_evaluations)
+
+    def worst(rtol: float) -> float:
+        return max(predicted_error(model, scene, name, rtol, longest) for name in AIMED)
+
+    return _choice(model, scene, min(TOLERANCES, key=worst), longest)
+
+
+def turns_needed(model: Model, scene: Scene, rtol: float, target: float) -> float:
+    """Counted turns, in all, that bring every figure within the target; infinite where its bias alone is larger."""
+    needed = 0.0
+    for name in AIMED:
+        room = target - model.systematic(name, rtol)
+        noise = _noise_factor(name, scene, rtol) * NORMAL * model.scatter[name]
+        needed = max(needed, (noise / room) ** 2 if room > 0.0 else math.inf)
+    return needed
+
+
+def predicted_error(model: Model, scene: Scene, name: str, rtol: float, turns: float) -> float:
+    """Total relative error of a figure after so many counted turns in all."""
+    noise = _noise_factor(name, scene, rtol) * NORMAL * model.scatter[name] / math.sqrt(turns)
+    return model.systematic(name, rtol) + noise
+
+
+def learned(model: Model, scene: Scene, choice: Choice, result: SimulationResult) -> Model:
+    """The model after a run: its scatter for the one of the pilots, and its bias where it stands out of the scatter."""
+    turns = choice.turns * choice.replicates
+    scatter, bias, gaps = dict(model.scatter), dict(model.bias), model.gaps
+    for name, figure in quantities_of(result).items():
+        statistical, numerical = figure.statistical_error, figure.numerical_error
+        if statistical is None or numerical is None or figure.value == 0.0:
+            continue
+        size = abs(figure.value)
+        scatter[name] = statistical / size * math.sqrt(turns) / NORMAL
+        if name in SCATTERED:
+            noise = _companion_noise(scene, choice.rtol) * statistical
+            if numerical > 2.0 * noise:
+                bias[name] = (numerical - noise) / size / choice.rtol
+        else:
+            gaps = gaps * max(numerical / size / model.systematic(name, choice.rtol), 1.0)
+    return replace(model, scatter=scatter, bias=bias, gaps=gaps)
+
+
+def _choice(model: Model, scene: Scene, rtol: float, needed: float) -> Choice:
+    """At least the counted turns needed, in whole impact windows of as many replicates as are worth their transients."""
+    numerics, window = scene.numerics, scene.numerics.impact_window_turns
+    each = max(WARM_UPS * numerics.warm_up_turns, PILOT_WINDOWS * window, PILOT_TURNS)
+    replicates = max(math.ceil(needed / each), FEWEST_REPLICATES)
+    fewest = max(PILOT_WINDOWS, math.ceil(PILOT_TURNS / window))
+    turns = max(math.ceil(needed / replicates / window), fewest) * window
+    companions = math.ceil(numerics.companion_share * replicates - 1e-9)
+    cost = replicates * model.cost(rtol) + companions * model.cost(companion_tolerance(rtol))
+    return Choice(rtol, turns, replicates, (turns + numerics.warm_up_turns) * cost)
+
+
+def _noise_factor(name: str, scene: Scene, rtol: float) -> float:
+    """Total over statistical error where there is no bias: the difference from companions, and its half-width."""
+    return 1.0 + ((1.0 + MEAN_SIZE) * _companion_noise(scene, rtol) if name in SCATTERED else 0.0)
+
+
+def _companion_noise(scene: Scene, rtol: float) -> float:
+    """Part of the numerical error that is half-width, over the statistical error (``rbdyn.dynamics.bias``)."""
+    looser = companion_tolerance(rtol) > rtol
+    scale = SAFETY / (FACTOR - 1.0) if looser else FACTOR / (FACTOR - 1.0)
+    return scale * math.sqrt(1.0 + 1.0 / scene.numerics.companion_share)
+
+
+def _scatter(name: str, series: Sequence[Sequence[Replicate]], scene: Scene) -> float:
+    """Relative standard error of one turn, from the error bars of all pilots."""
+    figure = FIGURES[name][0]
+    squares = []
+    for runs in series:
+        found = estimate([figure.moments(run) for run in runs], figure.of_sums)
+        turns = sum(run.duration for run in runs) / scene.turn_s
+        if found.half_width is not None and found.value != 0.0:
+            squares.append((found.half_width / found.value) ** 2 * turns)
+    return math.sqrt(float(np.mean(squares))) / NORMAL if squares else 0.0
+
+
+def _bias(name: str, series: Sequence[Sequence[Replicate]], scatter: float, turns: float) -> float:
+    """Bound of the relative bias over rtol: safety times the slope of the figure over the tolerance, where that stands
+    out of its scatter; none otherwise, as the run itself will tell. ``turns``: of all replicates of one pilot."""
+    figure = FIGURES[name][0]
+    values = [estimate([figure.moments(run) for run in runs], figure.of_sums).value for runs in series]
+    if values[-1] == 0.0:
+        return 0.0
+    relative, away = np.array(values) / values[-1], np.array(LADDER) - np.mean(LADDER)
+    slope = float(away @ relative / (away @ away))
+    half_width = NORMAL * scatter / math.sqrt(turns * float(away @ away))
+    return SAFETY * abs(slope) if abs(slope) > half_width else 0.0
+
+
+def _along(rtol: float, ladder: Array, values: Array) -> float:
+    """Between tolerances, and beyond them as between the last two, by powers of the tolerance."""
+    x, y = np.log(ladder[::-1]), np.log(values[::-1])
+    place = math.log(rtol)
+    if x[0] <= place <= x[-1]:
+        return math.exp(float(np.interp(place, x, y)))
+    end, inner = (0, 1) if place < x[0] else (-1, -2)
+    slope = (y[end] - y[inner]) / (x[end] - x[inner])
+    return math.exp(float(y[end] + slope * (place - x[end])))
+
+
+def _shortfall(
+    target: float, errors: dict[str, float | None], result: SimulationResult, choice: Choice
+) -> str:
+    """Which figure missed the target, by how much, and what limits it."""
+    unknown = [name for name, error in errors.items() if error is None]
+    if unknown:
+        return f"target of {100.0 * target:g} % not met: no relative error is known of {', '.join(unknown)}"
+    worst = max(errors, key=lambda name: errors[name] or 0.0)
+    figure = quantities_of(result)[worst]
+    statistical, numerical = figure.statistical_error or 0.0, figure.numerical_error or 0.0
+    if numerical > statistical:
+        limit = f"its numerical error at numerics.rtol = {choice.rtol:g} limits it"
+    else:
+        limit = f"its scatter over {choice.replicates} replicates of {choice.turns:g} turns limits it"
+    return (
+        f"target of {100.0 * target:g} % not met: {worst} is known to {100.0 * (errors[worst] or 0.0):.2g} %, and {limit}; "
+        "ask for less, or run longer by numerics.turns and numerics.replicates"
+    )
