@@ -81,6 +81,9 @@ def accuracy(
         Path | None, typer.Option(metavar="DIR", help="Write accuracy.json, .csv and .png here.")
     ] = None,
     options: Annotated[bool, typer.Option("--options", help="What each option costs, instead.")] = False,
+    stability: Annotated[
+        bool, typer.Option("--stability", help="How stiff and extreme variants of the scene end, instead.")
+    ] = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also versions.")] = False,
@@ -93,6 +96,9 @@ def accuracy(
         folder = output_folder(out) if out else None
         if options:
             _options(loaded, folder, as_json, quiet)
+            return
+        if stability:
+            _stability(loaded, folder, as_json, quiet)
             return
         from rbdyn import accuracy as study
 
@@ -209,6 +215,29 @@ def _options(scene: Scene, folder: Path | None, as_json: bool, quiet: bool) -> N
     )
     if folder:
         print(f"written to {folder}: {', '.join(files)}")
+
+
+def _stability(scene: Scene, folder: Path | None, as_json: bool, quiet: bool) -> None:
+    from rbdyn import stability
+
+    with progress_bar("extreme scenes", quiet or as_json) as progress:
+        rows = stability.battery(scene, progress=progress)
+    files = stability.write(rows, folder) if folder else []
+    if as_json:
+        print_json(stability.record(rows))
+    else:
+        print_table(
+            f"extreme scenes; closed: power balance within {100.0 * stability.LARGEST_GAP:g} %",
+            stability.HEADER,
+            [row.cells() for row in rows],
+        )
+        for row in rows:
+            if row.reason:
+                print(f"{row.case}: {row.reason}")
+        if folder:
+            print(f"written to {folder}: {', '.join(files)}")
+    if any(row.unexplained for row in rows):
+        raise typer.Exit(FAILED)
 
 
 def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:

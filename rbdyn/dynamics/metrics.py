@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,8 @@ class Replicate:
 
     ``impact_windows``: largest roller/cage force of each whole window; ``whirl``: samples, sum and sum of squares of
     the cage centre's speed; ``work``: integrals of the loss powers, then of those that come in by shafts and loads;
-    ``energy_change``: of kinetic, elastic and load energy together; ``energy_scale``: contact load times approach, at least.
+    ``energy_change``: of kinetic, elastic and load energy together; ``energy_scale``: contact load times approach, at least;
+    ``stiffness``: as in ``runge_kutta.Carry``.
     """
 
     duration: float
@@ -37,6 +38,8 @@ class Replicate:
     rejected_steps: int
     derivatives: int
     cpu_s: float
+    method: str = "rk45"
+    stiffness: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     @property
     def impact_force(self) -> float:
