@@ -97,6 +97,9 @@ def accuracy(
         bool, typer.Option("--replicates", help="Statistical error against run time, instead.")
     ] = False,
     options: Annotated[bool, typer.Option("--options", help="What each option costs, instead.")] = False,
+    stability: Annotated[
+        bool, typer.Option("--stability", help="How stiff and extreme variants of the scene end, instead.")
+    ] = False,
     scaling: Annotated[
         bool, typer.Option("--scaling", help="Time by rollers and slices, memory by turns, instead.")
     ] = False,
@@ -118,6 +121,7 @@ def accuracy(
             "slices": slices,
             "replicates": replicates,
             "options": options,
+            "stability": stability,
             "scaling": scaling,
         }
         name = _study(asked, trajectory)
@@ -129,10 +133,12 @@ def accuracy(
         files = studies.write(found, folder) if folder else []
         if as_json:
             print_json(found.record)
-            return
-        studies.show(found, verbose)
-        if folder:
-            print(f"written to {folder}: {', '.join(files)}")
+        else:
+            studies.show(found, verbose)
+            if folder:
+                print(f"written to {folder}: {', '.join(files)}")
+    if found.failed:
+        raise typer.Exit(FAILED)
 
 
 def _study(asked: dict[str, bool], trajectory: float | None) -> str:

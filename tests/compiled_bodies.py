@@ -17,7 +17,7 @@ from numba.core import event
 
 from rbdyn.dynamics.equations import derivative
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.races import scratch
+from rbdyn.dynamics.race_lanes import scratch
 
 
 class Recorder(event.Listener):
@@ -42,7 +42,7 @@ def main():
     vector, matrix = np.zeros(1), np.zeros((1, 1))
     for assignments in json.load(sys.stdin):
         bearing = roller_bearing(make(*assignments))
-        arguments = (bearing, vector, 0, matrix, matrix, matrix, scratch())
+        arguments = (bearing, vector, 0, matrix, matrix, matrix, scratch(bearing.rollers))
         derivative.compile(tuple(numba.typeof(argument) for argument in arguments))
         found.append(sorted(recorder.compiled))
     print(json.dumps(found))

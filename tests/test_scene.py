@@ -47,7 +47,7 @@ def faults_of(*assignments, changes=None):
 def test_unit_the_plain_scene_is_good():
     """Unit: the table of these tests is a scene, and its defaults are those of the documentation."""
     scene = Scene.from_dict(copy.deepcopy(TABLE))
-    assert scene.numerics.method == "rk45"
+    assert scene.numerics.method == "auto"
     assert (scene.numerics.turns, scene.numerics.discard_turns, scene.numerics.replicates) == (100, 20, 8)
     assert (scene.model.race_damping_ratio, scene.materials.cage) == (0.05, "bronze")
     assert scene.turn_s == pytest.approx(2.5e-3)

@@ -9,6 +9,7 @@ Studies, each a module with ``study(scene, progress) -> Report``; the command ``
 - ``slicing`` (``--slices``): slices of a roller with a profile
 - ``replication`` (``--replicates``): statistical error against replicates and turns
 - ``rbdyn.option_cost`` (``--options``): what each option of a scene costs
+- ``rbdyn.stability`` (``--stability``): how extreme variants of a scene end
 - ``rbdyn.scaling`` (``--scaling``): time by rollers and slices, memory by turns
 
 Beneath them: ``right_hand_side`` (compiled, callable from Python), ``fixed_step`` (Runge-Kutta 4, velocity Verlet),
@@ -48,6 +49,7 @@ STUDIES = {
     "slices": "rbdyn.accuracy.slicing",
     "replicates": "rbdyn.accuracy.replication",
     "options": "rbdyn.option_cost",
+    "stability": "rbdyn.stability",
     "scaling": "rbdyn.scaling",
 }
 _HOMES = {

@@ -21,7 +21,8 @@ class Table(NamedTuple):
 
 @dataclass(frozen=True)
 class Report:
-    """Outcome of a study: ``record`` becomes ``stem.json``, each sheet a CSV, each picture a PNG."""
+    """Outcome of a study: ``record`` becomes ``stem.json``, each sheet a CSV, each picture a PNG; ``failed``: the
+    command ends with an error."""
 
     stem: str
     record: dict[str, Any]
@@ -29,6 +30,7 @@ class Report:
     sentences: Sequence[str]
     sheets: Mapping[str, Sequence[Mapping[str, Any]]]
     pictures: Mapping[str, Callable[[Path], None]] = field(default_factory=dict)
+    failed: bool = False
 
 
 class Progress:

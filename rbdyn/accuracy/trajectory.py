@@ -65,7 +65,7 @@ def settled(scene: Scene, turns: float = DEFAULT_TURNS, starts: int = STARTS) ->
             [f"--trajectory {turns:g}: past a turn no reference holds; give more than 0 and at most 1"]
         )
     bearing = roller_bearing(scene)
-    scale = absolute_tolerance(scene, 1.0)
+    scale = absolute_tolerance(scene, bearing, 1.0)
     # The clock runs exactly in every method; its scale only has to be a number.
     scale[~np.isfinite(scale)] = 1.0
     found = []

@@ -97,7 +97,7 @@ def lyapunov_exponent(
     leader.to(begin)
     follower.carry.clock[:] = leader.carry.clock
     # The clock of a scene that depends on time has no scale, and is not moved apart.
-    weight = 1.0 / absolute_tolerance(scene, 1.0)
+    weight = 1.0 / absolute_tolerance(scene, bearing, 1.0)
     draw = np.random.default_rng(np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate, 1)))
     apart = np.where(weight > 0.0, draw.standard_normal(weight.size), 0.0)
     apart[weight > 0.0] /= weight[weight > 0.0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +26,8 @@ class Replicate:
     Arrays over batches, from the start on; figures count from the batch ``first``, and ``per_window`` batches make an
     impact window. ``whirl``: samples, sum and sum of squares of the cage centre's speed; ``work``: integrals of the
     loss powers, then of those that come in by shafts and loads; ``largest``: loads; ``energy``: kinetic, elastic and
-    load energy together, at the start and at the end of each batch; ``energy_scale``: contact load times approach.
+    load energy together, at the start and at the end of each batch; ``energy_scale``: contact load times approach;
+    ``stiffness``: as in ``runge_kutta.Carry``.
     """
 
     first: int
@@ -43,6 +44,8 @@ class Replicate:
     rejected_steps: int
     derivatives: int
     cpu_s: float
+    method: str = "rk45"
+    stiffness: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     def counted_from(self, first: int) -> Replicate:
         """The same run, counted from another batch."""

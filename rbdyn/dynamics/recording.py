@@ -1,4 +1,4 @@
-"""One replicate recorded in equal batches of about a shaft turn, from its start to its end."""
+"""One replicate recorded in equal batches of about two shaft turns, from its start to its end."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rbdyn.dynamics.simulate import Run
 
 # Long enough that the step cut at a batch's end costs nothing, short against any memory worth finding.
-BATCH_TURNS = 1.0
+BATCH_TURNS = 2.0
 # Bounds what a very long run keeps.
 MOST_BATCHES = 20_000
 
@@ -82,6 +82,8 @@ def record(run: Run) -> Replicate:
         rejected_steps=int(run.carry.counts[1]),
         derivatives=int(run.carry.counts[2]),
         cpu_s=time.thread_time() - started,
+        method=run.method,
+        stiffness=run.carry.stiffness.copy(),
     )
 
 

@@ -52,6 +52,11 @@ D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29
 SAFETY, BETA = 0.9, 0.04
 EXPONENT = 0.2 - 0.75 * BETA
 SHRINK, GROW = 0.2, 10.0
+# Stiffness is looked at in every eighth step. The method is stable up to h |eigenvalue| = 3.3 for decay and about 2.4 for
+# a loaded contact that vibrates.
+LOOK_EVERY, STABILITY_LIMIT = 8, 2.0
+# As integers of numpy: for each plain one a right-hand side would be compiled anew. b_2 = e_2 = d_2 = 0 leave row 1 free.
+FIRST_ROW, FREE_ROW = np.int64(0), np.int64(1)
 PEAK_POINTS = 8  # interior points at which a step that holds a new largest pocket load is looked at
 
 
@@ -75,6 +80,9 @@ class Carry(NamedTuple):
     scratch: Scratch
     clock: NDArray[np.float64]  # time, next step, previous error, next sample time, rate of the frame
     counts: NDArray[np.int64]  # accepted, rejected, right-hand sides, worst component
+    stiffness: NDArray[
+        np.float64
+    ]  # steps looked at, those held by stability, sum of their |eigenvalue| [1/s]
 
 
 class Tally(NamedTuple):
@@ -200,8 +208,7 @@ def refine_peak(bearing, carry, h, tally):
         for i in range(carry.y.size):
             inside[i] = interpolate(carry, h, p * spacing, i)
         to_fixed_axes(turn_of(carry.clock[4], p * spacing * h), bearing.rollers, inside)
-        # Row 1 of the stages is free once the step is accepted: b_2 = e_2 = d_2 = 0.
-        derivative_once(bearing, inside, 1, carry.k, carry.power, carry.loads, carry.scratch)
+        derivative_once(bearing, inside, FREE_ROW, carry.k, carry.power, carry.loads, carry.scratch)
         values[p] = carry.loads[1, POCKET_LOAD]
     for p in range(PEAK_POINTS + 2):
         if values[p] > best:
@@ -250,6 +257,28 @@ def keep(bearing, carry, h, tally, sample_step):
         carry.counts[2] += PEAK_POINTS
 
 
+@routine
+def look_at_stiffness(carry, h, inverse_tolerance):
+    """Book whether stability holds the step: |eigenvalue| = |k_7 - k_6|/|y_7 - y_6| over the tolerances, both at the end
+    of the step (Hairer and Wanner, Solving ODEs II, IV.2).
+    """
+    k = carry.k
+    rates = places = 0.0
+    for i in range(inverse_tolerance.size):
+        rate = (k[6, i] - k[5, i]) * inverse_tolerance[i]
+        place = 0.0
+        for s in range(6):
+            if A[6, s] != A[5, s]:
+                place += (A[6, s] - A[5, s]) * k[s, i]
+        place *= h * inverse_tolerance[i]
+        rates += rate * rate
+        places += place * place
+    carry.stiffness[0] += 1.0
+    if h * h * rates > STABILITY_LIMIT * STABILITY_LIMIT * places > 0.0:
+        carry.stiffness[1] += 1.0
+        carry.stiffness[2] += math.sqrt(rates / places)
+
+
 @entry
 def advance(bearing, control, carry, tally, t_end, sample_step):
     """Integrate from the carried time to ``t_end`` [s]; returns FINISHED or why not.
@@ -259,7 +288,7 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
     """
     clock, counts = carry.clock, carry.counts
     if counts[2] == 0:
-        derivative_once(bearing, carry.y, 0, carry.k, carry.power, carry.loads, carry.scratch)
+        derivative_once(bearing, carry.y, FIRST_ROW, carry.k, carry.power, carry.loads, carry.scratch)
         counts[2] = 1
         for i in range(carry.y.size):
             if not math.isfinite(carry.k[0, i]):
@@ -277,6 +306,8 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
         counts[2] += 6
         error = error_norm(carry.k, h, control.inverse_tolerance)
         if error <= 1.0:
+            if counts[0] % LOOK_EVERY == 0:
+                look_at_stiffness(carry, h, control.inverse_tolerance)
             keep(bearing, carry, h, tally, sample_step)
             counts[0] += 1
             rates_to_fixed_axes(turn_of(clock[4], h), bearing.rollers, carry.stage, 6, carry.k)

@@ -20,6 +20,7 @@ from rbdyn.dynamics.energy import mechanical_energy
 from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing
 from rbdyn.dynamics.error_bars import error_notes, quantities, settled
 from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
+from rbdyn.dynamics.method import advance_by, cheaper_method, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_lanes import scratch
@@ -32,7 +33,6 @@ from rbdyn.dynamics.runge_kutta import (
     Carry,
     Control,
     Tally,
-    advance,
 )
 from rbdyn.dynamics.start import start_state
 from rbdyn.dynamics.state import INNER_ANGLE, OUTER_ANGLE, name
@@ -75,18 +75,11 @@ class Run:
 
     def __init__(self, scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> None:
         self.scene, self.bearing, self.replicate, self.stop = scene, bearing, replicate, stop
+        self.rtol = rtol
         self.layout = layout_of(scene)
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
         y = start_state(scene, bearing, np.random.default_rng(seeds))
-        tolerance = absolute_tolerance(scene, rtol)
         numerics = scene.numerics
-        turns = numerics.turns + numerics.warm_up_turns
-        self.control = Control(
-            1.0 / tolerance,
-            SMALLEST_STEP_TURNS * scene.turn_s,
-            LARGEST_STEP_TURNS * scene.turn_s,
-            int(min(numerics.step_budget_per_turn * math.ceil(turns), 2**62)),
-        )
         n = y.size
         first_step = 1e-3 * scales(scene).length / scales(scene).speed
         self.carry = Carry(
@@ -98,18 +91,38 @@ class Run:
             scratch=scratch(bearing.rollers),
             clock=np.array([0.0, first_step, PI_START_ERROR, 0.0, 0.0]),
             counts=np.zeros(4, dtype=np.int64),
+            stiffness=np.zeros(3),
         )
         self.tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
+        self.sample_step = scene.turn_s / numerics.samples_per_turn
+        self.method: str = numerics.method
+        if self.method == "auto":
+            self.method, stiffness = cheaper_method(
+                scene, bearing, self._control_by, self.carry, self.tally, self.sample_step
+            )
+            # The implicit method does not see what it overcomes.
+            self.carry.stiffness[:] = stiffness if self.method == "rosenbrock" else 0.0
+        self.control = self._control_by(self.method)
+        self.advance = advance_by(self.method, scene, bearing)
+
+    def _control_by(self, method: str) -> Control:
+        numerics = self.scene.numerics
+        turns = numerics.turns + numerics.warm_up_turns
+        return Control(
+            1.0 / absolute_tolerance(self.scene, self.bearing, self.rtol, method),
+            SMALLEST_STEP_TURNS * self.scene.turn_s,
+            LARGEST_STEP_TURNS * self.scene.turn_s,
+            int(min(numerics.step_budget_per_turn * math.ceil(turns), 2**62)),
+        )
 
     def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""
-        sample_step = self.scene.turn_s / self.scene.numerics.samples_per_turn
         while True:
             self.stop.check()
             here = self.carry.clock[0] / self.scene.turn_s
             chunk = min(here + CHUNK_TURNS, turns)
             t_end = chunk * self.scene.turn_s
-            status = advance(self.bearing, self.control, self.carry, self.tally, t_end, sample_step)
+            status = self.advance(self.bearing, self.control, self.carry, self.tally, t_end, self.sample_step)
             if status != FINISHED:
                 raise RunError(self._why(status))
             if chunk >= turns:
@@ -144,7 +157,8 @@ class Run:
             return f"{where}: {component} is not finite at any step size; check the laws that act on it"
         return (
             f"{where}: step budget of {self.control.step_budget} used up (last step {self.carry.clock[1]:.2g} s); "
-            "raise numerics.step_budget_per_turn, loosen numerics.rtol, or soften the stiffest law"
+            f"{'take numerics.method = auto, ' if self.scene.numerics.method == 'rk45' else ''}raise "
+            "numerics.step_budget_per_turn, loosen numerics.rtol, or soften the stiffest law"
         )
 
 
@@ -311,10 +325,16 @@ def _gather(
             "rejected_steps": sum(run.rejected_steps for run in everything),
             "rhs_evaluations": sum(run.derivatives for run in everything),
             "turns": per_run * len(everything),
+            **stiffness_cost(runs),
         },
         replicates=scene.numerics.replicates,
         seed=scene.numerics.seed,
-        notes=(*_notes(scene, power_gap), *start.notes, *error_notes(scene, figures, fault)),
+        notes=(
+            *_notes(scene, power_gap),
+            *start.notes,
+            *error_notes(scene, figures, fault),
+            *stiffness_notes(scene, runs),
+        ),
         versions=versions(),
         scene=scene.model_dump(mode="json"),
     )

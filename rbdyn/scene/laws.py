@@ -84,7 +84,9 @@ class Laws(Strict):
 class Numerics(Strict):
     """Tolerance, length and replication of a run."""
 
-    method: Literal["rk45"] = "rk45"
+    # rk45: explicit Dormand-Prince. rosenbrock: linearly implicit RODAS4, for scenes whose explicit steps are held by
+    # stability. auto: the first, unless a trial at the start of a run shows the second to be cheaper.
+    method: Literal["auto", "rk45", "rosenbrock"] = "auto"
     # Per step, of the approach and speed of a race contact at its mean load share. At 1e-2 no output of the bearing
     # of Chen et al. 2022 is off by more than 0.2 %; looser ones add spurious power.
     rtol: Annotated[float, Field(ge=1e-13, le=0.1)] = 1e-2
