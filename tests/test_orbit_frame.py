@@ -69,10 +69,10 @@ def test_invariant_frame_changes_no_solution(outer, monkeypatch):
     ends, steps = [], []
     for factor in (1.0, 0.0, -0.5):
 
-        def begin_step(bearing, carry, factor=factor):
-            carry.clock[4] = factor * orbit_frame.mean_orbit_rate(10, carry.y)
-            turn = orbit_frame.turn_of(carry.clock[4], 0.0)
-            orbit_frame.rates_to_frame(turn, 10, carry.y, 0, carry.k)
+        def begin_step(z, y, k, factor=factor):
+            rate = factor * orbit_frame.mean_orbit_rate(z, y)
+            orbit_frame.rates_to_frame(orbit_frame.turn_of(rate, 0.0), z, y, 0, k)
+            return rate
 
         monkeypatch.setattr(rk, "begin_step", begin_step)
         run = Run(outer, roller_bearing(outer), 0, 1e-9, Stop())

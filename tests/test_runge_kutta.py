@@ -77,7 +77,7 @@ def test_rate_dense_output(conservative, evaluate):
         for h in steps:
             k, _ = one_step(bearing, y, h, evaluate)
             step = SimpleNamespace(k=k, y=y)
-            inside = np.array([rk.interpolate.py_func(step, h, theta, i) for i in range(y.size)])
+            inside = np.array([rk.interpolate.py_func(step.y, step.k, h, theta, i) for i in range(y.size)])
             exact = y
             for _ in range(16):
                 exact = one_step(bearing, exact, theta * h / 16.0, evaluate)[1]
@@ -92,7 +92,7 @@ def test_unit_dense_output_meets_the_ends():
     end = step.y + h * rk.A[6] @ step.k[:6]
     # Slopes at the ends are k_1 and k_7 whatever the stages between.
     for i in range(3):
-        at = [rk.interpolate.py_func(step, h, theta, i) for theta in (0.0, 1.0, 1e-6, 1.0 - 1e-6)]
+        at = [rk.interpolate.py_func(step.y, step.k, h, theta, i) for theta in (0.0, 1.0, 1e-6, 1.0 - 1e-6)]
         assert at[:2] == pytest.approx([step.y[i], end[i]], abs=1e-14)
         slopes = [(at[2] - at[0]) / (1e-6 * h), (at[1] - at[3]) / (1e-6 * h)]
         assert slopes == pytest.approx([step.k[0, i], step.k[6, i]], abs=1e-3)
@@ -258,7 +258,7 @@ def test_oracle_peak_inside_one_step(conservative, evaluate):
         forces = []
         for theta in thetas:
             inside = y.copy()
-            inside[10] = rk.interpolate.py_func(carry, h, theta, 10)
+            inside[10] = rk.interpolate.py_func(carry.y, carry.k, h, theta, 10)
             forces.append(evaluate(run.bearing, inside).loads[0])
         carry.loads[:] = run.tally.largest[:] = 0.0
         rk.refine_peak(run.bearing, carry, h, run.tally)

@@ -22,7 +22,8 @@ Advance = Callable[[RollerBearing, Control, Carry, Tally, float, float], int]
 TRIAL_TURNS, TRIAL_STEPS = 0.05, 20_000
 # Share of steps held by stability from which a run counts as stiff.
 STIFF_SHARE = 0.5
-# The implicit method takes 100 to 500 steps a turn of a bearing however stiff: below this the explicit one is cheaper.
+# The implicit method takes 100 to 500 steps a turn of a bearing however stiff: below this the explicit one is cheaper,
+# and steps at their limit of stability are nothing to speak of.
 FEWEST_STEPS_PER_TURN = 2000
 # Processor time of the implicit method over that of the explicit one, per right-hand side: linear algebra, and
 # right-hand sides of one roller that fill no vectors (10 rollers, measured).
@@ -123,7 +124,9 @@ def stiffness_notes(scene: Scene, runs: Sequence[Replicate]) -> tuple[str, ...]:
             f"method: {cost['implicit_runs']:g} of {len(runs)} runs by the linearly implicit one, because stability would "
             "hold the explicit steps and a trial showed it cheaper",
         )
-    if cost["held_by_stability"] < STIFF_SHARE:
+    turns = sum(float(run.durations.sum()) for run in runs) / scene.turn_s
+    steps = sum(run.accepted_steps + run.rejected_steps for run in runs)
+    if cost["held_by_stability"] < STIFF_SHARE or steps < FEWEST_STEPS_PER_TURN * turns:
         return ()
     time_s = 1.0 / cost["eigenvalue_1_s"]
     mend = "numerics.method = 'auto' tries the implicit one; " if scene.numerics.method == "rk45" else ""

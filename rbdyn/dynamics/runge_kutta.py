@@ -95,15 +95,14 @@ class Tally(NamedTuple):
 
 
 @kernel
-def interpolate(carry, h, theta, i):
+def interpolate(y, k, h, theta, i):
     """Component ``i`` at the fraction ``theta`` of the step, fourth-order accurate; rollers' in the frame of the step."""
-    k = carry.k
     difference = h * (B1 * k[0, i] + B3 * k[2, i] + B4 * k[3, i] + B5 * k[4, i] + B6 * k[5, i])
     slope = h * k[0, i] - difference
     curve = difference - h * k[6, i] - slope
     quartic = h * (D1 * k[0, i] + D3 * k[2, i] + D4 * k[3, i] + D5 * k[4, i] + D6 * k[5, i] + D7 * k[6, i])
     rest = 1.0 - theta
-    return carry.y[i] + theta * (difference + rest * (slope + theta * (curve + rest * quartic)))
+    return y[i] + theta * (difference + rest * (slope + theta * (curve + rest * quartic)))
 
 
 @kernel
@@ -163,31 +162,32 @@ def stage_state(s, y, k, h, state):
 
 
 @kernel
-def trial_step(bearing, carry, h):
-    """Stages 2 to 7 of a step of size ``h`` from ``carry.y``; the end state is left in ``carry.stage``."""
+def trial_step(bearing, y, k, stage, power, loads, scratch, rate, h):
+    """Stages 2 to 7 of a step of size ``h`` from ``y``, in a frame of ``rate``; the end state is left in ``stage``."""
     # One loop of a length the compiler does not know: unrolled, six derivatives overflow the instruction cache.
     z = roller_count(bearing)
-    for s in range(1, carry.k.shape[0]):
-        turn = turn_of(carry.clock[4], C[s] * h)
-        stage_state(s, carry.y, carry.k, h, carry.stage)
-        to_fixed_axes(turn, z, carry.stage)
-        derivative(bearing, carry.stage, s, carry.k, carry.power, carry.loads, carry.scratch)
-        rates_to_frame(turn, z, carry.stage, s, carry.k)
+    for s in range(1, k.shape[0]):
+        turn = turn_of(rate, C[s] * h)
+        stage_state(s, y, k, h, stage)
+        to_fixed_axes(turn, z, stage)
+        derivative(bearing, stage, s, k, power, loads, scratch)
+        rates_to_frame(turn, z, stage, s, k)
 
 
 @kernel
-def begin_step(bearing, carry):
-    """Choose the frame of the next step from ``carry.y``, and turn the first stage, given in fixed axes, into it."""
-    carry.clock[4] = mean_orbit_rate(bearing.rollers, carry.y)
-    rates_to_frame(turn_of(carry.clock[4], 0.0), bearing.rollers, carry.y, 0, carry.k)
+def begin_step(z, y, k):
+    """Rate of the frame [rad/s] of the step from ``y``, whose first stage, given in fixed axes, is turned into it."""
+    rate = mean_orbit_rate(z, y)
+    rates_to_frame(turn_of(rate, 0.0), z, y, 0, k)
+    return rate
 
 
 @routine
-def worst_component(carry, h, inverse_tolerance):
+def worst_component(k, h, inverse_tolerance):
     """Component that limits the step: the first that is not finite, else the one of the largest error."""
     worst, largest = 0, -1.0
     for i in range(inverse_tolerance.size):
-        e = abs(h * scaled_error(carry.k, i, inverse_tolerance))
+        e = abs(h * scaled_error(k, i, inverse_tolerance))
         if not math.isfinite(e):
             return i
         if e > largest:
@@ -206,7 +206,7 @@ def refine_peak(bearing, carry, h, tally):
     spacing = 1.0 / (PEAK_POINTS + 1)
     for p in range(1, PEAK_POINTS + 1):
         for i in range(carry.y.size):
-            inside[i] = interpolate(carry, h, p * spacing, i)
+            inside[i] = interpolate(carry.y, carry.k, h, p * spacing, i)
         to_fixed_axes(turn_of(carry.clock[4], p * spacing * h), bearing.rollers, inside)
         derivative_once(bearing, inside, FREE_ROW, carry.k, carry.power, carry.loads, carry.scratch)
         values[p] = carry.loads[1, POCKET_LOAD]
@@ -227,42 +227,40 @@ def refine_peak(bearing, carry, h, tally):
 
 
 @kernel
-def keep(bearing, carry, h, tally, sample_step):
-    """Book an accepted step: work, largest loads, samples."""
-    power, loads, work = carry.power, carry.loads, tally.work
+def keep(body, y, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step):
+    """Book an accepted step: work, largest loads, samples; the cage's coordinates stand from ``body`` on.
+
+    Returns whether a stage saw a new largest pocket load.
+    """
     for p in range(POWERS):
         work[p] += h * (
             B1 * power[0, p] + B3 * power[2, p] + B4 * power[3, p] + B5 * power[4, p] + B6 * power[5, p]
         )
-    time = carry.clock[0]
+    time = clock[0]
     suspected = 0.0
     for s in range(1, 7):
         suspected = max(suspected, loads[s, POCKET_LOAD])
     for force in range(LOADS):
-        if loads[6, force] > tally.largest[force]:
-            tally.largest[force] = loads[6, force]
-            tally.largest_time[force] = time + h
-    body = 5 * bearing.rollers
-    while carry.clock[3] <= time + h:
-        theta = (carry.clock[3] - time) / h
-        vx = interpolate(carry, h, theta, body + CAGE_VX)
-        vy = interpolate(carry, h, theta, body + CAGE_VY)
+        if loads[6, force] > largest[force]:
+            largest[force] = loads[6, force]
+            largest_time[force] = time + h
+    while clock[3] <= time + h:
+        theta = (clock[3] - time) / h
+        vx = interpolate(y, k, h, theta, body + CAGE_VX)
+        vy = interpolate(y, k, h, theta, body + CAGE_VY)
         square = vx * vx + vy * vy
-        tally.whirl[0] += 1.0
-        tally.whirl[1] += math.sqrt(square)
-        tally.whirl[2] += square
-        carry.clock[3] += sample_step
-    if suspected > tally.largest[POCKET_LOAD]:
-        refine_peak(bearing, carry, h, tally)
-        carry.counts[2] += PEAK_POINTS
+        whirl[0] += 1.0
+        whirl[1] += math.sqrt(square)
+        whirl[2] += square
+        clock[3] += sample_step
+    return suspected > largest[POCKET_LOAD]
 
 
 @routine
-def look_at_stiffness(carry, h, inverse_tolerance):
+def look_at_stiffness(k, stiffness, h, inverse_tolerance):
     """Book whether stability holds the step: |eigenvalue| = |k_7 - k_6|/|y_7 - y_6| over the tolerances, both at the end
     of the step (Hairer and Wanner, Solving ODEs II, IV.2).
     """
-    k = carry.k
     rates = places = 0.0
     for i in range(inverse_tolerance.size):
         rate = (k[6, i] - k[5, i]) * inverse_tolerance[i]
@@ -273,10 +271,10 @@ def look_at_stiffness(carry, h, inverse_tolerance):
         place *= h * inverse_tolerance[i]
         rates += rate * rate
         places += place * place
-    carry.stiffness[0] += 1.0
+    stiffness[0] += 1.0
     if h * h * rates > STABILITY_LIMIT * STABILITY_LIMIT * places > 0.0:
-        carry.stiffness[1] += 1.0
-        carry.stiffness[2] += math.sqrt(rates / places)
+        stiffness[1] += 1.0
+        stiffness[2] += math.sqrt(rates / places)
 
 
 @entry
@@ -286,15 +284,20 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
     Steps end exactly at ``t_end``. On any other status ``carry`` holds the last good state, and
     ``carry.counts[3]`` the component that made it impossible.
     """
-    clock, counts = carry.clock, carry.counts
+    # Taken out of their tuples once: each time counts references, atomically.
+    y, k, stage, clock, counts = carry.y, carry.k, carry.stage, carry.clock, carry.counts
+    power, loads, scratch = carry.power, carry.loads, carry.scratch
+    work, largest, largest_time, whirl = tally.work, tally.largest, tally.largest_time, tally.whirl
+    inverse_tolerance = control.inverse_tolerance
+    z = roller_count(bearing)
     if counts[2] == 0:
-        derivative_once(bearing, carry.y, FIRST_ROW, carry.k, carry.power, carry.loads, carry.scratch)
+        derivative_once(bearing, y, FIRST_ROW, k, power, loads, scratch)
         counts[2] = 1
-        for i in range(carry.y.size):
-            if not math.isfinite(carry.k[0, i]):
+        for i in range(y.size):
+            if not math.isfinite(k[0, i]):
                 counts[3] = i
                 return NOT_FINITE
-        begin_step(bearing, carry)
+        clock[4] = begin_step(z, y, k)
     grow = GROW
     while clock[0] < t_end:
         if counts[0] + counts[1] >= control.step_budget:
@@ -302,24 +305,26 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
         remaining = t_end - clock[0]
         last = clock[1] >= remaining
         h = remaining if last else clock[1]
-        trial_step(bearing, carry, h)
+        trial_step(bearing, y, k, stage, power, loads, scratch, clock[4], h)
         counts[2] += 6
-        error = error_norm(carry.k, h, control.inverse_tolerance)
+        error = error_norm(k, h, inverse_tolerance)
         if error <= 1.0:
             if counts[0] % LOOK_EVERY == 0:
-                look_at_stiffness(carry, h, control.inverse_tolerance)
-            keep(bearing, carry, h, tally, sample_step)
+                look_at_stiffness(k, carry.stiffness, h, inverse_tolerance)
+            if keep(5 * z, y, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step):
+                refine_peak(bearing, carry, h, tally)
+                counts[2] += PEAK_POINTS
             counts[0] += 1
-            rates_to_fixed_axes(turn_of(clock[4], h), bearing.rollers, carry.stage, 6, carry.k)
+            rates_to_fixed_axes(turn_of(clock[4], h), z, stage, 6, k)
             clock[0] = t_end if last else clock[0] + h
-            for i in range(carry.y.size):
-                carry.y[i] = carry.stage[i]
-                carry.k[0, i] = carry.k[6, i]
+            for i in range(y.size):
+                y[i] = stage[i]
+                k[0, i] = k[6, i]
             for p in range(POWERS):
-                carry.power[0, p] = carry.power[6, p]
+                power[0, p] = power[6, p]
             for force in range(LOADS):
-                carry.loads[0, force] = carry.loads[6, force]
-            begin_step(bearing, carry)
+                loads[0, force] = loads[6, force]
+            clock[4] = begin_step(z, y, k)
             error = max(error, 1e-4)
             factor = SAFETY * error**-EXPONENT * clock[2] ** BETA
             # A step cut short by t_end says nothing against the step it was cut from.
@@ -332,7 +337,7 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
             finite = math.isfinite(error)
             shrink = max(SAFETY * error**-0.2, SHRINK) if finite else SHRINK
             if h * shrink < control.smallest_step:
-                counts[3] = worst_component(carry, h, control.inverse_tolerance)
+                counts[3] = worst_component(k, h, inverse_tolerance)
                 return STEP_UNDERFLOW if finite else NOT_FINITE
             clock[1] = h * shrink
             grow = 1.0
