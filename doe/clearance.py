@@ -5,8 +5,8 @@ The only module of this package that runs bearing simulations.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -103,26 +103,27 @@ def run_scenes(
         key: SimulationResult.from_dict(record) for key, record in stored.items() if record is not None
     }
     progress(len(results), len(stored))
-    failures = {}
+    failures: dict[str, RunError] = {}
     if missing:
+        from rbdyn.dynamics.ensemble import Ended, Stop, run_all
         from rbdyn.dynamics.model import roller_bearing
-        from rbdyn.dynamics.simulate import Stop, as_they_end, prepare, simulate, thread_pool
+        from rbdyn.dynamics.simulate import prepare, simulate
 
         # Compiled once here, lest every thread wait for the same compilation.
         first = next(iter(missing.values()))
         prepare(first, roller_bearing(first))
-        stop = Stop()
-        with thread_pool(workers or os.cpu_count(), stop) as pool:
-            futures = {pool.submit(simulate, scene, 1, None, stop): key for key, scene in missing.items()}
-            for future in as_they_end(futures):
-                key = futures[future]
-                try:
-                    results[key] = future.result()
-                except RunError as error:
-                    failures[key] = error
-                    continue
-                store.put(key, results[key].as_dict())
-                progress(len(results), len(stored))
+        stop, keys_of_runs = Stop(), list(missing)
+
+        def ended(one: Ended[SimulationResult]) -> None:
+            key = keys_of_runs[one.place]
+            if one.fault is not None:
+                failures[key] = one.fault
+                return
+            results[key] = one.result()
+            store.put(key, results[key].as_dict())
+            progress(len(results), len(stored))
+
+        run_all([partial(simulate, scene, 1, None, stop) for scene in missing.values()], workers, stop, ended)
     if failures:
         causes = [
             f"{label}: {failures[key]}" for label, key in zip(labels, keys, strict=True) if key in failures

@@ -67,7 +67,7 @@ def race(
     stiffness = EXPONENT * elastic / approach
     engaged = np.minimum(approach * law.damping.per_engagement, 1.0)
     engaged = engaged**2 * (3.0 - 2.0 * engaged)
-    damping = 2.0 * law.damping.ratio * np.sqrt(stiffness * law.damping.mass) * engaged
+    damping = law.damping.scale * np.sqrt(stiffness) * engaged
     load = np.where(overlap > 0.0, np.maximum(elastic + damping * closing, 0.0), 0.0)
 
     # The surfaces meet half an approach below the roller's, and slide there.

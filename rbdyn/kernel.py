@@ -105,7 +105,7 @@ def either(first: bool, one: Any, other: Any) -> Any:
 def _either(first, one, other):
     if isinstance(one, types.BaseNamedTuple):
         fields = "".join(f"either(first, one.{name}, other.{name})," for name in one.fields)
-        made: dict[str, Any] = {"either": either, "made": one.instance_class}
+        made: dict[str, Any] = {"either": either, "made": one.instance_class, "__name__": __name__}
         exec(f"def body(first, one, other): return made({fields})", made)
         return made["body"]
 

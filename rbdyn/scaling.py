@@ -18,9 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from rbdyn.accuracy.report import Report, Table, record
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Stop, prepare, run_replicate
+from rbdyn.dynamics.simulate import prepare, run_replicate
 from rbdyn.faults import InputError, RunError
 from rbdyn.footprint import last_line
 from rbdyn.option_cost import with_options

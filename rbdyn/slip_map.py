@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,11 +17,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rbdyn.dynamics.bias import companion_tolerance
+from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.error_bars import quantities, settled
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Stop, as_they_end, prepare, run_replicate, thread_pool
-from rbdyn.faults import InputError, RunError
+from rbdyn.dynamics.simulate import prepare, run_replicate
+from rbdyn.faults import InputError
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene
 
@@ -142,6 +144,7 @@ def slip_map(
         (numerics.rtol, numerics.replicates),
         (companion_tolerance(numerics.rtol), numerics.companions),
     )
+    stop = Stop()
     tasks = [
         (place, rtol, replicate)
         for place in range(len(scenes))
@@ -150,21 +153,25 @@ def slip_map(
     ]
     runs: dict[tuple[int, float, int], Replicate] = {}
     causes: dict[int, str] = {}
+    done = 0
+
+    def ended(one: Ended[Replicate]) -> None:
+        nonlocal done
+        done += 1
+        place = tasks[one.place][0]
+        if one.fault is None:
+            runs[tasks[one.place]] = one.result()
+        else:
+            causes[place] = min(str(one.fault), causes.get(place, str(one.fault)))
+        if progress is not None:
+            progress(done, len(tasks))
+
     started = time.perf_counter()
-    stop = Stop()
-    with thread_pool(workers, stop) as pool:
-        futures = {
-            pool.submit(run_replicate, scenes[task[0]], bearings[task[0]], task[2], task[1], stop): task
-            for task in tasks
-        }
-        for done, future in enumerate(as_they_end(futures), 1):
-            task = futures[future]
-            try:
-                runs[task] = future.result()
-            except RunError as error:
-                causes[task[0]] = min(str(error), causes.get(task[0], str(error)))
-            if progress is not None:
-                progress(done, len(tasks))
+    work = [
+        partial(run_replicate, scenes[place], bearings[place], replicate, rtol, stop)
+        for place, rtol, replicate in tasks
+    ]
+    run_all(work, workers, stop, ended)
     points = []
     for place, point in enumerate(scenes):
         cause = causes.get(place)

@@ -115,7 +115,7 @@ NEUTRAL = {
         races(traction=NoTraction()),
         races(traction=FourConstantTraction(0.0, 0.0, 1.0, 0.0)),
     ),
-    "without race damping": (races(damping=NoDamping()), races(damping=ViscousDamping(0.0, 1e-3, 1e7))),
+    "without race damping": (races(damping=NoDamping()), races(damping=ViscousDamping(0.0, 1e7))),
     "without rolling resistance": (
         races(rolling=NoRollingResistance()),
         races(rolling=RollingResistance(0.0, 1.0)),

@@ -15,12 +15,13 @@ from hypothesis import strategies as st
 
 from rbdyn.dynamics.clock import ClockedDrive
 from rbdyn.dynamics.energy import mechanical_energy
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.equations import LOAD, SHAFT
 from rbdyn.dynamics.geometry import layout_of
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.races import unequal_rollers
 from rbdyn.dynamics.schedule import SmoothRamps
-from rbdyn.dynamics.simulate import Run, Stop
+from rbdyn.dynamics.simulate import Run
 
 FOLDER = Path(__file__).parent
 SCENES = pytest.mark.parametrize("fixture", ["outer", "inner", "everything"])

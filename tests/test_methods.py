@@ -26,12 +26,13 @@ from rbdyn.accuracy.methods import (
 )
 from rbdyn.accuracy.right_hand_side import BudgetSpent, RightHandSide
 from rbdyn.accuracy.trajectory import Error, Reference, difference, end_of, reference, settled
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.equations import LOADS, POWERS
 from rbdyn.dynamics.geometry import layout_of
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_lanes import scratch
 from rbdyn.dynamics.runge_kutta import Tally
-from rbdyn.dynamics.simulate import Run, Stop
+from rbdyn.dynamics.simulate import Run
 from rbdyn.faults import InputError, RunError
 
 CVODE = [method for method in METHODS if method.name.startswith("CVODE")]

@@ -10,16 +10,17 @@ import pytest
 from rbdyn.dynamics import rosenbrock as ros
 from rbdyn.dynamics import runge_kutta as rk
 from rbdyn.dynamics.arrow_matrix import PARTS, arrow_matrix, factor, shifted, solve
+from rbdyn.dynamics.batch_means import student_half_width
 from rbdyn.dynamics.energy import mechanical_energy
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.equations import POWERS, SHAFT
 from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, scales, slip_scale
 from rbdyn.dynamics.implicit import differences, workspace
 from rbdyn.dynamics.jacobian import jacobian
 from rbdyn.dynamics.method import held_by_stability, largest_eigenvalue
-from rbdyn.dynamics.batch_means import student_half_width
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_lanes import scratch
-from rbdyn.dynamics.simulate import Run, Stop, run_replicate, simulate
+from rbdyn.dynamics.simulate import Run, run_replicate, simulate
 from rbdyn.dynamics.state import layout
 from rbdyn.kernel import entry
 

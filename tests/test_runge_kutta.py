@@ -11,10 +11,11 @@ from scipy.integrate import solve_ivp
 
 from rbdyn.dynamics import runge_kutta as rk
 from rbdyn.dynamics.energy import mechanical_energy
+from rbdyn.dynamics.ensemble import CancelledError, Stop
 from rbdyn.dynamics.equations import POWERS, SHAFT
 from rbdyn.dynamics.geometry import scales
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import CancelledError, Run, Stop
+from rbdyn.dynamics.simulate import Run
 from rbdyn.faults import RunError
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from rbdyn.dynamics.batch_means import student_factor, student_half_width
 from rbdyn.dynamics.bias import Comparison
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.equations import (
     INNER_LOAD,
     LAND_LOAD,
@@ -25,7 +26,7 @@ from rbdyn.dynamics.geometry import kinematics
 from rbdyn.dynamics.history import history
 from rbdyn.dynamics.metrics import IMPACT_FORCE, POWER_LOSS, Replicate, quantity
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Run, Stop, simulate
+from rbdyn.dynamics.simulate import Run, simulate
 from rbdyn.faults import InputError, RunError
 from rbdyn.result import Quantity, SimulationResult
 

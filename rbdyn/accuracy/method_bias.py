@@ -22,10 +22,11 @@ from rbdyn.accuracy.methods import (
 )
 from rbdyn.accuracy.report import Progress, Table
 from rbdyn.accuracy.tolerances import NEGLIGIBLE, OUTPUTS, Bias, bias_cells, bias_of
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.recording import record
-from rbdyn.dynamics.simulate import Run, Stop, prepare
+from rbdyn.dynamics.simulate import Run, prepare
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from rbdyn.accuracy.fixed_step import runge_kutta_4, steps_of, velocity_of, velocity_verlet
 from rbdyn.accuracy.right_hand_side import BudgetSpent, RightHandSide
 from rbdyn.accuracy.stretch import Stretch
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.equations import RollerBearing
 from rbdyn.dynamics.geometry import scales
-from rbdyn.dynamics.simulate import Run, Stop
+from rbdyn.dynamics.simulate import Run
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from rbdyn.accuracy.report import Progress, Report, Table, record
 from rbdyn.accuracy.tolerances import OUTPUTS
 from rbdyn.dynamics.batch_means import student_factor
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Stop, prepare, run_series
+from rbdyn.dynamics.simulate import prepare, run_series
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.replicates/1"

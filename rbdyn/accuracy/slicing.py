@@ -15,9 +15,10 @@ import numpy as np
 from rbdyn.accuracy.report import Progress, Report, Table, record
 from rbdyn.accuracy.tolerances import OUTPUTS, Bias, bias_cells, bias_of, flat
 from rbdyn.contact.hertz_line import line_load
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import race_contact_law, roller_bearing
-from rbdyn.dynamics.simulate import Stop, prepare, run_series
+from rbdyn.dynamics.simulate import prepare, run_series
 from rbdyn.faults import InputError
 from rbdyn.option_cost import with_options
 from rbdyn.scene import Scene

@@ -16,9 +16,10 @@ import numpy as np
 
 from rbdyn.accuracy.report import Progress, Table
 from rbdyn.dynamics.batch_means import student_half_width
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Stop, prepare, run_series
+from rbdyn.dynamics.simulate import prepare, run_series
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 

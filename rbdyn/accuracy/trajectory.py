@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from rbdyn.accuracy.methods import DOP853, OURS, Method
 from rbdyn.accuracy.report import Table
 from rbdyn.accuracy.stretch import Stretch
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.geometry import absolute_tolerance, layout_of
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Run, Stop
+from rbdyn.dynamics.simulate import Run
 from rbdyn.dynamics.state import CAGE_X, CAGE_Y, RING_X, RING_Y
 from rbdyn.faults import InputError
 from rbdyn.scene import Scene

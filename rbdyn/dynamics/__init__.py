@@ -16,7 +16,7 @@ Compiled:
 - ``rosenbrock``: RODAS4 for scenes where it does, on ``jacobian`` and ``arrow_matrix``; ``implicit`` makes its storage
 
 Results:
-- ``method``: which of the two integrates a run
+- ``method``: which of the two integrates a run; ``ensemble``: runs side by side
 - ``simulate``: replicates, workers, error bars; ``metrics``: impact force, whirl deviation ratio, power loss
 - ``race_report``: pressure, half-width and film of each race
 - ``history``, ``observe``: every motion and contact over time, on request

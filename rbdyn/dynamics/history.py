@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics import observe as row
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.observe import OBSERVED, observe
-from rbdyn.dynamics.simulate import Run, Stop
+from rbdyn.dynamics.simulate import Run
 from rbdyn.dynamics.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, RING_X, RING_Y
 from rbdyn.scene import Scene
 

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.batch_means import student_half_width
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.geometry import absolute_tolerance
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Run, Stop
+from rbdyn.dynamics.simulate import Run
 from rbdyn.scene import Scene
 
 Array = NDArray[np.float64]

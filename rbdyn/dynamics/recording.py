@@ -1,4 +1,4 @@
-"""One replicate recorded in equal batches of about two shaft turns, from its start to its end."""
+"""One replicate recorded in equal batches of about a shaft turn, from its start to its end."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rbdyn.dynamics.simulate import Run
 
 # Long enough that the step cut at a batch's end costs nothing, short against any memory worth finding.
-BATCH_TURNS = 2.0
+BATCH_TURNS = 1.0
 # Bounds what a very long run keeps.
 MOST_BATCHES = 20_000
 
@@ -49,13 +49,16 @@ def record(run: Run) -> Replicate:
     ends, first, per_window = batch_ends(scene)
     count, angle = len(ends), 5 * run.bearing.rollers + CAGE_ANGLE
     whirl, work, largest = np.empty((count, 3)), np.empty((count, POWERS)), np.empty((count, LOADS))
-    cage, rolling, energy = (np.empty(count + 1) for _ in range(3))
+    cage, rolling = np.empty(count + 1), np.empty(count + 1)
+    # Looked at only where the count may begin or ends.
+    energy = np.full(count + 1, np.nan)
     begin = run.clock_angles()
 
     def look(place: int) -> None:
         cage[place] = run.carry.y[angle]
         rolling[place] = kinematic_cage_angle(scene, begin, run.clock_angles())
-        energy[place] = sum(mechanical_energy(run.bearing, run.carry.y))
+        if place in (first, count) or scene.numerics.discard_turns == "auto":
+            energy[place] = sum(mechanical_energy(run.bearing, run.carry.y))
 
     look(0)
     for batch, end in enumerate(ends):

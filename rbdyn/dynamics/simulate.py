@@ -1,22 +1,18 @@
-"""Replicates of a scene, in threads (compiled code runs outside the GIL), gathered with error bars."""
+"""Replicates of a scene, gathered with error bars."""
 
 from __future__ import annotations
 
 import math
-import os
-import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import TypeVar
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.bias import companion_tolerance
 from rbdyn.dynamics.energy import mechanical_energy
+from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing
 from rbdyn.dynamics.error_bars import error_notes, quantities, settled
 from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
@@ -29,6 +25,7 @@ from rbdyn.dynamics.recording import record
 from rbdyn.dynamics.runge_kutta import (
     FINISHED,
     NOT_FINITE,
+    STEP_BUDGET,
     STEP_UNDERFLOW,
     Carry,
     Control,
@@ -40,34 +37,13 @@ from rbdyn.faults import RunError
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene
 
-T = TypeVar("T")
-
-# Interruptions are looked at between chunks of this many shaft turns: some hundredths of a second.
-CHUNK_TURNS = 10.0
+# Interruptions are looked for between so many steps: some hundredths of a second, of the implicit method half a one.
+STEPS_AT_ONCE = 10_000
 LARGEST_STEP_TURNS = 0.02
 SMALLEST_STEP_TURNS = 1e-12
 PI_START_ERROR = 1e-4
 # Beyond this relative gap of the power balance a result warns of its tolerance.
 LARGEST_POWER_GAP = 0.005
-
-
-class CancelledError(Exception):
-    """The run was asked to stop."""
-
-
-@dataclass
-class Stop:
-    """Shared wish to stop; compiled code looks at it between chunks. A stop within another heeds both."""
-
-    outer: Stop | None = None
-    event: threading.Event = field(default_factory=threading.Event)
-
-    def check(self) -> None:
-        """Raises CancelledError when a stop is wished."""
-        if self.event.is_set():
-            raise CancelledError
-        if self.outer is not None:
-            self.outer.check()
 
 
 class Run:
@@ -117,16 +93,17 @@ class Run:
 
     def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""
+        counts, budget = self.carry.counts, self.control.step_budget
         while True:
             self.stop.check()
-            here = self.carry.clock[0] / self.scene.turn_s
-            chunk = min(here + CHUNK_TURNS, turns)
-            t_end = chunk * self.scene.turn_s
-            status = self.advance(self.bearing, self.control, self.carry, self.tally, t_end, self.sample_step)
-            if status != FINISHED:
-                raise RunError(self._why(status))
-            if chunk >= turns:
+            short = self.control._replace(step_budget=min(int(counts[:2].sum()) + STEPS_AT_ONCE, budget))
+            status = self.advance(
+                self.bearing, short, self.carry, self.tally, turns * self.scene.turn_s, self.sample_step
+            )
+            if status == FINISHED:
                 return
+            if status != STEP_BUDGET or counts[:2].sum() >= budget:
+                raise RunError(self._why(status))
 
     def forget(self) -> None:
         """Start counting here: empty the tally and sample from now on."""
@@ -245,41 +222,23 @@ def run_series(
     stop: Stop,
 ) -> list[list[Replicate]]:
     """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""
-    tasks = [(place, index) for place in range(len(tolerances)) for index in range(scene.numerics.replicates)]
-    runs: dict[tuple[int, int], Replicate] = {}
-    with thread_pool(workers, stop) as pool:
-        futures = {
-            pool.submit(run_replicate, scene, bearing, index, tolerances[place], stop): (place, index)
-            for place, index in tasks
-        }
-        for future in as_they_end(futures):
-            runs[futures[future]] = future.result()
-            if progress is not None:
-                progress(len(runs), len(tasks))
-    return [
-        [runs[place, index] for index in range(scene.numerics.replicates)] for place in range(len(tolerances))
+    replicates = range(scene.numerics.replicates)
+    tasks = [
+        partial(run_replicate, scene, bearing, index, rtol, stop)
+        for rtol in tolerances
+        for index in replicates
     ]
+    runs: dict[int, Replicate] = {}
 
+    def ended(one: Ended[Replicate]) -> None:
+        runs[one.place] = one.result()
+        if progress is not None:
+            progress(len(runs), len(tasks))
 
-@contextmanager
-def thread_pool(workers: int | None, stop: Stop) -> Iterator[ThreadPoolExecutor]:
-    """Threads that, should anything go wrong or Ctrl-C come, stop at the end of their chunk."""
-    pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
-    try:
-        yield pool
-    except BaseException:
-        stop.event.set()
-        pool.shutdown(wait=True, cancel_futures=True)
-        raise
-    pool.shutdown()
-
-
-def as_they_end(futures: Iterable[Future[T]]) -> Iterator[Future[T]]:
-    """Futures in the order in which they end; waits in short naps so that Ctrl-C is heard at once."""
-    pending = set(futures)
-    while pending:
-        done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-        yield from done
+    run_all(tasks, workers, stop, ended)
+    return [
+        [runs[place * len(replicates) + index] for index in replicates] for place in range(len(tolerances))
+    ]
 
 
 def _gather(

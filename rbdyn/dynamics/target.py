@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from rbdyn.dynamics.batch_means import estimate
 from rbdyn.dynamics.bias import FACTOR, SAFETY, companion_tolerance, mean_gap
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.error_bars import FIGURES, settled
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Stop, prepare, run_series, simulate
+from rbdyn.dynamics.simulate import prepare, run_series, simulate
 from rbdyn.faults import InputError
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene

@@ -1,0 +1,84 @@
+"""Independent runs side by side: in threads, since compiled code runs outside the GIL.
+
+Which thread takes a run, and in which order runs end, changes nothing in them: every run has its own state and seed.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from rbdyn.faults import RunError
+
+T = TypeVar("T")
+
+# Ctrl-C is looked for as often as this [s].
+NAP_S = 0.2
+
+
+class CancelledError(Exception):
+    """The run was asked to stop."""
+
+
+@dataclass
+class Stop:
+    """Shared wish to stop; runs look at it every few thousand steps. A stop within another heeds both."""
+
+    outer: Stop | None = None
+    event: threading.Event = field(default_factory=threading.Event)
+
+    def check(self) -> None:
+        """Raises CancelledError when a stop is wished."""
+        if self.event.is_set():
+            raise CancelledError
+        if self.outer is not None:
+            self.outer.check()
+
+
+@dataclass(frozen=True)
+class Ended(Generic[T]):
+    """A run that has ended: its place among all, and what it found or why it could not go on."""
+
+    place: int
+    found: T | None
+    fault: RunError | None
+
+    def result(self) -> T:
+        """What it found. Raises RunError."""
+        if self.fault is not None:
+            raise self.fault
+        assert self.found is not None
+        return self.found
+
+
+def run_all(
+    runs: Sequence[Callable[[], T]],
+    workers: int | None,
+    stop: Stop,
+    ended: Callable[[Ended[T]], None],
+) -> None:
+    """Run all on ``workers`` threads (all processors by default) and hand over each as it ends.
+
+    Whatever is raised, by ``ended`` or by Ctrl-C, stops the others at their next look at ``stop`` and is raised on.
+    """
+    pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+    try:
+        pending: dict[Future[T], int] = {pool.submit(run): place for place, run in enumerate(runs)}
+        while pending:
+            done, _ = wait(pending, timeout=NAP_S, return_when=FIRST_COMPLETED)
+            for future in sorted(done, key=pending.__getitem__):
+                place = pending.pop(future)
+                try:
+                    one = Ended(place, future.result(), None)
+                except RunError as fault:
+                    one = Ended(place, None, fault)
+                ended(one)
+    except BaseException:
+        stop.event.set()
+        pool.shutdown(wait=True, cancel_futures=True)
+        raise
+    pool.shutdown()
