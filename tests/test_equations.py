@@ -209,6 +209,16 @@ def test_oracle_twin(variant, make_scene, evaluate, random_state):
     assert refused(scene, outcomes, random_state, tolerances) == {}
 
 
+@pytest.mark.parametrize("rollers", [2, 7, 8, 9, 16, 17, 33])
+def test_oracle_twin_for_any_number_of_rollers(rollers, make_scene, evaluate, random_state):
+    """Oracle: contacts are all there however they fill vectors: less than one, whole ones, several blocks."""
+    pitch = max(43.5, 4.5 * rollers)
+    scene = make_scene(f"bearing.rollers={rollers}", f"bearing.pitch_diameter_mm={pitch}")
+    bearing = roller_bearing(scene)
+    outcomes = (evaluate(bearing, random_state(scene, seed)) for seed in range(20))
+    assert refused(scene, outcomes, random_state, {}) == {}
+
+
 def test_oracle_twin_interpreted(make_scene, random_state):
     """Oracle: the same for further meetings of laws, which are worth no compilation."""
     found = iter(interpreted([*MEETINGS.values(), *TABLES.values()]))

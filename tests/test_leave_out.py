@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import gc
-import math
 import importlib
 import json
+import math
 import os
 import pkgutil
 import subprocess

@@ -1,0 +1,73 @@
+"""Race contacts in vectors: which may share one, and how lanes choose their race."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba import njit
+
+from rbdyn.contact.hertz_line import LineContact, sliced
+from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.pocket import NoPocket, pocket_contact, pocket_gap
+from rbdyn.dynamics.race_form import RoundRace
+from rbdyn.dynamics.race_lanes import share_vectors
+from rbdyn.kernel import alike, either
+
+
+@njit
+def compiled_alike(one, other):
+    return alike(one, other)
+
+
+@njit
+def compiled_either(first, one, other):
+    return either(first, one, other)
+
+
+@njit
+def compiled_share(one, other):
+    return share_vectors(one, other)
+
+
+@njit
+def compiled_pocket(pocket, radius, ex, ey, dx, dy):
+    gap = pocket_gap(pocket, radius, dy * ex - dx * ey, dx * ex + dy * ey)
+    return gap, pocket_contact(pocket, radius, ex, ey, dx, dy, 0.0, 0.0, 900.0, 0.0)
+
+
+def test_unit_alike_and_either(outer):
+    """Unit: parameters of one type made of numbers are alike, others are not; a choice takes every number of one side."""
+    bearing = roller_bearing(outer)
+    assert compiled_alike(bearing.outer, bearing.inner) and alike(bearing.outer, bearing.inner)
+    for first, expected in ((True, bearing.outer), (False, bearing.inner)):
+        assert compiled_either(first, bearing.outer, bearing.inner) == expected
+        assert either(first, bearing.outer, bearing.inner) == expected
+    assert type(compiled_either(True, bearing.outer, bearing.inner).form) is RoundRace
+    cut = sliced(LineContact(1e9), np.zeros(3), np.zeros(3), 0.0, 0.0)
+    for one, other in ((cut, cut), (LineContact(1.0), RoundRace()), (cut, LineContact(1.0))):
+        assert not compiled_alike(one, other) and not alike(one, other)
+
+
+def test_unit_races_that_share_vectors(outer, everything):
+    """Unit: the plain races share vectors; wavy ones with tables, or races of unlike laws, do not."""
+    plain, rich = roller_bearing(outer), roller_bearing(everything)
+    assert compiled_share(plain.outer, plain.inner) and not compiled_share(rich.outer, rich.inner)
+    assert not compiled_share(plain.outer, plain.inner._replace(contact=rich.inner.contact))
+
+
+@pytest.mark.parametrize(
+    "assignments", [(), ("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.06")]
+)
+def test_invariant_nothing_acts_across_a_gap(make_scene, assignments):
+    """Invariant: where a pocket has a way left it acts with nothing at all; where it acts it has none."""
+    pocket = roller_bearing(make_scene(*assignments)).pocket
+    draw = np.random.default_rng(5)
+    acted = 0
+    for _ in range(2000):
+        dx, dy = 0.02175 + draw.uniform(-1e-4, 1e-4), draw.uniform(-2e-4, 2e-4)
+        gap, wrench = compiled_pocket(pocket, 4.5e-3, 1.0, 0.0, dx, dy)
+        assert (gap > 0.0) == (wrench[4] == 0.0)
+        assert gap <= 0.0 or not any(wrench)
+        acted += gap <= 0.0
+    assert 100 < acted < 1900
+    assert compiled_pocket(NoPocket(), 4.5e-3, 1.0, 0.0, 0.02, 0.0)[0] > 0.0
