@@ -141,7 +141,7 @@ def types_by_body():
     for package in (rbdyn.contact, rbdyn.dynamics):
         for info in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
             for value in vars(importlib.import_module(info.name)).values():
-                for kind, body in getattr(value, "bodies", {}).items():
+                for kind, body in getattr(value, "bodies", {}).items() if hasattr(value, "body") else ():
                     found.setdefault(name_of(body), set()).add(kind)
     return found
 

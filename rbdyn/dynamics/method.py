@@ -27,7 +27,7 @@ STIFF_SHARE = 0.5
 FEWEST_STEPS_PER_TURN = 2000
 # Processor time of the implicit method over that of the explicit one, per right-hand side: linear algebra, and
 # right-hand sides of one roller that fill no vectors (10 rollers, measured).
-IMPLICIT_OVERHEAD = 2.5
+IMPLICIT_OVERHEAD = 3.0
 
 
 def advance_by(method: str, scene: Scene, bearing: RollerBearing) -> Advance:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,13 +72,14 @@ class Run:
         self.tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
         self.sample_step = scene.turn_s / numerics.samples_per_turn
         self.method: str = numerics.method
+        control_by = cache(self._control_by)
         if self.method == "auto":
             self.method, stiffness = cheaper_method(
-                scene, bearing, self._control_by, self.carry, self.tally, self.sample_step
+                scene, bearing, control_by, self.carry, self.tally, self.sample_step
             )
             # The implicit method does not see what it overcomes.
             self.carry.stiffness[:] = stiffness if self.method == "rosenbrock" else 0.0
-        self.control = self._control_by(self.method)
+        self.control = control_by(self.method)
         self.advance = advance_by(self.method, scene, bearing)
 
     def _control_by(self, method: str) -> Control:
