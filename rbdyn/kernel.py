@@ -81,14 +81,16 @@ def _leaves(of: Any) -> list[types.Type]:
 
 def alike(one: Any, other: Any) -> bool:
     """Whether two sets of parameters are of one type, and made of numbers only; known at compile time."""
-    return type(one) is type(other) and all(
-        alike(x, y) if isinstance(x, tuple) else isinstance(x, float) for x, y in zip(one, other, strict=True)
-    )
+    if type(one) is not type(other):
+        return False
+    if not isinstance(one, tuple):
+        return isinstance(one, float)
+    return all(alike(x, y) for x, y in zip(one, other, strict=True))
 
 
 @numba.extending.overload(alike, jit_options=INLINED)  # type: ignore[arg-type]
 def _alike(one, other):
-    answer = one == other and all(isinstance(leaf, types.Float) for leaf in _leaves(one))
+    answer = _mixable(one, other)
 
     def body(one, other):
         return answer
@@ -97,22 +99,40 @@ def _alike(one, other):
 
 
 def either(first: bool, one: Any, other: Any) -> Any:
-    """``one`` or ``other``, number by number, so that neighbouring lanes may choose differently without a branch."""
-    return one if first else other
+    """``one`` or ``other``, number by number, so that neighbouring lanes may choose differently without a branch.
+
+    Where they are not alike they cannot be mixed: ``other``, whatever is asked for.
+    """
+    return one if first and alike(one, other) else other
 
 
 @numba.extending.overload(either, jit_options=INLINED)  # type: ignore[arg-type]
 def _either(first, one, other):
-    if isinstance(one, types.BaseNamedTuple):
-        fields = "".join(f"either(first, one.{name}, other.{name})," for name in one.fields)
-        made: dict[str, Any] = {"either": either, "made": one.instance_class, "__name__": __name__}
-        exec(f"def body(first, one, other): return made({fields})", made)
-        return made["body"]
+    if not _mixable(one, other):
 
-    def body(first, one, other):
-        return one if first else other
+        def body(first, one, other):
+            return other
 
-    return body
+        return body
+    return _choice(one)
+
+
+def _mixable(one: Any, other: Any) -> bool:
+    return one == other and all(isinstance(leaf, types.Float) for leaf in _leaves(one))
+
+
+def _choice(of: Any) -> Callable[..., Any]:
+    if isinstance(of, types.Float):
+
+        def body(first, one, other):
+            return one if first else other
+
+        return body
+    fields = "".join(f"either(first, one.{name}, other.{name})," for name in of.fields)
+    made: dict[str, Any] = {"either": either, "made": of.instance_class, "__name__": __name__}
+    exec(f"def body(first, one, other): return made({fields})", made)
+    chosen: Callable[..., Any] = made["body"]
+    return chosen
 
 
 def entry(function: Callable[..., Any]) -> Any:

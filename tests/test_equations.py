@@ -56,6 +56,7 @@ VARIANTS = {
         "model.rolling_resistance=off",
         "model.drag=off",
     ),
+    "one race wavy": ("bearing.outer_waviness=[{order=2, amplitude_um=10.0, phase_deg=30.0}]",),
     "everything": EVERYTHING,
 }
 SUPPORT = ("support.stiffness_N_m=2e7", "support.damping_N_s_m=5e3")

@@ -46,6 +46,11 @@ def test_unit_alike_and_either(outer):
     cut = sliced(LineContact(1e9), np.zeros(3), np.zeros(3), 0.0, 0.0)
     for one, other in ((cut, cut), (LineContact(1.0), RoundRace()), (cut, LineContact(1.0))):
         assert not compiled_alike(one, other) and not alike(one, other)
+    assert (
+        compiled_either(True, LineContact(1.0), RoundRace())
+        == either(True, LineContact(1.0), RoundRace())
+        == ()
+    )
 
 
 def test_unit_races_that_share_vectors(outer, everything):

@@ -178,14 +178,10 @@ def outer_block(race, sizes, ring, y, first, rollers, lanes, count):
 def picked_block(outer, inner, sizes, outer_ring, inner_ring, packed, lanes, count):
     """As ``outer_block``, for packed contacts: of either race where they share vectors, else of the inner one."""
     for i in range(lanes_to_fill(inner, count)):
+        side = packed[SIDES + i]
+        race, ring = either(side > 0.0, outer, inner), either(side > 0.0, outer_ring, inner_ring)
         radius = lane_radius(sizes, packed, RADII + i)
-        if share_vectors(outer, inner):
-            on_outer = packed[SIDES + i] > 0.0
-            race, ring = either(on_outer, outer, inner), either(on_outer, outer_ring, inner_ring)
-            out = contact_in_lane(race, packed[SIDES + i], radius, ring, packed, i, LANES)
-        else:
-            out = contact_in_lane(inner, -1.0, radius, inner_ring, packed, i, LANES)
-        keep_lane(lanes, i, out)
+        keep_lane(lanes, i, contact_in_lane(race, side, radius, ring, packed, i, LANES))
 
 
 @kernel

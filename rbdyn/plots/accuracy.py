@@ -81,8 +81,8 @@ def methods_at_work(attempts: Sequence[Attempt], floor: float, turns: float, pat
     left, right = axis.get_xlim()
     if floor > left:
         axis.axvspan(left, floor, color="0.93", zorder=0)
-        axis.annotate("not resolved", (floor, 0.02), xycoords=axis.get_xaxis_transform(), fontsize=8,
-                      color=GREY, ha="right", rotation=90, xytext=(-3, 0), textcoords="offset points")  # fmt: skip
+        axis.annotate("not resolved", (floor, 0.5), xycoords=axis.get_xaxis_transform(), fontsize=8,
+                      color=GREY, ha="left", rotation=90, xytext=(3, 0), textcoords="offset points")  # fmt: skip
     axis.set_xlim(left, right)
     axis.set_ylim(top=axis.get_ylim()[1] * 1.6)
     _failed(axis, failures)
