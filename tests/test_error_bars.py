@@ -248,8 +248,8 @@ def test_command_line_target(command):
 def test_oracle_coverage_on_the_bearing(outer):
     """Oracle: 60 short runs against 96 replicates: impact, whirl and loss lie in their intervals as often as they say.
 
-    About one replicate in eight settles into another whirl, which four replicates often all miss: 90 % is the least
-    that is claimed, and fewer than 48 of 60 would then come once in a hundred times.
+    Replicates differ for good, and four of them often miss the rarer ones: 90 % is the least that is claimed, and fewer
+    than 48 of 60 would then come once in a hundred times.
     """
     numbers = {"turns": 40.0, "discard_turns": 20.0, "impact_window_turns": 10.0}
 

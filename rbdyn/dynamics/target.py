@@ -37,8 +37,8 @@ LARGEST_TARGET = 0.5
 LADDER = (0.1, 0.03, 0.01, 0.003)
 PILOT_REPLICATES, PILOT_WINDOWS, PILOT_TURNS = 8, 2, 40.0
 TOLERANCES = (0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 1e-5, 1e-6)
-# A cage may stay in one of several kinds of whirl for as long as one cares to wait, so replicates tell more than turns:
-# they are as short as lets transients take no more than a sixth of the turns.
+# Replicates of the example differ for as long as they were watched, so more of them tell more than longer ones: they are
+# as short as lets transients take no more than a sixth of the turns.
 FEWEST_REPLICATES, WARM_UPS = 4, 5.0
 # A first short run may misjudge the scatter; the next is no more than so many times as long.
 GROWTH = (1.2, 4.0)
