@@ -18,6 +18,7 @@ from rbdyn.kernel import entry, kernel, routine
 from rbdyn.scene import Scene
 
 BISECTIONS = 60
+BALANCED = 1e-12  # of the forces at the ends of the bracket
 
 
 @kernel
@@ -73,13 +74,24 @@ def static_share(bearing, angles, orbit_speed, load, radii):
         low, high = high, 2.0 * high
     while static_force(bearing, angles, orbit_speed, low, radii) > load and low > -reach:
         low, high = 2.0 * low, low
+    below = static_force(bearing, angles, orbit_speed, low, radii) - load
+    above = static_force(bearing, angles, orbit_speed, high, radii) - load
+    # False position that halves the stale end (Illinois): a tenth of the forces that bisection takes.
+    enough = BALANCED * max(abs(below), abs(above))
+    if below >= 0.0 or above <= 0.0:
+        # No load within the play, or more than the bracket holds.
+        return 0.5 * (low + high) if below == above else low if below >= 0.0 else high
+    middle = high
     for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        if static_force(bearing, angles, orbit_speed, middle, radii) >= load:
-            high = middle
+        middle = (low * above - high * below) / (above - below)
+        force = static_force(bearing, angles, orbit_speed, middle, radii) - load
+        if abs(force) <= enough:
+            break
+        if force > 0.0:
+            high, above, below = middle, force, 0.5 * below
         else:
-            low = middle
-    return high
+            low, below, above = middle, force, 0.5 * above
+    return middle
 
 
 def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Generator) -> NDArray[np.float64]:
