@@ -81,11 +81,9 @@ def _leaves(of: Any) -> list[types.Type]:
 
 def alike(one: Any, other: Any) -> bool:
     """Whether two sets of parameters are of one type, and made of numbers only; known at compile time."""
-    if type(one) is not type(other):
-        return False
-    if not isinstance(one, tuple):
-        return isinstance(one, float)
-    return all(alike(x, y) for x, y in zip(one, other, strict=True))
+    if isinstance(one, tuple) and type(one) is type(other):
+        return all(alike(x, y) for x, y in zip(one, other, strict=True))
+    return isinstance(one, float) and isinstance(other, float)
 
 
 @numba.extending.overload(alike, jit_options=INLINED)  # type: ignore[arg-type]
