@@ -119,8 +119,6 @@ def test_rate_trajectory_error_falls_with_rtol(stretches, known):
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_oracle_every_method_reaches_the_same_end(smooth, smooth_end, method):
     """Oracle: all integrators, tight enough, end where ours does."""
-    if method in CVODE:
-        pytest.importorskip("sksundae")
     found = attempt(method, 1e-6 if method.adaptive else 0.01, [smooth], smooth_end)
     assert found.status == "ok" and found.scaled_error < 1e-3
     assert found.rhs_per_turn > 0.0 and found.turn_ms > 0.0
