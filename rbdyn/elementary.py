@@ -115,6 +115,21 @@ def _fast_exp(x):
     return body
 
 
+def _split(x: Any) -> Any:
+    """Power of two and mantissa less one of a positive normal number, the mantissa in [sqrt(1/2), sqrt(2))."""
+
+
+@overload(_split, jit_options=INLINED)  # type: ignore[arg-type]
+def _split_body(x):
+    def body(x):
+        # Only operations that vectorise.
+        offset = _bits(x) - SQRT_HALF_BITS
+        power = _from_bits(((offset + (BIAS << 52)) >> 52) | TWO_52_BITS) - (TWO_52 + BIAS)
+        return power, _from_bits(_bits(x) - (offset & EXPONENT_MASK)) - 1.0
+
+    return body
+
+
 def fast_log(x: float) -> float:
     """Natural logarithm of a positive normal number."""
     return math.log(x)
@@ -123,10 +138,7 @@ def fast_log(x: float) -> float:
 @overload(fast_log, jit_options=INLINED)  # type: ignore[arg-type]
 def _fast_log(x):
     def body(x):
-        # Mantissa in [sqrt(1/2), sqrt(2)) and the power of two that goes with it; only operations that vectorise.
-        offset = _bits(x) - SQRT_HALF_BITS
-        power = _from_bits(((offset + (BIAS << 52)) >> 52) | TWO_52_BITS) - (TWO_52 + BIAS)
-        f = _from_bits(_bits(x) - (offset & EXPONENT_MASK)) - 1.0
+        power, f = _split(x)
         s = f / (2.0 + f)
         z = s * s
         w = z * z
@@ -152,9 +164,7 @@ def _rough_power(x: Any, exponent: float) -> Any:
 @overload(_rough_power, jit_options=INLINED)  # type: ignore[arg-type]
 def _rough_power_body(x, exponent):
     def body(x, exponent):
-        offset = _bits(x) - SQRT_HALF_BITS
-        power = _from_bits(((offset + (BIAS << 52)) >> 52) | TWO_52_BITS) - (TWO_52 + BIAS)
-        f = _from_bits(_bits(x) - (offset & EXPONENT_MASK)) - 1.0
+        power, f = _split(x)
         # Minimax: log2(1 + f) within 6.4e-4 over a factor of two, then 2^t within 2.6e-6 over [-1/2, 1/2].
         high = fma(f, fma(f, 4.47594888e-1, -7.60965453e-1), 1.44564380)
         log_2 = power + fma(f, high, 5.83271110e-4)
@@ -168,8 +178,25 @@ def _rough_power_body(x, exponent):
     return body
 
 
-# An estimate x of y^(-1/n) gives s = y x^(n-1) and, exactly, y^(1/n) = s (s x)^(-(n-1)/n); four terms of the binomial
-# series in 1 - s x < 6e-4 leave 1e-17, and the rounding errors of s are cut by n.
+def _root_from(s: Any, guess: Any, n: int) -> Any:
+    """y^(1/n) from an estimate x of y^(-1/n) and s = y x^(n-1).
+
+    Exactly it is s (s x)^(-(n-1)/n); four terms of the binomial series in 1 - s x < 6e-4 leave 1e-17, and the rounding
+    errors of s are cut by n.
+    """
+
+
+@overload(_root_from, jit_options=INLINED)  # type: ignore[arg-type]
+def _root_from_body(s, guess, n):
+    def body(s, guess, n):
+        share = (n - 1) / n
+        r = fma(-s, guess, 1.0)
+        inner = fma(
+            (share + 1.0) / 2.0 * r, fma((share + 2.0) / 3.0 * r, fma((share + 3.0) / 4.0, r, 1.0), 1.0), 1.0
+        )
+        return s * fma(share * r, inner, 1.0)
+
+    return body
 
 
 def tenth_root(x: float) -> float:
@@ -179,15 +206,11 @@ def tenth_root(x: float) -> float:
 
 @overload(tenth_root, jit_options=INLINED)  # type: ignore[arg-type]
 def _tenth_root(x):
-    a1, a2, a3, a4 = 9 / 10, 19 / 20, 29 / 30, 39 / 40
-
     def body(x):
         guess = _rough_power(x, -1.0 / 10.0)
         guess2 = guess * guess
         guess4 = guess2 * guess2
-        s = x * guess4 * guess4 * guess
-        r = fma(-s, guess, 1.0)
-        return s * fma(a1 * r, fma(a2 * r, fma(a3 * r, fma(a4, r, 1.0), 1.0), 1.0), 1.0)
+        return _root_from(x * guess4 * guess4 * guess, guess, 10)
 
     return body
 
@@ -199,16 +222,12 @@ def eighteenth_root(x: float) -> float:
 
 @overload(eighteenth_root, jit_options=INLINED)  # type: ignore[arg-type]
 def _eighteenth_root(x):
-    a1, a2, a3, a4 = 17 / 18, 35 / 36, 53 / 54, 71 / 72
-
     def body(x):
         guess = _rough_power(x, -1.0 / 18.0)
         guess2 = guess * guess
         guess4 = guess2 * guess2
         guess8 = guess4 * guess4
-        s = x * guess8 * guess8 * guess
-        r = fma(-s, guess, 1.0)
-        return s * fma(a1 * r, fma(a2 * r, fma(a3 * r, fma(a4, r, 1.0), 1.0), 1.0), 1.0)
+        return _root_from(x * guess8 * guess8 * guess, guess, 18)
 
     return body
 

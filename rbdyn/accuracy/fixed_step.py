@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.equations import LOADS, POWERS, derivative, derivative_once
+from rbdyn.dynamics.runge_kutta import book_whirl
 from rbdyn.dynamics.state import (
     CAGE_ANGLE,
     CAGE_SPEED,
@@ -69,10 +70,7 @@ def book(tally, y, body, loads):
     """Take up the largest loads at a step's end, and the speed of the cage's centre as a sample of its whirl."""
     for force in range(LOADS):
         tally.largest[force] = max(tally.largest[force], loads[0, force])
-    square = y[body + CAGE_VX] ** 2 + y[body + CAGE_VY] ** 2
-    tally.whirl[0] += 1.0
-    tally.whirl[1] += math.sqrt(square)
-    tally.whirl[2] += square
+    book_whirl(tally.whirl, y[body + CAGE_VX], y[body + CAGE_VY])
 
 
 @entry

@@ -93,10 +93,7 @@ def conclusion(rows: Sequence[Row]) -> str:
     for row in rows:
         if row.found is None or row.power_gap is None or row.turn_ms is None or row.power_gap > NEGLIGIBLE:
             continue
-        unbiased = all(
-            abs(row.found.bias[name]) <= max(row.found.bias_error[name], NEGLIGIBLE) for name in OUTPUTS
-        )
-        if unbiased and (row.method not in best or row.turn_ms < (best[row.method].turn_ms or 0.0)):
+        if row.found.unbiased and (row.method not in best or row.turn_ms < (best[row.method].turn_ms or 0.0)):
             best[row.method] = row
     if not best:
         return "No method keeps its statistics within error (or 0.5 %) with a power balance closed to 0.5 %."

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rbdyn.accuracy.report import Progress, Report, Table, record
-from rbdyn.accuracy.tolerances import OUTPUTS, Bias, bias_cells, bias_of, flat
+from rbdyn.accuracy.tolerances import NEGLIGIBLE, OUTPUTS, Bias, bias_cells, bias_of, flat
 from rbdyn.contact.hertz_line import line_load
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.metrics import Replicate
@@ -30,7 +30,6 @@ LOADS = 40
 TURNS, DISCARDED, REPLICATES = 20, 5, 4
 # Loads below this share of the largest: the touching part is too short to matter to anything.
 LIGHTEST = 0.02
-NEGLIGIBLE = 0.005
 
 
 @dataclass(frozen=True)
@@ -156,8 +155,7 @@ def overlap_at(law: Any, load: float) -> float:
 def conclusion(rows: Sequence[Row], scene: Scene) -> str:
     """The fewest slices whose load and statistics are right within 0.5 % or their errors."""
     for row in rows:
-        unbiased = all(abs(row.bias[name]) <= max(row.bias_error[name], NEGLIGIBLE) for name in OUTPUTS)
-        if unbiased and row.load_error <= NEGLIGIBLE:
+        if row.unbiased and row.load_error <= NEGLIGIBLE:
             return (
                 f"{row.slices} slices are the fewest whose load is right within 0.5 % and that bias no output beyond "
                 f"its error (or 0.5 %): {row.rhs_ns:.0f} ns a right-hand side. The scene has {scene.slices}."

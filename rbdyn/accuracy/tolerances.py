@@ -41,6 +41,11 @@ class Bias:
     bias: dict[str, float]
     bias_error: dict[str, float]
 
+    @property
+    def unbiased(self) -> bool:
+        """Whether no output is off by more than its error, or half a per cent."""
+        return all(abs(self.bias[name]) <= max(self.bias_error[name], NEGLIGIBLE) for name in OUTPUTS)
+
 
 @dataclass(frozen=True)
 class Row(Bias):
@@ -93,8 +98,7 @@ def statistics_bias(
 def conclusion(rows: Sequence[Row], scene: Scene) -> str:
     """Which tolerance to take: the loosest that biases no output beyond error or 0.5 %, and closes in power."""
     for row in rows:
-        unbiased = all(abs(row.bias[name]) <= max(row.bias_error[name], NEGLIGIBLE) for name in OUTPUTS)
-        if unbiased and row.power_gap <= NEGLIGIBLE:
+        if row.unbiased and row.power_gap <= NEGLIGIBLE:
             return (
                 f"rtol {row.rtol:g} is the loosest at which no output is off by more than its error (or 0.5 %) and the "
                 f"power balance closes within 0.5 %: {row.turn_ms:.2f} ms a shaft turn. The scene has "

@@ -29,6 +29,8 @@ from rbdyn.dynamics.runge_kutta import (
     SHRINK,
     STEP_BUDGET,
     STEP_UNDERFLOW,
+    book_peak,
+    book_whirl,
 )
 from rbdyn.dynamics.state import CAGE_VX, CAGE_VY
 from rbdyn.kernel import entry, kernel, routine
@@ -165,27 +167,12 @@ def refine_peak(bearing, carry, work, h, tally):
     values = np.empty(PEAK_POINTS + 2)
     values[0], values[PEAK_POINTS + 1] = carry.loads[0, POCKET_LOAD], carry.loads[STAGES, POCKET_LOAD]
     spacing = 1.0 / (PEAK_POINTS + 1)
-    place = 0
-    for p in range(1, PEAK_POINTS + 2):
-        if p <= PEAK_POINTS:
-            for i in range(carry.y.size):
-                carry.stage[i] = interpolate(carry, work, p * spacing, i)
-            derivative_once(bearing, carry.stage, NEXT_ROW, carry.k, carry.power, carry.loads, carry.scratch)
-            values[p] = carry.loads[1, POCKET_LOAD]
-        if values[p] > values[place]:
-            place = p
-    best, theta = values[place], place * spacing
-    if 0 < place < PEAK_POINTS + 1:
-        slope, bend = (
-            0.5 * (values[place + 1] - values[place - 1]),
-            values[place - 1] - 2.0 * best + values[place + 1],
-        )
-        if bend < 0.0:
-            best -= 0.5 * slope * slope / bend
-            theta -= slope / bend * spacing
-    if best > tally.largest[POCKET_LOAD]:
-        tally.largest[POCKET_LOAD] = best
-        tally.largest_time[POCKET_LOAD] = carry.clock[0] + theta * h
+    for p in range(1, PEAK_POINTS + 1):
+        for i in range(carry.y.size):
+            carry.stage[i] = interpolate(carry, work, p * spacing, i)
+        derivative_once(bearing, carry.stage, NEXT_ROW, carry.k, carry.power, carry.loads, carry.scratch)
+        values[p] = carry.loads[1, POCKET_LOAD]
+    book_peak(values, carry.clock[0], h, tally)
 
 
 @routine
@@ -215,10 +202,7 @@ def keep(bearing, carry, work, h, tally, sample_step):
             interpolate(carry, work, theta, body + CAGE_VX),
             interpolate(carry, work, theta, body + CAGE_VY),
         )
-        square = vx * vx + vy * vy
-        tally.whirl[0] += 1.0
-        tally.whirl[1] += math.sqrt(square)
-        tally.whirl[2] += square
+        book_whirl(tally.whirl, vx, vy)
         carry.clock[3] += sample_step
     return suspected > tally.largest[POCKET_LOAD]
 

@@ -195,10 +195,40 @@ def worst_component(k, h, inverse_tolerance):
     return worst
 
 
+@kernel
+def book_whirl(whirl, vx, vy):
+    """Take a sample of the velocity of the cage's centre [m/s]."""
+    square = vx * vx + vy * vy
+    whirl[0] += 1.0
+    whirl[1] += math.sqrt(square)
+    whirl[2] += square
+
+
+@routine
+def book_peak(values, start, h, tally):
+    """Keep the largest of pocket loads at even points of a step of ``h`` [s] from ``start`` on, or the vertex of the
+    parabola through it and its neighbours, where it is larger than any before.
+    """
+    best, place, spacing = 0.0, 0, 1.0 / (values.size - 1)
+    for p in range(values.size):
+        if values[p] > best:
+            best, place = values[p], p
+    theta = place * spacing
+    if 0 < place < values.size - 1:
+        left, right = values[place - 1], values[place + 1]
+        bend = left - 2.0 * best + right
+        if bend < 0.0:
+            shift = 0.5 * (left - right) / bend
+            best -= 0.25 * (left - right) * shift
+            theta += shift * spacing
+    if best > tally.largest[POCKET_LOAD]:
+        tally.largest[POCKET_LOAD] = best
+        tally.largest_time[POCKET_LOAD] = start + theta * h
+
+
 @routine
 def refine_peak(bearing, carry, h, tally):
     """Look inside a step for its largest pocket load: eight points, then the vertex of a parabola."""
-    best, place = 0.0, 0
     values = np.empty(PEAK_POINTS + 2)
     inside = np.empty_like(carry.y)
     values[0] = carry.loads[0, POCKET_LOAD]
@@ -210,20 +240,7 @@ def refine_peak(bearing, carry, h, tally):
         to_fixed_axes(turn_of(carry.clock[4], p * spacing * h), bearing.rollers, inside)
         derivative_once(bearing, inside, FREE_ROW, carry.k, carry.power, carry.loads, carry.scratch)
         values[p] = carry.loads[1, POCKET_LOAD]
-    for p in range(PEAK_POINTS + 2):
-        if values[p] > best:
-            best, place = values[p], p
-    theta = place * spacing
-    if 0 < place < PEAK_POINTS + 1:
-        left, right = values[place - 1], values[place + 1]
-        bend = left - 2.0 * best + right
-        if bend < 0.0:
-            shift = 0.5 * (left - right) / bend
-            best -= 0.25 * (left - right) * shift
-            theta += shift * spacing
-    if best > tally.largest[POCKET_LOAD]:
-        tally.largest[POCKET_LOAD] = best
-        tally.largest_time[POCKET_LOAD] = carry.clock[0] + theta * h
+    book_peak(values, carry.clock[0], h, tally)
 
 
 @kernel
@@ -248,10 +265,7 @@ def keep(body, y, k, power, loads, clock, work, largest, largest_time, whirl, h,
         theta = (clock[3] - time) / h
         vx = interpolate(y, k, h, theta, body + CAGE_VX)
         vy = interpolate(y, k, h, theta, body + CAGE_VY)
-        square = vx * vx + vy * vy
-        whirl[0] += 1.0
-        whirl[1] += math.sqrt(square)
-        whirl[2] += square
+        book_whirl(whirl, vx, vy)
         clock[3] += sample_step
     return suspected > largest[POCKET_LOAD]
 
