@@ -7,6 +7,7 @@
 - ``traction``: friction coefficient against sliding speed and load, as compiled
 - ``rheology``: traction of an elastohydrodynamic film from the oil's behaviour under pressure and shear
 - ``film_thickness``: thickness of that film, its lambda ratio, the share that asperities bear
+- ``point_film``: the same for the ellipse of a ball, and the film's stiffness
 - ``film``: rolling resistance of the lubricated line contact; the short-journal film
 - ``pocket_film``: wedge, squeeze and shear between a roller and a pocket wall
 

@@ -100,7 +100,7 @@ def distribution(
     """Rest of the inner ring under loads [N] and a moment [N m] in one plane.
 
     ``first_ball``: angle of ball 0 from that plane [rad]. ``tilts``: whether the ring may tilt; if not, the moment is whatever holds it. delta_j and the balance follow
-    ISO/TS 16281, which takes moments at d_m/2. Raises RuntimeError when no equilibrium is found, as without a load.
+    ISO/TS 16281, which takes moments at d_m/2. Raises ValueError without a load, RuntimeError when no equilibrium is found.
     """
     cosine = np.cos(first_ball + 2.0 * np.pi * np.arange(row.balls) / row.balls)
     axial_free = row.groove_distance * math.sin(row.free_angle)
@@ -110,6 +110,10 @@ def distribution(
     axial_part = np.stack([np.zeros(row.balls), np.ones(row.balls), cosine])
     applied = np.array([radial_load, axial_load, moment / (0.5 * row.pitch_diameter)])
     free = np.array([True, True, tilts])
+    if not np.any(applied[free]):
+        raise ValueError(
+            "a row without a load rests anywhere in its play; give a radial or an axial load or a moment"
+        )
 
     def state(place: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         axial, radial = axial_free + place @ axial_part, radial_free + place @ radial_part
@@ -124,7 +128,9 @@ def distribution(
     scale = (np.abs(applied).max() / row.spring) ** (2.0 / 3.0)
     # Off the axis of symmetry, where a row without clearance has no axial stiffness.
     place = np.array([scale, math.copysign(scale, axial_load) if axial_load else 0.0, 0.0])
-    place[1] += math.copysign(math.sqrt(scale * row.groove_distance), axial_load) if axial_load else -axial_free
+    place[1] += (
+        math.copysign(math.sqrt(scale * row.groove_distance), axial_load) if axial_load else -axial_free
+    )
     residual = math.inf
     for _ in range(most_steps):
         axial, radial, span, approach = state(place)
@@ -146,7 +152,7 @@ def distribution(
             step = 0.5 * step
         place = place + step
     if not residual <= 1e-7 * np.abs(applied).max():
-        raise RuntimeError(f"no equilibrium of the row: {residual:g} N are out of balance; is it loaded?")
+        raise RuntimeError(f"no equilibrium of the row: {residual:g} N are out of balance")
     return Distribution(
         radial=float(place[0]),
         axial=float(place[1]),
