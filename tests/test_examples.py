@@ -167,8 +167,9 @@ def test_literature_preload_stresses_and_life():
     kept = stress[stress["axial_N"] != 50]
     for race, text in (("inner", 0.01), ("outer", 0.05)):
         printed = kept[f"{race}_MPa paper"].to_numpy()
-        assert kept[f"{race}_MPa as found"].to_numpy() == pytest.approx(printed, rel=2e-3)
         assert kept[f"{race}_MPa at rest"].to_numpy() == pytest.approx(printed, rel=text)
+        # An even 0.7 %, to the rounding of the table.
+        assert kept[f"{race}_MPa groove 0.53"].to_numpy() / printed == pytest.approx(1.007, abs=1.5e-3)
     assert np.all(stress["outer_MPa 63000 rpm"] > stress["outer_MPa paper"])
     assert stress["life_h ISO 281, read back"].iloc[:-1].to_numpy() == pytest.approx(
         stress["life_h paper"].iloc[:-1].to_numpy(), rel=0.06
