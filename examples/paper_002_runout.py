@@ -21,12 +21,11 @@ import pandas as pd
 import typer
 from published.common import Table, canvas, save
 
-from rbdyn.quasistatic.control import control_of
-from rbdyn.quasistatic.model import row_of
-from rbdyn.quasistatic.race_errors import RaceErrors, ball_path, perfect, rolling, waviness
+from rbdyn.quasistatic.race_errors import RaceErrors, ball_path, perfect, waviness
 from rbdyn.quasistatic.runout import homogenisation
 from rbdyn.quasistatic.runout_class import running_accuracy
 from rbdyn.quasistatic.runout_lots import Lot
+from rbdyn.quasistatic.runout_model import bench_of
 from rbdyn.quasistatic.tolerance_design import Bench, RaceLimits, design
 from rbdyn.quasistatic.turn import Followed, follow
 from rbdyn.scene.ball import BallScene
@@ -127,11 +126,7 @@ def cases() -> list[Case]:
 @functools.cache
 def bench() -> Bench:
     """The nominal 7014 under its measuring load."""
-    scene = BallScene.load(SCENE)
-    turning = rolling(12.7e-3, 90e-3, math.radians(15.0))
-    return Bench(
-        row_of(scene), control_of(scene), np.array([0.0, 0.0, 500.0, 0.0, 0.0]), turning, FACE_RADIUS
-    )
+    return bench_of(BallScene.load(SCENE), FACE_RADIUS)
 
 
 # The ring's tilt held, the rest free.

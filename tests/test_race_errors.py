@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from rbdyn.faults import InputError, validated
 from rbdyn.quasistatic.race_errors import (
     ball_path,
-    errors_of,
     perfect,
     random_waviness,
     rolling,
     waviness,
 )
+from rbdyn.quasistatic.runout_model import errors_of
 from rbdyn.scene.form_errors import FormErrors, faults
 
 Z = 7

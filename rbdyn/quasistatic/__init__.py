@@ -1,9 +1,14 @@
-"""Ball bearings in equilibrium.
+"""Ball bearings in equilibrium, after Jones and Harris: contact angles, loads, stiffness, runout, preload and life.
 
-- ``race_errors``: form errors of grooves and balls, as each ball meets them through the turns of the ring
-- ``runout``: radial and axial runout of the ring's path, synchronous and asynchronous parts
-- ``runout_class``: limits of running accuracy by tolerance class
+Where an equation stands: ``row`` (geometry of a row of balls), ``control`` (raceway control hypotheses), ``ball_motion``
+(orbit, spin, centrifugal force, gyroscopic moment), ``ball`` (forces on one ball and their derivatives), ``ring``
+(forces on the inner ring, balls eliminated), ``start`` (first guess), ``newton`` (convex start and full equations),
+``equilibrium`` (what Python calls). Of the turning ring: ``race_errors`` (form errors of grooves and balls, as each ball
+meets them), ``walk`` and ``turn`` (equilibrium step by step), ``roundness`` and ``runout`` (measures of the path),
+``runout_class`` (limits by tolerance class), ``linear_runout`` and ``runout_lots`` (small errors in proportion, many
+bearings at once), ``tolerance_design`` (race errors that meet a class), ``runout_model`` (all that from a scene).
 
-Conventions: x radial (direction of the load), z axial, balls at psi_j = 2 pi j/Z from x. The inner ring moves, the outer
-ring is the reference. All SI.
+x is radial along the load, z axial; ball j stands at psi_j = 2 pi j/Z from x. The inner ring moves, the outer ring is
+the reference. In the plane of a ball the centre of curvature of the outer groove is the origin, places are (axial,
+radial), and a contact angle is atan2(axial, radial) of the line through both centres.
 """

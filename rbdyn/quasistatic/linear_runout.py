@@ -7,13 +7,16 @@ Z equal balls all orders of a groove cancel but n = kZ +- 1, which shift and til
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.quasistatic.equilibrium import solve
+from rbdyn.faults import RunError
+from rbdyn.quasistatic.control import Control
+from rbdyn.quasistatic.equilibrium import Solution, solve
 from rbdyn.quasistatic.race_errors import BallPath
+from rbdyn.quasistatic.row import Row
 
 Array = NDArray[np.float64]
 # Error of one ball in the differences [m]: far below any deflection, far above the solver's round-off.
@@ -32,10 +35,10 @@ class LinearResponse(NamedTuple):
     tilt: Array
 
 
-def linear_response(row: Any, control: Any, load: Array, given: Array | None = None) -> LinearResponse:
+def linear_response(row: Row, control: Control, load: Array, given: Array | None = None) -> LinearResponse:
     """Response of a row of equal, evenly spaced balls under an axial load, by central differences.
 
-    Arguments as of ``equilibrium.solve``. Raises ValueError where load or row single out a direction, and RuntimeError
+    Arguments as of ``equilibrium.solve``. Raises ValueError where load or row single out a direction, and RunError
     with the reason where there is no equilibrium.
     """
     if np.any(np.delete(load, 2)):
@@ -58,9 +61,9 @@ def linear_response(row: Any, control: Any, load: Array, given: Array | None = N
     return LinearResponse(x * cosine + y * sine, z, theta_y * cosine - theta_x * sine)
 
 
-def _settled(solution: Any) -> Any:
-    if solution.status != "converged":
-        raise RuntimeError(f"no equilibrium of the nominal bearing: {solution.status}")
+def _settled(solution: Solution) -> Solution:
+    if not solution.found:
+        raise RunError(f"runout of the nominal bearing: {solution.status}")
     return solution
 
 

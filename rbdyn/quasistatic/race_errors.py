@@ -17,14 +17,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from rbdyn.scene.bearing import Harmonic
-    from rbdyn.scene.form_errors import FormErrors, RandomWaviness
 
 Array = NDArray[np.float64]
 
@@ -187,45 +183,4 @@ def ball_path(
         + wider_outer,
         inner_reach=wider_inner - inner_contact - larger,
         outer_reach=wider_outer - outer_contact - larger,
-    )
-
-
-def errors_of(errors: FormErrors, balls: int) -> RaceErrors:
-    """Form errors of a scene in SI, with what its seed draws.
-
-    Each kind of error draws from a stream of its own, so that adding one leaves the others as they were.
-    """
-    streams = [np.random.default_rng(child) for child in np.random.SeedSequence(errors.seed).spawn(8)]
-    forms = {
-        name: _form(getattr(errors, key), getattr(errors, f"{key}_random"), draw)
-        for (name, key), draw in zip(_RACES.items(), streams, strict=False)
-    }
-    given, spread = errors.ball_diameter_errors_um, errors.ball_diameter_spread_um
-    larger = np.array(given) if given is not None else spread * streams[6].standard_normal(balls)
-    sphericity = [PERFECT] * balls
-    for harmonic in errors.ball_sphericity:
-        drawn = streams[7].uniform(0.0, 2.0 * math.pi, balls)
-        for ball in range(balls) if harmonic.balls is None else [number - 1 for number in harmonic.balls]:
-            phase = drawn[ball] if harmonic.phase_deg is None else math.radians(harmonic.phase_deg)
-            wave = waviness((harmonic.order, 1e-6 * harmonic.amplitude_um, phase))
-            sphericity[ball] = sphericity[ball].plus(wave)
-    return RaceErrors(1e-6 * larger, tuple(sphericity), **forms)
-
-
-_RACES = {
-    "inner_roundness": "inner_roundness",
-    "outer_roundness": "outer_roundness",
-    "inner_sway": "inner_side_sway",
-    "outer_sway": "outer_side_sway",
-    "inner_groove_radius": "inner_groove_radius",
-    "outer_groove_radius": "outer_groove_radius",
-}
-
-
-def _form(given: list[Harmonic], drawn: RandomWaviness | None, draw: np.random.Generator) -> Waviness:
-    form = waviness(*((wave.order, 1e-6 * wave.amplitude_um, math.radians(wave.phase_deg)) for wave in given))
-    if drawn is None:
-        return form
-    return form.plus(
-        random_waviness(drawn.lowest_order, drawn.highest_order, 1e-6 * drawn.height_um, drawn.decay, draw)
     )

@@ -8,15 +8,16 @@ lot, and a few of its bearings are solved in full to tell what the proportion le
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.quasistatic.control import Control
 from rbdyn.quasistatic.linear_runout import LinearResponse, linear_response
 from rbdyn.quasistatic.race_errors import Turning, ball_path
+from rbdyn.quasistatic.row import Row
 from rbdyn.quasistatic.runout_lots import Lot, Parts, Readings, bearing_errors, draw_parts, readings
 from rbdyn.quasistatic.turn import follow
 
@@ -78,13 +79,14 @@ class Bench:
     ``face_radius``: where the axial indicator touches the inner ring [m]; ``steps`` to a turn, ``turns`` of the ring.
     """
 
-    row: Any
-    control: Any
+    row: Row
+    control: Control
     load: Array
     turning: Turning
     face_radius: float
     steps: int = 90
     turns: int = 2
+    given: Array | None = None
 
 
 def design(
@@ -109,7 +111,7 @@ def design(
     """
     if not 0.0 < wanted < 1.0:
         raise ValueError(f"wanted = {wanted:g}: a yield lies between 0 and 1; give a share such as 0.95")
-    response = linear_response(bench.row, bench.control, bench.load)
+    response = linear_response(bench.row, bench.control, bench.load, bench.given)
     _, read = _lot(bench, lot, response, bearings, seed)
 
     def widest(sway_share: float) -> Array:
@@ -161,7 +163,7 @@ def full_runouts(bench: Bench, parts: Parts, limits: Array, bearing: int) -> tup
     """Radial and face runout [m] of one bearing of a lot by full equilibria, read as in ``readings``."""
     errors = bearing_errors(parts, bearing, limits)
     path = ball_path(errors, bench.turning, bench.steps, bench.turns)
-    place = follow(bench.row, bench.control, bench.load, path, bench.turns).path
+    place = follow(bench.row, bench.control, bench.load, path, bench.turns, bench.given).path
     return float(np.ptp(place[:, 0])), float(np.ptp(place[:, 2] - bench.face_radius * place[:, 4]))
 
 
@@ -172,7 +174,7 @@ def _lot(
     return parts, readings(parts, response, bench.turning, bench.steps, bench.turns, bench.face_radius)
 
 
-def _widest(passes: Any, scale: float) -> float:
+def _widest(passes: Callable[[float], bool], scale: float) -> float:
     """Largest size that still passes, by bisection from ``scale``."""
     if not passes(0.0):
         raise ValueError("the balls alone fail the class; take better balls or a wider class")
