@@ -106,19 +106,23 @@ def readings(
     z = parts.diameter.shape[1]
     turn = 2.0 * math.pi * np.arange(steps * turns) / steps
     cage, inner, outer = turning.cage * turn, turning.inner * turn, turning.outer * turn
+    passing = np.isin(parts.order % z, (0, 1, z - 1))
+    order, races = parts.order[passing], parts.races[..., passing]
     # An error of a ball at psi reads Re(e g exp(i psi)) radially and e (g_z - r Re(tilt exp(i psi))) on the face.
     radial, face = [], []
     for kind, name in enumerate(RACES):
         change, sign = (1 if "roundness" in name else 0), (-1.0 if name.startswith("outer") else 1.0)
         relative = cage - (outer if name.startswith("outer") else inner)
-        shifting, lifting = _passing(parts.order, relative, cage, z)
-        radial.append((parts.races[kind] @ (sign * response.radial[change] * shifting)).real)
+        shifting, lifting = _passing(order, relative, cage, z)
+        radial.append((races[kind] @ (sign * response.radial[change] * shifting)).real)
         on_face = response.axial[change] * lifting - face_radius * response.tilt[change] * shifting
-        face.append((parts.races[kind] @ (sign * on_face)).real)
-    coefficients, shifting, lifting = _ball_waves(parts, response, turning.spin * turn, cage)
-    on_face = lifting - face_radius * shifting[1]
+        face.append((races[kind] @ (sign * on_face)).real)
+    coefficients, (shift, tilt), lift = _ball_waves(parts, response, turning.spin * turn, cage)
     return Readings(
-        np.array(radial), np.array(face), (coefficients @ shifting[0]).real, (coefficients @ on_face).real
+        np.array(radial),
+        np.array(face),
+        (coefficients @ shift).real,
+        (coefficients @ (lift - face_radius * tilt)).real,
     )
 
 
@@ -130,11 +134,8 @@ def _passing(order: NDArray[np.int64], relative: Array, cage: Array, z: int) -> 
     n = order[:, np.newaxis]
     with_balls, against = (n + 1) % z == 0, (n - 1) % z == 0
     # The real part of conj(c) w is that of c conj(w).
-    shifting = (
-        0.5
-        * z
-        * (with_balls * np.exp(1j * (n * relative + cage)) + against * np.exp(1j * (n * relative - cage)))
-    )
+    turning_on, turning_back = np.exp(1j * (n * relative + cage)), np.exp(1j * (n * relative - cage))
+    shifting = 0.5 * z * (with_balls * turning_on + against * turning_back)
     return shifting, z * (n % z == 0) * np.exp(1j * n * relative)
 
 

@@ -40,7 +40,7 @@ def turn(scene: BallScene) -> Followed:
     return follow(test.row, test.control, test.load, path, row.errors.turns, test.given)
 
 
-def bench_of(scene: BallScene, face_radius: float | None = None, steps: int = 90, turns: int = 2) -> Bench:
+def bench_of(scene: BallScene, face_radius: float | None = None, steps: int = 120, turns: int = 2) -> Bench:
     """The nominal bearing of a scene under its load, and where its runout is read.
 
     ``face_radius``: where an axial indicator touches the inner ring [m]; the radius of its groove bottom where left out.

@@ -1,8 +1,8 @@
 """Errors that the races of a bearing may have so that it meets a runout class with a given yield.
 
 Zhou et al. 2024 turn a homogenisation coefficient round; here a lot of bearings is drawn and its yield counted. The
-runout of a lot is linear in the limits and so is found for all of them at once; the design is then confirmed on a fresh
-lot, and a few of its bearings are solved in full to tell what the proportion leaves out.
+runout of a lot is linear in the limits and so is found for all of them at once; full equilibria of some bearings then set the size,
+and the design is confirmed on a fresh lot, in proportion and in full.
 """
 
 from __future__ import annotations
@@ -24,16 +24,17 @@ from rbdyn.quasistatic.turn import follow
 Array = NDArray[np.float64]
 # Bisections of a size: to a ten-thousandth.
 HALVINGS = 14
+REFINEMENTS = 3
 SWAY_SHARES = tuple(2.0 ** (0.5 * k) for k in range(-6, 7))
 
 
 @dataclass(frozen=True)
 class FullCheck:
-    """What full equilibria of a sample of bearings say about the proportion.
+    """What full equilibria of the first bearings of a lot say about the proportion.
 
     Differences of the runouts in proportion from the full ones over the limit: mean and root mean square, radial and
-    face. ``agreeing``: bearings of ``bearings`` on which both say alike whether the class is met. ``yielded``: share of
-    them that meets it in full, with its standard error.
+    face. ``agreeing``: bearings of ``bearings`` on which both say alike whether the class is met. ``gap``: share that
+    meets it in full less share in proportion, with its standard error (as if one at least had differed).
     """
 
     bearings: int
@@ -42,8 +43,8 @@ class FullCheck:
     face_bias: float
     face_rms: float
     agreeing: int
-    yielded: float
-    standard_error: float
+    gap: float
+    gap_error: float
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,8 @@ class RaceLimits:
     """Limits [m] on the heights of race errors, and what they yield.
 
     ``radial_limit, axial_limit``: K_ia and S_ia that were to be met [m]. ``yielded``: share of a fresh lot that meets
-    both, with its standard error; ``radial_yield, axial_yield``: that meets each.
+    both, with its standard error: counted in proportion on many and corrected by what full equilibria of some say
+    (``check``). ``proportional``: without that correction; ``radial_yield, axial_yield``: of it, what meets each.
     ``homogenisation``: 95 % quantile of the radial runout over the sum of both roundness limits, and of the face runout
     over the sum of both side-sways.
     """
@@ -64,6 +66,7 @@ class RaceLimits:
     axial_limit: float
     yielded: float
     standard_error: float
+    proportional: float
     radial_yield: float
     axial_yield: float
     homogenisation: tuple[float, float]
@@ -84,7 +87,7 @@ class Bench:
     load: Array
     turning: Turning
     face_radius: float
-    steps: int = 90
+    steps: int = 120
     turns: int = 2
     given: Array | None = None
 
@@ -100,19 +103,21 @@ def design(
     sway_shares: Sequence[float] = SWAY_SHARES,
     bearings: int = 4000,
     seed: int = 1,
-    checked: int = 0,
+    solved: int = 0,
 ) -> RaceLimits:
     """Largest race errors with which the share ``wanted`` of a lot keeps both runouts [m].
 
     ``outer_share``: limit of an outer race over that of the inner one. ``sway_shares``: side-sway limits over roundness
     limits that are tried; the one that leaves the largest product of both is taken, so that neither is held tight for
-    the other's sake. ``checked``: how many bearings of the fresh lot are solved in full. Raises ValueError where the
-    balls alone fail the class or no race error reaches the ring, and as ``linear_response``.
+    the other's sake. ``solved``: how many bearings are solved in full, again and again to set the size of all limits and
+    once more of the fresh lot; 0 leaves all to the proportion. Raises ValueError where the balls alone
+    fail the class or no race error reaches the ring, and as ``linear_response`` and ``turn.follow``.
     """
     if not 0.0 < wanted < 1.0:
         raise ValueError(f"wanted = {wanted:g}: a yield lies between 0 and 1; give a share such as 0.95")
     response = linear_response(bench.row, bench.control, bench.load, bench.given)
-    _, read = _lot(bench, lot, response, bearings, seed)
+    parts, read = _lot(bench, lot, response, bearings, seed)
+    allowed = np.array([radial_limit, axial_limit])
 
     def widest(sway_share: float) -> Array:
         shares = np.array([1.0, outer_share, sway_share, sway_share * outer_share])
@@ -126,20 +131,30 @@ def design(
         return _widest(passes, radial_limit) * shares
 
     limits = max((widest(share) for share in sway_shares), key=lambda found: float(found.prod()))
+    for _ in range(REFINEMENTS if solved else 0):
+        # Runout all but follows the size of the races: its quantile is brought to the limit. That of the lot is known in
+        # proportion, and from a few bearings how much larger the full one is.
+        shares = (np.column_stack(runouts(read, limits)) / allowed).max(axis=1)
+        full = (full_lot(bench, parts, limits, solved) / allowed).max(axis=1)
+        larger = np.quantile(full, wanted) / np.quantile(shares[:solved], wanted)
+        limits = limits / float(larger * np.quantile(shares, wanted))
     # A design is best on the lot that it was fitted to: count it on another.
     parts, read = _lot(bench, lot, response, bearings, seed + 1)
     radial, face = runouts(read, limits)
     good = (radial <= radial_limit) & (face <= axial_limit)
-    check = None
-    if checked:
-        check = _compare(bench, parts, limits, radial[:checked], face[:checked], (radial_limit, axial_limit))
-    yielded = float(good.mean())
+    check = compare(bench, parts, read, limits, allowed, solved) if solved else None
+    proportional = float(good.mean())
+    gap, gap_error = (0.0, 0.0) if check is None else (check.gap, check.gap_error)
     return RaceLimits(
-        *limits.tolist(),
+        inner_roundness=float(limits[0]),
+        outer_roundness=float(limits[1]),
+        inner_sway=float(limits[2]),
+        outer_sway=float(limits[3]),
         radial_limit=radial_limit,
         axial_limit=axial_limit,
-        yielded=yielded,
-        standard_error=math.sqrt(yielded * (1.0 - yielded) / bearings),
+        yielded=min(proportional + gap, 1.0),
+        standard_error=math.hypot(math.sqrt(proportional * (1.0 - proportional) / bearings), gap_error),
+        proportional=proportional,
         radial_yield=float((radial <= radial_limit).mean()),
         axial_yield=float((face <= axial_limit).mean()),
         homogenisation=(
@@ -167,6 +182,11 @@ def full_runouts(bench: Bench, parts: Parts, limits: Array, bearing: int) -> tup
     return float(np.ptp(place[:, 0])), float(np.ptp(place[:, 2] - bench.face_radius * place[:, 4]))
 
 
+def full_lot(bench: Bench, parts: Parts, limits: Array, count: int) -> Array:
+    """Full runouts [m] of the first ``count`` bearings of a lot, (count, 2)."""
+    return np.array([full_runouts(bench, parts, limits, bearing) for bearing in range(count)])
+
+
 def _lot(
     bench: Bench, lot: Lot, response: LinearResponse, bearings: int, seed: int
 ) -> tuple[Parts, Readings]:
@@ -189,22 +209,23 @@ def _widest(passes: Callable[[float], bool], scale: float) -> float:
     return low
 
 
-def _compare(
-    bench: Bench, parts: Parts, limits: Array, radial: Array, face: Array, allowed: tuple[float, float]
+def compare(
+    bench: Bench, parts: Parts, read: Readings, limits: Array, allowed: Array, count: int
 ) -> FullCheck:
-    full = np.array([full_runouts(bench, parts, limits, bearing) for bearing in range(len(radial))])
-    proportional = np.column_stack((radial, face))
+    """Solve the first ``count`` bearings of a lot in full; ``allowed``: radial and face runout of the class [m]."""
+    full = full_lot(bench, parts, limits, count)
+    proportional = np.column_stack(runouts(read, limits))[:count]
     off = (proportional - full) / allowed
     bias, rms = off.mean(axis=0), np.sqrt((off**2).mean(axis=0))
-    good = np.all(full <= allowed, axis=1)
-    share = float(good.mean())
+    better = np.all(full <= allowed, axis=1).astype(int) - np.all(proportional <= allowed, axis=1)
+    differing = int(np.abs(better).sum())
     return FullCheck(
-        bearings=len(full),
+        bearings=count,
         radial_bias=float(bias[0]),
         radial_rms=float(rms[0]),
         face_bias=float(bias[1]),
         face_rms=float(rms[1]),
-        agreeing=int((good == np.all(proportional <= allowed, axis=1)).sum()),
-        yielded=share,
-        standard_error=math.sqrt(share * (1.0 - share) / len(full)),
+        agreeing=count - differing,
+        gap=float(better.mean()),
+        gap_error=math.sqrt(max(differing, 1)) / count,
     )

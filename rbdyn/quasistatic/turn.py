@@ -76,7 +76,11 @@ def follow(
             row.outer_reach + balls.outer_reach,
         )
     )
-    own = row._replace(**dict(zip(Row._fields, np.zeros((6, size)), strict=False)))
+    # The walk writes over its row.
+    cosine, sine, axial, radial, inner_reach, outer_reach = np.zeros((6, size))
+    own = row._replace(
+        cosine=cosine, sine=sine, axial=axial, radial=radial, inner_reach=inner_reach, outer_reach=outer_reach
+    )
     path, told, walked = np.zeros((steps, RING)), np.zeros((steps, TOLD)), np.zeros(WALKED, np.int64)
     reached = walk(
         CommonCage(0.0),

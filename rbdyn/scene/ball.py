@@ -268,6 +268,7 @@ class BallScene(SceneFile):
     model: BallModel = BallModel()
     materials: BallMaterials = BallMaterials()
     lubricant: Lubricant | None = None
+    # What ``quasistatic.runout_model.turn`` follows; ``rbdyn.equilibrium`` is that of the perfect bearing.
     errors: FormErrors | None = None
 
     @classmethod
@@ -290,8 +291,9 @@ class SingleRowScene(BallScene):
     @model_validator(mode="after")
     def _errors_fit(self) -> SingleRowScene:
         row = self.bearing
-        found = [] if self.errors is None else faults(self.errors, row.balls, row.ball_diameter_mm)
-        return or_refuse(self, found)
+        if self.errors is None:
+            return self
+        return or_refuse(self, faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm))
 
 
 class DoubleDeckerScene(BallScene):

@@ -107,8 +107,8 @@ GROOVES = (
 )
 
 
-def faults(errors: FormErrors, balls: int, ball_diameter_mm: float) -> list[str]:
-    """What does not go with a row of ``balls``, one sentence each."""
+def faults(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diameter_mm: float) -> list[str]:
+    """What does not go with a row of ``balls`` on a pitch circle, one sentence each."""
     found = []
     given = errors.ball_diameter_errors_um
     if given is not None and len(given) != balls:
@@ -124,4 +124,13 @@ def faults(errors: FormErrors, balls: int, ball_diameter_mm: float) -> list[str]
             found.append(
                 f"errors.ball_sphericity[{number}].balls: ball {alien[0]} of {balls}; balls count from 1 to {balls}"
             )
+    # A ball spins dm/(2 D) times a turn, or a little less.
+    fastest = (
+        max((wave.order for wave in errors.ball_sphericity), default=0) * pitch_diameter_mm / ball_diameter_mm
+    )
+    if fastest >= errors.steps:
+        found.append(
+            f"errors.steps = {errors.steps}: too few to show errors.ball_sphericity on balls that spin "
+            f"{0.5 * pitch_diameter_mm / ball_diameter_mm:.3g} times a turn; take at least {int(fastest) + 1}"
+        )
     return found
