@@ -14,7 +14,7 @@ from rbdyn.quasistatic.equilibrium import solve
 from rbdyn.quasistatic.linear_runout import linear_response, respond
 from rbdyn.quasistatic.race_errors import ball_path, perfect, waviness
 from rbdyn.quasistatic.runout_lots import RACES, Lot, bearing_errors, draw_parts, readings
-from rbdyn.quasistatic.runout_model import bench_of, turn
+from rbdyn.quasistatic.runout_model import bench_of, follow_ring
 from rbdyn.quasistatic.tolerance_design import design, full_runouts, runouts
 from rbdyn.quasistatic.turn import follow
 from rbdyn.quasistatic.walk import walk
@@ -126,6 +126,19 @@ def test_invariant_permutation_of_the_balls(bench):
     paths = [follow(bench.row, bench.control, bench.load, balls, 1).path for balls in (path, moved)]
     assert paths[0] == pytest.approx(paths[1], rel=1e-6, abs=1e-12)
     assert np.ptp(paths[0][:, 0]) > 1e-8
+
+
+def test_unit_response_to_a_shifted_groove(bench, response):
+    """Unit: a groove that is shifted at one ball moves the ring back by the mean of a wave: 2/Z radially and in tilt, 1/Z
+    axially (closed form); inner and outer reach do the same while both contacts have one angle."""
+    assert response.radial[:2] == pytest.approx([0.0, -2.0 / Z], abs=1e-6)
+    assert response.tilt[:2] == pytest.approx([2.0 / Z / bench.row.lever, 0.0], rel=1e-5, abs=1e-5)
+    assert response.axial[0] == pytest.approx(-1.0 / Z, rel=1e-6)
+    angle = solve(bench.row, bench.control, bench.load).inner_angle[0]
+    # Along the contact a ball gives way by cos(a) of a radial and sin(a) of an axial shift.
+    assert response.axial[1] == pytest.approx(-math.cos(angle) / math.sin(angle) / Z, rel=0.1)
+    assert response.axial[2] == pytest.approx(1.0 / math.sin(angle) / Z, rel=0.1)
+    assert response.axial[3] == pytest.approx(response.axial[2], rel=1e-4)
 
 
 def test_unit_table_of_a_path(bench):
@@ -243,11 +256,11 @@ def test_unit_missing_equilibrium_is_named(bench):
 ECCENTRIC = "errors.inner_roundness=[{order=1, amplitude_um=1.0}]"
 
 
-def test_unit_turn_of_a_scene():
+def test_unit_path_of_a_scene():
     """Unit: a scene with form errors is followed as it says: an eccentricity of 1 um reads 2 um, tilt free or held."""
     for tilt in ("free", "fixed"):
         changes = (ECCENTRIC, "errors.steps=24", "errors.turns=2", f"operation.tilt={tilt}")
-        found = turn(BallScene.load(SCENE, changes))
+        found = follow_ring(BallScene.load(SCENE, changes))
         assert len(found.path) == 48 and found.turns == 2
         assert found.runout(FACE).indicator == pytest.approx(2e-6, rel=1e-2)
     assert np.abs(found.path[:, 3:]).max() == 0.0
@@ -261,8 +274,8 @@ def test_unit_turning_outer_ring():
         "errors.steps=24",
         "errors.turns=1",
     )
-    still = turn(BallScene.load(SCENE, (ECCENTRIC, *outside)))
-    moving = turn(BallScene.load(SCENE, (ECCENTRIC.replace("inner", "outer"), *outside)))
+    still = follow_ring(BallScene.load(SCENE, (ECCENTRIC, *outside)))
+    moving = follow_ring(BallScene.load(SCENE, (ECCENTRIC.replace("inner", "outer"), *outside)))
     assert still.runout(FACE).indicator < 1e-10
     assert moving.runout(FACE).indicator == pytest.approx(2e-6, rel=1e-2)
 
@@ -274,7 +287,20 @@ def test_unit_turning_outer_ring():
 def test_unit_scenes_without_runout(changes, sentence):
     """Unit: no errors, no runout; errors that do not fit the balls are refused with the scene."""
     with pytest.raises(InputError, match=sentence):
-        turn(BallScene.load(SCENE, changes))
+        follow_ring(BallScene.load(SCENE, changes))
+
+
+def test_unit_double_decker_takes_no_form_errors():
+    """Unit: form errors of a bearing of two rows are refused, not passed over."""
+    row = {"balls": 18, "ball_diameter_mm": 8.0, "pitch_diameter_mm": 60.0, "contact_angle_deg": 15.0,
+           "inner_groove_factor": 0.52, "outer_groove_factor": 0.52}  # fmt: skip
+    table = {
+        "bearing": {"kind": "double_decker_ball", "inner": row, "outer": {**row, "pitch_diameter_mm": 100.0}},
+        "operation": {"axial_load_N": 100.0},
+        "errors": {"steps": 100},
+    }
+    with pytest.raises(InputError, match="one row of balls only"):
+        BallScene.from_dict(table)
 
 
 @pytest.fixture

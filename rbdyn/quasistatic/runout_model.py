@@ -25,7 +25,7 @@ from rbdyn.scene.bearing import Harmonic
 from rbdyn.scene.form_errors import FormErrors, RandomWaviness
 
 
-def turn(scene: BallScene) -> Followed:
+def follow_ring(scene: BallScene) -> Followed:
     """Follow the inner ring of a scene over its form errors, as many turns and steps as they say.
 
     Raises InputError for a scene without form errors or of two rows, and RunError where an equilibrium is missing.

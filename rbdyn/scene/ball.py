@@ -268,7 +268,7 @@ class BallScene(SceneFile):
     model: BallModel = BallModel()
     materials: BallMaterials = BallMaterials()
     lubricant: Lubricant | None = None
-    # What ``quasistatic.runout_model.turn`` follows; ``rbdyn.equilibrium`` is that of the perfect bearing.
+    # What ``quasistatic.runout_model.follow_ring`` follows; ``rbdyn.equilibrium`` is that of the perfect bearing.
     errors: FormErrors | None = None
 
     @classmethod
@@ -300,5 +300,11 @@ class DoubleDeckerScene(BallScene):
     """A scene of two rows one inside the other."""
 
     bearing: DoubleDecker
-    # Runout is followed for one row only.
-    errors: None = None
+
+    @model_validator(mode="after")
+    def _no_errors(self) -> DoubleDeckerScene:
+        if self.errors is not None:
+            raise ValueError(
+                "errors: form errors are followed for one row of balls only; take the table away"
+            )
+        return self
