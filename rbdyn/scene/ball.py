@@ -11,6 +11,7 @@ from rbdyn.faults import Strict
 from rbdyn.materials import Material
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
 from rbdyn.scene.fields import Positive, or_refuse
+from rbdyn.scene.form_errors import FormErrors, faults
 from rbdyn.scene.lubricant import Lubricant
 from rbdyn.scene.mounting import material_of
 from rbdyn.scene.operation import Speed
@@ -270,6 +271,8 @@ class BallScene(SceneFile):
     model: BallModel = BallModel()
     materials: BallMaterials = BallMaterials()
     lubricant: Lubricant | None = None
+    # What ``quasistatic.runout_model.follow_ring`` follows; ``rbdyn.equilibrium`` is that of the perfect bearing.
+    errors: FormErrors | None = None
 
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:
@@ -288,8 +291,23 @@ class SingleRowScene(BallScene):
 
     bearing: BallBearing
 
+    @model_validator(mode="after")
+    def _errors_fit(self) -> SingleRowScene:
+        row = self.bearing
+        if self.errors is None:
+            return self
+        return or_refuse(self, faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm))
+
 
 class DoubleDeckerScene(BallScene):
     """A scene of two rows one inside the other."""
 
     bearing: DoubleDecker
+
+    @model_validator(mode="after")
+    def _no_errors(self) -> DoubleDeckerScene:
+        if self.errors is not None:
+            raise ValueError(
+                "errors: form errors are followed for one row of balls only; take the table away"
+            )
+        return self
