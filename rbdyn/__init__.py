@@ -13,13 +13,30 @@ if TYPE_CHECKING:
     from rbdyn.dynamics.history import History, history
     from rbdyn.dynamics.simulate import simulate
     from rbdyn.faults import InputError, RunError
+    from rbdyn.quasistatic.bearing import equilibrium
+    from rbdyn.quasistatic.result import BallResult
     from rbdyn.result import SimulationResult
-    from rbdyn.scene import Scene
+    from rbdyn.scene import BallScene, Scene
 
-__all__ = ["History", "InputError", "RunError", "Scene", "SimulationResult", "history", "load", "simulate"]
+__all__ = [
+    "BallResult",
+    "BallScene",
+    "History",
+    "InputError",
+    "RunError",
+    "Scene",
+    "SimulationResult",
+    "equilibrium",
+    "history",
+    "load",
+    "simulate",
+]
 
 _HOMES = {
     "Scene": "rbdyn.scene",
+    "BallScene": "rbdyn.scene",
+    "equilibrium": "rbdyn.quasistatic.bearing",
+    "BallResult": "rbdyn.quasistatic.result",
     "simulate": "rbdyn.dynamics.simulate",
     "history": "rbdyn.dynamics.history",
     "History": "rbdyn.dynamics.history",

@@ -62,16 +62,14 @@ def simulate(
 ) -> None:
     """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss."""
     with guarded(as_json):
-        from rbdyn.scene import Scene
-
-        loaded = Scene.load(scene, _overrides(assignments, turns, replicates, seed))
+        loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
         aim = None if target is None else _aim(target, turns, replicates)
         folder = output_folder(out) if out else None
         from rbdyn.dynamics.simulate import simulate as run_scene
 
         with progress_bar("simulating", quiet or as_json) as progress:
             result = run_scene(loaded, workers, progress, target=aim)
-        loaded = Scene.from_dict(result.scene)
+        loaded = type(loaded).from_dict(result.scene)
         if folder:
             _write(loaded, result, folder)
         if as_json:
@@ -80,6 +78,40 @@ def simulate(
             _print(result, quiet, verbose)
             if folder:
                 print(f"written to {folder}: result.json, history.csv, cage_orbit.png, pocket_forces.png")
+
+
+@app.command()
+def ball(
+    scene: SceneFile,
+    assignments: Set = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write result.json, balls.csv and pictures here.")
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also the stiffness matrix and cost.")
+    ] = False,
+) -> None:
+    """Find the equilibrium of a ball bearing: contact angles, loads, stiffness, stress, life."""
+    with guarded(as_json):
+        from rbdyn.scene import Scene, balls_only
+
+        loaded = balls_only(Scene.load(scene, assignments or []))
+        folder = output_folder(out) if out else None
+        from rbdyn.ball_command import print_result, write
+        from rbdyn.quasistatic.bearing import equilibrium
+
+        result = equilibrium(loaded)
+        files = write(result, folder) if folder else []
+        if as_json:
+            print_json(result.as_dict())
+        else:
+            print_result(result, quiet, verbose)
+            if folder:
+                print(f"written to {folder}: {', '.join(files)}")
+    if not result.found:
+        raise typer.Exit(FAILED)
 
 
 @app.command()
@@ -114,7 +146,6 @@ def accuracy(
     """Show error against run time: of every output at each tolerance and of the motion itself."""
     with guarded(as_json):
         from rbdyn import accuracy as studies
-        from rbdyn.scene import Scene
 
         asked = {
             "methods": methods,
@@ -125,7 +156,7 @@ def accuracy(
             "scaling": scaling,
         }
         name = _study(asked, trajectory)
-        loaded = Scene.load(scene, assignments or [])
+        loaded = _rollers(scene, assignments or [])
         folder = output_folder(out) if out else None
         limits = {} if trajectory is None else {"turns": trajectory}
         with progress_bar(name, quiet or as_json) as progress:
@@ -173,9 +204,7 @@ def slip_map(
 ) -> None:
     """Map cage slip, power loss, impact and whirl over speed and load."""
     with guarded(as_json):
-        from rbdyn.scene import Scene
-
-        loaded = Scene.load(scene, _overrides(assignments, turns, replicates, seed))
+        loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
         folder = output_folder(out) if out else None
         from rbdyn import slip_map as study
 
@@ -199,6 +228,13 @@ def slip_map(
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
     if found.failed:
         raise typer.Exit(FAILED)
+
+
+def _rollers(path: Path, overrides: list[str]) -> Scene:
+    """Scene of a roller bearing. Raises InputError for any other."""
+    from rbdyn.scene import Scene, rollers_only
+
+    return rollers_only(Scene.load(path, overrides))
 
 
 def _overrides(

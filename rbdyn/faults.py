@@ -116,8 +116,10 @@ def _sentences(
         elif kind == "value_error":
             # A validator of a whole table may find several faults: one a line.
             where = f"{key} = {_shown(value)}: " if key and not isinstance(value, Mapping | BaseModel) else ""
-            lines = str(fault["ctx"]["error"]).splitlines()
-            sentences += [f"{source}: {where}{line}" for line in lines]
+            for line in str(fault["ctx"]["error"]).splitlines():
+                # A table that may stand in several places names its keys without the path.
+                path = "" if where or not key or line.startswith(key.split(".")[0]) else f"{key}."
+                sentences.append(f"{source}: {where}{path}{line}")
         elif isinstance(value, float) and not math.isfinite(value):
             sentences.append(f"{source}: {key} = {value}: is not a finite number; write a plain number")
         else:

@@ -7,21 +7,20 @@ is compiled: ``rbdyn.dynamics.model`` turns a scene into the SI parameters of th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from copy import deepcopy
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, cast
 
 from pydantic import model_validator
 
-from rbdyn.faults import Strict, read_toml, set_key, validated
+from rbdyn.faults import InputError
 from rbdyn.materials import Material
+from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
 from rbdyn.scene.fields import or_refuse
 from rbdyn.scene.laws import Laws, Numerics
 from rbdyn.scene.lubricant import Lubricant, Traction
 from rbdyn.scene.mounting import Mounting, faults, material_of
 from rbdyn.scene.operation import Operation, Support
+from rbdyn.scene.reading import SceneFile
 
 if TYPE_CHECKING:
     from rbdyn.ring_expansion import MountedClearance
@@ -30,8 +29,8 @@ if TYPE_CHECKING:
 PROFILE_SLICES = 31
 
 
-class Scene(Strict):
-    """Everything a simulation needs. Equal scenes of equal seed and version give equal bits."""
+class Scene(SceneFile):
+    """Everything a simulation of a cylindrical roller bearing needs. ``load`` of a ball bearing's file gives a BallScene."""
 
     bearing: Bearing
     cage: Cage
@@ -45,17 +44,12 @@ class Scene(Strict):
     numerics: Numerics = Numerics()
 
     @classmethod
-    def load(cls, path: Path | str, overrides: Iterable[str] = ()) -> Scene:
-        """Read a TOML scene, with ``key.path=value`` overrides. Raises InputError with all faults at once."""
-        return cls.from_dict(read_toml(path), str(path), overrides)
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any], source: str = "scene", overrides: Iterable[str] = ()) -> Scene:
-        """Validate nested tables as TOML gives them; ``source`` stands in the messages. Raises InputError."""
-        data = deepcopy(data)
-        for override in overrides:
-            set_key(data, override)
-        return validated(cls, data, source)
+    def _of_kind(cls, data: dict[str, Any]) -> type[Self]:
+        bearing = data.get("bearing")
+        if isinstance(bearing, dict) and bearing.get("kind") in BALL_KINDS:
+            # Scene.load reads any scene; whoever asks for rollers says so by ``rollers_only``.
+            return cast(type[Self], BallScene._of_kind(data))
+        return cls
 
     @model_validator(mode="after")
     def _assembles(self) -> Scene:
@@ -180,3 +174,17 @@ class Scene(Strict):
     def material(self, part: str) -> Material:
         """Material of 'roller', 'rings' or 'cage' in SI."""
         return material_of(getattr(self.materials, part))
+
+
+def rollers_only(scene: Scene | BallScene) -> Scene:
+    """The scene, where it is one of rollers. Raises InputError for a ball bearing."""
+    if isinstance(scene, Scene):
+        return scene
+    raise InputError([f"bearing.kind = {scene.bearing.kind!r}: is not simulated in time; use rbdyn ball"])
+
+
+def balls_only(scene: Scene | BallScene) -> BallScene:
+    """The scene, where it is one of balls. Raises InputError for a roller bearing."""
+    if isinstance(scene, BallScene):
+        return scene
+    raise InputError([f"bearing.kind = {scene.bearing.kind!r}: has no balls; use rbdyn simulate"])

@@ -1,0 +1,75 @@
+"""What ``rbdyn ball`` prints and writes."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from rbdyn.quasistatic.result import BallResult
+from rbdyn.terminal import print_table
+
+
+def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
+    """Print a result as tables; the reason on standard error where there is none."""
+    record = result.record
+    if not result.found:
+        print(f"no equilibrium: {result.status}", file=sys.stderr)
+        return
+    for name in ("inner", "outer") if "inner" in record else ("",):
+        _print_row(f"{name} row" if name else "", record[name] if name else record, verbose)
+    if not quiet:
+        for note in record.get("notes", ()):
+            print(f"note: {note}")
+
+
+def write(result: BallResult, folder: Path) -> list[str]:
+    """Write result.json and balls.csv; returns the names of the files."""
+    result.save(folder / "result.json")
+    if not result.found:
+        return ["result.json"]
+    result.table().to_csv(folder / "balls.csv", index=False, float_format="%.8g")
+    return ["result.json", "balls.csv"]
+
+
+def _print_row(title: str, record: dict[str, Any], verbose: bool) -> None:
+    place, tilt, stiffness = record["displacement_mm"], record["tilt_mrad"], record["stiffness"]
+    header = (
+        "azimuth [deg]",
+        "inner angle [deg]",
+        "outer angle",
+        "inner load [N]",
+        "outer load",
+        "centrifugal [N]",
+    )
+    keys = (
+        "azimuth_deg",
+        "inner_angle_deg",
+        "outer_angle_deg",
+        "inner_load_N",
+        "outer_load_N",
+        "centrifugal_force_N",
+    )
+    rows = [
+        (f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in record["balls"]
+    ]
+    print_table(title, header, rows)
+    print(
+        "ring: "
+        + ", ".join(f"{axis} {1e3 * place[axis]:.4g} um" for axis in "xyz")
+        + ", "
+        + ", ".join(f"tilt {axis} {tilt[axis]:.4g} mrad" for axis in "xy")
+    )
+    stress = record["max_stress_MPa"]
+    print(f"peak pressure: {stress['inner']:.0f} MPa inner, {stress['outer']:.0f} MPa outer race")
+    print("stiffness: " + ", ".join(f"{axis} {stiffness[f'{axis}_N_per_um']:.4g} N/um" for axis in "xyz"))
+    if verbose:
+        print_table(
+            "stiffness [N/m, N, N m]",
+            ("", "x", "y", "z", "tilt x", "tilt y"),
+            [
+                (name, *(f"{value:.4g}" for value in row))
+                for name, row in zip(("x", "y", "z", "tilt x", "tilt y"), stiffness["matrix_SI"], strict=True)
+            ],
+        )
+        print(f"{record['iterations']} Newton steps, {record['residual_N']:.2g} N left over")

@@ -1,0 +1,11 @@
+"""Ball bearings in equilibrium, after Jones and Harris: contact angles, loads, stiffness, runout, preload and life.
+
+Where an equation stands: ``row`` (geometry of a row of balls), ``control`` (raceway control hypotheses), ``ball_motion``
+(orbit, spin, centrifugal force, gyroscopic moment), ``ball`` (forces on one ball and their derivatives), ``ring``
+(forces on the inner ring, balls eliminated), ``start`` (first guess), ``newton`` (convex start and full equations),
+``equilibrium`` (what Python calls).
+
+x is radial along the load, z axial; ball j stands at psi_j = 2 pi j/Z from x. The inner ring moves, the outer ring is
+the reference. In the plane of a ball the centre of curvature of the outer groove is the origin, places are (axial,
+radial), and a contact angle is atan2(axial, radial) of the line through both centres.
+"""

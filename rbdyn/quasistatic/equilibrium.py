@@ -1,0 +1,168 @@
+"""Equilibrium of one row of balls: what Python calls."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.kernel import entry
+from rbdyn.quasistatic.ball import ball_forces
+from rbdyn.quasistatic.control import CommonCage, Control
+from rbdyn.quasistatic.newton import CONVERGED, COUNTERS, NOT_CONVEX_MINIMUM, Space, find, space, unbalance
+from rbdyn.quasistatic.place import groove_centre
+from rbdyn.quasistatic.ring import LOADED, RING, TAKEN
+from rbdyn.quasistatic.row import Row
+
+# What ``tell`` leaves of a ball.
+INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, TOLD = range(7)
+OK = "ok"
+SENTENCES = {
+    NOT_CONVEX_MINIMUM: "no equilibrium was found even with one common cage speed",
+}
+LOST = (
+    "no equilibrium was found with this raceway control, only with one common cage speed: friction cannot hold the balls' "
+    "gyroscopic moments there"
+)
+
+
+class Solution(NamedTuple):
+    """Equilibrium of one row of Z balls. Arrays (Z,) unless told; angles in rad, forces in N, lengths in m.
+
+    ``displacement``: (x, y, z, theta_x, theta_y) of the inner ring [m, rad]. ``balls`` (Z, 2): place of each centre, (axial,
+    radial) from its outer groove centre. ``reaction`` (5,): the load that the ring takes [N, N m]. ``stiffness`` (5, 5): its
+    derivative by the displacement. ``residual``: the largest force left over [N]. ``status``: "ok" or why there is none.
+    ``steps, assemblies, strides``: Newton steps, evaluations of all balls, and continuations of the race control.
+    """
+
+    displacement: NDArray[np.float64]
+    balls: NDArray[np.float64]
+    inner_load: NDArray[np.float64]
+    outer_load: NDArray[np.float64]
+    inner_angle: NDArray[np.float64]
+    outer_angle: NDArray[np.float64]
+    centrifugal_force: NDArray[np.float64]
+    gyroscopic_moment: NDArray[np.float64]
+    reaction: NDArray[np.float64]
+    stiffness: NDArray[np.float64]
+    status: str
+    residual: float
+    steps: int
+    assemblies: int
+    strides: int
+
+    @property
+    def found(self) -> bool:
+        """Whether this is an equilibrium."""
+        return self.status == OK
+
+
+@entry
+def solve_row(
+    cage: Any,
+    control: Any,
+    row: Any,
+    load: Any,
+    free: Any,
+    warm: bool,
+    q: Any,
+    balls: Any,
+    at: Any,
+    counts: Any,
+    told: Any,
+) -> tuple[int, float]:
+    """Find the equilibrium and fill ``told`` (Z, TOLD); see ``newton.find``. Returns the outcome and the residual [N]."""
+    counts[:] = 0
+    outcome = find(cage, control, row, load, free, warm, q, balls, at, counts)
+    _, worst = unbalance(load, free, at.sums)
+    for j in range(row.cosine.size):
+        a_axial, a_radial = groove_centre(row, q, j)
+        x, y = balls[j, 0], balls[j, 1]
+        told[j, INNER_ANGLE] = math.atan2(a_axial - x, a_radial - y)
+        told[j, OUTER_ANGLE] = math.atan2(x, y)
+        inner = math.sqrt((a_axial - x) ** 2 + (a_radial - y) ** 2) - row.inner_reach[j]
+        outer = math.sqrt(x * x + y * y) - row.outer_reach[j]
+        told[j, INNER_LOAD] = row.inner_stiffness * max(inner, 0.0) ** 1.5
+        told[j, OUTER_LOAD] = row.outer_stiffness * max(outer, 0.0) ** 1.5
+        told[j, PULL], told[j, MOMENT] = row.centrifugal_force, 0.0
+        if at.work[j, LOADED] > 0.0:
+            _, _, _, _, _, _, told[j, PULL], told[j, MOMENT] = ball_forces(
+                control, 1.0, row, j, a_axial, a_radial, x, y
+            )
+        else:
+            # A lifted ball lies on the outer race alone and has no inner angle of its own.
+            told[j, INNER_LOAD], told[j, INNER_ANGLE] = 0.0, told[j, OUTER_ANGLE]
+            told[j, OUTER_LOAD] = row.centrifugal_force
+    return outcome, worst
+
+
+def solve(
+    row: Row,
+    control: Control,
+    load: NDArray[np.float64],
+    given: NDArray[np.float64] | None = None,
+    start: Solution | None = None,
+) -> Solution:
+    """Equilibrium of a row under ``load`` (Fx, Fy, Fz [N], Mx, My [N m]) on the inner ring.
+
+    ``given`` (5,): prescribed displacements [m, rad], NaN where the load rules; where one is prescribed the load there is not
+    used. ``start``: a solution nearby; without it the start cannot fail. Never raises for want of an equilibrium: see
+    ``status``.
+    """
+    size = row.cosine.size
+    unit = np.array([1.0, 1.0, 1.0, row.lever, row.lever])
+    free = np.ones(RING) if given is None else np.where(np.isnan(given), 1.0, 0.0)
+    q = np.zeros(RING) if given is None else np.where(free > 0.0, 0.0, given) * unit
+    balls = np.zeros((size, 2))
+    if start is not None:
+        q = np.where(free > 0.0, start.displacement * unit, q)
+        balls[:] = start.balls
+    at, counts, told = space(size), np.zeros(COUNTERS, np.int64), np.zeros((size, TOLD))
+    cage = CommonCage(0.0)
+    outcome, worst = solve_row(
+        cage,
+        control,
+        row,
+        np.asarray(load, float) / unit,
+        free,
+        start is not None,
+        q,
+        balls,
+        at,
+        counts,
+        told,
+    )
+    return told_solution(row, at, q, balls, counts, told, outcome, worst)
+
+
+def told_solution(
+    row: Row,
+    at: Space,
+    q: NDArray[np.float64],
+    balls: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    told: NDArray[np.float64],
+    outcome: int,
+    worst: float,
+) -> Solution:
+    """What a compiled solve left, in the units and names of a Solution."""
+    unit = np.array([1.0, 1.0, 1.0, row.lever, row.lever])
+    return Solution(
+        displacement=q / unit,
+        balls=balls,
+        inner_load=told[:, INNER_LOAD],
+        outer_load=told[:, OUTER_LOAD],
+        inner_angle=told[:, INNER_ANGLE],
+        outer_angle=told[:, OUTER_ANGLE],
+        centrifugal_force=told[:, PULL],
+        gyroscopic_moment=told[:, MOMENT],
+        reaction=at.sums[TAKEN : TAKEN + RING] * unit,
+        stiffness=at.matrix * np.outer(unit, unit),
+        status=OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST),
+        residual=worst,
+        steps=int(counts[0]),
+        assemblies=int(counts[1]),
+        strides=int(counts[2]),
+    )

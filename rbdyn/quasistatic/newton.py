@@ -1,0 +1,269 @@
+"""Equilibrium from any start: the convex problem first, then the full equations.
+
+With one common cage speed and no gyroscopic moment the equilibrium is the minimiser of a jointly convex energy in the ring's
+displacement and the places of the balls: unique, and a guarded Newton reaches it from anywhere. From there Newton on the
+full equations; where it fails the race control is brought in by and by.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.kernel import alike, kernel, routine
+from rbdyn.quasistatic.ring import (
+    BALL_WORK,
+    ENERGY,
+    LARGEST,
+    RING,
+    SUMS,
+    TAKEN,
+    UNBALANCE,
+    WORST,
+    assemble,
+    follow,
+)
+from rbdyn.quasistatic.start import along_the_load, settle_all
+
+# Outcomes of ``find``.
+CONVERGED, NOT_CONVEX_MINIMUM, RACE_CONTROL_LOST, NOT_FINITE = range(4)
+# Largest residual over largest force: aimed at, and accepted where rounding allows no better.
+AIM, ACCEPTED = 1e-12, 1e-10
+CONVEX_STEPS, FULL_STEPS, CONTINUED_STEPS, CONTINUATIONS = 200, 40, 12, 400
+SMALLEST_STRIDE = 1e-5
+SHORTEST_CONVEX, SHORTEST_FULL = 1e-10, 1e-3
+# Counters: Newton steps, assemblies, continuations.
+STEPS, ASSEMBLIES, STRIDES, COUNTERS = range(4)
+
+
+class Space(NamedTuple):
+    """Work space of a solve, kept from one to the next. ``matrix``: the ring's stiffness where the last solve ended [N/m]."""
+
+    matrix: NDArray[np.float64]
+    vector: NDArray[np.float64]
+    table: NDArray[np.float64]
+    step: NDArray[np.float64]
+    sums: NDArray[np.float64]
+    work: NDArray[np.float64]
+    old_work: NDArray[np.float64]
+    old_balls: NDArray[np.float64]
+    old_ring: NDArray[np.float64]
+    base: NDArray[np.float64]
+
+
+def space(balls: int) -> Space:
+    """Work space for a row of so many balls."""
+    return Space(
+        np.zeros((RING, RING)),
+        np.zeros(RING),
+        np.zeros((RING, RING + 1)),
+        np.zeros(RING),
+        np.zeros(SUMS),
+        np.zeros((balls, BALL_WORK)),
+        np.zeros((balls, BALL_WORK)),
+        np.zeros((balls, 2)),
+        np.zeros(RING),
+        np.zeros(RING),
+    )
+
+
+@kernel
+def ring_step(matrix: Any, vector: Any, free: Any, damping: float, table: Any, step: Any) -> bool:
+    """Solve (matrix + damping) step = vector for the free components, by elimination with pivots; 0 for the others.
+
+    ``table``: work space (5, 6). Returns whether a pivot of a reasonable size was found every time.
+    """
+    count = 0
+    largest = 0.0
+    for i in range(RING):
+        step[i] = 0.0
+        if free[i] > 0.0:
+            column = 0
+            for k in range(RING):
+                if free[k] > 0.0:
+                    table[count, column] = matrix[i, k]
+                    column += 1
+            table[count, count] += damping
+            table[count, RING] = vector[i]
+            largest = max(largest, abs(table[count, count]))
+            count += 1
+    for i in range(count):
+        pivot = i
+        for k in range(i + 1, count):
+            if abs(table[k, i]) > abs(table[pivot, i]):
+                pivot = k
+        if not abs(table[pivot, i]) > 1e-13 * largest:
+            return False
+        if pivot != i:
+            for k in range(i, count):
+                table[i, k], table[pivot, k] = table[pivot, k], table[i, k]
+            table[i, RING], table[pivot, RING] = table[pivot, RING], table[i, RING]
+        one = 1.0 / table[i, i]
+        for k in range(i + 1, count):
+            factor = table[k, i] * one
+            for m in range(i + 1, count):
+                table[k, m] -= factor * table[i, m]
+            table[k, RING] -= factor * table[i, RING]
+    for i in range(count - 1, -1, -1):
+        rest = table[i, RING]
+        for k in range(i + 1, count):
+            rest -= table[i, k] * table[k, RING]
+        table[i, RING] = rest / table[i, i]
+    place = 0
+    for i in range(RING):
+        if free[i] > 0.0:
+            step[i] = table[place, RING]
+            place += 1
+    return True
+
+
+@kernel
+def unbalance(load: Any, free: Any, sums: Any) -> tuple[float, float]:
+    """Squared length of all residuals [N^2] and the largest of them [N], the ring's free components included."""
+    total, worst = sums[UNBALANCE], sums[WORST]
+    for i in range(RING):
+        left = (load[i] - sums[TAKEN + i]) * free[i]
+        total += left * left
+        worst = max(worst, abs(left))
+    return total, worst
+
+
+@kernel
+def stiffness_scale(row: Any, force: float) -> float:
+    """A contact stiffness to measure damping by [N/m]: that of a ball under ``force``."""
+    return 1.5 * row.outer_stiffness ** (2.0 / 3.0) * force ** (1.0 / 3.0)
+
+
+@routine
+def descend(
+    control: Any, strength: float, convex: bool, limit: int, row: Any, load: Any, free: Any, q: Any, balls: Any, at: Any,
+    counts: Any,
+) -> bool:  # fmt: skip
+    """Newton's method from ``q`` and ``balls``, which it leaves at the best point found; whether that is an equilibrium.
+
+    Guarded by the energy where ``convex``, else by the squared length of the residuals.
+    """
+    matrix, sums, step = at.matrix, at.sums, at.step
+    assemble(control, strength, row, load, q, balls, matrix, at.vector, at.work, sums)
+    counts[ASSEMBLIES] += 1
+    total, worst = unbalance(load, free, sums)
+    unit = stiffness_scale(row, sums[LARGEST])
+    damping = 0.0
+    for _ in range(limit):
+        if not math.isfinite(total):
+            return False
+        if worst <= AIM * sums[LARGEST]:
+            return True
+        if not ring_step(matrix, at.vector, free, damping, at.table, step):
+            damping = max(1e3 * damping, 1e-9 * unit)
+            if damping > 1e9 * unit:
+                return worst <= ACCEPTED * sums[LARGEST]
+            continue
+        counts[STEPS] += 1
+        at.old_ring[:] = q
+        at.old_balls[:] = balls
+        at.old_work[:] = at.work
+        before, energy, scale = total, sums[ENERGY], 1.0
+        shortest = SHORTEST_CONVEX if convex else SHORTEST_FULL
+        better = False
+        while scale >= shortest:
+            for i in range(RING):
+                q[i] = at.old_ring[i] + scale * step[i]
+            follow(row, step, scale, at.old_work, at.old_balls, balls)
+            assemble(control, strength, row, load, q, balls, matrix, at.vector, at.work, sums)
+            counts[ASSEMBLIES] += 1
+            total, worst = unbalance(load, free, sums)
+            better = total <= (1.0 - 1e-4 * scale) * before
+            if convex and not better:
+                better = sums[ENERGY] < energy - 1e-14 * abs(energy)
+            if better:
+                break
+            scale *= 0.5 if scale > 0.1 else 0.25
+        if better:
+            if scale == 1.0:
+                damping = 0.1 * damping if damping > 1e-9 * unit else 0.0
+            continue
+        # No step helps: rounding has been reached, or the matrix misleads.
+        q[:] = at.old_ring
+        balls[:] = at.old_balls
+        assemble(control, strength, row, load, q, balls, matrix, at.vector, at.work, sums)
+        counts[ASSEMBLIES] += 1
+        total, worst = unbalance(load, free, sums)
+        if worst <= ACCEPTED * sums[LARGEST]:
+            return True
+        if not convex or damping > 1e3 * unit:
+            return False
+        damping = max(1e2 * damping, 1e-6 * unit)
+    return worst <= ACCEPTED * sums[LARGEST]
+
+
+@routine
+def bring_in(control: Any, row: Any, load: Any, free: Any, q: Any, balls: Any, at: Any, counts: Any) -> bool:
+    """From the convex minimum to the full equations by strides in the strength of the race control."""
+    keep_q, keep = q.copy(), balls.copy()
+    reached, stride = 0.0, 0.25
+    for _ in range(CONTINUATIONS):
+        counts[STRIDES] += 1
+        ahead = min(reached + stride, 1.0)
+        if descend(control, ahead, False, CONTINUED_STEPS, row, load, free, q, balls, at, counts):
+            if ahead == 1.0:
+                return True
+            reached, stride = ahead, 2.0 * stride
+            keep_q[:] = q
+            keep[:] = balls
+        else:
+            q[:] = keep_q
+            balls[:] = keep
+            stride *= 0.25
+            if stride < SMALLEST_STRIDE:
+                return False
+    return False
+
+
+@routine
+def find(
+    cage: Any,
+    control: Any,
+    row: Any,
+    load: Any,
+    free: Any,
+    warm: bool,
+    q: Any,
+    balls: Any,
+    at: Any,
+    counts: Any,
+) -> int:
+    """Equilibrium of one row. ``q`` and ``balls`` hold the start where ``warm``, and the prescribed displacements always.
+
+    ``cage``: the ``CommonCage`` of the convex problem; ``control`` may be the same. Returns an outcome.
+    """
+    if warm and descend(control, 1.0, False, FULL_STEPS, row, load, free, q, balls, at, counts):
+        return CONVERGED
+    for i in range(RING):
+        if free[i] > 0.0:
+            q[i] = 0.0
+    along_the_load(row, load, free, q, at.step, at.base)
+    settle_all(row, q, balls)
+    if not descend(cage, 0.0, True, CONVEX_STEPS, row, load, free, q, balls, at, counts):
+        return NOT_CONVEX_MINIMUM
+    return complete(cage, control, row, load, free, q, balls, at, counts)
+
+
+@routine
+def complete(
+    cage: Any, control: Any, row: Any, load: Any, free: Any, q: Any, balls: Any, at: Any, counts: Any
+) -> int:
+    """From the convex minimum to the equilibrium of ``control``."""
+    if alike(cage, control):
+        return CONVERGED
+    start_q, start = q.copy(), balls.copy()
+    if descend(control, 1.0, False, FULL_STEPS, row, load, free, q, balls, at, counts):
+        return CONVERGED
+    q[:] = start_q
+    balls[:] = start
+    if bring_in(control, row, load, free, q, balls, at, counts):
+        return CONVERGED
+    return RACE_CONTROL_LOST

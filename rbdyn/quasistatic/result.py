@@ -1,0 +1,125 @@
+"""What an equilibrium of a ball bearing reports, saves and loads."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.faults import InputError
+from rbdyn.quasistatic.equilibrium import Solution
+from rbdyn.result import write_json
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FORMAT = "rbdyn.ball/1"
+
+
+@dataclass(frozen=True)
+class BallResult:
+    """Equilibrium of a ball bearing.
+
+    ``record``: what ``as_dict`` gives and ``save`` writes, units in the names. ``rows``: the solved rows in SI, one, or the
+    inner and the outer one of a double-decker; empty for a result that was loaded or that found no equilibrium.
+    """
+
+    record: dict[str, Any]
+    rows: tuple[Solution, ...] = ()
+
+    @property
+    def status(self) -> str:
+        """ "ok", or why there is no equilibrium."""
+        return str(self.record["status"])
+
+    @property
+    def found(self) -> bool:
+        """Whether an equilibrium was found."""
+        return self.status == "ok"
+
+    @property
+    def displacement(self) -> NDArray[np.float64]:
+        """(x, y, z [m], theta_x, theta_y [rad]) of the inner ring. Raises KeyError where there is no equilibrium."""
+        place, tilt = self.record["displacement_mm"], self.record["tilt_mrad"]
+        return 1e-3 * np.array([place["x"], place["y"], place["z"], tilt["x"], tilt["y"]])
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return self.record
+
+    def table(self) -> pd.DataFrame:
+        """A row a ball: azimuth, angles, loads, centrifugal force, gyroscopic moment; units in the names."""
+        import pandas as pd
+
+        if "balls" in self.record:
+            return pd.DataFrame(self.record["balls"])
+        layers = {name: pd.DataFrame(self.record[name]["balls"]) for name in ("inner", "outer")}
+        return pd.concat(layers, names=["row", "ball"]).reset_index()
+
+    def save(self, path: Path | str) -> None:
+        """Write JSON, whole or not at all."""
+        write_json(path, self.record)
+
+    @classmethod
+    def load(cls, path: Path | str) -> BallResult:
+        """Read a saved result. Raises InputError when the file is missing or not such a result."""
+        try:
+            data = json.loads(Path(path).read_text(encoding="utf-8"))
+            if data["format"] != FORMAT:
+                raise InputError([f"{path}: format is {data['format']}, not {FORMAT}; run the scene again"])
+            return cls(data)
+        except OSError as error:
+            raise InputError([f"{path}: cannot be read ({error.strerror}); check the path"]) from None
+        except (ValueError, KeyError, TypeError):
+            raise InputError([f"{path}: not a saved equilibrium; check the path"]) from None
+
+
+def displacement_record(displacement: NDArray[np.float64]) -> dict[str, Any]:
+    """Displacement of a ring in mm and mrad."""
+    x, y, z, tilt_x, tilt_y = (1e3 * float(value) for value in displacement)
+    return {"displacement_mm": {"x": x, "y": y, "z": z}, "tilt_mrad": {"x": tilt_x, "y": tilt_y}}
+
+
+def ball_records(solution: Solution) -> list[dict[str, float]]:
+    """One record a ball."""
+    size = solution.inner_load.size
+    columns = {
+        "azimuth_deg": 360.0 * np.arange(size) / size,
+        "inner_angle_deg": np.degrees(solution.inner_angle),
+        "outer_angle_deg": np.degrees(solution.outer_angle),
+        "inner_load_N": solution.inner_load,
+        "outer_load_N": solution.outer_load,
+        "centrifugal_force_N": solution.centrifugal_force,
+        "gyroscopic_moment_Nmm": 1e3 * solution.gyroscopic_moment,
+    }
+    return [{name: float(values[j]) for name, values in columns.items()} for j in range(size)]
+
+
+def stiffness_record(stiffness: NDArray[np.float64]) -> dict[str, Any]:
+    """Diagonal stiffnesses and the whole matrix."""
+    across, tilt = np.diag(stiffness)[:3] * 1e-6, np.diag(stiffness)[3:] * 1e-3
+    return {
+        "x_N_per_um": float(across[0]),
+        "y_N_per_um": float(across[1]),
+        "z_N_per_um": float(across[2]),
+        "tilt_x_Nm_per_mrad": float(tilt[0]),
+        "tilt_y_Nm_per_mrad": float(tilt[1]),
+        "matrix_SI": stiffness.tolist(),
+    }
+
+
+def needed_friction(solution: Solution, control_share: float | None, ball_diameter: float) -> float:
+    """Largest friction coefficient that a contact needs to hold its part of the gyroscopic moment, 2 s M_g/(D Q)."""
+    if control_share is None:
+        return 0.0
+    moment = 2.0 * np.abs(solution.gyroscopic_moment) / ball_diameter
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inner = np.where(solution.inner_load > 0.0, control_share * moment / solution.inner_load, 0.0)
+        outer = np.where(solution.outer_load > 0.0, (1.0 - control_share) * moment / solution.outer_load, 0.0)
+    largest = float(max(inner.max(), outer.max()))
+    return largest if math.isfinite(largest) else 0.0

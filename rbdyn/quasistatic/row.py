@@ -1,0 +1,38 @@
+"""Geometry of one row of balls: what the equations of equilibrium need to know, in SI."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Row(NamedTuple):
+    """One row of Z balls between two rings. Arrays have shape (Z,), lengths are in m.
+
+    ``cosine, sine``: of the azimuth of each ball. ``axial, radial``: place of the inner groove centre before any
+    displacement, form errors, clearance and ring growth included. ``inner_reach, outer_reach``: groove radius less ball
+    radius. ``inner_stiffness, outer_stiffness``: K of Q = K delta^1.5 [N/m^1.5]. ``lever``: radius R_i of the circle of
+    inner groove centres. ``inner_groove_radius``: f_i D, the lever of a friction force about the groove centre.
+    ``centrifugal_force``: that of a ball at the common cage speed [N]; ``rest_deflection``: how deep a ball that only this
+    force loads presses into the outer race.
+    """
+
+    cosine: NDArray[np.float64]
+    sine: NDArray[np.float64]
+    axial: NDArray[np.float64]
+    radial: NDArray[np.float64]
+    inner_reach: NDArray[np.float64]
+    outer_reach: NDArray[np.float64]
+    inner_stiffness: float
+    outer_stiffness: float
+    lever: float
+    inner_groove_radius: float
+    centrifugal_force: float
+    rest_deflection: float
+
+
+def rest_deflection(centrifugal_force: float, outer_stiffness: float) -> float:
+    """Outer deflection [m] under the centrifugal force alone."""
+    return float((centrifugal_force / outer_stiffness) ** (2.0 / 3.0))
