@@ -50,7 +50,8 @@ class MountedRings:
 def mounted_rings(
     mounting: Mounting,
     bearing: Raceways,
-    ring_material: Material,
+    inner_material: Material,
+    outer_material: Material,
     inner_speed: float,
     outer_speed: float = 0.0,
 ) -> MountedRings:
@@ -78,8 +79,8 @@ def mounted_rings(
     inner_race, outer_race = (0.5e-3 * diameter for diameter in bearing.raceway_diameters_mm)
     return MountedRings(
         shaft=Ring(shaft_bore, bore, material_of(mounting.shaft_material), shaft_rise, inner_speed),
-        inner_ring=Ring(bore, inner_race, ring_material, inner_rise, inner_speed),
-        outer_ring=Ring(outer_race, outside, ring_material, outer_rise, outer_speed),
+        inner_ring=Ring(bore, inner_race, inner_material, inner_rise, inner_speed),
+        outer_ring=Ring(outer_race, outside, outer_material, outer_rise, outer_speed),
         housing=Ring(
             outside, housing_outside, material_of(mounting.housing_material), housing_rise, outer_speed
         ),
@@ -100,7 +101,8 @@ def operating_clearance(
 
     ``bearing.radial_clearance_mm`` is the clearance before mounting. Raises ValueError as ``mounted_rings``.
     """
-    rings = mounted_rings(mounting, bearing, material_of(materials.rings), inner_speed, outer_speed)
+    material = material_of(materials.rings)
+    rings = mounted_rings(mounting, bearing, material, material, inner_speed, outer_speed)
     return mounted_clearance(
         bearing.radial_clearance_mm * 1e-3,
         shaft=rings.shaft,

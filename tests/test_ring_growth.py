@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rbdyn import BallScene, equilibrium
+from rbdyn.faults import InputError
 from rbdyn.materials import MATERIALS
+from rbdyn.quasistatic.growth_model import layer_changes, mounted_of, row_change
 from rbdyn.quasistatic.ring_growth import groove_change, printed_growth, race_radii
 from rbdyn.ring_expansion import Ring, interface_pressure, loosening_speed
 
@@ -65,13 +70,17 @@ def test_limit_middle_ring_of_no_wall():
 
 def test_unit_which_race_grows():
     """Unit: a turning inner ring closes the gap, a turning outer ring opens it; rotation leaves the grooves' radii."""
-    still = groove_change(inner_ring(speed=0.0), outer_ring(), 3e-3, (0.515, 0.525), ball_material=STEEL)
-    assert still == (0.0, 0.0, 0.0)
-    inner = groove_change(inner_ring(), outer_ring(), 3e-3, (0.515, 0.525), ball_material=STEEL)
-    outer = groove_change(
-        inner_ring(speed=0.0), outer_ring(speed=SPEED), 3e-3, (0.515, 0.525), ball_material=STEEL
+    still = groove_change(
+        inner_ring(speed=0.0), outer_ring(), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL
     )
-    both = groove_change(inner_ring(), outer_ring(speed=SPEED), 3e-3, (0.515, 0.525), ball_material=STEEL)
+    assert still == (0.0, 0.0, 0.0)
+    inner = groove_change(inner_ring(), outer_ring(), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL)
+    outer = groove_change(
+        inner_ring(speed=0.0), outer_ring(speed=SPEED), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL
+    )
+    both = groove_change(
+        inner_ring(), outer_ring(speed=SPEED), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL
+    )
     assert inner.radial == inner_ring().rotation_growth(inner_ring().outer_radius) > 0.0 > outer.radial
     assert both.radial == pytest.approx(inner.radial + outer.radial, rel=1e-12)
     assert inner[1:] == outer[1:] == (0.0, 0.0)
@@ -81,20 +90,21 @@ def test_unit_uniform_heat_scales_the_row():
     """Unit: of one steel at one temperature, groove centres and reaches grow as all lengths do; ceramic balls do not."""
     strain = STEEL.thermal_expansion * 80.0
     rings = inner_ring(speed=0.0, rise=80.0), outer_ring(rise=80.0)
-    hot = groove_change(*rings, 3e-3, (0.515, 0.525), ball_material=STEEL, ball_temperature_rise=80.0)
-    # Between races that leave no play: (f_i + f_o - 1) D of the drawing, seen radially, is grooves less a ball.
-    apart = rings[0].outer_radius + 0.515 * 3e-3 - (rings[1].inner_radius - 0.525 * 3e-3)
-    assert hot.radial == pytest.approx(strain * apart, rel=1e-12)
+    hot = groove_change(*rings, 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL, ball_temperature_rise=80.0)
+    # B cos a_0 lies radially between the groove centres.
+    assert hot.radial == pytest.approx(strain * 0.04 * 3e-3 * math.cos(ANGLE), rel=1e-9)
     assert hot.inner_reach == pytest.approx(strain * 0.015 * 3e-3, rel=1e-9)
     assert hot.outer_reach == pytest.approx(strain * 0.025 * 3e-3, rel=1e-9)
-    hybrid = groove_change(*rings, 3e-3, (0.515, 0.525), ball_material=CERAMIC, ball_temperature_rise=80.0)
+    hybrid = groove_change(
+        *rings, 3e-3, (0.515, 0.525), ANGLE, ball_material=CERAMIC, ball_temperature_rise=80.0
+    )
     assert hybrid.inner_reach - hot.inner_reach == pytest.approx(1.5e-3 * 80.0 * (12e-6 - 3.2e-6), rel=1e-9)
 
 
 def test_unit_fits_press_the_races():
     """Unit: a press fit on the shaft closes the gap as Lame says, and so does a tight housing."""
     change = groove_change(
-        inner_ring(speed=0.0), outer_ring(), 3e-3, (0.515, 0.525), ball_material=STEEL,
+        inner_ring(speed=0.0), outer_ring(), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL,
         inner_pressure=20e6, outer_pressure=10e6,
     )  # fmt: skip
     inner = inner_ring().pressure_growth(inner_ring().outer_radius, inside=20e6)
@@ -140,3 +150,109 @@ def test_literature_inner_ring_leaves_its_shaft():
     per_square = STEEL.density * a / (4.0 * STEEL.elastic_modulus) * (3.0 + nu) * b**2
     speed = loosening_speed(Ring(0.0, a, STEEL), inner_ring(), 2e-6)
     assert speed == pytest.approx(math.sqrt(1e-6 / per_square), rel=1e-12)
+
+
+def deep_groove(**tables):
+    """A 6206 between two radial loads: bore 30, outside 62 mm."""
+    scene = {
+        "bearing": {
+            "kind": "deep_groove_ball", "balls": 9, "ball_diameter_mm": 9.525, "pitch_diameter_mm": 46.0,
+            "inner_groove_factor": 0.515, "outer_groove_factor": 0.525, "radial_clearance_mm": 0.02,
+        },
+        "operation": {"inner_speed_rpm": 12000.0, "radial_load_N": 1000.0, "axial_load_N": 300.0},
+        "mounting": {"bore_mm": 30.0, "outside_diameter_mm": 62.0, "housing_diameter_mm": 90.0},
+    }  # fmt: skip
+    for name, table in tables.items():
+        scene[name] = scene.get(name, {}) | table
+    return BallScene.from_dict(scene)
+
+
+def test_limit_mounting_of_a_ball_bearing_is_a_change_of_clearance():
+    """Limit: fits and rotation change a ball bearing just as the diametral clearance that they take."""
+    mounted = deep_groove(mounting={"inner_interference_um": 15.0, "outer_interference_um": 8.0})
+    rings = mounted_of(mounted)
+    taken = -2e6 * row_change(mounted).radial
+    assert -15.0 - 8.0 < taken < -10.0
+    by_lame = rings.inner_ring.growth(rings.inner_ring.outer_radius, inside=rings.inner_pressure)
+    by_lame -= rings.outer_ring.growth(rings.outer_ring.inner_radius, outside=rings.outer_pressure)
+    assert taken == pytest.approx(-2e6 * by_lame, rel=1e-12)
+    plain = mounted.model_dump(mode="json") | {"mounting": None}
+    plain["bearing"]["clearance_change_um"] = taken
+    first, second = equilibrium(mounted), equilibrium(BallScene.from_dict(plain))
+    assert first.displacement == pytest.approx(second.displacement, abs=1e-12)
+    record = first.record["fits"]
+    assert record["inner_ring_loosens_rpm"] > 12000.0 and not record["inner_ring_loose"]
+    assert record["inner_pressure_MPa"] > record["outer_pressure_MPa"] > 0.0
+
+
+def test_unit_rotation_loosens_a_light_fit():
+    """Unit: a fit of 1 um has let go at 12000 rpm, and the record says from which speed."""
+    record = equilibrium(deep_groove(mounting={"inner_interference_um": 0.3})).record["fits"]
+    assert record["inner_ring_loose"] and 0.0 < record["inner_ring_loosens_rpm"] < 12000.0
+    loose = equilibrium(deep_groove(mounting={"inner_interference_um": -3.0})).record["fits"]
+    assert loose["inner_ring_loosens_rpm"] == 0.0
+
+
+def test_unit_hot_hybrid_bearing():
+    """Unit: ceramic balls between hot steel rings leave the grooves deeper and the clearance wider."""
+    hot = {"inner_ring_temperature_C": 120.0, "outer_ring_temperature_C": 120.0, "rotation": False}
+    steel = row_change(deep_groove(mounting=hot))
+    hybrid = row_change(deep_groove(mounting=hot, materials={"ball": "silicon_nitride"}))
+    assert hybrid.radial == steel.radial
+    assert hybrid.inner_reach - steel.inner_reach == pytest.approx(0.5 * 9.525e-3 * 100.0 * 8.8e-6, rel=1e-9)
+    warm = equilibrium(deep_groove(mounting=hot, materials={"ball": "silicon_nitride"}))
+    cold = equilibrium(deep_groove(mounting={"rotation": False}, materials={"ball": "silicon_nitride"}))
+    assert warm.displacement[2] > cold.displacement[2]
+
+
+@pytest.mark.parametrize("form", ["thick_ring", "paper"])
+def test_unit_growth_of_a_single_row(form):
+    """Unit: ring_expansion grows the inner ring of a single row in either form, and closes the contact angle."""
+    expanding = {"ring_expansion": True, "ring_expansion_form": form}
+    data = deep_groove().model_dump(mode="json") | {"mounting": None}
+    data["bearing"]["bore_mm"] = 30.0
+    plain = equilibrium(BallScene.from_dict(data))
+    data["model"] = data["model"] | expanding
+    scene = BallScene.from_dict(data)
+    ring = Ring(15e-3, 0.5e-3 * scene.bearing.raceway_diameters_mm[0], STEEL, speed=12000.0 * math.pi / 30.0)
+    thick = ring.rotation_growth(ring.outer_radius)
+    expected = thick if form == "thick_ring" else printed_growth(46e-3, 30e-3, STEEL, ring.speed)
+    assert row_change(scene).radial == pytest.approx(expected, rel=1e-12)
+    grown = equilibrium(scene)
+    assert grown.record["ring_growth_um"]["inner_less_outer_race"] == pytest.approx(1e6 * expected)
+    assert grown.displacement[0] < plain.displacement[0]
+
+
+def test_unit_mounted_double_decker():
+    """Unit: a press fit closes the inner row, a tight housing the outer one, heat of a steel bearing only scales."""
+    file = Path(__file__).parent.parent / "examples" / "double_decker.toml"
+    text = tomllib.loads(
+        file.read_text().replace("bore_mm = 12.0", "").replace("outside_diameter_mm = 42.0", "")
+    )
+    text["operation"]["inner_speed_rpm"] = 0.0
+    text["mounting"] = {"bore_mm": 12.0, "outside_diameter_mm": 42.0, "housing_diameter_mm": 60.0}
+
+    def changed(**mounting):
+        scene = BallScene.from_dict(text | {"mounting": text["mounting"] | mounting})
+        return layer_changes(scene, 0.0)
+
+    inner, outer = changed(inner_interference_um=4.0)
+    assert inner.radial > 0.0 == outer.radial
+    inner, outer = changed(outer_interference_um=4.0)
+    assert outer.radial > 0.0 == inner.radial
+    for change in changed(inner_ring_temperature_C=100.0, outer_ring_temperature_C=100.0):
+        assert change.radial / change.inner_reach == pytest.approx(0.04 / 0.015 * math.cos(ANGLE), rel=1e-9)
+
+
+def test_unit_contradictory_rings_are_refused():
+    """Unit: what is told twice in different ways, or cannot go together, is named with a mend."""
+    cases = (
+        ({"bearing": {"bore_mm": 29.0}}, "mounting.bore_mm = 30"),
+        ({"bearing": {"clearance_change_um": -5.0}}, "clearance_change_um = -5"),
+        ({"model": {"ring_expansion": True, "ring_expansion_form": "paper"}}, "knows no fits"),
+        ({"mounting": {"bore_mm": 37.0}}, "mounting.bore_mm = 37"),
+    )
+    for tables, words in cases:
+        with pytest.raises(InputError) as caught:
+            deep_groove(**tables)
+        assert any(words in fault for fault in caught.value.faults)

@@ -30,6 +30,9 @@ class GrooveChange(NamedTuple):
     outer_reach: float
 
 
+UNCHANGED = GrooveChange(0.0, 0.0, 0.0)
+
+
 def race_radii(pitch_diameter: float, ball_diameter: float, contact_angle: float) -> tuple[float, float]:
     """Radii [m] of the circles on which balls touch inner and outer race: (dm -+ D cos alpha0)/2."""
     reach = ball_diameter * math.cos(contact_angle)
@@ -48,10 +51,11 @@ def printed_growth(pitch_diameter: float, bore_diameter: float, material: Materi
 
 
 def groove_change(
-    inner: Ring,
-    outer: Ring,
+    inner: Ring | None,
+    outer: Ring | None,
     ball_diameter: float,
     groove_factors: tuple[float, float],
+    contact_angle: float,
     *,
     ball_material: Material,
     ball_temperature_rise: float = 0.0,
@@ -60,15 +64,20 @@ def groove_change(
 ) -> GrooveChange:
     """What rotation, heat and fits of both rings do to a row of balls between them.
 
-    ``inner`` ends at its race outside, ``outer`` at its race inside. ``inner_pressure`` on the bore of the inner ring,
+    ``inner`` ends at its race outside, ``outer`` at its race inside; None for a ring that stays as it is. ``inner_pressure`` on the bore of the inner ring,
     ``outer_pressure`` on the outside of the outer one [Pa]. ``groove_factors``: groove radius over ball diameter, inner
-    and outer. The groove centre moves as its race does, and by the heat of its groove radius.
+    and outer. The groove centre moves as the circle of contact does, at the unloaded ``contact_angle`` [rad], and by the heat
+    of its groove radius.
     """
-    inner_race, outer_race = inner.outer_radius, outer.inner_radius
     inner_radius, outer_radius = (factor * ball_diameter for factor in groove_factors)
     ball = 0.5 * ball_diameter * ball_material.thermal_expansion * ball_temperature_rise
+    inner_centre = inner_heat = outer_centre = outer_heat = 0.0
+    radially = math.cos(contact_angle)
     # Seen from the axis an inner groove's centre lies outside its race, an outer groove's inside.
-    inner_heat, outer_heat = inner.thermal_growth(inner_radius), outer.thermal_growth(outer_radius)
-    inner_centre = inner.growth(inner_race, inside=inner_pressure) + inner_heat
-    outer_centre = outer.growth(outer_race, outside=outer_pressure) - outer_heat
+    if inner is not None:
+        inner_heat = inner.thermal_growth(inner_radius)
+        inner_centre = inner.growth(inner.outer_radius, inside=inner_pressure) + inner_heat * radially
+    if outer is not None:
+        outer_heat = outer.thermal_growth(outer_radius)
+        outer_centre = outer.growth(outer.inner_radius, outside=outer_pressure) - outer_heat * radially
     return GrooveChange(inner_centre - outer_centre, inner_heat - ball, outer_heat - ball)

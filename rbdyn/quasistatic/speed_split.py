@@ -26,7 +26,9 @@ SLOWEST_TERM = 160.0
 HALVINGS = 200
 
 RPM = math.pi / 30.0
-Status = Literal["shared", "inner layer stands", "outer layer stands", "undetermined", "no relative speed"]
+Status = Literal[
+    "given", "shared", "inner layer stands", "outer layer stands", "undetermined", "no relative speed"
+]
 
 
 class LayerFriction(NamedTuple):
