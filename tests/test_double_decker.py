@@ -327,3 +327,18 @@ def test_limit_still_bearing_has_no_growth_and_no_middle_speed():
     assert model.changes == ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) and model.split.speed == 0.0
     together = double_decker_of(scene_of("operation.outer_speed_rpm=10000.0"))
     assert together.split.speed == pytest.approx(10000.0 * math.pi / 30.0)
+
+
+def test_unit_command_prints_both_rows(tmp_path):
+    """Unit: rbdyn ball prints rows and middle ring, writes a table of all balls, and gives one JSON object."""
+    from typer.testing import CliRunner
+
+    from rbdyn.cli import app
+
+    printed = CliRunner().invoke(app, ["ball", str(FILE), "--out", str(tmp_path)])
+    assert printed.exit_code == 0
+    for words in ("inner row", "outer row", "middle ring: 575.8 rpm", "both rows: x 2.997 um"):
+        assert words in printed.stdout
+    assert len((tmp_path / "balls.csv").read_text().splitlines()) == 1 + 17 + 21
+    as_json = CliRunner().invoke(app, ["ball", str(FILE), "--json", "--set", "operation.tilt=free"])
+    assert {"inner", "outer", "middle_ring", "stiffness"} <= set(json.loads(as_json.stdout))

@@ -3,7 +3,9 @@
 Where an equation stands: ``row`` (geometry of a row of balls), ``control`` (raceway control hypotheses), ``ball_motion``
 (orbit, spin, centrifugal force, gyroscopic moment), ``ball`` (forces on one ball and their derivatives), ``ring``
 (forces on the inner ring, balls eliminated), ``start`` (first guess), ``newton`` (convex start and full equations),
-``equilibrium`` (what Python calls).
+``equilibrium`` (what Python calls). Two rows with a floating ring between: ``double_decker`` (equilibrium), ``speed_split``
+(speed of the middle ring). ``ring_growth`` (rotation, fits and heat of the rings). From scenes: ``model``,
+``growth_model``, ``double_decker_model``; ``bearing`` puts all together.
 
 x is radial along the load, z axial; ball j stands at psi_j = 2 pi j/Z from x. The inner ring moves, the outer ring is
 the reference. In the plane of a ball the centre of curvature of the outer groove is the origin, places are (axial,
