@@ -49,11 +49,7 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
 
 def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallResult:
     model = double_decker_of(scene)
-    warm = None
-    if start is not None and len(start.rows) == 2:
-        # Displacements of the rows are all that a start needs.
-        inner, outer = start.rows
-        warm = Start(inner, outer)
+    warm = Start(*start.rows) if start is not None and len(start.rows) == 2 else None
     began = time.perf_counter()
     solution = solve_double_decker(model.stack, load_of(scene), given_of(scene), model.middle_given, warm)
     took = time.perf_counter() - began

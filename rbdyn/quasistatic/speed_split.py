@@ -18,7 +18,6 @@ import numpy as np
 
 OIL_BATH = 3.3
 ANGULAR_CONTACT = (0.001, 0.33)
-DEEP_GROOVE = (0.0005, 0.55)
 # Y0 of P0 = 0.5 Fr + Y0 Fa for a single angular contact ball bearing (ISO 76), by contact angle [deg].
 AXIAL_FACTORS = {15: 0.46, 20: 0.42, 25: 0.38, 30: 0.33, 35: 0.29, 40: 0.26, 45: 0.22}
 # Below nu n = 2000 (mm^2/s rpm) the oil's torque no longer follows the speed.
