@@ -15,12 +15,14 @@ from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
 from rbdyn.faults import InputError
+from rbdyn.materials import MATERIALS
 from rbdyn.quasistatic import double_decker
 from rbdyn.quasistatic.ball import ball_forces
 from rbdyn.quasistatic.double_decker import Layer, load_on_middle_ring, solve_double_decker
 from rbdyn.quasistatic.double_decker_model import double_decker_of, static_capacity
 from rbdyn.quasistatic.equilibrium import solve
-from rbdyn.quasistatic.model import RPM, given_of, load_of
+from rbdyn.quasistatic.model import RPM, contacts, given_of, load_of
+from rbdyn.scene.ball import BallRow
 
 FILE = Path(__file__).parent.parent / "examples" / "double_decker.toml"
 FREE = np.full(5, np.nan)
@@ -266,11 +268,22 @@ def test_unit_speed_of_the_middle_ring():
     record = equilibrium(scene).record["middle_ring"]
     assert record["speed_status"] == split.status == "shared"
     assert record["speed_share"] < 0.0576 and record["friction_torque_Nmm"] > 0.0
-    # 71905C: catalogues give 7 to 8 kN.
-    model = double_decker_of(scene)
-    assert static_capacity(scene.bearing.outer, model.outer.inner_contact) == pytest.approx(7.5e3, rel=0.2)
-    given_ = scene_of("bearing.outer.static_capacity_N=5000.0").bearing.outer
-    assert static_capacity(given_, model.outer.inner_contact) == 5000.0
+    heavier = scene_of("bearing.middle.speed_split='torque_balance'", "operation.axial_load_N=600.0", *oil)
+    assert double_decker_of(heavier).split.status == "outer layer stands"
+
+
+@pytest.mark.parametrize(
+    ("gamma", "factor"), [(0.01, 14.9), (0.05, 15.7), (0.09, 16.5), (0.12, 15.9), (0.2, 14.0)]
+)
+def test_literature_static_capacity(gamma, factor):
+    """Literature: C0 = f0 Z D^2 cos a_0 with f0 of ISO 76 as commonly tabulated, to 1.5 %: both races in their turn."""
+    table = {"balls": 10, "ball_diameter_mm": 8.0, "inner_groove_factor": 0.52, "outer_groove_factor": 0.53}
+    angle = math.radians(15.0)
+    row = BallRow(**table, pitch_diameter_mm=8.0 * math.cos(angle) / gamma, contact_angle_deg=15.0)
+    steel = MATERIALS["bearing_steel"]
+    races = contacts(row, steel, steel, steel)
+    assert static_capacity(row, races) == pytest.approx(factor * 10 * 8.0**2 * math.cos(angle), rel=0.015)
+    assert static_capacity(row.model_copy(update={"static_capacity_N": 5000.0}), races) == 5000.0
 
 
 @pytest.mark.parametrize("control", ["outer", "hybrid"])

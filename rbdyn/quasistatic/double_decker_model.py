@@ -110,24 +110,26 @@ def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFrict
         rows, (middle.inner_oil_factor, middle.outer_oil_factor), strict=True
     ):
         materials = (scene.material(part) for part in ("ball", f"{under}_ring", f"{over}_ring"))
-        inner_contact, _ = contacts(row, *materials)
         torque = load_torque(
             math.hypot(x, y),
             axial,
             row.contact_angle,
             1e-3 * row.pitch_diameter_mm,
-            static_capacity(row, inner_contact),
+            static_capacity(row, contacts(row, *materials)),
         )
         frictions.append(LayerFriction(1e-3 * row.pitch_diameter_mm, viscosity, torque, factor))
     return frictions[0], frictions[1]
 
 
-def static_capacity(row: BallRow, inner_contact: PointContact) -> float:
-    """Static capacity C0 [N], of the catalogue or from the pressure that defines it (ISO 76), at the inner race."""
+def static_capacity(row: BallRow, races: tuple[PointContact, PointContact]) -> float:
+    """Static capacity C0 [N], of the catalogue or from the pressure that defines it (ISO 76), at the race that has it first.
+
+    The outer race up to some D cos a_0/dm = 0.09, the inner one beyond.
+    """
     if row.static_capacity_N is not None:
         return row.static_capacity_N
-    heaviest = (STATIC_PRESSURE / float(peak_pressure(inner_contact, 1.0))) ** 3
-    return row.balls * math.cos(row.contact_angle) * heaviest / STRIBECK
+    sharpest = max(float(peak_pressure(contact, 1.0)) for contact in races)
+    return row.balls * math.cos(row.contact_angle) * (STATIC_PRESSURE / sharpest) ** 3 / STRIBECK
 
 
 def middle_record(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> dict[str, Any]:
