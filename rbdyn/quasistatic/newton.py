@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.kernel import alike, kernel, routine
+from rbdyn.kernel import alike, entry, kernel, routine
 from rbdyn.quasistatic.ring import (
     BALL,
     BALL_WORK,
@@ -306,7 +306,7 @@ def bring_in(control: Any, row: Any, load: Any, free: Any, q: Any, balls: Any, a
     return False
 
 
-@routine
+@entry
 def find(
     cage: Any,
     control: Any,
