@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rbdyn.kernel import entry
 from rbdyn.quasistatic.ball import ball_forces, spring
-from rbdyn.quasistatic.control import CommonCage, Control
+from rbdyn.quasistatic.control import Control
 from rbdyn.quasistatic.newton import CONVERGED, COUNTERS, NOT_CONVEX_MINIMUM, Space, find, space, unbalance
 from rbdyn.quasistatic.place import groove_centre
 from rbdyn.quasistatic.ring import BALL, INNER_DEPTH, LOADED, OUTER_DEPTH, RING, TAKEN
@@ -62,7 +62,6 @@ class Solution(NamedTuple):
 
 @entry
 def solve_row(
-    cage: Any,
     control: Any,
     row: Any,
     load: Any,
@@ -76,7 +75,7 @@ def solve_row(
 ) -> tuple[int, float]:
     """Find the equilibrium and fill ``told`` (Z, TOLD); see ``newton.find``. Returns the outcome and the residual [N]."""
     counts[:] = 0
-    outcome = find(cage, control, row, load, free, warm, q, balls, at, counts)
+    outcome = find(control, row, load, free, warm, q, balls, at, counts)
     _, worst = unbalance(load, free, at.sums)
     for j in range(row.cosine.size):
         a_axial, a_radial = groove_centre(row, q, j)
@@ -119,9 +118,7 @@ def solve(
         q = np.where(free > 0.0, start.displacement * unit, q)
         balls[:] = np.hstack((start.balls, start.depths))
     at, counts, told = space(size), np.zeros(COUNTERS, np.int64), np.zeros((size, TOLD))
-    cage = CommonCage(0.0)
     outcome, worst = solve_row(
-        cage,
         control,
         row,
         np.asarray(load, float) / unit,
