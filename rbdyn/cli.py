@@ -12,7 +12,7 @@ from rbdyn.terminal import FAILED, guarded, output_folder, print_json, print_tab
 
 if TYPE_CHECKING:
     from rbdyn.result import SimulationResult
-    from rbdyn.scene import Scene
+    from rbdyn.scene import BallScene, Scene
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -135,6 +135,12 @@ def accuracy(
     scaling: Annotated[
         bool, typer.Option("--scaling", help="Time by rollers and slices, memory by turns, instead.")
     ] = False,
+    battery: Annotated[
+        bool, typer.Option("--battery", help="Solvers over thousands of random ball bearings, instead.")
+    ] = False,
+    scenes: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Scenes of the battery; 5000 unless given.")
+    ] = None,
     trajectory: Annotated[
         float | None,
         typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25."),
@@ -143,7 +149,7 @@ def accuracy(
     quiet: Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also versions.")] = False,
 ) -> None:
-    """Show error against run time: of every output at each tolerance and of the motion itself."""
+    """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, the solvers."""
     with guarded(as_json):
         from rbdyn import accuracy as studies
 
@@ -154,11 +160,15 @@ def accuracy(
             "options": options,
             "stability": stability,
             "scaling": scaling,
+            "battery": battery,
         }
-        name = _study(asked, trajectory)
-        loaded = _rollers(scene, assignments or [])
+        from rbdyn.scene import Scene
+
+        loaded = Scene.load(scene, assignments or [])
+        limits = {"turns": trajectory, "scenes": scenes}
+        limits = {key: value for key, value in limits.items() if value is not None}
+        name = _study(asked, limits, loaded)
         folder = output_folder(out) if out else None
-        limits = {} if trajectory is None else {"turns": trajectory}
         with progress_bar(name, quiet or as_json) as progress:
             found = studies.study(name, loaded, progress, **limits)
         files = studies.write(found, folder) if folder else []
@@ -172,17 +182,32 @@ def accuracy(
         raise typer.Exit(FAILED)
 
 
-def _study(asked: dict[str, bool], trajectory: float | None) -> str:
-    """Name of the one study asked for. Raises InputError for two, or for trajectories in a study without them."""
+def _study(asked: dict[str, bool], limits: dict[str, Any], scene: Scene | BallScene) -> str:
+    """Name of the one study asked for. Raises InputError for two, for one of another kind of bearing, and for limits that
+    the study does not know."""
+    from rbdyn.accuracy import BALL_STUDIES
     from rbdyn.faults import InputError
+    from rbdyn.scene.ball import BallScene as Balls
 
     chosen = [name for name, wished in asked.items() if wished]
     flags = " and ".join(f"--{name}" for name in chosen)
     if len(chosen) > 1:
         raise InputError([f"{flags}: are studies of their own; choose one"])
-    name = chosen[0] if chosen else "tolerances"
-    if trajectory is not None and name not in ("tolerances", "methods"):
-        raise InputError([f"--trajectory {trajectory:g}: {flags} integrates no trajectories; leave it out"])
+    balls = isinstance(scene, Balls)
+    name = chosen[0] if chosen else ("solvers" if balls else "tolerances")
+    if balls and name not in BALL_STUDIES:
+        raise InputError(
+            [f"{flags}: studies roller bearings in time; leave it out for {scene.bearing.kind!r}"]
+        )
+    if not balls and name in BALL_STUDIES:
+        raise InputError([f"{flags}: studies ball bearings; leave it out for {scene.bearing.kind!r}"])
+    shown = flags or "this study of " + scene.bearing.kind
+    if "turns" in limits and name not in ("tolerances", "methods"):
+        raise InputError(
+            [f"--trajectory {limits['turns']:g}: {shown} integrates no trajectories; leave it out"]
+        )
+    if "scenes" in limits and name != "battery":
+        raise InputError([f"--scenes {limits['scenes']}: goes with --battery only; leave it out"])
     return name
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rbdyn.contact.hertz_point import peak_pressure
 from rbdyn.faults import InputError
-from rbdyn.quasistatic.equilibrium import Solution, solve
+from rbdyn.quasistatic.equilibrium import Solution
 from rbdyn.quasistatic.model import RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.result import (
     FORMAT,
@@ -18,6 +18,7 @@ from rbdyn.quasistatic.result import (
     displacement_record,
     stiffness_record,
 )
+from rbdyn.quasistatic.solvers import SOLVERS
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import SingleRowScene
@@ -35,12 +36,13 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
     model = row_of(scene)
     warm = start.rows[0] if start is not None and start.rows else None
     began = time.perf_counter()
-    solution = solve(model.row, model.control, load_of(scene), given_of(scene), warm)
+    solution = SOLVERS[scene.model.solver](model.row, model.control, load_of(scene), given_of(scene), warm)
     took = time.perf_counter() - began
     head = {
         "format": FORMAT,
         "status": solution.status,
         "raceway_control": scene.model.raceway_control,
+        "solver": scene.model.solver,
     }
     tail = {
         "cost": {"solve_us": 1e6 * took},
@@ -54,6 +56,7 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
 
 def row_record(model: RowModel, solution: Solution) -> dict[str, Any]:
     """What is reported of one row in equilibrium."""
+    searches = {} if solution.searches is None else {"searches": solution.searches}
     return {
         **displacement_record(solution.displacement),
         "balls": ball_records(solution),
@@ -64,4 +67,5 @@ def row_record(model: RowModel, solution: Solution) -> dict[str, Any]:
         "stiffness": stiffness_record(solution.stiffness),
         "residual_N": solution.residual,
         "iterations": solution.steps,
+        **searches,
     }

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.kernel import entry
+from rbdyn.kernel import entry, routine
 from rbdyn.quasistatic.ball import ball_forces
 from rbdyn.quasistatic.control import CommonCage, Control
 from rbdyn.quasistatic.newton import CONVERGED, COUNTERS, NOT_CONVEX_MINIMUM, Space, find, space, unbalance
@@ -35,6 +35,7 @@ class Solution(NamedTuple):
     radial) from its outer groove centre. ``reaction`` (5,): the load that the ring takes [N, N m]. ``stiffness`` (5, 5): its
     derivative by the displacement. ``residual``: the largest force left over [N]. ``status``: "ok" or why there is none.
     ``steps, assemblies, strides``: Newton steps, evaluations of all balls, and continuations of the race control.
+    ``searches``: starting values that the finite search tried; None for a solver that searches for none.
     """
 
     displacement: NDArray[np.float64]
@@ -52,11 +53,35 @@ class Solution(NamedTuple):
     steps: int
     assemblies: int
     strides: int
+    searches: int | None = None
 
     @property
     def found(self) -> bool:
         """Whether this is an equilibrium."""
         return self.status == OK
+
+
+@routine
+def tell(control: Any, row: Any, q: Any, balls: Any, work: Any, told: Any) -> None:
+    """Fill ``told`` (Z, TOLD) with angles, loads and what the balls' motion does to them; ``work`` as ``assemble`` left it."""
+    for j in range(row.cosine.size):
+        a_axial, a_radial = groove_centre(row, q, j)
+        x, y = balls[j, 0], balls[j, 1]
+        told[j, INNER_ANGLE] = math.atan2(a_axial - x, a_radial - y)
+        told[j, OUTER_ANGLE] = math.atan2(x, y)
+        inner = math.sqrt((a_axial - x) ** 2 + (a_radial - y) ** 2) - row.inner_reach[j]
+        outer = math.sqrt(x * x + y * y) - row.outer_reach[j]
+        told[j, INNER_LOAD] = row.inner_stiffness * max(inner, 0.0) ** 1.5
+        told[j, OUTER_LOAD] = row.outer_stiffness * max(outer, 0.0) ** 1.5
+        told[j, PULL], told[j, MOMENT] = row.centrifugal_force, 0.0
+        if work[j, LOADED] > 0.0:
+            _, _, _, _, _, _, told[j, PULL], told[j, MOMENT] = ball_forces(
+                control, 1.0, row, j, a_axial, a_radial, x, y
+            )
+        else:
+            # A lifted ball lies on the outer race alone and has no inner angle of its own.
+            told[j, INNER_LOAD], told[j, INNER_ANGLE] = 0.0, told[j, OUTER_ANGLE]
+            told[j, OUTER_LOAD] = row.centrifugal_force
 
 
 @entry
@@ -77,24 +102,7 @@ def solve_row(
     counts[:] = 0
     outcome = find(cage, control, row, load, free, warm, q, balls, at, counts)
     _, worst = unbalance(load, free, at.sums)
-    for j in range(row.cosine.size):
-        a_axial, a_radial = groove_centre(row, q, j)
-        x, y = balls[j, 0], balls[j, 1]
-        told[j, INNER_ANGLE] = math.atan2(a_axial - x, a_radial - y)
-        told[j, OUTER_ANGLE] = math.atan2(x, y)
-        inner = math.sqrt((a_axial - x) ** 2 + (a_radial - y) ** 2) - row.inner_reach[j]
-        outer = math.sqrt(x * x + y * y) - row.outer_reach[j]
-        told[j, INNER_LOAD] = row.inner_stiffness * max(inner, 0.0) ** 1.5
-        told[j, OUTER_LOAD] = row.outer_stiffness * max(outer, 0.0) ** 1.5
-        told[j, PULL], told[j, MOMENT] = row.centrifugal_force, 0.0
-        if at.work[j, LOADED] > 0.0:
-            _, _, _, _, _, _, told[j, PULL], told[j, MOMENT] = ball_forces(
-                control, 1.0, row, j, a_axial, a_radial, x, y
-            )
-        else:
-            # A lifted ball lies on the outer race alone and has no inner angle of its own.
-            told[j, INNER_LOAD], told[j, INNER_ANGLE] = 0.0, told[j, OUTER_ANGLE]
-            told[j, OUTER_LOAD] = row.centrifugal_force
+    tell(control, row, q, balls, at.work, told)
     return outcome, worst
 
 
