@@ -93,7 +93,7 @@ def study(
                 "speed_decades": SPEED_DECADES,
             },
             conclusion=sentence,
-        ),  # fmt: skip
+        ),
         tables=(_attempt_table(attempts), success_table(f"{perturbations} seeded scenes nearby", rows)),
         sentences=(*causes(rows), sentence),
         sheets={"solvers": [attempt._asdict() for attempt in attempts]},

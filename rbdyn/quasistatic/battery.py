@@ -19,7 +19,7 @@ from rbdyn.quasistatic.model import RPM, row_model
 from rbdyn.quasistatic.row import Row
 from rbdyn.scene.ball import BallBearing, BallModel, BallOperation, Prescribed
 
-CONTROLS = ("common_cage", "outer", "inner", "half", "hybrid")
+CONTROLS = ("outer", "inner", "half", "hybrid", "common_cage")
 LOADS = ("radial", "axial", "combined", "moment", "preload_force", "preload_displacement")
 SCENES = 5000
 SEED = 1
