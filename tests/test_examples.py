@@ -49,7 +49,7 @@ def test_unit_published_checks_are_whole():
     """Unit: the quick and the full run hold the same checks."""
     module = script("published_checks")
     assert list(module.FULL) == list(module.BRIEF)
-    assert set(module.FULL) == {"table4", "figure14", "nu215", "friction", "sensitivity", "whirl"}
+    assert set(module.FULL) == {"table4", "figure14", "nu215", "friction", "sensitivity", "whirl", "preload"}
 
 
 def test_literature_table4(effort):
@@ -157,3 +157,47 @@ def test_unit_trend_words():
     assert trend((3.0, 1.0, 3.0), (0.1, 0.1, 0.1)) == "falls, then rises"
     assert trend((1.0, 3.0, 1.0), (0.1, 0.1, 0.1)) == "rises, then falls"
     assert trend((1.0, 0.5, 1.2), (1.0, 1.0, 1.0)) == "level"
+
+
+def test_literature_preload_stresses_and_life():
+    """Literature: Sensors 2023, Table 4: stresses of rings at rest, least near 70 N; life of a catalogue rating."""
+    from published import preload
+
+    stress = preload.table4()
+    kept = stress[stress["axial_N"] != 50]
+    for race, text in (("inner", 0.01), ("outer", 0.05)):
+        printed = kept[f"{race}_MPa paper"].to_numpy()
+        assert kept[f"{race}_MPa at rest"].to_numpy() == pytest.approx(printed, rel=text)
+        # An even 0.7 %, to the rounding of the table.
+        assert kept[f"{race}_MPa groove 0.53"].to_numpy() / printed == pytest.approx(1.007, abs=1.5e-3)
+    assert np.all(stress["outer_MPa 63000 rpm"] > stress["outer_MPa paper"])
+    assert stress["life_h ISO 281, read back"].iloc[:-1].to_numpy() == pytest.approx(
+        stress["life_h paper"].iloc[:-1].to_numpy(), rel=0.06
+    )
+    best = preload.optima()
+    assert best["at rest"].least_stress.value == pytest.approx(30.0, abs=2.0)
+    assert best["at rest"].longest_life.value < 20.0
+    assert best["63000 rpm, tilting"].least_stress.value < 10.0
+    assert any("differ" in note for note in best["at rest"].notes)
+
+
+def test_literature_clearance_lowers_the_life_of_the_ball_loads():
+    """Literature: Sensors 2023, Table 3: its angles are eq 17's; its rise in life is not what the loads give."""
+    from published import preload
+
+    frame = preload.table3()
+    assert frame["angle_deg eq 17"].to_numpy() == pytest.approx(frame["angle_deg paper"].to_numpy(), abs=0.06)
+    assert np.all(np.diff(frame["life_h paper"]) > 0.0)
+    for name in preload.MODELS:
+        assert np.all(np.diff(frame[f"life_h {name}"]) < 0.0)
+    assert np.all(np.diff(frame["life_h axial load alone"]) > 0.0)
+
+
+def test_trend_tilt_loads_the_most_loaded_ball_more():
+    """Trend: Sensors 2023, Fig. 13: the greatest ball load rises with misalignment."""
+    from published import preload
+
+    frame = preload.tilted_loads()
+    loads = frame.drop(columns="azimuth_deg")
+    assert np.all(np.diff(loads.max()) > 0.0)
+    assert loads.max().iloc[0] == pytest.approx(105.1, abs=0.1)

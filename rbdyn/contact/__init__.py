@@ -1,11 +1,13 @@
 """Contact laws that rollers and balls share.
 
 - ``hertz_line``: load of a line contact against approach (Palmgren and rivals), whole, in slices, on an elastic bar
+- ``hertz_point``: load of a point contact against approach, its ellipse and pressure (exact Hertz)
 - ``profile``: roller profiles as drops over the length
 - ``damping``: what a closing or opening contact adds to the elastic load; restitution
 - ``traction``: friction coefficient against sliding speed and load, as compiled
 - ``rheology``: traction of an elastohydrodynamic film from the oil's behaviour under pressure and shear
 - ``film_thickness``: thickness of that film, its lambda ratio, the share that asperities bear
+- ``point_film``: the same for the ellipse of a ball, and the film's stiffness
 - ``film``: rolling resistance of the lubricated line contact; the short-journal film
 - ``pocket_film``: wedge, squeeze and shear between a roller and a pocket wall
 

@@ -64,10 +64,15 @@ def thermal_factor(contact: RollingContact, oil: Oil, load: Any, slip: Any = 0.0
     (1 - 13.2 (p_H/E') L^0.42)/(1 + 0.213 (1 + 2.23 S^0.83) L^0.64), L = (-d eta/dT) u^2/k, S = slip/u. Zhou and
     Hoeprich 1991, eq 21, print the same constants. The numerator is held above 0.1, where the fit ends.
     """
-    heating = oil.viscosity_slope * contact.entrainment_speed**2 / oil.conductivity
     pressure = hertz_pressure(contact, load) / contact.equivalent_modulus
-    numerator = np.maximum(1.0 - 13.2 * pressure * heating**0.42, SMALLEST_PRESSURE_TERM)
-    slide_roll = np.abs(slip) / contact.entrainment_speed
+    return inlet_heating(pressure, oil, contact.entrainment_speed, slip)
+
+
+def inlet_heating(relative_pressure: Any, oil: Oil, entrainment_speed: Any, slip: Any = 0.0) -> Any:
+    """The thermal factor at a Hertz pressure p_H/E', for line and point contacts."""
+    heating = oil.viscosity_slope * entrainment_speed**2 / oil.conductivity
+    numerator = np.maximum(1.0 - 13.2 * relative_pressure * heating**0.42, SMALLEST_PRESSURE_TERM)
+    slide_roll = np.abs(slip) / entrainment_speed
     return numerator / (1.0 + 0.213 * (1.0 + 2.23 * slide_roll**0.83) * heating**0.64)
 
 

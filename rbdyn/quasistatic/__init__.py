@@ -3,7 +3,8 @@
 Where an equation stands: ``row`` (geometry of a row of balls), ``control`` (raceway control hypotheses), ``ball_motion``
 (orbit, spin, centrifugal force, gyroscopic moment), ``ball`` (forces on one ball and their derivatives), ``ring``
 (forces on the inner ring, balls eliminated), ``start`` (first guess), ``newton`` (convex start and full equations),
-``equilibrium`` (what Python calls).
+``equilibrium`` (what Python calls), ``preload`` (least stress and longest life), ``life`` (fatigue from ball loads),
+``rating`` (ISO 281 and ISO 76 from dimensions), ``rigid_rings`` (rest by ISO/TS 16281).
 
 x is radial along the load, z axial; ball j stands at psi_j = 2 pi j/Z from x. The inner ring moves, the outer ring is
 the reference. In the plane of a ball the centre of curvature of the outer groove is the origin, places are (axial,

@@ -18,16 +18,30 @@ from rbdyn.kernel import kernel, law
 from rbdyn.quasistatic.ball_motion import orbit_and_spin
 from rbdyn.quasistatic.control import CommonCage, FixedShare, FrictionShare
 
+# Share of the friction limit up to which a contact holds all of a gyroscopic moment.
+STICKING = 0.8
+# Share of blend_load up to which race control would change no digit; angles may then be such that it is singular.
+CLEAR = 1e-9
+
 
 @kernel
-def contact(axial: float, radial: float, reach: float, stiffness: float) -> tuple[float, ...]:
-    """Load [N], normal stiffness [N/m], deflection [m], 1/length [1/m], sine and cosine of a contact between two centres
-    (axial, radial) [m] apart; load and stiffness are 0 where it is open."""
-    length = math.sqrt(axial * axial + radial * radial)
-    inverse = 1.0 / length
-    deflection = max(length - reach, 0.0)
-    root = stiffness * math.sqrt(deflection)
-    return root * deflection, 1.5 * root, deflection, inverse, axial * inverse, radial * inverse
+def line(axial: float, radial: float) -> tuple[float, float, float]:
+    """1/length [1/m], sine and cosine of the angle of a line between two centres (axial, radial) [m] apart."""
+    inverse = 1.0 / math.sqrt(axial * axial + radial * radial)
+    return inverse, axial * inverse, radial * inverse
+
+
+@kernel
+def deflection(axial: float, radial: float, reach: float) -> float:
+    """How deep two bodies with centres (axial, radial) [m] apart touch; 0 where the contact is open."""
+    return max(math.sqrt(axial * axial + radial * radial) - reach, 0.0)
+
+
+@kernel
+def spring(depth: float, stiffness: float) -> tuple[float, float]:
+    """Load [N] and normal stiffness [N/m] of a Hertz contact ``depth`` [m] deep."""
+    root = stiffness * math.sqrt(depth)
+    return root * depth, 1.5 * root
 
 
 @kernel
@@ -35,6 +49,22 @@ def tangent(load: float, normal: float, inverse: float, s: float, c: float) -> t
     """Derivative of a contact's force by the place of its end: axial/axial, axial/radial, radial/radial [N/m]."""
     side = load * inverse
     return side + (normal - side) * s * s, (normal - side) * s * c, side + (normal - side) * c * c
+
+
+@kernel
+def held(force: float, limit: float) -> tuple[float, float, float]:
+    """What a contact holds of a friction ``force`` where at most ``limit`` > 0 is possible, by force and by limit.
+
+    The whole force up to STICKING of the limit, then a smooth approach to the limit.
+    """
+    beyond = (abs(force) / limit - STICKING) / (1.0 - STICKING)
+    if beyond <= 0.0:
+        return force, 1.0, 0.0
+    one = 1.0 / (1.0 + beyond)
+    part = STICKING + (1.0 - STICKING) * beyond * one
+    slope = one * one
+    side = 1.0 if force > 0.0 else -1.0
+    return side * part * limit, slope, side * (part - abs(force) / limit * slope)
 
 
 @law
@@ -61,9 +91,12 @@ def _by_friction(
 
 @law
 def ball_forces(
-    control: Any, strength: float, row: Any, j: int, a_axial: float, a_radial: float, x: float, y: float
+    control: Any, strength: float, row: Any, a_axial: float, a_radial: float, x: float, y: float, di: float, do: float
 ) -> Any:
-    """Ball j with its centre at (x, y) and the inner groove centre at (a_axial, a_radial) [m].
+    """A ball with its centre at (x, y), the inner groove centre at (a_axial, a_radial), contacts ``di`` and ``do`` deep [m].
+
+    The depths are unknowns of their own: the lines between the centres tell the angles only. Derivatives by place count a
+    change along a line as a change of depth.
 
     ``strength``: 0 to 1, how far the race control rules orbit and moment; the rest is the common cage speed.
     Returns (residual, ring, residual by A, residual by X, ring by A, ring by X): residual (axial, radial) [N]; ring
@@ -72,9 +105,11 @@ def ball_forces(
 
 
 @ball_forces.body(CommonCage)
-def _going_with_the_cage(control, strength, row, j, a_axial, a_radial, x, y):
-    qi, ki, _, one_i, si, ci = contact(a_axial - x, a_radial - y, row.inner_reach[j], row.inner_stiffness)
-    qo, ko, _, one_o, so, co = contact(x, y, row.outer_reach[j], row.outer_stiffness)
+def _going_with_the_cage(control, strength, row, a_axial, a_radial, x, y, di, do):
+    one_i, si, ci = line(a_axial - x, a_radial - y)
+    one_o, so, co = line(x, y)
+    qi, ki = spring(di, row.inner_stiffness)
+    qo, ko = spring(do, row.outer_stiffness)
     aa, ar, rr = tangent(qi, ki, one_i, si, ci)
     oaa, oar, orr = tangent(qo, ko, one_o, so, co)
     pull = row.centrifugal_force
@@ -91,12 +126,15 @@ def _going_with_the_cage(control, strength, row, j, a_axial, a_radial, x, y):
 
 
 @ball_forces.body(FixedShare, FrictionShare)
-def _rolling(control, strength, row, j, a_axial, a_radial, x, y):
-    qi, ki, di, one_i, si, ci = contact(a_axial - x, a_radial - y, row.inner_reach[j], row.inner_stiffness)
-    qo, ko, do, one_o, so, co = contact(x, y, row.outer_reach[j], row.outer_stiffness)
+def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
+    one_i, si, ci = line(a_axial - x, a_radial - y)
+    one_o, so, co = line(x, y)
+    qi, ki = spring(di, row.inner_stiffness)
+    qo, ko = spring(do, row.outer_stiffness)
     aa, ar, rr = tangent(qi, ki, one_i, si, ci)
     oaa, oar, orr = tangent(qo, ko, one_o, so, co)
-    if qi <= 0.0 or qo <= 0.0:
+    spinning = control.spinning
+    if qi <= CLEAR * spinning.blend_load or qo <= 0.0:
         pull = row.centrifugal_force
         return (
             (qi * si - qo * so, qi * ci - qo * co + pull),
@@ -108,7 +146,6 @@ def _rolling(control, strength, row, j, a_axial, a_radial, x, y):
             pull,
             0.0,
         )
-    spinning = control.spinning
     share, share_i, share_o = spin_share(control, di, do)
     (f, f_i, f_o, f_s), (m, m_i, m_o, m_s) = orbit_and_spin(spinning, share, ci, si, co, so)
     # A lightly loaded ball goes with the cage; from blend_load on the race control alone rules.
@@ -123,7 +160,7 @@ def _rolling(control, strength, row, j, a_axial, a_radial, x, y):
     # By inner angle, outer angle, inner deflection, outer deflection.
     pull_1, pull_2 = follow * f_i, follow * f_o
     pull_3, pull_4 = follow_d * beyond + follow * f_s * share_i, follow * f_s * share_o
-    in_share = (m * share + 0.0) * by_diameter
+    in_share = m * share * by_diameter
     out_share = m * (1.0 - share) * by_diameter
     grow_i = (m_s * share + m) * by_diameter
     grow_o = (m_s * (1.0 - share) - m) * by_diameter
@@ -131,6 +168,12 @@ def _rolling(control, strength, row, j, a_axial, a_radial, x, y):
     ti_3, ti_4 = follow_d * in_share + follow * grow_i * share_i, follow * grow_i * share_o
     to_1, to_2 = follow * m_i * (1.0 - share) * by_diameter, follow * m_o * (1.0 - share) * by_diameter
     to_3, to_4 = follow_d * out_share + follow * grow_o * share_i, follow * grow_o * share_o
+    # A contact holds no more than friction allows.
+    held_i, slope_i, by_load_i = held(ti, spinning.friction * qi)
+    held_o, slope_o, by_load_o = held(to, spinning.friction * qo)
+    by_load_i, by_load_o = by_load_i * spinning.friction * ki, by_load_o * spinning.friction * ko
+    ti, ti_1, ti_2, ti_3, ti_4 = held_i, slope_i * ti_1, slope_i * ti_2, slope_i * ti_3 + by_load_i, slope_i * ti_4
+    to, to_1, to_2, to_3, to_4 = held_o, slope_o * to_1, slope_o * to_2, slope_o * to_3, slope_o * to_4 + by_load_o
     # Down to the places: an angle turns with (c, -s)/length, a deflection grows along (s, c).
     ic, is_ = ci * one_i, si * one_i
     oc, os_ = co * one_o, so * one_o

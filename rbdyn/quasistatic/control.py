@@ -23,8 +23,8 @@ class Spinning(NamedTuple):
 
     ``ratio``: g = D/d_m. ``orbit_mass``: half the ball's mass times the pitch diameter, F_c = orbit_mass w_m^2 [kg m].
     ``inertia``: J of the ball [kg m^2], 0 where no gyroscopic moment is wanted. ``turning``: -1 keeps the sign of the ball's spin
-    for an inner ring that turns faster, +1 drops it. ``blend_load``: inner contact load [N] at which a ball follows
-    the race control by half; unloaded it goes with the cage.
+    for an inner ring that turns faster, +1 drops it. ``blend_load``: inner contact load [N] from which on a ball
+    follows the race control; unloaded it goes with the cage. ``friction``: largest coefficient that may hold a gyroscopic moment.
     """
 
     ratio: float
@@ -35,6 +35,7 @@ class Spinning(NamedTuple):
     inner_speed: float
     outer_speed: float
     blend_load: float
+    friction: float
 
 
 class CommonCage(NamedTuple):

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.kernel import entry, routine
-from rbdyn.quasistatic.ball import ball_forces
+from rbdyn.quasistatic.ball import ball_forces, spring
 from rbdyn.quasistatic.control import CommonCage, Control
 from rbdyn.quasistatic.newton import CONVERGED, COUNTERS, NOT_CONVEX_MINIMUM, Space, find, space, unbalance
 from rbdyn.quasistatic.place import groove_centre
-from rbdyn.quasistatic.ring import LOADED, RING, TAKEN
+from rbdyn.quasistatic.ring import BALL, INNER_DEPTH, LOADED, OUTER_DEPTH, RING, TAKEN
 from rbdyn.quasistatic.row import Row
 
 # What ``tell`` leaves of a ball.
@@ -31,8 +31,8 @@ LOST = (
 class Solution(NamedTuple):
     """Equilibrium of one row of Z balls. Arrays (Z,) unless told; angles in rad, forces in N, lengths in m.
 
-    ``displacement``: (x, y, z, theta_x, theta_y) of the inner ring [m, rad]. ``balls`` (Z, 2): place of each centre, (axial,
-    radial) from its outer groove centre. ``reaction`` (5,): the load that the ring takes [N, N m]. ``stiffness`` (5, 5): its
+    ``displacement``: (x, y, z, theta_x, theta_y) of the inner ring [m, rad]. ``balls`` (Z, 4): place of each centre, (axial,
+    radial) from its outer groove centre, and depth of its contacts, inner and outer. ``reaction`` (5,): the load that the ring takes [N, N m]. ``stiffness`` (5, 5): its
     derivative by the displacement. ``residual``: the largest force left over [N]. ``status``: "ok" or why there is none.
     ``steps, assemblies, strides``: Newton steps, evaluations of all balls, and continuations of the race control.
     ``searches``: starting values that the finite search tried; None for a solver that searches for none.
@@ -69,14 +69,12 @@ def tell(control: Any, row: Any, q: Any, balls: Any, work: Any, told: Any) -> No
         x, y = balls[j, 0], balls[j, 1]
         told[j, INNER_ANGLE] = math.atan2(a_axial - x, a_radial - y)
         told[j, OUTER_ANGLE] = math.atan2(x, y)
-        inner = math.sqrt((a_axial - x) ** 2 + (a_radial - y) ** 2) - row.inner_reach[j]
-        outer = math.sqrt(x * x + y * y) - row.outer_reach[j]
-        told[j, INNER_LOAD] = row.inner_stiffness * max(inner, 0.0) ** 1.5
-        told[j, OUTER_LOAD] = row.outer_stiffness * max(outer, 0.0) ** 1.5
+        told[j, INNER_LOAD], _ = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
+        told[j, OUTER_LOAD], _ = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
         told[j, PULL], told[j, MOMENT] = row.centrifugal_force, 0.0
         if work[j, LOADED] > 0.0:
             _, _, _, _, _, _, told[j, PULL], told[j, MOMENT] = ball_forces(
-                control, 1.0, row, j, a_axial, a_radial, x, y
+                control, 1.0, row, a_axial, a_radial, x, y, balls[j, INNER_DEPTH], balls[j, OUTER_DEPTH]
             )
         else:
             # A lifted ball lies on the outer race alone and has no inner angle of its own.
@@ -123,7 +121,7 @@ def solve(
     unit = np.array([1.0, 1.0, 1.0, row.lever, row.lever])
     free = np.ones(RING) if given is None else np.where(np.isnan(given), 1.0, 0.0)
     q = np.zeros(RING) if given is None else np.where(free > 0.0, 0.0, given) * unit
-    balls = np.zeros((size, 2))
+    balls = np.zeros((size, BALL))
     if start is not None:
         q = np.where(free > 0.0, start.displacement * unit, q)
         balls[:] = start.balls

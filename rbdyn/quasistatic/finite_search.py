@@ -73,8 +73,8 @@ def search_points(row: Row, search: Search = SEARCH) -> NDArray[np.float64]:
 
 
 def offset_distances(points: NDArray[np.float64], balls: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance [m] of the mean of each set of starting places from the mean place of the balls (Z, 2) found (eq 19)."""
-    return np.asarray(np.linalg.norm(points.mean(axis=1) - balls.mean(axis=0), axis=1))
+    """Distance [m] of the mean of each set of starting places from the mean place of the ``balls`` found (eq 19)."""
+    return np.asarray(np.linalg.norm(points.mean(axis=1) - balls[:, :2].mean(axis=0), axis=1))
 
 
 @entry
@@ -147,7 +147,7 @@ def solve(
     system = system_of(row, load, given)
     points = search_points(row, search)
     if start is not None:
-        points = np.concatenate((start.balls[np.newaxis], points))
+        points = np.concatenate((start.balls[np.newaxis, :, :2], points))
     u = np.zeros(system.size)
     most = damping.iterations * len(points) if limit is None else limit
     outcome, searches, iterations, evaluations, residual = _search(

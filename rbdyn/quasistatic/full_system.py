@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.kernel import entry, routine
-from rbdyn.quasistatic.ball import ball_forces
+from rbdyn.quasistatic.ball import ball_forces, deflection
 from rbdyn.quasistatic.control import Control
 from rbdyn.quasistatic.equilibrium import TOLD, Solution, tell, told_solution
 from rbdyn.quasistatic.newton import COUNTERS, space
 from rbdyn.quasistatic.place import groove_centre
-from rbdyn.quasistatic.ring import RING, assemble
+from rbdyn.quasistatic.ring import BALL, LOADED, RING, assemble
 from rbdyn.quasistatic.row import Row
 
 
@@ -53,8 +53,8 @@ def system_of(row: Row, load: NDArray[np.float64], given: NDArray[np.float64] | 
 
 
 def unknowns(system: System, q: NDArray[np.float64], balls: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Vector of the unknowns with the ring at ``q`` (5,) [m] and the ``balls`` (Z, 2)."""
-    return np.concatenate((balls.ravel(), q[system.free]))
+    """Vector of the unknowns with the ring at ``q`` (5,) [m] and the balls at ``balls`` (Z, 2 or more)."""
+    return np.concatenate((balls[:, :2].ravel(), q[system.free]))
 
 
 def ring_of(system: System, u: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -89,8 +89,11 @@ def forces(control: Any, system: Any, u: Any, residual: Any, jacobian: Any) -> t
             (0.0, 0.0, 0.0, s * one, -c * one),
         )
         a_axial, a_radial = groove_centre(row, q, j)
+        x, y = u[2 * j], u[2 * j + 1]
+        inner = deflection(a_axial - x, a_radial - y, row.inner_reach[j])
+        outer = deflection(x, y, row.outer_reach[j])
         (ra, rr), (fa, fr, fm), by_a, by_x, ring_a, ring_x, pull, _ = ball_forces(
-            control, 1.0, row, j, a_axial, a_radial, u[2 * j], u[2 * j + 1]
+            control, 1.0, row, a_axial, a_radial, x, y, inner, outer
         )
         residual[2 * j], residual[2 * j + 1] = ra, rr
         largest = max(largest, abs(fa), abs(fr), abs(pull))
@@ -124,7 +127,8 @@ def evaluate(control: Any, system: Any, u: Any, residual: Any, jacobian: Any) ->
 @entry
 def _finish(control: Any, row: Any, load: Any, q: Any, balls: Any, at: Any, told: Any) -> None:
     """Stiffness and loads at a solution, lifted balls put to rest."""
-    assemble(control, 1.0, row, load, q, balls, at.matrix, at.vector, at.work, at.sums)
+    at.work[:, LOADED] = 1.0
+    assemble(control, 1.0, False, row, load, q, balls, at.matrix, at.vector, at.work, at.sums)
     tell(control, row, q, balls, at.work, told)
 
 
@@ -142,7 +146,8 @@ def solution_at(
     row, z = system.row, system.row.cosine.size
     at, told, counts = space(z), np.zeros((z, TOLD)), np.zeros(COUNTERS, np.int64)
     counts[0], counts[1] = steps, evaluations
-    q, balls = ring_of(system, u), u[: 2 * z].reshape(z, 2).copy()
+    q, balls = ring_of(system, u), np.zeros((z, BALL))
+    balls[:, :2] = u[: 2 * z].reshape(z, 2)
     _finish(control, row, system.load, q, balls, at, told)
     found = told_solution(row, at, q, balls, counts, told, 0, residual)
     return found._replace(status=status, searches=searches)

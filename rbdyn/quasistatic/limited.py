@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from rbdyn.kernel import alike, entry
 from rbdyn.quasistatic.control import CommonCage, Control
-from rbdyn.quasistatic.equilibrium import Solution
+from rbdyn.quasistatic.equilibrium import OK, Solution
 from rbdyn.quasistatic.full_system import evaluate, solution_at, system_of, unknowns
-from rbdyn.quasistatic.newton import ACCEPTED, ASSEMBLIES, COUNTERS, STEPS, descend, space
-from rbdyn.quasistatic.ring import RING
+from rbdyn.quasistatic.newton import ASSEMBLIES, COUNTERS, STEPS, descend, march, space
+from rbdyn.quasistatic.ring import BALL, RING
 from rbdyn.quasistatic.row import Row
 from rbdyn.quasistatic.start import along_the_load, settle_all
 
@@ -29,14 +29,15 @@ def _within(
     balls: Any,
     at: Any,
     counts: Any,
-) -> None:
-    """The start, the convex problem, the full equations: ``limit`` steps in all."""
+) -> bool:
+    """The start, the convex problem, the full equations: ``limit`` steps in all; whether that was enough."""
     along_the_load(row, load, free, q, at.step, at.base)
-    settle_all(row, q, balls)
+    settle_all(row, q, balls, at.work)
     found = descend(cage, 0.0, True, limit, row, load, free, q, balls, at, counts)
     left = limit - counts[STEPS]
-    if found and left > 0 and not alike(cage, control):
-        descend(control, 1.0, False, left, row, load, free, q, balls, at, counts)
+    if alike(cage, control) or not found:
+        return found
+    return march(control, 1.0, left, row, load, free, q, balls, at, counts)
 
 
 def solve(
@@ -50,9 +51,9 @@ def solve(
     """As ``equilibrium.solve`` in at most ``limit`` steps, without continuation. ``start`` is not used."""
     system = system_of(row, load, given)
     at, counts = space(row.cosine.size), np.zeros(COUNTERS, np.int64)
-    q, balls, free = system.held.copy(), np.zeros((row.cosine.size, 2)), np.zeros(RING)
+    q, balls, free = system.held.copy(), np.zeros((row.cosine.size, BALL)), np.zeros(RING)
     free[system.free] = 1.0
-    _within(CommonCage(0.0), control, row, system.load, free, limit, q, balls, at, counts)
+    found = _within(CommonCage(0.0), control, row, system.load, free, limit, q, balls, at, counts)
     u = unknowns(system, q, balls)
     worst, largest = evaluate(control, system, u, np.zeros(system.size), np.zeros((system.size, system.size)))
     status = "ok" if worst <= ACCEPTED * largest else f"not converged in {limit} steps"

@@ -92,6 +92,7 @@ def row_model(
         inner_speed=inner_speed,
         outer_speed=outer_speed,
         blend_load=max(model.light_load_share * pull, VANISHING),
+        friction=model.friction_limit,
     )
     return RowModel(row, control_of(model, spinning, cage, to_inner, to_outer), to_inner, to_outer)
 

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from rbdyn.kernel import alike, kernel, routine
 from rbdyn.quasistatic.ring import (
+    BALL,
     BALL_WORK,
     ENERGY,
     LARGEST,
+    LOADED,
     RING,
     SUMS,
     TAKEN,
@@ -32,9 +34,11 @@ from rbdyn.quasistatic.start import along_the_load, settle_all
 CONVERGED, NOT_CONVEX_MINIMUM, RACE_CONTROL_LOST, NOT_FINITE = range(4)
 # Largest residual over largest force: aimed at, and accepted where rounding allows no better.
 AIM, ACCEPTED = 1e-12, 1e-10
-CONVEX_STEPS, FULL_STEPS, CONTINUED_STEPS, CONTINUATIONS = 200, 40, 12, 400
+CONVEX_STEPS, FULL_STEPS, CONTINUED_STEPS, CONTINUATIONS = 200, 40, 30, 100
 SMALLEST_STRIDE = 1e-5
 SHORTEST_CONVEX, SHORTEST_FULL = 1e-10, 1e-3
+# Largest turn of a contact line in one whole step [rad], and steps without progress that are waited for.
+FURTHEST, PATIENCE = 0.5, 8
 # Counters: Newton steps, assemblies, continuations.
 STEPS, ASSEMBLIES, STRIDES, COUNTERS = range(4)
 
@@ -64,7 +68,7 @@ def space(balls: int) -> Space:
         np.zeros(SUMS),
         np.zeros((balls, BALL_WORK)),
         np.zeros((balls, BALL_WORK)),
-        np.zeros((balls, 2)),
+        np.zeros((balls, BALL)),
         np.zeros(RING),
         np.zeros(RING),
     )
@@ -147,7 +151,7 @@ def descend(
     Guarded by the energy where ``convex``, else by the squared length of the residuals.
     """
     matrix, sums, step = at.matrix, at.sums, at.step
-    assemble(control, strength, row, load, q, balls, matrix, at.vector, at.work, sums)
+    assemble(control, strength, False, row, load, q, balls, matrix, at.vector, at.work, sums)
     counts[ASSEMBLIES] += 1
     total, worst = unbalance(load, free, sums)
     unit = stiffness_scale(row, sums[LARGEST])
@@ -173,7 +177,7 @@ def descend(
             for i in range(RING):
                 q[i] = at.old_ring[i] + scale * step[i]
             follow(row, step, scale, at.old_work, at.old_balls, balls)
-            assemble(control, strength, row, load, q, balls, matrix, at.vector, at.work, sums)
+            assemble(control, strength, False, row, load, q, balls, matrix, at.vector, at.work, sums)
             counts[ASSEMBLIES] += 1
             total, worst = unbalance(load, free, sums)
             better = total <= (1.0 - 1e-4 * scale) * before
@@ -189,7 +193,7 @@ def descend(
         # No step helps: rounding has been reached, or the matrix misleads.
         q[:] = at.old_ring
         balls[:] = at.old_balls
-        assemble(control, strength, row, load, q, balls, matrix, at.vector, at.work, sums)
+        assemble(control, strength, False, row, load, q, balls, matrix, at.vector, at.work, sums)
         counts[ASSEMBLIES] += 1
         total, worst = unbalance(load, free, sums)
         if worst <= ACCEPTED * sums[LARGEST]:
@@ -197,6 +201,71 @@ def descend(
         if not convex or damping > 1e3 * unit:
             return False
         damping = max(1e2 * damping, 1e-6 * unit)
+    return worst <= ACCEPTED * sums[LARGEST]
+
+
+@kernel
+def bound(row: Any, step: Any, at: Any, furthest: float) -> float:
+    """Share of a Newton step that turns no contact line by more than ``furthest`` [rad]."""
+    scale = 1.0
+    for j in range(row.cosine.size):
+        if at.work[j, LOADED] > 0.0:
+            c, s = row.cosine[j], row.sine[j]
+            axial = step[2] + step[3] * s - step[4] * c
+            radial = step[0] * c + step[1] * s
+            x = at.work[j, 0] + at.work[j, 2] * axial + at.work[j, 3] * radial
+            y = at.work[j, 1] + at.work[j, 4] * axial + at.work[j, 5] * radial
+            u, v = axial - x, radial - y
+            moved = max(
+                (x * x + y * y) / (row.outer_reach[j] * row.outer_reach[j]),
+                (u * u + v * v) / (row.inner_reach[j] * row.inner_reach[j]),
+            )
+            if moved * scale * scale > furthest * furthest:
+                scale = furthest / math.sqrt(moved)
+    return scale
+
+
+@routine
+def march(
+    control: Any, strength: float, limit: int, row: Any, load: Any, free: Any, q: Any, balls: Any, at: Any, counts: Any
+) -> bool:
+    """Newton's method with whole steps, bounded in angle, that need not improve at once; whether it ends in an equilibrium.
+
+    A ball that slides along its groove leaves the stiff normal direction by the square of its step: forces rise, and the next
+    step mends them. A search along the step for smaller forces would creep.
+    """
+    matrix, sums, step = at.matrix, at.sums, at.step
+    assemble(control, strength, True, row, load, q, balls, matrix, at.vector, at.work, sums)
+    counts[ASSEMBLIES] += 1
+    total, worst = unbalance(load, free, sums)
+    best, idle = total, 0
+    for _ in range(limit):
+        if not math.isfinite(total):
+            return False
+        if worst <= AIM * sums[LARGEST]:
+            return True
+        if not ring_step(matrix, at.vector, free, 0.0, at.table, step) and not ring_step(
+            matrix, at.vector, free, 1e-9 * stiffness_scale(row, sums[LARGEST]), at.table, step
+        ):
+            return False
+        counts[STEPS] += 1
+        scale = bound(row, step, at, FURTHEST)
+        floor = worst <= ACCEPTED * sums[LARGEST]
+        at.old_balls[:] = balls
+        for i in range(RING):
+            q[i] += scale * step[i]
+        follow(row, step, scale, at.work, at.old_balls, balls)
+        assemble(control, strength, True, row, load, q, balls, matrix, at.vector, at.work, sums)
+        counts[ASSEMBLIES] += 1
+        total, worst = unbalance(load, free, sums)
+        if total < 0.25 * best:
+            best, idle = total, 0
+        else:
+            idle += 1
+            if floor and worst <= ACCEPTED * sums[LARGEST]:
+                return True
+            if idle > PATIENCE:
+                return False
     return worst <= ACCEPTED * sums[LARGEST]
 
 
@@ -208,7 +277,12 @@ def bring_in(control: Any, row: Any, load: Any, free: Any, q: Any, balls: Any, a
     for _ in range(CONTINUATIONS):
         counts[STRIDES] += 1
         ahead = min(reached + stride, 1.0)
-        if descend(control, ahead, False, CONTINUED_STEPS, row, load, free, q, balls, at, counts):
+        arrived = march(control, ahead, CONTINUED_STEPS, row, load, free, q, balls, at, counts)
+        if not arrived:
+            q[:] = keep_q
+            balls[:] = keep
+            arrived = descend(control, ahead, False, CONTINUED_STEPS, row, load, free, q, balls, at, counts)
+        if arrived:
             if ahead == 1.0:
                 return True
             reached, stride = ahead, 2.0 * stride
@@ -240,13 +314,13 @@ def find(
 
     ``cage``: the ``CommonCage`` of the convex problem; ``control`` may be the same. Returns an outcome.
     """
-    if warm and descend(control, 1.0, False, FULL_STEPS, row, load, free, q, balls, at, counts):
+    if warm and march(control, 1.0, FULL_STEPS, row, load, free, q, balls, at, counts):
         return CONVERGED
     for i in range(RING):
         if free[i] > 0.0:
             q[i] = 0.0
     along_the_load(row, load, free, q, at.step, at.base)
-    settle_all(row, q, balls)
+    settle_all(row, q, balls, at.work)
     if not descend(cage, 0.0, True, CONVEX_STEPS, row, load, free, q, balls, at, counts):
         return NOT_CONVEX_MINIMUM
     return complete(cage, control, row, load, free, q, balls, at, counts)
@@ -260,6 +334,10 @@ def complete(
     if alike(cage, control):
         return CONVERGED
     start_q, start = q.copy(), balls.copy()
+    if march(control, 1.0, FULL_STEPS, row, load, free, q, balls, at, counts):
+        return CONVERGED
+    q[:] = start_q
+    balls[:] = start
     if descend(control, 1.0, False, FULL_STEPS, row, load, free, q, balls, at, counts):
         return CONVERGED
     q[:] = start_q

@@ -6,12 +6,13 @@ import math
 from typing import Any
 
 from rbdyn.kernel import kernel
-from rbdyn.quasistatic.ball import contact, tangent
+from rbdyn.quasistatic.ball import deflection, line, spring, tangent
 
-SETTLING_STEPS = 20
-SHORTEST = 1e-6
+# A light ball slides along a curved, narrow valley of its energy.
+SETTLING_STEPS = 300
+SHORTEST = 1e-7
 # Residual over the contact loads of a ball that counts as settled.
-SETTLED = 1e-6
+SETTLED = 1e-11
 
 
 @kernel
@@ -47,12 +48,44 @@ def rest(row: Any, j: int, balls: Any, a_axial: float, a_radial: float) -> None:
 @kernel
 def contact_energy(row: Any, j: int, a_axial: float, a_radial: float, x: float, y: float) -> float:
     """Elastic energy of both contacts of ball j less the work of the common centrifugal force [J]."""
-    u, v = a_axial - x, a_radial - y
-    inner = max(math.sqrt(u * u + v * v) - row.inner_reach[j], 0.0)
-    outer = max(math.sqrt(x * x + y * y) - row.outer_reach[j], 0.0)
+    inner = deflection(a_axial - x, a_radial - y, row.inner_reach[j])
+    outer = deflection(x, y, row.outer_reach[j])
     elastic = row.inner_stiffness * inner * inner * math.sqrt(inner)
     elastic += row.outer_stiffness * outer * outer * math.sqrt(outer)
     return 0.4 * elastic - row.centrifugal_force * (y - row.outer_reach[j])
+
+
+@kernel
+def balance(row: Any, j: int, a_axial: float, a_radial: float, x: float, y: float) -> tuple[float, ...]:
+    """Energy [J], contact loads [N], force (axial, radial) on ball j and its stiffness, orbiting with the cage."""
+    one_i, si, ci = line(a_axial - x, a_radial - y)
+    one_o, so, co = line(x, y)
+    di, do = deflection(a_axial - x, a_radial - y, row.inner_reach[j]), deflection(x, y, row.outer_reach[j])
+    qi, ki = spring(di, row.inner_stiffness)
+    qo, ko = spring(do, row.outer_stiffness)
+    iaa, iar, irr = tangent(qi, ki, one_i, si, ci)
+    oaa, oar, orr = tangent(qo, ko, one_o, so, co)
+    pull = row.centrifugal_force
+    energy = 0.4 * (qi * di + qo * do) - pull * (y - row.outer_reach[j])
+    return energy, qi + qo, qi * si - qo * so, qi * ci - qo * co + pull, iaa + oaa, iar + oar, irr + orr
+
+
+@kernel
+def wedge(row: Any, j: int, a_axial: float, a_radial: float) -> tuple[float, float]:
+    """Where ball j just touches both races, the outermost such place; on the line of centres where it is squeezed."""
+    length = math.sqrt(a_axial * a_axial + a_radial * a_radial)
+    ri, ro = row.inner_reach[j], row.outer_reach[j]
+    cos_a, sin_a = a_radial / length, a_axial / length
+    squeeze = length - ri - ro
+    if squeeze > 0.0:
+        soft = row.inner_stiffness ** (2.0 / 3.0)
+        along = ro + squeeze * soft / (soft + row.outer_stiffness ** (2.0 / 3.0))
+        return along * sin_a, along * cos_a
+    along = 0.5 * (length + (ro - ri) * (ro + ri) / length)
+    across = math.sqrt(max(ro * ro - along * along, 0.0))
+    if sin_a < 0.0:
+        across = -across
+    return along * sin_a - across * cos_a, along * cos_a + across * sin_a
 
 
 @kernel
@@ -61,37 +94,37 @@ def settle(row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> Non
     if lifted(row, j, a_axial, a_radial):
         rest(row, j, balls, a_axial, a_radial)
         return
+    x, y = wedge(row, j, a_axial, a_radial)
     pull = row.centrifugal_force
-    length = math.sqrt(a_axial * a_axial + a_radial * a_radial)
-    squeeze = max(length - row.inner_reach[j] - row.outer_reach[j], 0.0)
-    soft = row.inner_stiffness ** (2.0 / 3.0)
-    outer = squeeze * soft / (soft + row.outer_stiffness ** (2.0 / 3.0))
-    if row.outer_stiffness * outer * math.sqrt(outer) > pull:
-        share = (row.outer_reach[j] + outer) / length
-        balls[j, 0], balls[j, 1] = a_axial * share, a_radial * share
-    else:
-        rest(row, j, balls, a_axial, a_radial)
     if pull == 0.0:
+        balls[j, 0], balls[j, 1] = x, y
         return
-    x, y = balls[j, 0], balls[j, 1]
-    energy = contact_energy(row, j, a_axial, a_radial, x, y)
+    out = 1.0 + row.rest_deflection / row.outer_reach[j]
+    x, y = x * out, y * out
+    high = row.outer_reach[j] + row.rest_deflection
+    at_rest = contact_energy(row, j, a_axial, a_radial, 0.0, high)
+    if at_rest < contact_energy(row, j, a_axial, a_radial, x, y):
+        x, y = 0.0, high
+    energy, held, fa, fr, aa, ar, rr = balance(row, j, a_axial, a_radial, x, y)
+    damping = 0.0
     for _ in range(SETTLING_STEPS):
-        qi, ki, _, one_i, si, ci = contact(a_axial - x, a_radial - y, row.inner_reach[j], row.inner_stiffness)
-        qo, ko, _, one_o, so, co = contact(x, y, row.outer_reach[j], row.outer_stiffness)
-        iaa, iar, irr = tangent(qi, ki, one_i, si, ci)
-        oaa, oar, orr = tangent(qo, ko, one_o, so, co)
-        aa, ar, rr = iaa + oaa, iar + oar, irr + orr
-        fa, fr = qi * si - qo * so, qi * ci - qo * co + pull
-        if abs(fa) + abs(fr) < SETTLED * (qi + qo):
+        lacking = abs(fa) + abs(fr)
+        if lacking < SETTLED * held:
             break
-        one = 1.0 / (aa * rr - ar * ar)
-        da, dr = (rr * fa - ar * fr) * one, (aa * fr - ar * fa) * one
+        one = 1.0 / ((aa + damping) * (rr + damping) - ar * ar)
+        da = ((rr + damping) * fa - ar * fr) * one
+        dr = ((aa + damping) * fr - ar * fa) * one
         scale, moved = 1.0, False
         while scale > SHORTEST and not moved:
-            trial = contact_energy(row, j, a_axial, a_radial, x + scale * da, y + scale * dr)
-            if trial < energy:
-                x, y, energy, moved = x + scale * da, y + scale * dr, trial, True
+            trial, held_, fa_, fr_, aa_, ar_, rr_ = balance(
+                row, j, a_axial, a_radial, x + scale * da, y + scale * dr
+            )
+            # Near the bottom the energy no longer tells better from worse, the forces still do.
+            if trial < energy or abs(fa_) + abs(fr_) < 0.5 * lacking:
+                x, y, moved = x + scale * da, y + scale * dr, True
+                energy, held, fa, fr, aa, ar, rr = trial, held_, fa_, fr_, aa_, ar_, rr_
             scale *= 0.5
-        if not moved:
+        if not moved and damping > 0.0:
             break
+        damping = 0.0 if moved else 1e-2 * (aa + rr)
     balls[j, 0], balls[j, 1] = x, y

@@ -18,6 +18,7 @@ from rbdyn.quasistatic.elimination import eliminate
 from rbdyn.quasistatic.equilibrium import OK, Solution
 from rbdyn.quasistatic.full_system import System, forces, solution_at, system_of, unknowns
 from rbdyn.quasistatic.newton import ACCEPTED
+from rbdyn.quasistatic.ring import BALL, BALL_WORK
 from rbdyn.quasistatic.row import Row
 from rbdyn.quasistatic.start import settle_all
 
@@ -73,15 +74,15 @@ def unloaded(system: System) -> NDArray[np.float64]:
     length = float(np.linalg.norm(pull))
     if length > 0.0:
         q[system.free] += SEAT * float(row.inner_reach[0] + row.outer_reach[0]) * pull / length
-    balls = np.zeros((row.cosine.size, 2))
-    rest_balls(row, q, balls)
+    balls = np.zeros((row.cosine.size, BALL))
+    rest_balls(row, q, balls, np.zeros((row.cosine.size, BALL_WORK)))
     return unknowns(system, q, balls)
 
 
 @entry
-def rest_balls(row: Any, q: Any, balls: Any) -> None:
+def rest_balls(row: Any, q: Any, balls: Any, work: Any) -> None:
     """Settle the balls for the ring at ``q``."""
-    settle_all(row, q, balls)
+    settle_all(row, q, balls, work)
 
 
 def solve(

@@ -10,73 +10,82 @@ from __future__ import annotations
 from typing import Any
 
 from rbdyn.kernel import kernel, routine
-from rbdyn.quasistatic.ball import ball_forces
+from rbdyn.quasistatic.ball import ball_forces, deflection, line, spring
 from rbdyn.quasistatic.place import contact_energy, groove_centre, lifted, rest, settle
 
 RING = 5
-# Columns of the work space of a ball: Newton step (axial, radial), its change with A (four), open or loaded.
-BALL_WORK = 7
-LOADED = 6
+# Columns of the work space of a ball: Newton step (axial, radial), its change with A (four), open or loaded, then the lines
+# of both contacts (axial, radial) and what the geometry has deeper than the ball's depths [m].
+BALL_WORK = 13
+LOADED, INNER_LINE, OUTER_LINE, INNER_GAP, OUTER_GAP = 6, 7, 9, 11, 12
+# Columns of ``balls``: place (axial, radial) and depth of the contacts (inner, outer) [m].
+AXIAL, RADIAL, INNER_DEPTH, OUTER_DEPTH, BALL = range(5)
+# A Newton step leaves at least this share of a depth.
+LEFT = 0.2
 # Sums that ``assemble`` leaves in ``sums``; from TAKEN on what the ring takes [N].
 ENERGY, UNBALANCE, WORST, LARGEST, TAKEN = range(5)
 SUMS = TAKEN + RING
 
 
 @kernel
-def astray(strength: float, row: Any, ra: float, rr: float, fa: float, fr: float) -> bool:
-    """Whether a ball is so far from balance that it is better settled by itself."""
+def measure(row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> None:
+    """Set the depths of ball j to what its place tells."""
+    x, y = balls[j, AXIAL], balls[j, RADIAL]
+    balls[j, INNER_DEPTH] = deflection(a_axial - x, a_radial - y, row.inner_reach[j])
+    balls[j, OUTER_DEPTH] = deflection(x, y, row.outer_reach[j])
+
+
+@kernel
+def astray(convex: bool, ra: float, rr: float, fa: float, fr: float) -> bool:
+    """Whether a ball is so far from balance that it is better settled by itself: Newton's step would tell nothing."""
     lacking, held = max(abs(ra), abs(rr)), max(abs(fa), abs(fr))
-    if strength == 0.0:
-        return lacking > 0.3 * held
-    return held == 0.0
+    return lacking > 0.3 * held if convex else held == 0.0
 
 
 @routine
 def assemble(
-    control: Any,
-    strength: float,
-    row: Any,
-    load: Any,
-    q: Any,
-    balls: Any,
-    matrix: Any,
-    vector: Any,
-    work: Any,
-    sums: Any,
-) -> None:
+    control: Any, strength: float, mixed: bool, row: Any, load: Any, q: Any, balls: Any, matrix: Any, vector: Any,
+    work: Any, sums: Any,
+) -> None:  # fmt: skip
     """Ring forces at ``q`` and ``balls``, with the balls eliminated.
 
+    ``mixed``: whether the depths in ``balls`` are unknowns of their own; else they are set to what the places tell.
     Fills ``matrix`` (5, 5), the derivative of the load that the ring takes by q where every ball stays in balance [N/m];
     ``vector`` (5,), the load less what the ring takes once the balls have moved into balance to first order [N];
-    ``work`` (Z, BALL_WORK) for ``follow``; ``sums``: energy [J], the squared length of all residuals [N^2], the largest
-    of them [N] and the largest force [N]. Moments and couples count over the lever. Lifted balls in ``balls`` are put to rest.
+    ``work`` (Z, BALL_WORK) for ``follow``; ``sums``: energy [J], the squared length of the balls' residuals [N^2], the largest
+    of them [N], the largest force [N] and what the ring takes. Moments and couples count over the lever. Lifted balls are put
+    to rest.
     """
-    size = row.cosine.size
-    for i in range(RING):
-        vector[i] = load[i]
-        for k in range(RING):
-            matrix[i, k] = 0.0
+    vector[:] = load
+    matrix[:, :] = 0.0
     energy, unbalance, worst, largest = 0.0, 0.0, 0.0, 0.0
     taken_x, taken_y, taken_z, taken_u, taken_v = 0.0, 0.0, 0.0, 0.0, 0.0
     one = 1.0 / row.lever
-    for j in range(size):
+    for j in range(row.cosine.size):
         a_axial, a_radial = groove_centre(row, q, j)
         if lifted(row, j, a_axial, a_radial):
             rest(row, j, balls, a_axial, a_radial)
             work[j, LOADED] = 0.0
             largest = max(largest, row.centrifugal_force)
-            energy += contact_energy(row, j, a_axial, a_radial, balls[j, 0], balls[j, 1])
+            energy += contact_energy(row, j, a_axial, a_radial, balls[j, AXIAL], balls[j, RADIAL])
             continue
-        work[j, LOADED] = 1.0
+        if work[j, LOADED] == 0.0:
+            settle(row, j, a_axial, a_radial, balls)
+            measure(row, j, a_axial, a_radial, balls)
+            work[j, LOADED] = 1.0
+        elif not mixed:
+            measure(row, j, a_axial, a_radial, balls)
         for attempt in range(2):
             (ra, rr), (fa, fr, fm), by_a, by_x, ring_a, ring_x, pull, _ = ball_forces(
-                control, strength, row, j, a_axial, a_radial, balls[j, 0], balls[j, 1]
-            )
-            # The ball's own force on the ring is small against what it lacks: Newton's step would tell nothing.
-            if attempt == 1 or not astray(strength, row, ra, rr, fa, fr):
+                control, strength, row, a_axial, a_radial, balls[j, AXIAL], balls[j, RADIAL],
+                balls[j, INNER_DEPTH], balls[j, OUTER_DEPTH],
+            )  # fmt: skip
+            if attempt == 1 or not astray(strength == 0.0, ra, rr, fa, fr):
                 break
             settle(row, j, a_axial, a_radial, balls)
-        energy += contact_energy(row, j, a_axial, a_radial, balls[j, 0], balls[j, 1])
+            measure(row, j, a_axial, a_radial, balls)
+        x, y = balls[j, AXIAL], balls[j, RADIAL]
+        energy += contact_energy(row, j, a_axial, a_radial, x, y)
         unbalance += ra * ra + rr * rr
         worst = max(worst, abs(ra), abs(rr))
         largest = max(largest, abs(fa), abs(fr), abs(pull))
@@ -87,8 +96,32 @@ def assemble(
         taken_z += fa
         taken_u += turn * s
         taken_v -= turn * c
+        if mixed:
+            # What the places tell beyond the depths goes into the step, not into the forces.
+            one_i, si, ci = line(a_axial - x, a_radial - y)
+            one_o, so, co = line(x, y)
+            gap_i = 1.0 / one_i - row.inner_reach[j] - balls[j, INNER_DEPTH]
+            gap_o = 1.0 / one_o - row.outer_reach[j] - balls[j, OUTER_DEPTH]
+            _, ki = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
+            _, ko = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+            slip = max(abs(gap_i) * ki, abs(gap_o) * ko)
+            worst = max(worst, slip)
+            unbalance += slip * slip
+            work[j, INNER_LINE], work[j, INNER_LINE + 1], work[j, INNER_GAP] = si, ci, gap_i
+            work[j, OUTER_LINE], work[j, OUTER_LINE + 1], work[j, OUTER_GAP] = so, co, gap_o
+            ia, ir, oa, or_ = gap_i * si, gap_i * ci, gap_o * so, gap_o * co
+            ra += by_a[0] * ia + by_a[1] * ir + (by_x[0] + by_a[0]) * oa + (by_x[1] + by_a[1]) * or_
+            rr += by_a[2] * ia + by_a[3] * ir + (by_x[2] + by_a[2]) * oa + (by_x[3] + by_a[3]) * or_
+            fa += ring_a[0] * ia + ring_a[1] * ir + (ring_x[0] + ring_a[0]) * oa + (ring_x[1] + ring_a[1]) * or_
+            fr += ring_a[2] * ia + ring_a[3] * ir + (ring_x[2] + ring_a[2]) * oa + (ring_x[3] + ring_a[3]) * or_
+            fm += ring_a[4] * ia + ring_a[5] * ir + (ring_x[4] + ring_a[4]) * oa + (ring_x[5] + ring_a[5]) * or_
+        determinant = by_x[0] * by_x[3] - by_x[1] * by_x[2]
+        if determinant == 0.0:
+            # Squeezed by less than the spacing of numbers: as good as lifted.
+            work[j, LOADED] = 0.0
+            continue
         # The ball moves by -B^-1 (residual + R dA): B = d residual/dX, R = d residual/dA.
-        one_b = 1.0 / (by_x[0] * by_x[3] - by_x[1] * by_x[2])
+        one_b = 1.0 / determinant
         b0, b1, b2, b3 = by_x[3] * one_b, -by_x[1] * one_b, -by_x[2] * one_b, by_x[0] * one_b
         da, dr = -(b0 * ra + b1 * rr), -(b2 * ra + b3 * rr)
         m0, m1 = -(b0 * by_a[0] + b1 * by_a[2]), -(b0 * by_a[1] + b1 * by_a[3])
@@ -145,10 +178,17 @@ def assemble(
 def follow(row: Any, step: Any, scale: float, work: Any, start: Any, balls: Any) -> None:
     """Move the balls from ``start`` by ``scale`` times the Newton step that goes with the ring's ``step`` [m]."""
     for j in range(row.cosine.size):
-        balls[j, 0], balls[j, 1] = start[j, 0], start[j, 1]
+        for i in range(BALL):
+            balls[j, i] = start[j, i]
         if work[j, LOADED] > 0.0:
             c, s = row.cosine[j], row.sine[j]
             axial = step[2] + step[3] * s - step[4] * c
             radial = step[0] * c + step[1] * s
-            balls[j, 0] += scale * (work[j, 0] + work[j, 2] * axial + work[j, 3] * radial)
-            balls[j, 1] += scale * (work[j, 1] + work[j, 4] * axial + work[j, 5] * radial)
+            x = work[j, 0] + work[j, 2] * axial + work[j, 3] * radial
+            y = work[j, 1] + work[j, 4] * axial + work[j, 5] * radial
+            balls[j, AXIAL] += scale * x
+            balls[j, RADIAL] += scale * y
+            inner = work[j, INNER_GAP] + work[j, INNER_LINE] * (axial - x) + work[j, INNER_LINE + 1] * (radial - y)
+            outer = work[j, OUTER_GAP] + work[j, OUTER_LINE] * x + work[j, OUTER_LINE + 1] * y
+            balls[j, INNER_DEPTH] = max(start[j, INNER_DEPTH] + scale * inner, LEFT * start[j, INNER_DEPTH])
+            balls[j, OUTER_DEPTH] = max(start[j, OUTER_DEPTH] + scale * outer, LEFT * start[j, OUTER_DEPTH])

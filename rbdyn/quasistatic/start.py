@@ -7,7 +7,7 @@ from typing import Any
 
 from rbdyn.kernel import kernel, routine
 from rbdyn.quasistatic.place import groove_centre, settle
-from rbdyn.quasistatic.ring import RING
+from rbdyn.quasistatic.ring import LOADED, RING, measure
 
 FIRST_STEP = 1e-6  # [m]
 LONGEST_STEP = 1.0  # [m]
@@ -69,8 +69,10 @@ def along_the_load(row: Any, load: Any, free: Any, q: Any, direction: Any, base:
 
 
 @routine
-def settle_all(row: Any, q: Any, balls: Any) -> None:
-    """Settle every ball for the ring at ``q``."""
+def settle_all(row: Any, q: Any, balls: Any, work: Any) -> None:
+    """Settle every ball for the ring at ``q``, and mark all in ``work`` as loaded."""
+    work[:, LOADED] = 1.0
     for j in range(row.cosine.size):
         a_axial, a_radial = groove_centre(row, q, j)
         settle(row, j, a_axial, a_radial, balls)
+        measure(row, j, a_axial, a_radial, balls)

@@ -243,6 +243,9 @@ class BallModel(Strict):
     # Race control sets in as the inner contact load rises to this share of the centrifugal force; below, balls go with the cage.
     # A smaller share lets a light ball have several orbits: its centrifugal force then changes faster than its load.
     light_load_share: Annotated[float, Field(ge=1e-3, le=10.0)] = 0.3
+    # Largest friction coefficient that may hold a ball's gyroscopic moment: beyond that of any oiled or boundary contact, so
+    # that it only ends what no friction could hold; the ball then slips about that axis.
+    friction_limit: Annotated[float, Field(ge=1e-3, le=10.0)] = 0.3
     # Growth of rotating rings: of a thick ring, or by the formula of Hu et al. (double-decker papers) for comparison.
     ring_expansion: bool = False
     ring_expansion_form: Literal["thick_ring", "paper"] = "thick_ring"

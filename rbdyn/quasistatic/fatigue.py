@@ -1,0 +1,72 @@
+"""Fatigue life of the row of a scene: which ratings its drawing gives, and which ring turns against the load."""
+
+from __future__ import annotations
+
+import math
+
+from rbdyn.quasistatic.equilibrium import Solution
+from rbdyn.quasistatic.life import (
+    BallLife,
+    Turning,
+    lundberg_palmgren_capacities,
+    rated_capacities,
+    row_life,
+)
+from rbdyn.quasistatic.rating import dynamic_capacity
+from rbdyn.scene.ball import BallRow
+
+# ISO 281 grants grooves closer than its table's no more than the table.
+CLOSEST_RATED = 0.52
+
+
+def capacity_of(drawing: BallRow) -> float:
+    """C_r of a row [N]: the catalogue's where the drawing has it, else by ISO 281 from the dimensions."""
+    if drawing.dynamic_capacity_N is not None:
+        return drawing.dynamic_capacity_N
+    return dynamic_capacity(
+        drawing.balls,
+        1e-3 * drawing.ball_diameter_mm,
+        1e-3 * drawing.pitch_diameter_mm,
+        drawing.contact_angle,
+        max(drawing.inner_groove_factor, CLOSEST_RATED),
+        max(drawing.outer_groove_factor, CLOSEST_RATED),
+    )
+
+
+def reference_capacities(drawing: BallRow) -> tuple[float, float]:
+    """Ball loads [N] that the inner and the outer race bear for 1e6 turns by ISO/TS 16281."""
+    gamma = drawing.ball_diameter_mm * math.cos(drawing.contact_angle) / drawing.pitch_diameter_mm
+    return rated_capacities(
+        capacity_of(drawing),
+        drawing.balls,
+        gamma,
+        drawing.contact_angle,
+        drawing.inner_groove_factor,
+        drawing.outer_groove_factor,
+    )
+
+
+def plain_capacities(drawing: BallRow) -> tuple[float, float]:
+    """The same by Lundberg and Palmgren from the dimensions alone: steel and finish of 1947, no b_m."""
+    return lundberg_palmgren_capacities(
+        drawing.balls,
+        1e-3 * drawing.ball_diameter_mm,
+        1e-3 * drawing.pitch_diameter_mm,
+        drawing.contact_angle,
+        drawing.inner_groove_factor,
+        drawing.outer_groove_factor,
+    )
+
+
+def turning_rings(inner_speed: float, outer_speed: float) -> Turning:
+    """Which rings turn against a load that keeps its direction; the inner one where nothing turns."""
+    if outer_speed == 0.0:
+        return "inner"
+    return "outer" if inner_speed == 0.0 else "both"
+
+
+def solution_life(
+    solution: Solution, capacities: tuple[float, float], turning: Turning = "inner"
+) -> BallLife:
+    """Life of a row in equilibrium."""
+    return row_life(solution.inner_load, solution.outer_load, capacities, turning)

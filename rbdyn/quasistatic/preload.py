@@ -1,0 +1,279 @@
+"""Preload or clearance for least stress and for longest life, and what worn balls do to the clearance.
+
+Stress and life ask for different things: the peak Hertz pressure belongs to one ball, a life to all of them and to how
+often they pass. A coarse scan, each equilibrium started from its neighbour, finds where each is best; golden sections
+refine it. Neither needs to have one optimum only, or one inside the range: what is found is the best of the scan,
+refined, and a sentence says when it lies at an end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.contact.hertz_point import peak_pressure
+from rbdyn.quasistatic.equilibrium import Solution, solve
+from rbdyn.quasistatic.fatigue import reference_capacities, solution_life, turning_rings
+from rbdyn.quasistatic.life import BallLife
+from rbdyn.quasistatic.model import RowModel, given_of, load_of, row_of
+from rbdyn.scene.ball import BallRow, SingleRowScene
+
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+# Optima closer together than this share of the range, or that lose less than this of stress or life, count as one.
+SAME_PLACE = 0.02
+SAME_VALUE = 0.005
+
+Capacities = Callable[[BallRow], tuple[float, float]]
+
+
+class Case(NamedTuple):
+    """One bearing under one load, ready to be solved."""
+
+    model: RowModel
+    load: NDArray[np.float64]
+    given: NDArray[np.float64]
+    capacities: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One equilibrium of a sweep.
+
+    ``value``: of what is swept. ``inner_pressure, outer_pressure``: largest Hertz pressure on each race [Pa]. Those
+    and ``life`` are NaN and None where no equilibrium was found.
+    """
+
+    value: float
+    inner_pressure: float
+    outer_pressure: float
+    life: BallLife | None
+    solution: Solution
+
+    @property
+    def peak_pressure(self) -> float:
+        """The larger of both [Pa]."""
+        return max(self.inner_pressure, self.outer_pressure)
+
+    @property
+    def million_turns(self) -> float:
+        """L10 in 1e6 turns; NaN without an equilibrium."""
+        return math.nan if self.life is None else self.life.million_turns
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A scan over preload or clearance and its two optima; ``notes`` say where they differ or lie at an end."""
+
+    name: str
+    unit: str
+    points: tuple[Point, ...]
+    least_stress: Point
+    longest_life: Point
+    notes: tuple[str, ...]
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """What is swept, in SI."""
+        return np.array([point.value for point in self.points])
+
+    @property
+    def peak_pressure(self) -> NDArray[np.float64]:
+        """Largest Hertz pressure at each point [Pa]."""
+        return np.array([point.peak_pressure for point in self.points])
+
+    @property
+    def million_turns(self) -> NDArray[np.float64]:
+        """L10 at each point [1e6 turns]."""
+        return np.array([point.million_turns for point in self.points])
+
+
+def solved(value: float, case: Case, scene: SingleRowScene, start: Solution | None = None) -> Point:
+    """Equilibrium, stress and life of a case; ``start``: a solution nearby."""
+    solution = solve(case.model.row, case.model.control, case.load, case.given, start)
+    if not solution.found and start is not None:
+        solution = solve(case.model.row, case.model.control, case.load, case.given)
+    if not solution.found:
+        return Point(value, math.nan, math.nan, None, solution)
+    turning = turning_rings(scene.operation.inner_speed_rpm, scene.operation.outer_speed_rpm)
+    return Point(
+        value,
+        float(np.max(peak_pressure(case.model.inner_contact, solution.inner_load))),
+        float(np.max(peak_pressure(case.model.outer_contact, solution.outer_load))),
+        solution_life(solution, case.capacities, turning),
+        solution,
+    )
+
+
+def golden_section(
+    function: Callable[[float], float], low: float, high: float, tolerance: float
+) -> tuple[float, float]:
+    """Place and value of a minimum between ``low`` and ``high``, to within ``tolerance``; no derivative is used."""
+    left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    at_left, at_right = function(left), function(right)
+    while high - low > tolerance:
+        if at_left <= at_right:
+            high, right, at_right = right, left, at_left
+            left = high - GOLDEN * (high - low)
+            at_left = function(left)
+        else:
+            low, left, at_left = left, right, at_right
+            right = low + GOLDEN * (high - low)
+            at_right = function(right)
+    return (left, at_left) if at_left <= at_right else (right, at_right)
+
+
+def sweep(
+    scene: SingleRowScene,
+    case_at: Callable[[float], Case],
+    values: Sequence[float],
+    name: str,
+    unit: str,
+    scale: float = 1.0,
+) -> Sweep:
+    """Scan ``values``, at least three and rising, and refine both optima.
+
+    ``case_at`` makes the case of a value; ``name``, ``unit`` and ``scale`` (units to one of SI) are for the notes.
+    Raises ValueError for other values, or when fewer than three of them have an equilibrium.
+    """
+    if len(values) < 3 or not np.all(np.diff(values) > 0.0):
+        raise ValueError(f"{name}: give at least three rising values to scan, not {list(values)}")
+    points: list[Point] = []
+    start: Solution | None = None
+    for value in values:
+        points.append(solved(value, case_at(value), scene, start))
+        start = points[-1].solution if points[-1].life is not None else None
+    found = [point for point in points if point.life is not None]
+    if len(found) < 3:
+        raise ValueError(
+            f"{name}: only {len(found)} of {len(points)} scanned values have an equilibrium; scan a range that has one"
+        )
+
+    def refined(worth: Callable[[Point], float]) -> Point:
+        best = min(range(len(found)), key=lambda i: worth(found[i]))
+        low, high = found[max(best - 1, 0)].value, found[min(best + 1, len(found) - 1)].value
+
+        def point_at(value: float) -> Point:
+            return solved(value, case_at(value), scene, found[best].solution)
+
+        def cost(value: float) -> float:
+            point = point_at(value)
+            return math.inf if point.life is None else worth(point)
+
+        place, value = golden_section(cost, low, high, 1e-4 * (high - low))
+        return point_at(place) if value < worth(found[best]) else found[best]
+
+    least = refined(lambda point: point.peak_pressure)
+    longest = refined(lambda point: -point.million_turns)
+    notes = _notes(found, least, longest, name, unit, scale)
+    return Sweep(name, unit, tuple(points), least, longest, notes)
+
+
+def _notes(
+    found: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float
+) -> tuple[str, ...]:
+    notes = []
+    span = found[-1].value - found[0].value
+    for goal, point in (("least peak stress", least), ("longest life", longest)):
+        for end, word in ((found[0].value, "lower"), (found[-1].value, "upper")):
+            if abs(point.value - end) <= 1e-3 * span:
+                notes.append(
+                    f"the {goal} lies at the {word} end of the range, {name} {scale * end:.4g} {unit}: it has no "
+                    "optimum inside; widen the range or take what the end gives"
+                )
+    loss = 1.0 - least.million_turns / longest.million_turns
+    rise = longest.peak_pressure / least.peak_pressure - 1.0
+    apart = abs(least.value - longest.value) > SAME_PLACE * span
+    if apart and (loss > SAME_VALUE or rise > SAME_VALUE):
+        notes.append(
+            f"least peak stress and longest life differ: {name} {scale * least.value:.4g} {unit} for stress costs "
+            f"{100.0 * loss:.3g} % of the life, {scale * longest.value:.4g} {unit} for life {100.0 * rise:.3g} % more stress"
+        )
+    return tuple(notes)
+
+
+def over_preload(
+    scene: SingleRowScene, preloads: Sequence[float], capacities: Capacities = reference_capacities
+) -> Sweep:
+    """Sweep of the axial force of a preload spring [N], on top of the scene's load.
+
+    ``capacities``: how races are rated, ``fatigue.reference_capacities`` or ``fatigue.plain_capacities``. Raises
+    ValueError as ``sweep``, or where the scene prescribes the axial displacement, which no force can change.
+    """
+    model, load, given = row_of(scene), load_of(scene), given_of(scene)
+    if not math.isnan(given[2]):
+        raise ValueError(
+            "operation.prescribed.z_mm or preload_um: the axial displacement is prescribed, so a preload by force has no "
+            "effect; leave it out"
+        )
+    rated = capacities(scene.bearing)
+
+    def case_at(preload: float) -> Case:
+        return Case(model, load + np.array([0.0, 0.0, preload, 0.0, 0.0]), given, rated)
+
+    return sweep(scene, case_at, preloads, "a preload of", "N")
+
+
+def over_clearance(
+    scene: SingleRowScene, clearances: Sequence[float], capacities: Capacities = reference_capacities
+) -> Sweep:
+    """Sweep of the diametral clearance [m] with everything else as in the scene; raises ValueError as ``sweep``."""
+
+    def case_at(clearance: float) -> Case:
+        changed = with_clearance(scene, clearance)
+        return Case(row_of(changed), load_of(changed), given_of(changed), capacities(changed.bearing))
+
+    return sweep(scene, case_at, clearances, "a clearance of", "um", 1e6)
+
+
+def over_wear(
+    scene: SingleRowScene, wears: Sequence[float], capacities: Capacities = reference_capacities
+) -> Sweep:
+    """Sweep of the diameter that every ball has lost [m]; raises ValueError as ``sweep`` and ``worn``."""
+
+    def case_at(wear: float) -> Case:
+        changed = worn(scene, wear)
+        return Case(row_of(changed), load_of(changed), given_of(changed), capacities(changed.bearing))
+
+    return sweep(scene, case_at, wears, "a wear of", "um", 1e6)
+
+
+def clearance_of(drawing: BallRow) -> float:
+    """Diametral clearance of a row [m], given or from its contact angle: 2 B (1 - cos alpha_0)."""
+    if drawing.radial_clearance_mm is not None:
+        return 1e-3 * drawing.radial_clearance_mm
+    return 2e-3 * drawing.groove_centre_distance_mm * (1.0 - math.cos(drawing.contact_angle))
+
+
+def with_clearance(scene: SingleRowScene, clearance: float) -> SingleRowScene:
+    """The scene with a diametral clearance [m] in place of its contact angle."""
+    return _redrawn(scene, radial_clearance_mm=1e3 * clearance)
+
+
+def worn(scene: SingleRowScene, wear: float) -> SingleRowScene:
+    """The scene with balls that have lost ``wear`` of their diameter [m], evenly; the grooves keep their radii.
+
+    The diametral clearance grows by twice the wear, the groove factors as 1/D, and with both the contact angle.
+    Raises ValueError for a wear that is negative or leaves no ball.
+    """
+    drawing = scene.bearing
+    diameter = drawing.ball_diameter_mm - 1e3 * wear
+    if not wear >= 0.0 or not diameter > 0.0:
+        raise ValueError(f"wear {wear:g} m must lie between 0 and the ball's diameter")
+    grown = drawing.ball_diameter_mm / diameter
+    return _redrawn(
+        scene,
+        ball_diameter_mm=diameter,
+        inner_groove_factor=drawing.inner_groove_factor * grown,
+        outer_groove_factor=drawing.outer_groove_factor * grown,
+        radial_clearance_mm=1e3 * (clearance_of(drawing) + 2.0 * wear),
+    )
+
+
+def _redrawn(scene: SingleRowScene, **changes: float) -> SingleRowScene:
+    bearing = {**scene.bearing.model_dump(), "contact_angle_deg": None, **changes}
+    return type(scene).model_validate({**scene.model_dump(), "bearing": bearing})
