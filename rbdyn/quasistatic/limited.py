@@ -55,6 +55,6 @@ def solve(
     free[system.free] = 1.0
     found = _within(CommonCage(0.0), control, row, system.load, free, limit, q, balls, at, counts)
     u = unknowns(system, q, balls)
-    worst, largest = evaluate(control, system, u, np.zeros(system.size), np.zeros((system.size, system.size)))
-    status = "ok" if worst <= ACCEPTED * largest else f"not converged in {limit} steps"
+    worst, _ = evaluate(control, system, u, np.zeros(system.size), np.zeros((system.size, system.size)))
+    status = OK if found else f"not converged in {limit} steps"
     return solution_at(control, system, u, status, int(counts[STEPS]), int(counts[ASSEMBLIES]), worst)

@@ -227,7 +227,16 @@ def bound(row: Any, step: Any, at: Any, furthest: float) -> float:
 
 @routine
 def march(
-    control: Any, strength: float, limit: int, row: Any, load: Any, free: Any, q: Any, balls: Any, at: Any, counts: Any
+    control: Any,
+    strength: float,
+    limit: int,
+    row: Any,
+    load: Any,
+    free: Any,
+    q: Any,
+    balls: Any,
+    at: Any,
+    counts: Any,
 ) -> bool:
     """Newton's method with whole steps, bounded in angle, that need not improve at once; whether it ends in an equilibrium.
 
