@@ -18,6 +18,10 @@ def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
         return
     for name in ("inner", "outer") if "inner" in record else ("",):
         _print_row(f"{name} row" if name else "", record[name] if name else record, verbose)
+    if "middle_ring" in record:
+        _print_middle_ring(record)
+    if "fits" in record:
+        _print_fits(record["fits"])
     if not quiet:
         for note in record.get("notes", ()):
             print(f"note: {note}")
@@ -73,3 +77,25 @@ def _print_row(title: str, record: dict[str, Any], verbose: bool) -> None:
             ],
         )
         print(f"{record['iterations']} Newton steps, {record['residual_N']:.2g} N left over")
+
+
+def _print_middle_ring(record: dict[str, Any]) -> None:
+    middle, place, stiffness = record["middle_ring"], record["displacement_mm"], record["stiffness"]
+    share = "" if middle["speed_share"] is None else f", {100.0 * middle['speed_share']:.4g} % of the speed"
+    print(f"middle ring: {middle['speed_rpm']:.5g} rpm{share} ({middle['speed_status']})")
+    print(
+        "both rows: "
+        + ", ".join(f"{axis} {1e3 * place[axis]:.4g} um" for axis in "xyz")
+        + "; stiffness "
+        + ", ".join(f"{axis} {stiffness[f'{axis}_N_per_um']:.4g} N/um" for axis in "xyz")
+    )
+
+
+def _print_fits(fits: dict[str, Any]) -> None:
+    loosens = fits["inner_ring_loosens_rpm"]
+    state = "loose" if fits["inner_ring_loose"] else "tight"
+    when = "at no speed" if loosens is None else f"at {loosens:.4g} rpm"
+    print(
+        f"fits: {fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the housing; the inner "
+        f"ring is {state}, rotation loosens it {when}"
+    )

@@ -7,7 +7,7 @@ Radii are of the drawing; growths are radial, clearances and interferences diame
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rbdyn.materials import Material
 
@@ -83,6 +83,23 @@ def interface_pressure(inner: Ring, outer: Ring, interference: float) -> float:
     overlap = 0.5 * interference + inner.growth(radius) - outer.growth(radius)
     compliance = outer.pressure_growth(radius, inside=1.0) - inner.pressure_growth(radius, outside=1.0)
     return max(overlap / compliance, 0.0)
+
+
+def loosening_speed(inner: Ring, outer: Ring, interference: float) -> float:
+    """Speed [rad/s] of both rings together at which their fit comes loose, whatever speeds they have themselves.
+
+    Rotation widens the outer more: overlap at rest = (difference of the growths at 1 rad/s) times speed^2. 0 where the
+    fit is loose at rest, infinite where the inner ring grows as much as the outer. Raises ValueError as
+    ``interface_pressure``.
+    """
+    if interface_pressure(replace(inner, speed=0.0), replace(outer, speed=0.0), interference) == 0.0:
+        return 0.0
+    radius = outer.inner_radius
+    overlap = 0.5 * interference + inner.thermal_growth(radius) - outer.thermal_growth(radius)
+    opening = replace(outer, speed=1.0).rotation_growth(radius) - replace(inner, speed=1.0).rotation_growth(
+        radius
+    )
+    return math.sqrt(overlap / opening) if opening > 0.0 else math.inf
 
 
 @dataclass(frozen=True)

@@ -298,14 +298,9 @@ def test_command_line_refuses_studies_of_the_other_kind(command, arguments, told
     assert told in ended.stderr
 
 
-def test_unit_two_rows_are_refused(tmp_path):
-    row = Scene.load(BALLS).bearing.model_dump(exclude={"kind"}, exclude_none=True)
-    outer = {**row, "pitch_diameter_mm": 80.0}
-    scene = BallScene.from_dict(
-        {
-            "bearing": {"kind": "double_decker_ball", "inner": row, "outer": outer},
-            "operation": {"axial_load_N": 100.0},
-        }
-    )
+def test_unit_two_rows_are_refused():
+    file = ROOT / "examples" / "double_decker.toml"
     with pytest.raises(InputError, match="take one of its rows"):
-        ball_solvers.study(scene)
+        ball_solvers.study(BallScene.load(file))
+    with pytest.raises(InputError, match="model.solver = 'newton': solves one row"):
+        BallScene.load(file, ["model.solver=newton"])

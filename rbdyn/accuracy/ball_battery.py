@@ -1,6 +1,6 @@
 """Every solver over the battery of random scenes (``rbdyn.quasistatic.battery``): how many it solves, how fast.
 
-The scene gives materials, gyroscopic moment and light load share; all else is the battery's. The slow solvers see only the
+The scene gives materials, gyroscopic moment, friction limit and light load share; all else is the battery's. The slow solvers see only the
 first so many scenes. Times are of the second of two calls from Python, those of MINPACK's and the search's of one.
 """
 
@@ -25,6 +25,8 @@ FORMAT = "rbdyn.accuracy.battery/1"
 SLOW = {"MINPACK LM": 500, "finite search": 500}
 FAST = ("convex", "plain Newton")
 OURS = "convex"
+# What the battery takes of the scene's model.
+MODEL = ("gyroscopic", "light_load_share", "friction_limit")
 # Balls whose loads differ by more than this share of the largest are in another equilibrium.
 SAME = 1e-6
 
@@ -42,9 +44,7 @@ def study(
     scene: BallScene, progress: Callable[[int, int], None] | None = None, scenes: int = SCENES
 ) -> Report:
     """``rbdyn accuracy --battery``, its first ``scenes`` scenes."""
-    drawn = cases(
-        scenes, SEED, gyroscopic=scene.model.gyroscopic, light_load_share=scene.model.light_load_share
-    )
+    drawn = cases(scenes, SEED, **{key: getattr(scene.model, key) for key in MODEL})
     ball, rings = scene.material("ball"), scene.material("inner_ring")
     problems = [posed(case, ball, rings) for case in drawn]
     sizes = {name: min(SLOW.get(name, scenes), scenes) for name in WHOLE}

@@ -20,8 +20,8 @@ from rbdyn.quasistatic.control import CommonCage, FixedShare, FrictionShare
 
 # Share of the friction limit up to which a contact holds all of a gyroscopic moment.
 STICKING = 0.8
-# Share of blend_load up to which race control would change no digit; angles may then be such that it is singular.
-CLEAR = 1e-9
+# Cosine of the inner angle below which a ball begins to lie across the groove, where rolling on both races ends: 78 deg.
+ACROSS = 0.2
 
 
 @kernel
@@ -49,6 +49,13 @@ def tangent(load: float, normal: float, inverse: float, s: float, c: float) -> t
     """Derivative of a contact's force by the place of its end: axial/axial, axial/radial, radial/radial [N/m]."""
     side = load * inverse
     return side + (normal - side) * s * s, (normal - side) * s * c, side + (normal - side) * c * c
+
+
+@kernel
+def gradually(part: float) -> tuple[float, float]:
+    """From 0 at 0 to 1 at 1 with no slope at either end, and the slope."""
+    part = min(part, 1.0)
+    return part * part * (3.0 - 2.0 * part), 6.0 * part * (1.0 - part)
 
 
 @kernel
@@ -142,7 +149,7 @@ def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
     aa, ar, rr = tangent(qi, ki, one_i, si, ci)
     oaa, oar, orr = tangent(qo, ko, one_o, so, co)
     spinning = control.spinning
-    if qi <= CLEAR * spinning.blend_load or qo <= 0.0:
+    if qi <= 0.0 or qo <= 0.0 or ci <= 0.0:
         pull = row.centrifugal_force
         return (
             (qi * si - qo * so, qi * ci - qo * co + pull),
@@ -156,25 +163,28 @@ def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
         )
     share, share_i, share_o = spin_share(control, di, do)
     (f, f_i, f_o, f_s), (m, m_i, m_o, m_s) = orbit_and_spin(spinning, share, ci, si, co, so)
-    # A lightly loaded ball goes with the cage; from blend_load on the race control alone rules.
-    part = min(qi / spinning.blend_load, 1.0)
-    follow = strength * part * part * (3.0 - 2.0 * part)
-    follow_d = strength * 6.0 * part * (1.0 - part) / spinning.blend_load * ki
+    # A lightly loaded ball, or one across the groove, goes with the cage; otherwise the race control alone rules.
+    loaded, loaded_q = gradually(qi / spinning.blend_load)
+    level, level_c = gradually(ci / ACROSS)
+    follow = strength * loaded * level
+    follow_d = strength * level * loaded_q / spinning.blend_load * ki
+    follow_a = -strength * loaded * level_c / ACROSS * si
     beyond = f - row.centrifugal_force
     pull = row.centrifugal_force + follow * beyond
     moment = follow * m
     by_diameter = 2.0 / spinning.ball_diameter
     ti, to = share * moment * by_diameter, (1.0 - share) * moment * by_diameter
     # By inner angle, outer angle, inner deflection, outer deflection.
-    pull_1, pull_2 = follow * f_i, follow * f_o
+    pull_1, pull_2 = follow * f_i + follow_a * beyond, follow * f_o
     pull_3, pull_4 = follow_d * beyond + follow * f_s * share_i, follow * f_s * share_o
     in_share = m * share * by_diameter
     out_share = m * (1.0 - share) * by_diameter
     grow_i = (m_s * share + m) * by_diameter
     grow_o = (m_s * (1.0 - share) - m) * by_diameter
-    ti_1, ti_2 = follow * m_i * share * by_diameter, follow * m_o * share * by_diameter
+    ti_1, ti_2 = follow * m_i * share * by_diameter + follow_a * in_share, follow * m_o * share * by_diameter
     ti_3, ti_4 = follow_d * in_share + follow * grow_i * share_i, follow * grow_i * share_o
-    to_1, to_2 = follow * m_i * (1.0 - share) * by_diameter, follow * m_o * (1.0 - share) * by_diameter
+    to_1 = follow * m_i * (1.0 - share) * by_diameter + follow_a * out_share
+    to_2 = follow * m_o * (1.0 - share) * by_diameter
     to_3, to_4 = follow_d * out_share + follow * grow_o * share_i, follow * grow_o * share_o
     # A contact holds no more than friction allows.
     held_i, slope_i, by_load_i = held(ti, spinning.friction * qi)

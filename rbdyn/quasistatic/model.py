@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from rbdyn.contact.hertz_point import PointContact, ball_on_race
 from rbdyn.materials import Material, equivalent_modulus
 from rbdyn.quasistatic.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.growth_model import row_change
+from rbdyn.quasistatic.ring_growth import UNCHANGED, GrooveChange
 from rbdyn.quasistatic.row import Row, rest_deflection
 from rbdyn.scene.ball import BallModel, BallRow, BallScene, SingleRowScene
 
@@ -55,11 +57,11 @@ def row_model(
     outer: Material,
     inner_speed: float,
     outer_speed: float,
-    growth: float = 0.0,
+    change: GrooveChange = UNCHANGED,
 ) -> RowModel:
     """One row of balls between two rings that turn at ``inner_speed`` and ``outer_speed`` [rad/s].
 
-    ``growth``: of the inner race's radius less that of the outer's, by rotation, fits and temperature [m].
+    ``change``: of the grooves by rotation, fits and temperature.
     """
     z = drawing.balls
     azimuth = 2.0 * math.pi * np.arange(z) / z
@@ -73,9 +75,9 @@ def row_model(
         cosine=np.cos(azimuth),
         sine=np.sin(azimuth),
         axial=np.full(z, between * math.sin(angle)),
-        radial=np.full(z, between * math.cos(angle) + drawing.interference_m + growth),
-        inner_reach=np.full(z, (drawing.inner_groove_factor - 0.5) * diameter),
-        outer_reach=np.full(z, (drawing.outer_groove_factor - 0.5) * diameter),
+        radial=np.full(z, between * math.cos(angle) + drawing.interference_m + change.radial),
+        inner_reach=np.full(z, (drawing.inner_groove_factor - 0.5) * diameter + change.inner_reach),
+        outer_reach=np.full(z, (drawing.outer_groove_factor - 0.5) * diameter + change.outer_reach),
         inner_stiffness=to_inner.stiffness,
         outer_stiffness=to_outer.stiffness,
         lever=0.5 * pitch + (drawing.inner_groove_factor - 0.5) * diameter * math.cos(angle),
@@ -112,8 +114,8 @@ def control_of(
     return FixedShare(INNER_SHARE[model.raceway_control], spinning)
 
 
-def row_of(scene: SingleRowScene, growth: float = 0.0) -> RowModel:
-    """The row of a single-row scene; ``growth`` as in ``row_model``."""
+def row_of(scene: SingleRowScene) -> RowModel:
+    """The row of a single-row scene, its rings grown as far as the scene asks for."""
     operation = scene.operation
     return row_model(
         scene.bearing,
@@ -123,7 +125,7 @@ def row_of(scene: SingleRowScene, growth: float = 0.0) -> RowModel:
         scene.material("outer_ring"),
         operation.inner_speed_rpm * RPM,
         operation.outer_speed_rpm * RPM,
-        growth,
+        row_change(scene),
     )
 
 

@@ -9,10 +9,12 @@ from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
 from rbdyn.materials import Material
+from rbdyn.scene.ball_rings import ring_faults
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
 from rbdyn.scene.fields import Positive, or_refuse
+from rbdyn.scene.form_errors import FormErrors, faults
 from rbdyn.scene.lubricant import Lubricant
-from rbdyn.scene.mounting import material_of
+from rbdyn.scene.mounting import Mounting, material_of
 from rbdyn.scene.operation import Speed
 from rbdyn.scene.reading import SceneFile
 
@@ -44,6 +46,8 @@ class BallRow(Strict):
     clearance_change_um: Annotated[float, Field(ge=-2000.0, le=2000.0)] = 0.0
     # Basic dynamic capacity of the catalogue; by ISO 281 from the dimensions where left out.
     dynamic_capacity_N: Positive | None = None  # noqa: N815
+    # Load at which the most loaded ball has a pressure of 4200 MPa (ISO 76); by Hertz from the dimensions where left out.
+    static_capacity_N: Positive | None = None  # noqa: N815
     # Bore of the inner and outside diameter of the outer ring: only for the growth of rotating rings.
     bore_mm: Positive | None = None
     outside_diameter_mm: Positive | None = None
@@ -120,6 +124,12 @@ class BallRow(Strict):
         return math.acos(min(1.0 - self.radial_clearance_mm / (2.0 * self.groove_centre_distance_mm), 1.0))
 
     @property
+    def raceway_diameters_mm(self) -> tuple[float, float]:
+        """Circles on which balls touch both races at the unloaded contact angle."""
+        reach = self.ball_diameter_mm * math.cos(self.contact_angle)
+        return self.pitch_diameter_mm - reach, self.pitch_diameter_mm + reach
+
+    @property
     def interference_m(self) -> float:
         """What the inner groove is pushed outward by interference and mounting, radially [m]; negative with clearance."""
         given = self.radial_clearance_mm or 0.0
@@ -132,12 +142,44 @@ class BallBearing(BallRow):
     kind: Literal["angular_contact_ball", "deep_groove_ball"]
 
 
+class MiddleRing(Strict):
+    """The ring between the rows of a double-decker bearing: it floats, and only friction turns it."""
+
+    # Its speed, where it is known; otherwise by speed_split.
+    speed_rpm: Speed | None = None
+    # "oil": rows of equal oil friction (Hu et al., eq 13); "torque_balance": oil and load after Palmgren; needs [lubricant].
+    speed_split: Literal["oil", "torque_balance"] = "oil"
+    # Palmgren's f0 of each row: oil mist 1.7, grease 2, oil bath 3.3, oil jet 6.6 as commonly cited.
+    inner_oil_factor: Positive = 3.3
+    outer_oil_factor: Positive = 3.3
+    # fixed: it stays square to the outer ring; as operation.tilt where left out.
+    tilt: Literal["free", "fixed"] | None = None
+    # Axial distance of the inner row's ball plane from the outer row's, the bearing unloaded.
+    axial_offset_mm: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
+
+
 class DoubleDecker(Strict):
     """Two rows one inside the other; the ring between them floats."""
 
     kind: Literal["double_decker_ball"]
     inner: BallRow
     outer: BallRow
+    middle: MiddleRing = MiddleRing()
+
+    @model_validator(mode="after")
+    def _nests(self) -> DoubleDecker:
+        below, above = self.inner.raceway_diameters_mm[1], self.outer.raceway_diameters_mm[0]
+        if below < above:
+            return self
+        raise ValueError(
+            f"bearing.outer.pitch_diameter_mm = {self.outer.pitch_diameter_mm:g}: leaves no middle ring between raceways of "
+            f"{below:.4g} and {above:.4g} mm; make it larger, or the inner row smaller"
+        )
+
+    @property
+    def raceway_diameters_mm(self) -> tuple[float, float]:
+        """Race of the inner ring and race of the outer ring."""
+        return self.inner.raceway_diameters_mm[0], self.outer.raceway_diameters_mm[1]
 
 
 class Prescribed(Strict):
@@ -270,6 +312,13 @@ class BallScene(SceneFile):
     model: BallModel = BallModel()
     materials: BallMaterials = BallMaterials()
     lubricant: Lubricant | None = None
+    # What ``quasistatic.runout_model.follow_ring`` follows; ``rbdyn.equilibrium`` is that of the perfect bearing.
+    errors: FormErrors | None = None
+    mounting: Mounting | None = None
+
+    @model_validator(mode="after")
+    def _rings_known(self) -> Self:
+        return or_refuse(self, ring_faults(self))
 
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:
@@ -288,8 +337,26 @@ class SingleRowScene(BallScene):
 
     bearing: BallBearing
 
+    @model_validator(mode="after")
+    def _errors_fit(self) -> SingleRowScene:
+        row = self.bearing
+        if self.errors is None:
+            return self
+        return or_refuse(self, faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm))
+
 
 class DoubleDeckerScene(BallScene):
     """A scene of two rows one inside the other."""
 
     bearing: DoubleDecker
+
+    @model_validator(mode="after")
+    def _solvable(self) -> DoubleDeckerScene:
+        found = []
+        if self.errors is not None:
+            found.append("errors: form errors are followed for one row of balls only; take the table away")
+        if self.model.solver != "convex":
+            found.append(
+                f"model.solver = {self.model.solver!r}: solves one row of balls only; leave it out for two"
+            )
+        return or_refuse(self, found)

@@ -61,6 +61,17 @@ class Bearing(Strict):
     # Inner ring with its share of the shaft: 1 to 5 kg for a main shaft of this size.
     inner_ring_mass_kg: Annotated[float, Field(gt=0.0, le=1e5)] = 1.0
 
+    @property
+    def raceway_diameters_mm(self) -> tuple[float, float]:
+        """Inner and outer raceway at the pitch diameter less and plus one roller.
+
+        Their share of the clearance is left out: it would change a ring's growth by some 1e-3 of itself.
+        """
+        return (
+            self.pitch_diameter_mm - self.roller_diameter_mm,
+            self.pitch_diameter_mm + self.roller_diameter_mm,
+        )
+
     @model_validator(mode="after")
     def _fits(self) -> Bearing:
         faults = []

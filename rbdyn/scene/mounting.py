@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Protocol
 
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
 from rbdyn.materials import MATERIALS, Material
-from rbdyn.scene.bearing import Bearing, CustomMaterial, MaterialName
+from rbdyn.scene.bearing import CustomMaterial, MaterialName
 from rbdyn.scene.fields import NonNegative, Positive, or_refuse
 
 Celsius = Annotated[float, Field(ge=-200.0, le=1000.0)]
 # Beyond this share of its diameter a fit is a slip of the unit: a heavy press fit has a thousandth.
 LARGEST_FIT = 0.005
+
+
+class Raceways(Protocol):
+    """A bearing that can be mounted: of rollers or of balls."""
+
+    @property
+    def raceway_diameters_mm(self) -> tuple[float, float]:
+        """Diameters of inner and outer raceway where the rolling elements touch."""
 
 
 class Mounting(Strict):
@@ -36,7 +44,7 @@ class Mounting(Strict):
     # Both rings at the reference temperature unless given.
     inner_ring_temperature_C: Celsius | None = None  # noqa: N815
     outer_ring_temperature_C: Celsius | None = None  # noqa: N815
-    # The mean of the rings unless given.
+    # Of rollers or balls; the mean of the rings unless given.
     roller_temperature_C: Celsius | None = None  # noqa: N815
     # As their rings unless given.
     shaft_temperature_C: Celsius | None = None  # noqa: N815
@@ -77,10 +85,9 @@ class Mounting(Strict):
         return or_refuse(self, faults)
 
 
-def faults(mounting: Mounting, bearing: Bearing) -> list[str]:
+def faults(mounting: Mounting, bearing: Raceways) -> list[str]:
     """One sentence for each way in which the mounting does not suit the bearing."""
-    inner = bearing.pitch_diameter_mm - bearing.roller_diameter_mm
-    outer = bearing.pitch_diameter_mm + bearing.roller_diameter_mm
+    inner, outer = bearing.raceway_diameters_mm
     found = []
     if mounting.bore_mm >= inner:
         found.append(

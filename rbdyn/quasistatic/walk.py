@@ -1,0 +1,64 @@
+"""Equilibrium at every step of a path of balls, each from the one before: the compiled loop."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rbdyn.kernel import entry
+from rbdyn.quasistatic.newton import ASSEMBLIES, CONVERGED, STEPS, find, unbalance
+from rbdyn.quasistatic.place import groove_centre
+from rbdyn.quasistatic.ring import RING
+
+# What a walk counts: Newton steps and evaluations of all balls.
+WALKED = 2
+# Columns of what it tells of a step.
+LARGEST_LOAD, RESIDUAL, TOLD = range(3)
+
+
+@entry
+def walk(
+    cage: Any,
+    control: Any,
+    row: Any,
+    load: Any,
+    free: Any,
+    changes: Any,
+    q: Any,
+    balls: Any,
+    at: Any,
+    counts: Any,
+    path: Any,
+    told: Any,
+    walked: Any,
+) -> int:
+    """Fill ``path`` (steps, 5) and ``told`` (steps, TOLD); returns how many steps found their equilibrium.
+
+    ``row`` is written over: ``changes`` holds its six arrays at each step, (6, steps, Z) in the order of ``Row``. ``load``
+    and ``q`` count tilts over the lever, ``free, balls, at, counts`` are as of ``newton.find``.
+    """
+    steps, size = path.shape[0], row.cosine.size
+    for step in range(steps):
+        for j in range(size):
+            row.cosine[j], row.sine[j] = changes[0, step, j], changes[1, step, j]
+            row.axial[j], row.radial[j] = changes[2, step, j], changes[3, step, j]
+            row.inner_reach[j], row.outer_reach[j] = changes[4, step, j], changes[5, step, j]
+        counts[:] = 0
+        outcome = find(cage, control, row, load, free, step > 0, q, balls, at, counts)
+        walked[0] += counts[STEPS]
+        walked[1] += counts[ASSEMBLIES]
+        if outcome != CONVERGED:
+            return step
+        for i in range(RING):
+            path[step, i] = q[i]
+        largest = row.centrifugal_force
+        for j in range(size):
+            a_axial, a_radial = groove_centre(row, q, j)
+            x, y = balls[j, 0], balls[j, 1]
+            inner = math.sqrt((a_axial - x) ** 2 + (a_radial - y) ** 2) - row.inner_reach[j]
+            outer = math.sqrt(x * x + y * y) - row.outer_reach[j]
+            largest = max(largest, row.inner_stiffness * max(inner, 0.0) ** 1.5)
+            largest = max(largest, row.outer_stiffness * max(outer, 0.0) ** 1.5)
+        told[step, LARGEST_LOAD] = largest
+        _, told[step, RESIDUAL] = unbalance(load, free, at.sums)
+    return steps

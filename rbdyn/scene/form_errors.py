@@ -1,0 +1,136 @@
+"""Form errors of a ball bearing: grooves and balls as measured, or drawn by a seed."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from rbdyn.faults import Strict
+from rbdyn.scene.bearing import Harmonic
+from rbdyn.scene.fields import NonNegative, or_refuse
+
+Order = Annotated[int, Field(ge=1, le=2000)]
+# Beyond this share of the ball it is no form error but a slip of the unit.
+LARGEST_ERROR = 0.01
+
+
+class RandomWaviness(Strict):
+    """Orders ``lowest_order`` to ``highest_order`` in random phases, ``height_um`` from peak to valley together.
+
+    Amplitudes fall as order^-decay on the average. Ground raceways: between 1 and 2.
+    """
+
+    lowest_order: Order = 1
+    highest_order: Order
+    height_um: Annotated[float, Field(gt=0.0, le=500.0)]
+    decay: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
+
+
+class BallHarmonic(Strict):
+    """One harmonic of the sphericity of balls, from order 2: order 1 is no form."""
+
+    order: Annotated[int, Field(ge=2, le=2000)]
+    amplitude_um: Annotated[float, Field(ge=-500.0, le=500.0)]
+    # Drawn for each ball by errors.seed where left out.
+    phase_deg: float | None = None
+    # Numbers of the balls that have it, from 1; every ball where left out.
+    balls: list[Annotated[int, Field(ge=1)]] | None = None
+
+
+class FormErrors(Strict):
+    """Form errors of grooves and balls, and how finely and how long the turning ring is followed.
+
+    Each error of a groove is given by its harmonics, drawn at random, or both added. Roundness is radial, side-sway
+    axial (order 1 proper, others are axial waviness), groove radius the width of the groove at a fixed bottom.
+    """
+
+    inner_roundness: list[Harmonic] = []
+    outer_roundness: list[Harmonic] = []
+    inner_side_sway: list[Harmonic] = []
+    outer_side_sway: list[Harmonic] = []
+    inner_groove_radius: list[Harmonic] = []
+    outer_groove_radius: list[Harmonic] = []
+    inner_roundness_random: RandomWaviness | None = None
+    outer_roundness_random: RandomWaviness | None = None
+    inner_side_sway_random: RandomWaviness | None = None
+    outer_side_sway_random: RandomWaviness | None = None
+    inner_groove_radius_random: RandomWaviness | None = None
+    outer_groove_radius_random: RandomWaviness | None = None
+    ball_sphericity: list[BallHarmonic] = []
+    # Each ball's diameter less the nominal one; or the standard deviation of a seeded normal spread.
+    ball_diameter_errors_um: list[float] | None = None
+    ball_diameter_spread_um: NonNegative = 0.0
+    seed: Annotated[int, Field(ge=0)] = 1
+    # Steps to a turn of the inner ring against the outer; turns, since the cage does not come round with the ring.
+    steps: Annotated[int, Field(ge=8, le=100_000)] = 360
+    turns: Annotated[int, Field(ge=1, le=10_000)] = 8
+
+    @model_validator(mode="after")
+    def _sensible(self) -> FormErrors:
+        faults = []
+        for key in GROOVES:
+            drawn = getattr(self, f"{key}_random")
+            if drawn is not None and drawn.lowest_order > drawn.highest_order:
+                faults.append(
+                    f"errors.{key}_random.lowest_order = {drawn.lowest_order}: above highest_order = "
+                    f"{drawn.highest_order}; swap them"
+                )
+        if self.ball_diameter_errors_um is not None and self.ball_diameter_spread_um > 0.0:
+            faults.append(
+                "errors.ball_diameter_errors_um and errors.ball_diameter_spread_um contradict each other: give the "
+                "errors or their spread, not both"
+            )
+        highest = self.highest_order
+        if 2 * highest >= self.steps:
+            faults.append(
+                f"errors.steps = {self.steps}: too few to show order {highest}, which needs more than two steps a "
+                f"wave; take at least {2 * highest + 1}"
+            )
+        return or_refuse(self, faults)
+
+    @property
+    def highest_order(self) -> int:
+        """Highest order of a groove; 0 where all are perfect."""
+        given = [wave.order for key in GROOVES for wave in getattr(self, key)]
+        drawn = [getattr(self, f"{key}_random") for key in GROOVES]
+        return max(given + [wave.highest_order for wave in drawn if wave is not None], default=0)
+
+
+GROOVES = (
+    "inner_roundness",
+    "outer_roundness",
+    "inner_side_sway",
+    "outer_side_sway",
+    "inner_groove_radius",
+    "outer_groove_radius",
+)
+
+
+def faults(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diameter_mm: float) -> list[str]:
+    """What does not go with a row of ``balls`` on a pitch circle, one sentence each."""
+    found = []
+    given = errors.ball_diameter_errors_um
+    if given is not None and len(given) != balls:
+        found.append(
+            f"errors.ball_diameter_errors_um: {len(given)} values for {balls} balls; give one a ball"
+        )
+    limit = LARGEST_ERROR * ball_diameter_mm * 1e3
+    if any(abs(error) > limit for error in given or []) or errors.ball_diameter_spread_um > limit:
+        found.append(f"errors: ball diameters beyond {limit:g} um, a hundredth of the ball; give micrometres")
+    for number, harmonic in enumerate(errors.ball_sphericity, 1):
+        alien = [ball for ball in harmonic.balls or [] if ball > balls]
+        if alien:
+            found.append(
+                f"errors.ball_sphericity[{number}].balls: ball {alien[0]} of {balls}; balls count from 1 to {balls}"
+            )
+    # A ball spins dm/(2 D) times a turn, or a little less.
+    fastest = (
+        max((wave.order for wave in errors.ball_sphericity), default=0) * pitch_diameter_mm / ball_diameter_mm
+    )
+    if fastest >= errors.steps:
+        found.append(
+            f"errors.steps = {errors.steps}: too few to show errors.ball_sphericity on balls that spin "
+            f"{0.5 * pitch_diameter_mm / ball_diameter_mm:.3g} times a turn; take at least {int(fastest) + 1}"
+        )
+    return found
