@@ -12,7 +12,7 @@ from rbdyn.terminal import FAILED, guarded, output_folder, print_json, print_tab
 
 if TYPE_CHECKING:
     from rbdyn.result import SimulationResult
-    from rbdyn.scene import BallScene, Scene
+    from rbdyn.scene import Scene
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -162,12 +162,13 @@ def accuracy(
             "scaling": scaling,
             "battery": battery,
         }
+        from rbdyn.accuracy.asked import asked_study
         from rbdyn.scene import Scene
 
         loaded = Scene.load(scene, assignments or [])
-        limits = {"turns": trajectory, "scenes": scenes}
-        limits = {key: value for key, value in limits.items() if value is not None}
-        name = _study(asked, limits, loaded)
+        given = {"turns": trajectory, "scenes": scenes}
+        limits = {key: value for key, value in given.items() if value is not None}
+        name = asked_study(asked, limits, loaded)
         folder = output_folder(out) if out else None
         with progress_bar(name, quiet or as_json) as progress:
             found = studies.study(name, loaded, progress, **limits)
@@ -180,35 +181,6 @@ def accuracy(
                 print(f"written to {folder}: {', '.join(files)}")
     if found.failed:
         raise typer.Exit(FAILED)
-
-
-def _study(asked: dict[str, bool], limits: dict[str, Any], scene: Scene | BallScene) -> str:
-    """Name of the one study asked for. Raises InputError for two, for one of another kind of bearing, and for limits that
-    the study does not know."""
-    from rbdyn.accuracy import BALL_STUDIES
-    from rbdyn.faults import InputError
-    from rbdyn.scene.ball import BallScene as Balls
-
-    chosen = [name for name, wished in asked.items() if wished]
-    flags = " and ".join(f"--{name}" for name in chosen)
-    if len(chosen) > 1:
-        raise InputError([f"{flags}: are studies of their own; choose one"])
-    balls = isinstance(scene, Balls)
-    name = chosen[0] if chosen else ("solvers" if balls else "tolerances")
-    if balls and name not in BALL_STUDIES:
-        raise InputError(
-            [f"{flags}: studies roller bearings in time; leave it out for {scene.bearing.kind!r}"]
-        )
-    if not balls and name in BALL_STUDIES:
-        raise InputError([f"{flags}: studies ball bearings; leave it out for {scene.bearing.kind!r}"])
-    shown = flags or "this study of " + scene.bearing.kind
-    if "turns" in limits and name not in ("tolerances", "methods"):
-        raise InputError(
-            [f"--trajectory {limits['turns']:g}: {shown} integrates no trajectories; leave it out"]
-        )
-    if "scenes" in limits and name != "battery":
-        raise InputError([f"--scenes {limits['scenes']}: goes with --battery only; leave it out"])
-    return name
 
 
 @app.command("map")

@@ -302,5 +302,5 @@ def test_unit_two_rows_are_refused():
     file = ROOT / "examples" / "double_decker.toml"
     with pytest.raises(InputError, match="take one of its rows"):
         ball_solvers.study(BallScene.load(file))
-    with pytest.raises(InputError, match="model.solver = 'newton': solves one row"):
+    with pytest.raises(InputError, match=r"model\.solver = 'newton': solves one row"):
         BallScene.load(file, ["model.solver=newton"])

@@ -75,6 +75,8 @@ def study(
             success_table("convex solver, by load", _some(by_load), "load"),
             _steps_table(ours),
             success_table(_title(sizes, scenes), _some(solvers)),
+            _share_table("solved by load", LOADS, runs, lambda case: case.load),
+            _share_table("solved by raceway control", CONTROLS, runs, lambda case: case.control),
         ),
         sentences=(
             *causes(_some(solvers)),
@@ -160,6 +162,20 @@ def _steps_table(runs: Sequence[Run]) -> Table:
     return Table(
         "Newton steps of the convex solver", ("control", "median", "99 %", "most", "continued"), cells
     )
+
+
+def _share_table(
+    title: str, kinds: Sequence[str], runs: dict[str, list[Run]], kind_of: Callable[[Case], str]
+) -> Table:
+    """Share that each solver solves of the scenes of each kind."""
+    cells = []
+    for kind in kinds:
+        line = [kind]
+        for found in runs.values():
+            solved = [r.solution.found for r in found if kind_of(r.case) == kind]
+            line.append(f"{100.0 * np.mean(solved):.1f} %" if solved else "")
+        cells.append(line)
+    return Table(title, ("", *runs), cells)
 
 
 def _title(sizes: dict[str, int], scenes: int) -> str:

@@ -9,7 +9,8 @@ and then outward along the tangent's perpendicular. The ring always starts undis
 How far a search goes at a time is not in the paper. Here a step is a share of the radius of O1, 0.1: one step along the
 tangent turns the outer contact angle by 0.1 rad, and ten sweep all that speed can do to one of up to 45 deg.
 
-Where the circles touch neither contact is loaded: the Jacobian is zero there and the first search never leads anywhere.
+Where the circles touch neither contact is loaded: unless interference or a prescribed displacement presses the rings
+together, the Jacobian is zero there and the first search leads nowhere.
 
 Rule a asks that all deflections end above 0. As printed it refuses equilibria in which some balls are unloaded, which
 are lawful: a ball that only its centrifugal force holds, or none. They are accepted unless ``strict``.
