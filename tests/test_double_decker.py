@@ -295,13 +295,15 @@ def test_oracle_load_on_middle_ring_by_the_balance_of_each_ball(control):
     _, found = solved(scene_of("operation.inner_speed_rpm=40000.0", "model.raceway_control='common_cage'"))
     row, rule = model.stack.inner
     forces, moments, expected = [], [], np.zeros(3)
-    for j, (x, y) in enumerate(found.inner.balls):
+    for j, ((x, y), depths) in enumerate(zip(found.inner.balls, found.inner.depths, strict=True)):
         c, s = row.cosine[j], row.sine[j]
         place = (
             row.axial[j] + found.inner.displacement[2],
             row.radial[j] + found.inner.displacement[0] * c + found.inner.displacement[1] * s,
         )
-        residual, ring, *_, pull, moment = ball_forces.bodies[type(rule)](rule, 1.0, row, j, *place, x, y)
+        residual, ring, *_, pull, moment = ball_forces.bodies[type(rule)](
+            rule, 1.0, row, *place, x, y, *depths
+        )
         radial = ring[1] + pull - residual[1]
         expected += [radial * c, radial * s, ring[0] - residual[0]]
         forces.append(pull)

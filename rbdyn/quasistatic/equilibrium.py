@@ -31,8 +31,8 @@ LOST = (
 class Solution(NamedTuple):
     """Equilibrium of one row of Z balls. Arrays (Z,) unless told; angles in rad, forces in N, lengths in m.
 
-    ``displacement``: (x, y, z, theta_x, theta_y) of the inner ring [m, rad]. ``balls`` (Z, 4): place of each centre, (axial,
-    radial) from its outer groove centre, and depth of its contacts, inner and outer. ``reaction`` (5,): the load that the ring takes [N, N m]. ``stiffness`` (5, 5): its
+    ``displacement``: (x, y, z, theta_x, theta_y) of the inner ring [m, rad]. ``balls`` (Z, 2): place of each centre, (axial,
+    radial) from its outer groove centre; ``depths`` (Z, 2): how deep its contacts are, (inner, outer). ``reaction`` (5,): the load that the ring takes [N, N m]. ``stiffness`` (5, 5): its
     derivative by the displacement. ``residual``: the largest force left over [N]. ``status``: "ok" or why there is none.
     ``steps, assemblies, strides``: Newton steps, evaluations of all balls, and continuations of the race control.
     ``searches``: starting values that the finite search tried; None for a solver that searches for none.
@@ -40,6 +40,7 @@ class Solution(NamedTuple):
 
     displacement: NDArray[np.float64]
     balls: NDArray[np.float64]
+    depths: NDArray[np.float64]
     inner_load: NDArray[np.float64]
     outer_load: NDArray[np.float64]
     inner_angle: NDArray[np.float64]
@@ -124,7 +125,7 @@ def solve(
     balls = np.zeros((size, BALL))
     if start is not None:
         q = np.where(free > 0.0, start.displacement * unit, q)
-        balls[:] = start.balls
+        balls[:] = np.hstack((start.balls, start.depths))
     at, counts, told = space(size), np.zeros(COUNTERS, np.int64), np.zeros((size, TOLD))
     cage = CommonCage(0.0)
     outcome, worst = solve_row(
@@ -157,7 +158,8 @@ def told_solution(
     unit = np.array([1.0, 1.0, 1.0, row.lever, row.lever])
     return Solution(
         displacement=q / unit,
-        balls=balls,
+        balls=balls[:, :INNER_DEPTH],
+        depths=balls[:, INNER_DEPTH:],
         inner_load=told[:, INNER_LOAD],
         outer_load=told[:, OUTER_LOAD],
         inner_angle=told[:, INNER_ANGLE],

@@ -13,7 +13,7 @@ from rbdyn.materials import Material, equivalent_modulus
 from rbdyn.quasistatic.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.growth_model import row_change
 from rbdyn.quasistatic.ring_growth import UNCHANGED, GrooveChange
-from rbdyn.quasistatic.row import Row, rest_deflection
+from rbdyn.quasistatic.row import Row, at_rest
 from rbdyn.scene.ball import BallModel, BallRow, BallScene, SingleRowScene
 
 INNER_SHARE = {"outer": 0.0, "inner": 1.0, "half": 0.5}
@@ -71,6 +71,7 @@ def row_model(
     mass = ball.density * math.pi * diameter**3 / 6.0
     cage = cage_speed(drawing, inner_speed, outer_speed)
     pull = 0.5 * mass * pitch * cage**2
+    resting = at_rest(pull, to_outer.stiffness)
     row = Row(
         cosine=np.cos(azimuth),
         sine=np.sin(azimuth),
@@ -83,7 +84,8 @@ def row_model(
         lever=0.5 * pitch + (drawing.inner_groove_factor - 0.5) * diameter * math.cos(angle),
         inner_groove_radius=drawing.inner_groove_factor * diameter,
         centrifugal_force=pull,
-        rest_deflection=rest_deflection(pull, to_outer.stiffness),
+        rest_deflection=resting[0],
+        rest_energy=resting[1],
     )
     spinning = Spinning(
         ratio=diameter / pitch,

@@ -33,8 +33,8 @@ from rbdyn.quasistatic.start import along_the_load, settle_all
 # Outcomes of ``find``.
 CONVERGED, NOT_CONVEX_MINIMUM, RACE_CONTROL_LOST, NOT_FINITE = range(4)
 # Largest residual over largest force: aimed at, and accepted where rounding allows no better.
-AIM, ACCEPTED = 1e-12, 1e-10
-CONVEX_STEPS, FULL_STEPS, CONTINUED_STEPS, CONTINUATIONS = 200, 40, 30, 100
+AIM, ACCEPTED = 1e-12, 1e-9
+CONVEX_MARCH, CONVEX_STEPS, FULL_STEPS, CONTINUED_STEPS, CONTINUATIONS = 12, 200, 40, 30, 100
 SMALLEST_STRIDE = 1e-5
 SHORTEST_CONVEX, SHORTEST_FULL = 1e-10, 1e-3
 # Largest turn of a contact line in one whole step [rad], and steps without progress that are waited for.
@@ -323,15 +323,23 @@ def find(
 
     ``cage``: the ``CommonCage`` of the convex problem; ``control`` may be the same. Returns an outcome.
     """
-    if warm and march(control, 1.0, FULL_STEPS, row, load, free, q, balls, at, counts):
-        return CONVERGED
+    if warm:
+        at.work[:, LOADED] = 1.0
+        if march(control, 1.0, FULL_STEPS, row, load, free, q, balls, at, counts):
+            return CONVERGED
     for i in range(RING):
         if free[i] > 0.0:
             q[i] = 0.0
     along_the_load(row, load, free, q, at.step, at.base)
     settle_all(row, q, balls, at.work)
-    if not descend(cage, 0.0, True, CONVEX_STEPS, row, load, free, q, balls, at, counts):
-        return NOT_CONVEX_MINIMUM
+    start = q.copy()
+    if not march(cage, 0.0, CONVEX_MARCH, row, load, free, q, balls, at, counts):
+        q[:] = start
+        settle_all(row, q, balls, at.work)
+        if not descend(cage, 0.0, True, CONVEX_STEPS, row, load, free, q, balls, at, counts) and not march(
+            cage, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts
+        ):
+            return NOT_CONVEX_MINIMUM
     return complete(cage, control, row, load, free, q, balls, at, counts)
 
 

@@ -11,8 +11,6 @@ from rbdyn.quasistatic.ball import deflection, line, spring, tangent
 # A light ball slides along a curved, narrow valley of its energy.
 SETTLING_STEPS = 300
 SHORTEST = 1e-7
-# Residual over the contact loads of a ball that counts as settled.
-SETTLED = 1e-11
 
 
 @kernel
@@ -89,8 +87,11 @@ def wedge(row: Any, j: int, a_axial: float, a_radial: float) -> tuple[float, flo
 
 
 @kernel
-def settle(row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> None:
-    """Put ball j where its energy is least for a fixed ring, orbiting with the cage: guarded Newton in two unknowns."""
+def settle(row: Any, j: int, a_axial: float, a_radial: float, settled: float, balls: Any) -> None:
+    """Put ball j where its energy is least for a fixed ring, orbiting with the cage: guarded Newton in two unknowns.
+
+    Until no more than the share ``settled`` of its contact loads is out of balance.
+    """
     if lifted(row, j, a_axial, a_radial):
         rest(row, j, balls, a_axial, a_radial)
         return
@@ -109,7 +110,7 @@ def settle(row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> Non
     damping = 0.0
     for _ in range(SETTLING_STEPS):
         lacking = abs(fa) + abs(fr)
-        if lacking < SETTLED * held:
+        if lacking < settled * held:
             break
         one = 1.0 / ((aa + damping) * (rr + damping) - ar * ar)
         da = ((rr + damping) * fa - ar * fr) * one

@@ -11,7 +11,7 @@ from typing import Any
 
 from rbdyn.kernel import kernel, routine
 from rbdyn.quasistatic.ball import ball_forces, deflection, line, spring
-from rbdyn.quasistatic.place import contact_energy, groove_centre, lifted, rest, settle
+from rbdyn.quasistatic.place import groove_centre, lifted, rest, settle
 
 RING = 5
 # Columns of the work space of a ball: Newton step (axial, radial), its change with A (four), open or loaded, then the lines
@@ -20,6 +20,8 @@ BALL_WORK = 13
 LOADED, INNER_LINE, OUTER_LINE, INNER_GAP, OUTER_GAP = 6, 7, 9, 11, 12
 # Columns of ``balls``: place (axial, radial) and depth of the contacts (inner, outer) [m].
 AXIAL, RADIAL, INNER_DEPTH, OUTER_DEPTH, BALL = range(5)
+# Residual over the contact loads of a ball that counts as settled.
+SETTLED = 1e-11
 # A Newton step leaves at least this share of a depth.
 LEFT = 0.2
 # Sums that ``assemble`` leaves in ``sums``; from TAKEN on what the ring takes [N].
@@ -67,10 +69,11 @@ def assemble(
             rest(row, j, balls, a_axial, a_radial)
             work[j, LOADED] = 0.0
             largest = max(largest, row.centrifugal_force)
-            energy += contact_energy(row, j, a_axial, a_radial, balls[j, AXIAL], balls[j, RADIAL])
+            # By its place: at rest on the outer race.
+            energy += row.rest_energy
             continue
         if work[j, LOADED] == 0.0:
-            settle(row, j, a_axial, a_radial, balls)
+            settle(row, j, a_axial, a_radial, SETTLED, balls)
             measure(row, j, a_axial, a_radial, balls)
             work[j, LOADED] = 1.0
         elif not mixed:
@@ -82,10 +85,13 @@ def assemble(
             )  # fmt: skip
             if attempt == 1 or not astray(strength == 0.0, ra, rr, fa, fr):
                 break
-            settle(row, j, a_axial, a_radial, balls)
+            settle(row, j, a_axial, a_radial, SETTLED, balls)
             measure(row, j, a_axial, a_radial, balls)
         x, y = balls[j, AXIAL], balls[j, RADIAL]
-        energy += contact_energy(row, j, a_axial, a_radial, x, y)
+        qi, ki = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
+        qo, ko = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+        energy += 0.4 * (qi * balls[j, INNER_DEPTH] + qo * balls[j, OUTER_DEPTH])
+        energy -= row.centrifugal_force * (y - row.outer_reach[j])
         unbalance += ra * ra + rr * rr
         worst = max(worst, abs(ra), abs(rr))
         largest = max(largest, abs(fa), abs(fr), abs(pull))
@@ -102,8 +108,6 @@ def assemble(
             one_o, so, co = line(x, y)
             gap_i = 1.0 / one_i - row.inner_reach[j] - balls[j, INNER_DEPTH]
             gap_o = 1.0 / one_o - row.outer_reach[j] - balls[j, OUTER_DEPTH]
-            _, ki = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
-            _, ko = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
             slip = max(abs(gap_i) * ki, abs(gap_o) * ko)
             worst = max(worst, slip)
             unbalance += slip * slip

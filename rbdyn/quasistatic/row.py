@@ -16,7 +16,8 @@ class Row(NamedTuple):
     radius. ``inner_stiffness, outer_stiffness``: K of Q = K delta^1.5 [N/m^1.5]. ``lever``: radius R_i of the circle of
     inner groove centres. ``inner_groove_radius``: f_i D, the lever of a friction force about the groove centre.
     ``centrifugal_force``: that of a ball at the common cage speed [N]; ``rest_deflection``: how deep a ball that only this
-    force loads presses into the outer race.
+    force loads presses into the outer race; ``rest_energy``: what
+    that stores less the work of the force [J].
     """
 
     cosine: NDArray[np.float64]
@@ -31,8 +32,10 @@ class Row(NamedTuple):
     inner_groove_radius: float
     centrifugal_force: float
     rest_deflection: float
+    rest_energy: float
 
 
-def rest_deflection(centrifugal_force: float, outer_stiffness: float) -> float:
-    """Outer deflection [m] under the centrifugal force alone."""
-    return float((centrifugal_force / outer_stiffness) ** (2.0 / 3.0))
+def at_rest(centrifugal_force: float, outer_stiffness: float) -> tuple[float, float]:
+    """Outer deflection [m] under the centrifugal force alone, and energy [J] there."""
+    deflection = float((centrifugal_force / outer_stiffness) ** (2.0 / 3.0))
+    return deflection, -0.6 * centrifugal_force * deflection

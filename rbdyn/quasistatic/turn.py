@@ -12,7 +12,7 @@ from rbdyn.faults import RunError
 from rbdyn.quasistatic.control import CommonCage, Control
 from rbdyn.quasistatic.newton import COUNTERS, space
 from rbdyn.quasistatic.race_errors import BallPath
-from rbdyn.quasistatic.ring import RING
+from rbdyn.quasistatic.ring import BALL, RING
 from rbdyn.quasistatic.row import Row
 from rbdyn.quasistatic.runout import Runout, runout
 from rbdyn.quasistatic.walk import LARGEST_LOAD, RESIDUAL, TOLD, WALKED, walk
@@ -90,7 +90,7 @@ def follow(
         free,
         changes,
         q,
-        np.zeros((size, 2)),
+        np.zeros((size, BALL)),
         space(size),
         np.zeros(COUNTERS, np.int64),
         path,

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from rbdyn.kernel import entry
+from rbdyn.quasistatic.ball import spring
 from rbdyn.quasistatic.newton import ASSEMBLIES, CONVERGED, STEPS, find, unbalance
-from rbdyn.quasistatic.place import groove_centre
-from rbdyn.quasistatic.ring import RING
+from rbdyn.quasistatic.ring import INNER_DEPTH, LOADED, OUTER_DEPTH, RING
 
 # What a walk counts: Newton steps and evaluations of all balls.
 WALKED = 2
@@ -53,12 +52,10 @@ def walk(
             path[step, i] = q[i]
         largest = row.centrifugal_force
         for j in range(size):
-            a_axial, a_radial = groove_centre(row, q, j)
-            x, y = balls[j, 0], balls[j, 1]
-            inner = math.sqrt((a_axial - x) ** 2 + (a_radial - y) ** 2) - row.inner_reach[j]
-            outer = math.sqrt(x * x + y * y) - row.outer_reach[j]
-            largest = max(largest, row.inner_stiffness * max(inner, 0.0) ** 1.5)
-            largest = max(largest, row.outer_stiffness * max(outer, 0.0) ** 1.5)
+            inner, _ = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
+            outer, _ = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+            if at.work[j, LOADED] > 0.0:
+                largest = max(largest, inner, outer)
         told[step, LARGEST_LOAD] = largest
         _, told[step, RESIDUAL] = unbalance(load, free, at.sums)
     return steps
