@@ -11,7 +11,7 @@ from rbdyn.kernel import alike, entry
 from rbdyn.quasistatic.control import CommonCage, Control
 from rbdyn.quasistatic.equilibrium import OK, Solution
 from rbdyn.quasistatic.full_system import evaluate, solution_at, system_of, unknowns
-from rbdyn.quasistatic.newton import ASSEMBLIES, COUNTERS, STEPS, descend, march, space
+from rbdyn.quasistatic.newton import ASSEMBLIES, CONVEX_MARCH, COUNTERS, STEPS, descend, march, space
 from rbdyn.quasistatic.ring import BALL, RING
 from rbdyn.quasistatic.row import Row
 from rbdyn.quasistatic.start import along_the_load, settle_all
@@ -30,11 +30,17 @@ def _within(
     at: Any,
     counts: Any,
 ) -> bool:
-    """The start, the convex problem, the full equations: ``limit`` steps in all; whether that was enough."""
+    """The way of ``newton.find`` in ``limit`` steps; whether they were enough."""
     along_the_load(row, load, free, q, at.step, at.base)
     settle_all(row, q, balls, at.work)
-    found = descend(cage, 0.0, True, limit, row, load, free, q, balls, at, counts)
+    start = q.copy()
+    found = march(cage, 0.0, min(limit, CONVEX_MARCH), row, load, free, q, balls, at, counts)
     left = limit - counts[STEPS]
+    if not found and left > 0:
+        q[:] = start
+        settle_all(row, q, balls, at.work)
+        found = descend(cage, 0.0, True, left, row, load, free, q, balls, at, counts)
+        left = limit - counts[STEPS]
     if alike(cage, control) or not found:
         return found
     return march(control, 1.0, left, row, load, free, q, balls, at, counts)
