@@ -12,7 +12,17 @@ from rbdyn.quasistatic.ball import rules
 from rbdyn.quasistatic.control import Control
 from rbdyn.quasistatic.equilibrium import OK, Solution
 from rbdyn.quasistatic.full_system import evaluate, solution_at, system_of, unknowns
-from rbdyn.quasistatic.newton import ASSEMBLIES, CONVEX_MARCH, COUNTERS, STEPS, descend, march, space
+from rbdyn.quasistatic.newton import (
+    ASSEMBLIES,
+    CONVEX_MARCH,
+    COUNTERS,
+    ROUGHLY,
+    STEPS,
+    descend,
+    go_back,
+    march,
+    space,
+)
 from rbdyn.quasistatic.ring import BALL, RING
 from rbdyn.quasistatic.row import Row
 from rbdyn.quasistatic.start import along_the_load, settle_all
@@ -22,20 +32,21 @@ from rbdyn.quasistatic.start import along_the_load, settle_all
 def _within(
     control: Any, row: Any, load: Any, free: Any, limit: int, q: Any, balls: Any, at: Any, counts: Any
 ) -> bool:
-    """The way of ``newton.find`` in ``limit`` steps, without its rough start; whether they were enough."""
+    """The usual way of ``newton.find`` in ``limit`` steps; whether they were enough."""
     along_the_load(row, load, free, q, at.step, at.base)
     settle_all(row, q, balls, at.work)
-    start = q.copy()
-    found = march(control, 0.0, 0.0, min(limit, CONVEX_MARCH), row, load, free, q, balls, at, counts)
-    left = limit - counts[STEPS]
-    if not found and left > 0:
-        q[:] = start
-        settle_all(row, q, balls, at.work)
-        found = descend(control, 0.0, True, left, row, load, free, q, balls, at, counts)
-        left = limit - counts[STEPS]
+    start_q, start = q.copy(), balls.copy()
+    enough = 0.0
+    if rules(control):
+        for i in range(RING):
+            enough = max(enough, ROUGHLY * abs(load[i]) * free[i])
+    found = march(control, 0.0, enough, min(limit, CONVEX_MARCH), row, load, free, q, balls, at, counts)
+    if not found and limit > counts[STEPS]:
+        go_back(q, balls, start_q, start)
+        found = descend(control, 0.0, True, limit - counts[STEPS], row, load, free, q, balls, at, counts)
     if not found or not rules(control):
         return found
-    return march(control, 1.0, 0.0, left, row, load, free, q, balls, at, counts)
+    return march(control, 1.0, 0.0, limit - counts[STEPS], row, load, free, q, balls, at, counts)
 
 
 def solve(
