@@ -1,0 +1,58 @@
+"""Ball bearings that several tests share: tables of scenes."""
+
+from __future__ import annotations
+
+import copy
+
+from rbdyn import BallScene
+
+# 71808 of Hu et al. 2021, Table 1, at the third condition of their Table 3.
+SMALL = {
+    "bearing": {
+        "kind": "angular_contact_ball", "balls": 29, "ball_diameter_mm": 3.175, "pitch_diameter_mm": 46.0,
+        "contact_angle_deg": 25.0, "inner_groove_factor": 0.515, "outer_groove_factor": 0.525,
+    },
+    "operation": {
+        "inner_speed_rpm": 30000.0, "radial_load_N": 200.0, "axial_load_N": 200.0, "tilt": "fixed",
+    },
+    "model": {"raceway_control": "outer"},
+}  # fmt: skip
+# 218, the example of Harris, Rolling Bearing Analysis.
+LARGE = {
+    "bearing": {
+        "kind": "angular_contact_ball", "balls": 16, "ball_diameter_mm": 22.225, "pitch_diameter_mm": 125.26,
+        "contact_angle_deg": 40.0, "inner_groove_factor": 0.5232, "outer_groove_factor": 0.5232,
+    },
+    "operation": {
+        "inner_speed_rpm": 10000.0, "load_N": [6000.0, -1500.0, 15000.0], "moment_Nm": [90.0, -140.0],
+    },
+    "model": {"raceway_control": "hybrid"},
+}  # fmt: skip
+# 209 with clearance, both rings turning, under a load that leaves balls unloaded.
+DEEP = {
+    "bearing": {
+        "kind": "deep_groove_ball", "balls": 9, "ball_diameter_mm": 12.7, "pitch_diameter_mm": 65.0,
+        "radial_clearance_mm": 0.015, "inner_groove_factor": 0.52, "outer_groove_factor": 0.52,
+    },
+    "operation": {
+        "inner_speed_rpm": 9000.0, "outer_speed_rpm": -4000.0, "load_N": [2500.0, 400.0, 100.0], "tilt": "fixed",
+    },
+    "model": {"raceway_control": "outer"},
+}  # fmt: skip
+
+
+def changed(table, **groups):
+    """A table with keys of its groups changed; ``None`` takes a key away."""
+    table = copy.deepcopy(table)
+    for group, values in groups.items():
+        part = table.setdefault(group, {})
+        for key, value in values.items():
+            part.pop(key, None)
+            if value is not None:
+                part[key] = value
+    return table
+
+
+def scene(table, **groups):
+    """A scene of a table with changes."""
+    return BallScene.from_dict(changed(table, **groups))
