@@ -76,7 +76,8 @@ def _print_row(title: str, record: dict[str, Any], verbose: bool) -> None:
                 for name, row in zip(("x", "y", "z", "tilt x", "tilt y"), stiffness["matrix_SI"], strict=True)
             ],
         )
-        print(f"{record['iterations']} Newton steps, {record['residual_N']:.2g} N left over")
+        searches = f"{record['searches']} searches, " if "searches" in record else ""
+        print(f"{searches}{record['iterations']} Newton steps, {record['residual_N']:.2g} N left over")
 
 
 def _print_middle_ring(record: dict[str, Any]) -> None:

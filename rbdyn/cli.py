@@ -135,6 +135,12 @@ def accuracy(
     scaling: Annotated[
         bool, typer.Option("--scaling", help="Time by rollers and slices, memory by turns, instead.")
     ] = False,
+    battery: Annotated[
+        bool, typer.Option("--battery", help="Solvers over thousands of random ball bearings, instead.")
+    ] = False,
+    scenes: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Scenes of the battery; 5000 unless given.")
+    ] = None,
     trajectory: Annotated[
         float | None,
         typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25."),
@@ -143,7 +149,7 @@ def accuracy(
     quiet: Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also versions.")] = False,
 ) -> None:
-    """Show error against run time: of every output at each tolerance and of the motion itself."""
+    """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, the solvers."""
     with guarded(as_json):
         from rbdyn import accuracy as studies
 
@@ -154,11 +160,16 @@ def accuracy(
             "options": options,
             "stability": stability,
             "scaling": scaling,
+            "battery": battery,
         }
-        name = _study(asked, trajectory)
-        loaded = _rollers(scene, assignments or [])
+        from rbdyn.accuracy.asked import asked_study
+        from rbdyn.scene import Scene
+
+        loaded = Scene.load(scene, assignments or [])
+        given = {"turns": trajectory, "scenes": scenes}
+        limits = {key: value for key, value in given.items() if value is not None}
+        name = asked_study(asked, limits, loaded)
         folder = output_folder(out) if out else None
-        limits = {} if trajectory is None else {"turns": trajectory}
         with progress_bar(name, quiet or as_json) as progress:
             found = studies.study(name, loaded, progress, **limits)
         files = studies.write(found, folder) if folder else []
@@ -170,20 +181,6 @@ def accuracy(
                 print(f"written to {folder}: {', '.join(files)}")
     if found.failed:
         raise typer.Exit(FAILED)
-
-
-def _study(asked: dict[str, bool], trajectory: float | None) -> str:
-    """Name of the one study asked for. Raises InputError for two, or for trajectories in a study without them."""
-    from rbdyn.faults import InputError
-
-    chosen = [name for name, wished in asked.items() if wished]
-    flags = " and ".join(f"--{name}" for name in chosen)
-    if len(chosen) > 1:
-        raise InputError([f"{flags}: are studies of their own; choose one"])
-    name = chosen[0] if chosen else "tolerances"
-    if trajectory is not None and name not in ("tolerances", "methods"):
-        raise InputError([f"--trajectory {trajectory:g}: {flags} integrates no trajectories; leave it out"])
-    return name
 
 
 @app.command("map")

@@ -3,8 +3,9 @@
 - ``@kernel``: a small pure function of floats and arrays, compiled as part of whatever calls it.
 - ``@law``: a function whose body is chosen, at compile time, by the type of its first argument (a
   NamedTuple of parameters). A law that a scene leaves out is thus not compiled at all.
-- ``@entry``: the few functions called from Python, and large ones that several of these share. Their machine code is kept on disk, in a folder named
-  by a hash of every source file of the package, so that an edit anywhere can never bring back stale code.
+- ``@entry``: the few functions called from Python, and large ones that several of these share. Their machine code is
+  kept on disk, in a folder named by a hash of every source file of the package, so that an edit anywhere can never
+  bring back stale code.
 """
 
 from __future__ import annotations

@@ -201,3 +201,25 @@ def test_trend_tilt_loads_the_most_loaded_ball_more():
     loads = frame.drop(columns="azimuth_deg")
     assert np.all(np.diff(loads.max()) > 0.0)
     assert loads.max().iloc[0] == pytest.approx(105.1, abs=0.1)
+
+
+def test_literature_finite_search(monkeypatch):
+    """Literature: all of Table 3 of Hu et al. by their search and ours, to the same equilibria; searches are few."""
+    module = script("paper_000_finite_search")
+    monkeypatch.setattr(module, "REPEATS", 1)
+    outcomes = module.table_3()
+    table = module.frame(outcomes)
+    assert list(table["status"]) == ["ok"] * 24
+    assert table["searches"].max() <= table["their_searches"].max() == 8
+    assert table["gap_deg"].max() < 1e-6
+    assert (table["convex_residual_N"] < 1e-9 * table["axial"]).all()
+    # The touching point itself leads nowhere: no contact is loaded there.
+    assert table["searches"].min() >= 2
+    # With speed the nearest starting point moves along the search, as their count of searches does.
+    for _, group in table.groupby(["bearing", "radial", "axial"]):
+        assert group["nearest_search"].is_monotonic_increasing
+    found = module.figure_7()
+    assert found["method_gap"] < 1e-6
+    assert 1.0 < found["sign_gap"] < 15.0
+    spread = [both[0].max() - both[1].min() for both in found["curves"]["search"].values()]
+    assert spread == sorted(spread)

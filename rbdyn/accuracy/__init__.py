@@ -11,6 +11,8 @@ Studies, each a module with ``study(scene, progress) -> Report``; the command ``
 - ``rbdyn.option_cost`` (``--options``): what each option of a scene costs
 - ``rbdyn.stability`` (``--stability``): how extreme variants of a scene end
 - ``rbdyn.scaling`` (``--scaling``): time by rollers and slices, memory by turns
+- ``ball_solvers`` (default for a ball bearing): solvers of its equilibrium, residual against time
+- ``ball_battery`` (``--battery``): all of them over thousands of random ball bearings
 
 Beneath them: ``right_hand_side`` (compiled, callable from Python), ``fixed_step`` (Runge-Kutta 4, velocity Verlet),
 ``methods`` (every integrator behind one door), ``stretch`` (what they integrate), ``equal_error`` (how many times
@@ -39,10 +41,11 @@ if TYPE_CHECKING:
     from rbdyn.accuracy.equal_error import times_faster
     from rbdyn.accuracy.report import Report, show, write
     from rbdyn.accuracy.tolerances import statistics_bias
-    from rbdyn.scene import Scene
+    from rbdyn.scene import BallScene, Scene
 
-__all__ = ["STUDIES", "Report", "show", "statistics_bias", "study", "times_faster", "write"]
+__all__ = ["BALL_STUDIES", "STUDIES", "Report", "show", "statistics_bias", "study", "times_faster", "write"]
 
+BALL_STUDIES = {"solvers": "rbdyn.accuracy.ball_solvers", "battery": "rbdyn.accuracy.ball_battery"}
 STUDIES = {
     "tolerances": "rbdyn.accuracy.work_precision",
     "methods": "rbdyn.accuracy.comparison",
@@ -51,6 +54,7 @@ STUDIES = {
     "options": "rbdyn.option_cost",
     "stability": "rbdyn.stability",
     "scaling": "rbdyn.scaling",
+    **BALL_STUDIES,
 }
 _HOMES = {
     "Report": "rbdyn.accuracy.report",
@@ -62,7 +66,7 @@ _HOMES = {
 
 
 def study(
-    name: str, scene: Scene, progress: Callable[[int, int], None] | None = None, **options: Any
+    name: str, scene: Scene | BallScene, progress: Callable[[int, int], None] | None = None, **options: Any
 ) -> Report:
     """Run the study ``name`` of ``STUDIES``; ``progress(done, total)`` is called as it goes on.
 

@@ -2,6 +2,7 @@
 
 - ``motion``: cage orbit, pocket and land forces, whirl, sections, spectra, of a history
 - ``contacts``: load, slip and heat around the bearing; power by loss
+- ``solvers``: solvers of the equilibrium of balls at work
 - ``accuracy``: error against run time; ``scaling``: run time over rollers and slices
 - ``drawing``: the bearing at one moment, clearances magnified; shared by ``animation`` (GIF or MP4) and ``player`` (HTML)
 """

@@ -9,7 +9,9 @@ Where an equation stands: ``row`` (geometry of a row of balls), ``control`` (rac
 ``roundness`` and ``runout`` (measures of the path), ``runout_class`` (limits by tolerance class), ``linear_runout`` and
 ``runout_lots`` (small errors in proportion, many bearings at once), ``tolerance_design`` (race errors that meet a class). Two
 rows with a floating ring between: ``double_decker`` (equilibrium), ``speed_split`` (speed of the middle ring).
-``ring_growth`` (rotation, fits and heat of the rings). From scenes: ``model``, ``growth_model``, ``double_decker_model``,
+``ring_growth`` (rotation, fits and heat of the rings). Rivals of the convex solver: ``full_system`` (all equations, dense),
+``elimination``, ``plain_newton``, ``minpack``, ``levenberg_marquardt`` and ``finite_search`` (Hu et al. 2021), ``limited``
+(ours, stopped early), ``solvers`` (by name), ``battery`` (random scenes for all). From scenes: ``model``, ``growth_model``, ``double_decker_model``,
 ``runout_model``; ``bearing`` puts all together.
 
 x is radial along the load, z axial; ball j stands at psi_j = 2 pi j/Z from x. The inner ring moves, the outer ring is

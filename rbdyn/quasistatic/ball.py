@@ -97,6 +97,22 @@ def _by_friction(
 
 
 @law
+def rules(control: Any) -> bool:
+    """Whether there is more to the equilibrium than one common cage speed."""
+    raise NotImplementedError
+
+
+@rules.body(CommonCage)
+def _never(control: Any) -> bool:
+    return False
+
+
+@rules.body(FixedShare, FrictionShare)
+def _always(control: Any) -> bool:
+    return True
+
+
+@law
 def ball_forces(
     control: Any,
     strength: float,
@@ -149,7 +165,7 @@ def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
     aa, ar, rr = tangent(qi, ki, one_i, si, ci)
     oaa, oar, orr = tangent(qo, ko, one_o, so, co)
     spinning = control.spinning
-    if qi <= 0.0 or qo <= 0.0 or ci <= 0.0:
+    if strength == 0.0 or qi <= 0.0 or qo <= 0.0 or ci <= 0.0:
         pull = row.centrifugal_force
         return (
             (qi * si - qo * so, qi * ci - qo * co + pull),

@@ -10,7 +10,7 @@ import numpy as np
 from rbdyn.contact.hertz_point import peak_pressure
 from rbdyn.quasistatic.double_decker import Start, solve_double_decker
 from rbdyn.quasistatic.double_decker_model import double_decker_of, load_record, middle_record
-from rbdyn.quasistatic.equilibrium import Solution, solve
+from rbdyn.quasistatic.equilibrium import Solution
 from rbdyn.quasistatic.growth_model import growth_record, row_change
 from rbdyn.quasistatic.model import RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.result import (
@@ -20,6 +20,7 @@ from rbdyn.quasistatic.result import (
     displacement_record,
     stiffness_record,
 )
+from rbdyn.quasistatic.solvers import SOLVERS
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
@@ -38,7 +39,7 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
     model = row_of(scene)
     warm = start.rows[0] if start is not None and start.rows else None
     began = time.perf_counter()
-    solution = solve(model.row, model.control, load_of(scene), given_of(scene), warm)
+    solution = SOLVERS[scene.model.solver](model.row, model.control, load_of(scene), given_of(scene), warm)
     took = time.perf_counter() - began
     head, tail = _frame(scene, solution.status, took)
     if not solution.found:
@@ -77,7 +78,12 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
 
 def _frame(scene: BallScene, status: str, took: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """How every record begins and ends."""
-    head = {"format": FORMAT, "status": status, "raceway_control": scene.model.raceway_control}
+    head = {
+        "format": FORMAT,
+        "status": status,
+        "raceway_control": scene.model.raceway_control,
+        "solver": scene.model.solver,
+    }
     tail = {
         "cost": {"solve_us": 1e6 * took},
         "versions": versions(),
@@ -88,6 +94,7 @@ def _frame(scene: BallScene, status: str, took: float) -> tuple[dict[str, Any], 
 
 def row_record(model: RowModel, solution: Solution) -> dict[str, Any]:
     """What is reported of one row in equilibrium."""
+    searches = {} if solution.searches is None else {"searches": solution.searches}
     return {
         **displacement_record(solution.displacement),
         "balls": ball_records(solution),
@@ -98,4 +105,5 @@ def row_record(model: RowModel, solution: Solution) -> dict[str, Any]:
         "stiffness": stiffness_record(solution.stiffness),
         "residual_N": solution.residual,
         "iterations": solution.steps,
+        **searches,
     }

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.kernel import entry
+from rbdyn.kernel import entry, routine
 from rbdyn.quasistatic.ball import ball_forces, spring
-from rbdyn.quasistatic.control import CommonCage, Control
+from rbdyn.quasistatic.control import Control
 from rbdyn.quasistatic.newton import CONVERGED, COUNTERS, NOT_CONVEX_MINIMUM, Space, find, space, unbalance
 from rbdyn.quasistatic.place import groove_centre
 from rbdyn.quasistatic.ring import BALL, INNER_DEPTH, LOADED, OUTER_DEPTH, RING, TAKEN
@@ -35,6 +35,7 @@ class Solution(NamedTuple):
     radial) from its outer groove centre; ``depths`` (Z, 2): how deep its contacts are, (inner, outer). ``reaction`` (5,): the load that the ring takes [N, N m]. ``stiffness`` (5, 5): its
     derivative by the displacement. ``residual``: the largest force left over [N]. ``status``: "ok" or why there is none.
     ``steps, assemblies, strides``: Newton steps, evaluations of all balls, and continuations of the race control.
+    ``searches``: starting values that the finite search tried; None for a solver that searches for none.
     """
 
     displacement: NDArray[np.float64]
@@ -53,6 +54,7 @@ class Solution(NamedTuple):
     steps: int
     assemblies: int
     strides: int
+    searches: int | None = None
 
     @property
     def found(self) -> bool:
@@ -60,9 +62,29 @@ class Solution(NamedTuple):
         return self.status == OK
 
 
+@routine
+def tell(control: Any, row: Any, q: Any, balls: Any, work: Any, told: Any) -> None:
+    """Fill ``told`` (Z, TOLD) with angles, loads and what the balls' motion does to them; ``work`` as ``assemble`` left it."""
+    for j in range(row.cosine.size):
+        a_axial, a_radial = groove_centre(row, q, j)
+        x, y = balls[j, 0], balls[j, 1]
+        told[j, INNER_ANGLE] = math.atan2(a_axial - x, a_radial - y)
+        told[j, OUTER_ANGLE] = math.atan2(x, y)
+        told[j, INNER_LOAD], _ = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
+        told[j, OUTER_LOAD], _ = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+        told[j, PULL], told[j, MOMENT] = row.centrifugal_force, 0.0
+        if work[j, LOADED] > 0.0:
+            _, _, _, _, _, _, told[j, PULL], told[j, MOMENT] = ball_forces(
+                control, 1.0, row, a_axial, a_radial, x, y, balls[j, INNER_DEPTH], balls[j, OUTER_DEPTH]
+            )
+        else:
+            # A lifted ball lies on the outer race alone and has no inner angle of its own.
+            told[j, INNER_LOAD], told[j, INNER_ANGLE] = 0.0, told[j, OUTER_ANGLE]
+            told[j, OUTER_LOAD] = row.centrifugal_force
+
+
 @entry
 def solve_row(
-    cage: Any,
     control: Any,
     row: Any,
     load: Any,
@@ -76,24 +98,9 @@ def solve_row(
 ) -> tuple[int, float]:
     """Find the equilibrium and fill ``told`` (Z, TOLD); see ``newton.find``. Returns the outcome and the residual [N]."""
     counts[:] = 0
-    outcome = find(cage, control, row, load, free, warm, q, balls, at, counts)
+    outcome = find(control, row, load, free, warm, q, balls, at, counts)
     _, worst = unbalance(load, free, at.sums)
-    for j in range(row.cosine.size):
-        a_axial, a_radial = groove_centre(row, q, j)
-        x, y = balls[j, 0], balls[j, 1]
-        told[j, INNER_ANGLE] = math.atan2(a_axial - x, a_radial - y)
-        told[j, OUTER_ANGLE] = math.atan2(x, y)
-        told[j, INNER_LOAD], _ = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
-        told[j, OUTER_LOAD], _ = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
-        told[j, PULL], told[j, MOMENT] = row.centrifugal_force, 0.0
-        if at.work[j, LOADED] > 0.0:
-            _, _, _, _, _, _, told[j, PULL], told[j, MOMENT] = ball_forces(
-                control, 1.0, row, a_axial, a_radial, x, y, balls[j, INNER_DEPTH], balls[j, OUTER_DEPTH]
-            )
-        else:
-            # A lifted ball lies on the outer race alone and has no inner angle of its own.
-            told[j, INNER_LOAD], told[j, INNER_ANGLE] = 0.0, told[j, OUTER_ANGLE]
-            told[j, OUTER_LOAD] = row.centrifugal_force
+    tell(control, row, q, balls, at.work, told)
     return outcome, worst
 
 
@@ -119,9 +126,7 @@ def solve(
         q = np.where(free > 0.0, start.displacement * unit, q)
         balls[:] = np.hstack((start.balls, start.depths))
     at, counts, told = space(size), np.zeros(COUNTERS, np.int64), np.zeros((size, TOLD))
-    cage = CommonCage(0.0)
     outcome, worst = solve_row(
-        cage,
         control,
         row,
         np.asarray(load, float) / unit,

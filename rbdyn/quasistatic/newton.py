@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.kernel import alike, entry, kernel, routine
+from rbdyn.kernel import entry, kernel, routine
+from rbdyn.quasistatic.ball import rules
 from rbdyn.quasistatic.ring import (
     BALL,
     BALL_WORK,
@@ -34,6 +35,8 @@ from rbdyn.quasistatic.start import along_the_load, settle_all
 CONVERGED, NOT_CONVEX_MINIMUM, RACE_CONTROL_LOST, NOT_FINITE = range(4)
 # Largest residual over largest force: aimed at, and accepted where rounding allows no better.
 AIM, ACCEPTED = 1e-12, 1e-9
+# Residual over the load that is good enough for the convex problem where the full equations follow.
+ROUGHLY = 1e-3
 CONVEX_MARCH, CONVEX_STEPS, FULL_STEPS, CONTINUED_STEPS, CONTINUATIONS = 12, 200, 40, 30, 100
 SMALLEST_STRIDE = 1e-5
 SHORTEST_CONVEX, SHORTEST_FULL = 1e-10, 1e-3
@@ -74,7 +77,7 @@ def space(balls: int) -> Space:
     )
 
 
-@kernel
+@routine
 def ring_step(matrix: Any, vector: Any, free: Any, damping: float, table: Any, step: Any) -> bool:
     """Solve (matrix + damping) step = vector for the free components, by elimination with pivots; 0 for the others.
 
@@ -204,7 +207,7 @@ def descend(
     return worst <= ACCEPTED * sums[LARGEST]
 
 
-@kernel
+@routine
 def bound(row: Any, step: Any, at: Any, furthest: float) -> float:
     """Share of a Newton step that turns no contact line by more than ``furthest`` [rad]."""
     scale = 1.0
@@ -229,6 +232,7 @@ def bound(row: Any, step: Any, at: Any, furthest: float) -> float:
 def march(
     control: Any,
     strength: float,
+    enough: float,
     limit: int,
     row: Any,
     load: Any,
@@ -241,7 +245,8 @@ def march(
     """Newton's method with whole steps, bounded in angle, that need not improve at once; whether it ends in an equilibrium.
 
     A ball that slides along its groove leaves the stiff normal direction by the square of its step: forces rise, and the next
-    step mends them. A search along the step for smaller forces would creep.
+    step mends them. A search along the step for smaller forces would creep. ``enough``: residual at which to
+    stop already [N].
     """
     matrix, sums, step = at.matrix, at.sums, at.step
     assemble(control, strength, True, row, load, q, balls, matrix, at.vector, at.work, sums)
@@ -251,7 +256,7 @@ def march(
     for _ in range(limit):
         if not math.isfinite(total):
             return False
-        if worst <= AIM * sums[LARGEST]:
+        if worst <= max(AIM * sums[LARGEST], enough):
             return True
         if not ring_step(matrix, at.vector, free, 0.0, at.table, step) and not ring_step(
             matrix, at.vector, free, 1e-9 * stiffness_scale(row, sums[LARGEST]), at.table, step
@@ -279,6 +284,13 @@ def march(
 
 
 @routine
+def go_back(q: Any, balls: Any, to_q: Any, to: Any) -> None:
+    """Set ``q`` and ``balls`` to what ``to_q`` and ``to`` hold."""
+    q[:] = to_q
+    balls[:] = to
+
+
+@routine
 def bring_in(control: Any, row: Any, load: Any, free: Any, q: Any, balls: Any, at: Any, counts: Any) -> bool:
     """From the convex minimum to the full equations by strides in the strength of the race control."""
     keep_q, keep = q.copy(), balls.copy()
@@ -286,20 +298,17 @@ def bring_in(control: Any, row: Any, load: Any, free: Any, q: Any, balls: Any, a
     for _ in range(CONTINUATIONS):
         counts[STRIDES] += 1
         ahead = min(reached + stride, 1.0)
-        arrived = march(control, ahead, CONTINUED_STEPS, row, load, free, q, balls, at, counts)
+        arrived = march(control, ahead, 0.0, CONTINUED_STEPS, row, load, free, q, balls, at, counts)
         if not arrived:
-            q[:] = keep_q
-            balls[:] = keep
+            go_back(q, balls, keep_q, keep)
             arrived = descend(control, ahead, False, CONTINUED_STEPS, row, load, free, q, balls, at, counts)
         if arrived:
             if ahead == 1.0:
                 return True
             reached, stride = ahead, 2.0 * stride
-            keep_q[:] = q
-            keep[:] = balls
+            go_back(keep_q, keep, q, balls)
         else:
-            q[:] = keep_q
-            balls[:] = keep
+            go_back(q, balls, keep_q, keep)
             stride *= 0.25
             if stride < SMALLEST_STRIDE:
                 return False
@@ -308,57 +317,47 @@ def bring_in(control: Any, row: Any, load: Any, free: Any, q: Any, balls: Any, a
 
 @entry
 def find(
-    cage: Any,
-    control: Any,
-    row: Any,
-    load: Any,
-    free: Any,
-    warm: bool,
-    q: Any,
-    balls: Any,
-    at: Any,
-    counts: Any,
+    control: Any, row: Any, load: Any, free: Any, warm: bool, q: Any, balls: Any, at: Any, counts: Any
 ) -> int:
     """Equilibrium of one row. ``q`` and ``balls`` hold the start where ``warm``, and the prescribed displacements always.
 
-    ``cage``: the ``CommonCage`` of the convex problem; ``control`` may be the same. Returns an outcome.
+    Returns an outcome.
     """
     if warm:
         at.work[:, LOADED] = 1.0
-        if march(control, 1.0, FULL_STEPS, row, load, free, q, balls, at, counts):
+        if march(control, 1.0, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts):
             return CONVERGED
     for i in range(RING):
         if free[i] > 0.0:
             q[i] = 0.0
     along_the_load(row, load, free, q, at.step, at.base)
     settle_all(row, q, balls, at.work)
-    start = q.copy()
-    if not march(cage, 0.0, CONVEX_MARCH, row, load, free, q, balls, at, counts):
-        q[:] = start
-        settle_all(row, q, balls, at.work)
-        if not descend(cage, 0.0, True, CONVEX_STEPS, row, load, free, q, balls, at, counts) and not march(
-            cage, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts
+    start_q, start = q.copy(), balls.copy()
+    if rules(control):
+        # Most often a rough minimum is start enough.
+        enough = 0.0
+        for i in range(RING):
+            enough = max(enough, ROUGHLY * abs(load[i]) * free[i])
+        if march(control, 0.0, enough, CONVEX_MARCH, row, load, free, q, balls, at, counts) and march(
+            control, 1.0, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts
+        ):
+            return CONVERGED
+        go_back(q, balls, start_q, start)
+    if not march(control, 0.0, 0.0, CONVEX_MARCH, row, load, free, q, balls, at, counts):
+        go_back(q, balls, start_q, start)
+        if not descend(control, 0.0, True, CONVEX_STEPS, row, load, free, q, balls, at, counts) and not march(
+            control, 0.0, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts
         ):
             return NOT_CONVEX_MINIMUM
-    return complete(cage, control, row, load, free, q, balls, at, counts)
-
-
-@routine
-def complete(
-    cage: Any, control: Any, row: Any, load: Any, free: Any, q: Any, balls: Any, at: Any, counts: Any
-) -> int:
-    """From the convex minimum to the equilibrium of ``control``."""
-    if alike(cage, control):
+    if not rules(control):
         return CONVERGED
-    start_q, start = q.copy(), balls.copy()
-    if march(control, 1.0, FULL_STEPS, row, load, free, q, balls, at, counts):
+    go_back(start_q, start, q, balls)
+    if march(control, 1.0, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts):
         return CONVERGED
-    q[:] = start_q
-    balls[:] = start
+    go_back(q, balls, start_q, start)
     if descend(control, 1.0, False, FULL_STEPS, row, load, free, q, balls, at, counts):
         return CONVERGED
-    q[:] = start_q
-    balls[:] = start
+    go_back(q, balls, start_q, start)
     if bring_in(control, row, load, free, q, balls, at, counts):
         return CONVERGED
     return RACE_CONTROL_LOST

@@ -184,7 +184,7 @@ def assemble(
     sums[ENERGY], sums[UNBALANCE], sums[WORST], sums[LARGEST] = energy, unbalance, worst, largest
 
 
-@kernel
+@routine
 def follow(row: Any, step: Any, scale: float, work: Any, start: Any, balls: Any) -> None:
     """Move the balls from ``start`` by ``scale`` times the Newton step that goes with the ring's ``step`` [m]."""
     for j in range(row.cosine.size):

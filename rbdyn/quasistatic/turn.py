@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.faults import RunError
-from rbdyn.quasistatic.control import CommonCage, Control
+from rbdyn.quasistatic.control import Control
 from rbdyn.quasistatic.newton import COUNTERS, space
 from rbdyn.quasistatic.race_errors import BallPath
 from rbdyn.quasistatic.ring import BALL, RING
@@ -83,7 +83,6 @@ def follow(
     )
     path, told, walked = np.zeros((steps, RING)), np.zeros((steps, TOLD)), np.zeros(WALKED, np.int64)
     reached = walk(
-        CommonCage(0.0),
         control,
         own,
         np.asarray(load, float) / unit,

@@ -17,7 +17,6 @@ LARGEST_LOAD, RESIDUAL, TOLD = range(3)
 
 @entry
 def walk(
-    cage: Any,
     control: Any,
     row: Any,
     load: Any,
@@ -43,7 +42,7 @@ def walk(
             row.axial[j], row.radial[j] = changes[2, step, j], changes[3, step, j]
             row.inner_reach[j], row.outer_reach[j] = changes[4, step, j], changes[5, step, j]
         counts[:] = 0
-        outcome = find(cage, control, row, load, free, step > 0, q, balls, at, counts)
+        outcome = find(control, row, load, free, step > 0, q, balls, at, counts)
         walked[0] += counts[STEPS]
         walked[1] += counts[ASSEMBLIES]
         if outcome != CONVERGED:

@@ -351,9 +351,12 @@ class DoubleDeckerScene(BallScene):
     bearing: DoubleDecker
 
     @model_validator(mode="after")
-    def _no_errors(self) -> DoubleDeckerScene:
+    def _solvable(self) -> DoubleDeckerScene:
+        found = []
         if self.errors is not None:
-            raise ValueError(
-                "errors: form errors are followed for one row of balls only; take the table away"
+            found.append("errors: form errors are followed for one row of balls only; take the table away")
+        if self.model.solver != "convex":
+            found.append(
+                f"model.solver = {self.model.solver!r}: solves one row of balls only; leave it out for two"
             )
-        return self
+        return or_refuse(self, found)
