@@ -111,7 +111,9 @@ class Bearing:
         else:
             angle = mp.acos(1 - number(drawing["radial_clearance_mm"]) / 1000 / (2 * between))
         gamma = diameter * mp.cos(angle) / pitch
-        modulus = 2 / sum((1 - number(m.poisson_ratio) ** 2) / number(m.elastic_modulus) for m in (ball, ring))
+        modulus = 2 / sum(
+            (1 - number(m.poisson_ratio) ** 2) / number(m.elastic_modulus) for m in (ball, ring)
+        )
         inner, outer = Hertz(diameter, fi, gamma, modulus), Hertz(diameter, fo, -gamma, modulus)
         mass = number(ball.density) * mp.pi * diameter**3 / 6
         w_in, w_out = (
@@ -146,7 +148,10 @@ class Bearing:
     def ball(self, a_axial, a_radial, x, y, reach_i=None, reach_o=None):
         """(residual axial, radial), (ring axial, radial, couple), loads, F_c and M_g of a ball at (x, y)."""
         context = self.context
-        reach_i, reach_o = self.reach_i if reach_i is None else reach_i, self.reach_o if reach_o is None else reach_o
+        reach_i, reach_o = (
+            self.reach_i if reach_i is None else reach_i,
+            self.reach_o if reach_o is None else reach_o,
+        )
         u, v = a_axial - x, a_radial - y
         length_i, length_o = context.sqrt(u * u + v * v), context.sqrt(x * x + y * y)
         si, ci, so, co = u / length_i, v / length_i, x / length_o, y / length_o

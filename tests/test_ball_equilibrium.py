@@ -38,7 +38,9 @@ def balanced(row, control, load, given=None, start=None):
     """A solution, which must be one: its residual and that of the ring below 1e-9 of the largest force."""
     found = solve(row, control, np.asarray(load, float), given, start)
     assert found.found, found.status
-    largest = max(np.abs(found.inner_load).max(), np.abs(found.outer_load).max(), np.abs(load[:3]).max(), 1e-9)
+    largest = max(
+        np.abs(found.inner_load).max(), np.abs(found.outer_load).max(), np.abs(load[:3]).max(), 1e-9
+    )
     assert found.residual <= 1e-9 * largest
     assert all(np.isfinite(part).all() for part in found if isinstance(part, np.ndarray))
     lacking = np.where(np.isnan(FREE if given is None else given), load - found.reaction, 0.0)
@@ -53,7 +55,9 @@ def turned(load, angle):
     return np.array([c * x - s * y, s * x + c * y, z, c * u - s * v, s * u + c * v])
 
 
-@pytest.mark.parametrize("table", [SMALL, LARGE, DEEP], ids=["71808 outer", "218 hybrid", "209 with clearance"])
+@pytest.mark.parametrize(
+    "table", [SMALL, LARGE, DEEP], ids=["71808 outer", "218 hybrid", "209 with clearance"]
+)
 def test_oracle_equilibrium_to_30_digits(table):
     """Oracle: the root of all equations written once more, found to 30 digits, is this solution to 1e-10 and better."""
     case = scene(table)
@@ -146,7 +150,9 @@ def test_invariant_load_turned_by_a_pitch_permutes_the_balls(pitches, x, y, z, u
     assert other.displacement == pytest.approx(turned(one.displacement, angle), rel=0.0, abs=1e-13)
     assert other.inner_load == pytest.approx(np.roll(one.inner_load, pitches), rel=1e-8, abs=1e-8)
     assert other.outer_angle == pytest.approx(np.roll(one.outer_angle, pitches), rel=0.0, abs=1e-9)
-    assert other.gyroscopic_moment == pytest.approx(np.roll(one.gyroscopic_moment, pitches), rel=1e-8, abs=1e-12)
+    assert other.gyroscopic_moment == pytest.approx(
+        np.roll(one.gyroscopic_moment, pitches), rel=1e-8, abs=1e-12
+    )
 
 
 @given(x=FORCE, y=FORCE, z=FORCE, u=FORCE, v=FORCE)
@@ -198,7 +204,8 @@ def test_invariant_stiffness_is_the_slope_of_the_reaction(name):
         step = np.zeros(5)
         step[i] = 2e-9 / unit[i]
         ahead, behind = (
-            solve(row, control, load, found.displacement + side * step, found).reaction for side in (1.0, -1.0)
+            solve(row, control, load, found.displacement + side * step, found).reaction
+            for side in (1.0, -1.0)
         )
         slope = (ahead - behind) / 4e-9 / unit
         assert scaled[:, i] == pytest.approx(slope, rel=0.0, abs=1e-6 * largest)
@@ -235,7 +242,8 @@ def test_rate_a_near_start_takes_few_steps(name):
     assert solve(row, control, load, start=found).steps == 0
     for away, most in ((1e-10, 2), (1e-7, 4)):
         start = found._replace(
-            displacement=found.displacement + np.array([away, -away, away, 0.0, 0.0]), balls=found.balls + 0.3 * away
+            displacement=found.displacement + np.array([away, -away, away, 0.0, 0.0]),
+            balls=found.balls + 0.3 * away,
         )
         again = balanced(row, control, load, start=start)
         assert 1 <= again.steps <= most
@@ -243,9 +251,7 @@ def test_rate_a_near_start_takes_few_steps(name):
 
 
 @pytest.mark.parametrize("name", ["218 cage", "209 cage"])
-@given(
-    move=st.lists(FORCE, min_size=5, max_size=5), size=st.floats(-7.0, -3.3), shaken=st.floats(0.0, 1.0)
-)
+@given(move=st.lists(FORCE, min_size=5, max_size=5), size=st.floats(-7.0, -3.3), shaken=st.floats(0.0, 1.0))
 @settings(max_examples=15, deadline=None)
 def test_invariant_convex_equilibrium_wherever_it_starts(name, move, size, shaken):
     """Invariant: with one common cage speed every start leads to the one equilibrium, half a millimetre away or shaken."""
@@ -339,7 +345,11 @@ def test_invariant_preload_by_force_and_by_displacement():
     assert np.array_equal(by_force.displacement, balanced(row, control, load_of(together)).displacement)
     nut = scene(
         LARGE,
-        operation={"load_N": None, "radial_load_N": 3000.0, "preload_um": 1e6 * float(by_force.displacement[2])},
+        operation={
+            "load_N": None,
+            "radial_load_N": 3000.0,
+            "preload_um": 1e6 * float(by_force.displacement[2]),
+        },
     )
     by_nut = balanced(row, control, load_of(nut), given_of(nut))
     assert by_nut.reaction == pytest.approx(by_force.reaction, rel=1e-8, abs=1e-5)

@@ -107,7 +107,8 @@ def test_unit_strength_leads_from_the_cage_to_the_race_control(name):
     model = MODELS[name]
     place = places(model, 0.6, 0.4, 12e-6, 11e-6)
     none, half, full = (
-        compiled_forces(model.control, strength, model.row, *place, 12e-6, 11e-6) for strength in (0.0, 0.5, 1.0)
+        compiled_forces(model.control, strength, model.row, *place, 12e-6, 11e-6)
+        for strength in (0.0, 0.5, 1.0)
     )
     cage = MODELS["common_cage"]
     expected = compiled_forces(cage.control, 0.0, cage.row, *place, 12e-6, 11e-6)
@@ -160,7 +161,8 @@ def test_unit_blends_have_no_kink(name, what):
     else:
         told = compiled_forces(model.control, 1.0, row, *places(model, ai, ao, di, do), di, do)
         inner, outer = (
-            stiffness * depth**1.5 for stiffness, depth in ((row.inner_stiffness, di), (row.outer_stiffness, do))
+            stiffness * depth**1.5
+            for stiffness, depth in ((row.inner_stiffness, di), (row.outer_stiffness, do))
         )
         share = 0.0
         if name == "hybrid":
@@ -212,7 +214,13 @@ def test_unit_held_is_smooth_and_bounded(function):
             assert 0.8 * limit < value < limit
             assert function(-part * limit, limit) == (-value, by_force, -by_limit)
             step = 1e-6
-            forward = function(part * limit * (1.0 + step), limit)[0] - function(part * limit * (1.0 - step), limit)[0]
+            forward = (
+                function(part * limit * (1.0 + step), limit)[0]
+                - function(part * limit * (1.0 - step), limit)[0]
+            )
             assert by_force == pytest.approx(forward / (2.0 * step * part * limit), rel=1e-4)
-            wider = function(part * limit, limit * (1.0 + step))[0] - function(part * limit, limit * (1.0 - step))[0]
+            wider = (
+                function(part * limit, limit * (1.0 + step))[0]
+                - function(part * limit, limit * (1.0 - step))[0]
+            )
             assert by_limit == pytest.approx(wider / (2.0 * step * limit), rel=1e-4)

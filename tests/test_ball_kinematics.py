@@ -34,7 +34,15 @@ def compiled_motion(spinning, share, ci, si, co, so):
 def spinning_of(inner_speed, outer_speed=0.0, turning=-1.0):
     """What orbit and spin of a half-inch steel ball depend on."""
     return Spinning(
-        DIAMETER / PITCH, DIAMETER, 0.5 * MASS * PITCH, INERTIA, turning, inner_speed, outer_speed, 1e-200, 1e9
+        DIAMETER / PITCH,
+        DIAMETER,
+        0.5 * MASS * PITCH,
+        INERTIA,
+        turning,
+        inner_speed,
+        outer_speed,
+        1e-200,
+        1e9,
     )
 
 
@@ -92,7 +100,9 @@ def test_literature_outer_and_inner_raceway_control(inner, outer):
         assert moment == pytest.approx(INERTIA * spin * orbit * sb, rel=1e-12)
         rolling = Rolling(fp, g, share, (si, ci), (so, co), w, 0.0)
         free, ruled = (
-            (rolling.inner_spin, rolling.outer_spin) if share == 0.0 else (rolling.outer_spin, rolling.inner_spin)
+            (rolling.inner_spin, rolling.outer_spin)
+            if share == 0.0
+            else (rolling.outer_spin, rolling.inner_spin)
         )
         assert abs(ruled) < 1e-11 * w and abs(free) > 1e-3 * w
 
@@ -140,9 +150,7 @@ def couple_of_inertia(orbit, axial, radial):
     r, cosine, turn = np.meshgrid(0.25 * DIAMETER * (1.0 + nodes), nodes, turns, indexing="ij")
     sine = np.sqrt(1.0 - cosine**2)
     bits = np.stack((r * cosine, r * sine * np.cos(turn), r * sine * np.sin(turn)), -1)
-    volume = (
-        np.einsum("i,j->ij", 0.25 * DIAMETER * weights, weights)[:, :, None] * r**2 * (2.0 * np.pi / 8)
-    )
+    volume = np.einsum("i,j->ij", 0.25 * DIAMETER * weights, weights)[:, :, None] * r**2 * (2.0 * np.pi / 8)
     assert volume.sum() == pytest.approx(math.pi * DIAMETER**3 / 6.0, rel=1e-13)
     # e_z x e_r = e_psi, which is the right-handed order of the three.
     frame, own = np.array([orbit, 0.0, 0.0]), np.array([axial - orbit, radial, 0.0])
@@ -187,9 +195,7 @@ def test_first_principles_friction_turns_the_ball_with_its_orbit(share, inner_sp
         assert told[0][1][2] == pytest.approx(taken, rel=1e-9, abs=1e-12)
         return inner, np.subtract(told[0][0], told[1][0]) - inner, told[0][7]
 
-    rolling = Rolling(
-        fp, DIAMETER / PITCH, share, tuple(normal_i), tuple(normal_o), inner_speed, outer_speed
-    )
+    rolling = Rolling(fp, DIAMETER / PITCH, share, tuple(normal_i), tuple(normal_o), inner_speed, outer_speed)
     needed = couple_of_inertia(rolling.orbit, rolling.axial, rolling.radial)
     assert np.abs(needed[:2]).max() < 1e-12 * abs(needed[2])
     for turning, agrees in ((-1.0, 1.0), (1.0, -1.0)):
