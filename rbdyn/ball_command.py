@@ -64,8 +64,20 @@ def _print_row(title: str, record: dict[str, Any], verbose: bool) -> None:
         + ", "
         + ", ".join(f"tilt {axis} {tilt[axis]:.4g} mrad" for axis in "xy")
     )
-    stress = record["max_stress_MPa"]
-    print(f"peak pressure: {stress['inner']:.0f} MPa inner, {stress['outer']:.0f} MPa outer race")
+    for race, contact in record["contacts"].items():
+        film = (
+            f", film {contact['central_film_um']:.3g} um, lambda {contact['lambda_ratio']:.2g}"
+            if "central_film_um" in contact
+            else ""
+        )
+        print(
+            f"{race} race: up to {contact['load_N']:.4g} N, {record['max_stress_MPa'][race]:.0f} MPa over "
+            f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} um{film}"
+        )
+    life = record["life"]
+    if life["L10_Mrev"] is not None:
+        hours = f", {life['L10_h']:.4g} h" if life["L10_h"] is not None else ""
+        print(f"life L10r: {life['L10_Mrev']:.4g} million turns{hours} ({life['method']})")
     print("stiffness: " + ", ".join(f"{axis} {stiffness[f'{axis}_N_per_um']:.4g} N/um" for axis in "xyz"))
     if verbose:
         print_table(

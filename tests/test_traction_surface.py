@@ -25,7 +25,6 @@ from rbdyn.contact.traction import (
     traction,
     traction_surface,
 )
-from rbdyn.dynamics.model import lubricant
 from rbdyn.dynamics.race_traction import film_report, race_traction
 from rbdyn.faults import InputError
 from rbdyn.lubricants import oil_at
@@ -205,7 +204,7 @@ def scene(*assignments):
 def law_of(*assignments, load=2600.0, speed=26.2):
     """Law of the inner race of a scene."""
     chosen = scene(*assignments)
-    return race_traction(chosen, 3.57e-3, speed, lubricant(chosen), 226.4e9, 3.5e-3, load)
+    return race_traction(chosen, 3.57e-3, speed, chosen.lubricant.in_service, 226.4e9, 3.5e-3, load)
 
 
 def test_unit_laws_of_a_scene():

@@ -6,7 +6,6 @@ What only some scenes need is imported where it is built: a scene without it nev
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,7 +48,7 @@ from rbdyn.dynamics.race_form import RoundRace, largest_rise, wavy_race
 from rbdyn.dynamics.race_traction import race_traction
 from rbdyn.dynamics.races import EqualRollers, Race, unequal_rollers
 from rbdyn.dynamics.ring_motion import HeldRing
-from rbdyn.lubricants import Oil, oil_at
+from rbdyn.lubricants import Oil
 from rbdyn.materials import equivalent_modulus
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Harmonic
@@ -67,7 +66,7 @@ def roller_bearing(scene: Scene) -> RollerBearing:
     drawing = scene.bearing
     diameter, mass = drawing.roller_diameter_mm * 1e-3, roller_mass(scene)
     angles = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
-    oil = lubricant(scene)
+    oil = scene.lubricant.in_service
     radii = roller_radii(scene)
     return RollerBearing(
         rollers=drawing.rollers,
@@ -87,19 +86,6 @@ def roller_bearing(scene: Scene) -> RollerBearing:
         drive=_drive(scene),
         gravity=_gravity(scene),
     )
-
-
-def lubricant(scene: Scene) -> Oil:
-    """The oil of the scene at its temperature, with what the scene replaces."""
-    oil = oil_at(scene.lubricant.oil, scene.lubricant.temperature_C)
-    given = scene.lubricant
-    if given.viscosity_mPas is not None:
-        viscosity = given.viscosity_mPas * 1e-3
-        slope = oil.viscosity_slope * viscosity / oil.viscosity
-        oil = replace(oil, viscosity=viscosity, viscosity_slope=slope)
-    if given.pressure_coefficient_1_GPa is not None:
-        oil = replace(oil, pressure_coefficient=given.pressure_coefficient_1_GPa * 1e-9)
-    return oil
 
 
 def _modulus(scene: Scene, first: str, second: str) -> float:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
-from rbdyn.dynamics.model import lubricant, race_contact_law
+from rbdyn.dynamics.model import race_contact_law
 from rbdyn.dynamics.race_traction import film_report, rolling_contacts
 from rbdyn.scene import Scene
 
@@ -21,7 +21,7 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
     With a profile or a tilt the pressure is that of the most loaded slice, with the roller where the tilt is largest.
     """
     films = film_report(
-        scene, lubricant(scene), max(inner_load, SMALLEST_LOAD), max(outer_load, SMALLEST_LOAD)
+        scene, scene.lubricant.in_service, max(inner_load, SMALLEST_LOAD), max(outer_load, SMALLEST_LOAD)
     )
     count = scene.slices
     contacts = rolling_contacts(scene)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import numpy as np
-
-from rbdyn.contact.hertz_point import peak_pressure
 from rbdyn.quasistatic.double_decker import Start, solve_double_decker
-from rbdyn.quasistatic.double_decker_model import double_decker_of, load_record, middle_record
+from rbdyn.quasistatic.double_decker_model import (
+    DoubleDeckerModel,
+    double_decker_of,
+    load_record,
+    middle_record,
+)
 from rbdyn.quasistatic.equilibrium import Solution
 from rbdyn.quasistatic.growth_model import growth_record, row_change
-from rbdyn.quasistatic.model import RowModel, given_of, load_of, row_of
+from rbdyn.quasistatic.model import RPM, RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.result import (
     FORMAT,
     BallResult,
@@ -20,10 +22,15 @@ from rbdyn.quasistatic.result import (
     displacement_record,
     stiffness_record,
 )
+from rbdyn.quasistatic.roots import other_roots
+from rbdyn.quasistatic.row_report import beyond_hertz, film_record, notes, row_record
 from rbdyn.quasistatic.solvers import SOLVERS
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
-from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
+from rbdyn.scene.ball import BallRow, DoubleDeckerScene, SingleRowScene
+
+# Raceway controls under which there may be more than one equilibrium.
+SEVERAL_ROOTS = ("inner", "half")
 
 
 def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> BallResult:
@@ -44,8 +51,46 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
     head, tail = _frame(scene, solution.status, took)
     if not solution.found:
         return BallResult({**head, **tail})
+    why = beyond_hertz(scene.bearing, model, solution)
+    if why is not None:
+        return BallResult({**head, "status": why, **tail})
+    speeds = scene.operation.inner_speed_rpm * RPM, scene.operation.outer_speed_rpm * RPM
+    film = _film(scene, scene.bearing, model, solution, speeds, ("inner_ring", "outer_ring"))
+    record = row_record(scene.bearing, model, solution, speeds, film)
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
-    return BallResult({**head, **row_record(model, solution), **grown, **tail}, (solution,))
+    told = notes(scene.bearing, model, solution)
+    others = _other_roots(scene, model, solution)
+    if others:
+        told.append(
+            f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load under this raceway control, see "
+            "other_roots; this one is reached from one common cage speed"
+        )
+    roots = {"other_roots": others} if others is not None else {}
+    return BallResult({**head, **record, **grown, **roots, "notes": told, **tail}, (solution,))
+
+
+def _film(
+    scene: BallScene,
+    drawing: BallRow,
+    model: RowModel,
+    solution: Solution,
+    speeds: tuple[float, float],
+    rings: tuple[str, str],
+) -> dict[str, Any] | None:
+    """Film of a row, where the scene tells the oil."""
+    if scene.lubricant is None:
+        return None
+    inner, outer = (scene.material(ring) for ring in rings)
+    materials = scene.material("ball"), inner, outer
+    return film_record(drawing, model, solution, speeds, materials, scene.lubricant)
+
+
+def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[dict[str, Any]] | None:
+    """Other equilibria, where the raceway control may have several; None where they are not looked for."""
+    if scene.model.raceway_control not in SEVERAL_ROOTS or scene.model.solver != "convex":
+        return None
+    found = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
+    return [{**displacement_record(root.displacement), "balls": ball_records(root)} for root in found]
 
 
 def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallResult:
@@ -58,10 +103,24 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
     if not solution.found:
         return BallResult({**head, **tail})
     rows = solution.inner, solution.outer
-    layers = {
-        name: row_record(layer, row)
-        for name, layer, row in zip(("inner", "outer"), (model.inner, model.outer), rows, strict=True)
-    }
+    why = next(
+        (
+            f"{name} row {why}"
+            for name, drawing, layer, row in _layers(scene, model, rows)
+            if (why := beyond_hertz(drawing, layer, row)) is not None
+        ),
+        None,
+    )
+    if why is not None:
+        return BallResult({**head, "status": why, **tail})
+    inner, outer = scene.operation.inner_speed_rpm * RPM, scene.operation.outer_speed_rpm * RPM
+    speeds = {"inner": (inner, model.split.speed), "outer": (model.split.speed, outer)}
+    rings = {"inner": ("inner_ring", "middle_ring"), "outer": ("middle_ring", "outer_ring")}
+    layers, told = {}, []
+    for name, drawing, layer, row in _layers(scene, model, rows):
+        film = _film(scene, drawing, layer, row, speeds[name], rings[name])
+        layers[name] = row_record(drawing, layer, row, speeds[name], film)
+        told += notes(drawing, layer, row, name)
     grown = growth_record(
         scene, dict(zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True))
     )
@@ -73,7 +132,17 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
         "residual_N": solution.residual,
         "iterations": solution.steps + sum(row.steps for row in rows),
     }
-    return BallResult({**head, **whole, **layers, **grown, **tail}, rows)
+    return BallResult({**head, **whole, **layers, **grown, "notes": told, **tail}, rows)
+
+
+def _layers(
+    scene: DoubleDeckerScene, model: DoubleDeckerModel, rows: tuple[Solution, Solution]
+) -> tuple[tuple[str, BallRow, RowModel, Solution], ...]:
+    """Name, drawing, parameters and equilibrium of the inner and the outer row."""
+    return (
+        ("inner", scene.bearing.inner, model.inner, rows[0]),
+        ("outer", scene.bearing.outer, model.outer, rows[1]),
+    )
 
 
 def _frame(scene: BallScene, status: str, took: float) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -90,20 +159,3 @@ def _frame(scene: BallScene, status: str, took: float) -> tuple[dict[str, Any], 
         "scene": scene.model_dump(mode="json"),
     }
     return head, tail
-
-
-def row_record(model: RowModel, solution: Solution) -> dict[str, Any]:
-    """What is reported of one row in equilibrium."""
-    searches = {} if solution.searches is None else {"searches": solution.searches}
-    return {
-        **displacement_record(solution.displacement),
-        "balls": ball_records(solution),
-        "max_stress_MPa": {
-            "inner": 1e-6 * float(np.max(peak_pressure(model.inner_contact, solution.inner_load))),
-            "outer": 1e-6 * float(np.max(peak_pressure(model.outer_contact, solution.outer_load))),
-        },
-        "stiffness": stiffness_record(solution.stiffness),
-        "residual_N": solution.residual,
-        "iterations": solution.steps,
-        **searches,
-    }

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
-from rbdyn.lubricants import oil_at
 from rbdyn.quasistatic.double_decker import DoubleDeckerSolution, Layer, Stack
 from rbdyn.quasistatic.growth_model import layer_changes
 from rbdyn.quasistatic.model import RPM, RowModel, contacts, row_model
@@ -99,9 +98,8 @@ def middle_speed(scene: DoubleDeckerScene) -> SpeedSplit:
 def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFriction]:
     """Friction of inner and outer row under the scene's load, which both carry; prescribed displacements give none."""
     assert scene.lubricant is not None
-    oil = oil_at(scene.lubricant.oil, scene.lubricant.temperature_C)
-    given = scene.lubricant.viscosity_mPas
-    viscosity = (oil.viscosity if given is None else 1e-3 * given) / oil.density
+    oil = scene.lubricant.in_service
+    viscosity = oil.viscosity / oil.density
     x, y, axial = scene.operation.load
     middle = scene.bearing.middle
     rows = ("inner", "middle", scene.bearing.inner), ("middle", "outer", scene.bearing.outer)

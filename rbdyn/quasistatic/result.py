@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -111,15 +110,3 @@ def stiffness_record(stiffness: NDArray[np.float64]) -> dict[str, Any]:
         "tilt_y_Nm_per_mrad": float(tilt[1]),
         "matrix_SI": stiffness.tolist(),
     }
-
-
-def needed_friction(solution: Solution, control_share: float | None, ball_diameter: float) -> float:
-    """Largest friction coefficient that a contact needs to hold its part of the gyroscopic moment, 2 s M_g/(D Q)."""
-    if control_share is None:
-        return 0.0
-    moment = 2.0 * np.abs(solution.gyroscopic_moment) / ball_diameter
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inner = np.where(solution.inner_load > 0.0, control_share * moment / solution.inner_load, 0.0)
-        outer = np.where(solution.outer_load > 0.0, (1.0 - control_share) * moment / solution.outer_load, 0.0)
-    largest = float(max(inner.max(), outer.max()))
-    return largest if math.isfinite(largest) else 0.0

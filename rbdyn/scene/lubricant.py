@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from rbdyn.faults import Strict
+from rbdyn.lubricants import Oil, oil_at
 from rbdyn.scene.fields import Fraction, NonNegative, Positive, or_refuse
 
 RheologyOil = Literal[
@@ -40,6 +42,18 @@ class Lubricant(Strict):
     race_roughness_um: Annotated[float, Field(gt=0.0, le=100.0)] = 0.05
     # Where the oil begins ahead of a contact, in its half-widths; flooded where left out. ADORE-style inputs have 10.
     inlet_distance: Positive | None = None
+
+    @property
+    def in_service(self) -> Oil:
+        """The oil at its temperature, with what the scene replaces."""
+        oil = oil_at(self.oil, self.temperature_C)
+        if self.viscosity_mPas is not None:
+            viscosity = self.viscosity_mPas * 1e-3
+            slope = oil.viscosity_slope * viscosity / oil.viscosity
+            oil = replace(oil, viscosity=viscosity, viscosity_slope=slope)
+        if self.pressure_coefficient_1_GPa is not None:
+            oil = replace(oil, pressure_coefficient=self.pressure_coefficient_1_GPa * 1e-9)
+        return oil
 
 
 class Traction(Strict):

@@ -1,0 +1,61 @@
+"""Other equilibria of the same bearing under the same load: a raceway control other than outer may have several."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.quasistatic.control import Control, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.equilibrium import Solution, solve
+from rbdyn.quasistatic.row import Row
+
+# Shares of the inner race and of the speeds whose equilibria are the starts of the search.
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+SPEEDS = (0.7, 1.4)
+# Contact angles that differ by less belong to one equilibrium [rad].
+SAME = 1e-4
+
+
+def other_roots(
+    row: Row, control: Control, load: NDArray[np.float64], given: NDArray[np.float64], known: Solution
+) -> tuple[Solution, ...]:
+    """Equilibria besides ``known``, found from those of other raceway controls and of slower and faster rings.
+
+    A search, not a proof: an empty answer says that none of these starts leads elsewhere. None under one common cage speed,
+    where the equilibrium is unique.
+    """
+    if not isinstance(control, FixedShare | FrictionShare):
+        return ()
+    found = [known]
+    for start in _starts(row, control, load, given):
+        root = solve(row, control, load, given, start)
+        if root.found and all(_differ(root, other) for other in found):
+            found.append(root)
+    return tuple(found[1:])
+
+
+def _starts(
+    row: Row, control: FixedShare | FrictionShare, load: NDArray[np.float64], given: NDArray[np.float64]
+) -> Sequence[Solution]:
+    neighbours: list[tuple[Row, Control]] = [(row, FixedShare(share, control.spinning)) for share in SHARES]
+    for factor in SPEEDS:
+        neighbours.append((row, control._replace(spinning=_turning(control.spinning, factor))))
+    # The sign of the moment that many texts have leads to the other side.
+    neighbours.append(
+        (row, control._replace(spinning=control.spinning._replace(turning=-control.spinning.turning)))
+    )
+    return [start for start in (solve(a, b, load, given) for a, b in neighbours) if start.found]
+
+
+def _turning(spinning: Spinning, factor: float) -> Spinning:
+    return spinning._replace(
+        inner_speed=factor * spinning.inner_speed, outer_speed=factor * spinning.outer_speed
+    )
+
+
+def _differ(one: Solution, other: Solution) -> bool:
+    touching = (one.inner_load > 0.0) & (other.inner_load > 0.0)
+    apart = np.abs(one.inner_angle - other.inner_angle)[touching]
+    return bool(np.any((one.inner_load > 0.0) != (other.inner_load > 0.0)) or np.any(apart > SAME))
