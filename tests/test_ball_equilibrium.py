@@ -358,17 +358,11 @@ def test_invariant_preload_by_force_and_by_displacement():
 @given(power=st.floats(-1.0, 6.0), radial=FORCE, tilted=FORCE)
 @settings(max_examples=40, deadline=None)
 def test_stiff_seven_decades_of_load(power, radial, tilted):
-    """Stiff: from 0.1 N to 1 MN on a bearing at 3 million mm rpm there is an equilibrium, or a sentence tells that there is none."""
+    """Stiff: from 0.1 N to 1 MN on a bearing at 3 million mm rpm each load has its equilibrium."""
     size = 10.0**power
-    row, control = model_of(LARGE, operation={"inner_speed_rpm": 24_000.0}, model=HARD)
-    found = solve(row, control, np.array([size * radial, 0.0, size, 0.0, 0.02 * size * tilted]))
-    assert np.isfinite(found.displacement).all()
-    if found.found:
-        assert found.residual <= 1e-9 * max(size, found.outer_load.max())
-    else:
-        assert "no equilibrium was found" in found.status
-    cage = model_of(LARGE, operation={"inner_speed_rpm": 24_000.0}, model=CAGE)
-    balanced(*cage, np.array([size * radial, 0.0, size, 0.0, 0.02 * size * tilted]))
+    for model in (CAGE, HARD):
+        row, control = model_of(LARGE, operation={"inner_speed_rpm": 24_000.0}, model=model)
+        balanced(row, control, np.array([size * radial, 0.0, size, 0.0, 0.02 * size * tilted]))
 
 
 EXTREMES = {
@@ -389,25 +383,33 @@ EXTREMES = {
 @pytest.mark.parametrize("speed", [0.0, 24_000.0])
 @pytest.mark.parametrize("name", EXTREMES)
 def test_stiff_extremes(name, speed):
-    """Stiff: with one common cage speed each has its equilibrium; with race control too, or a sentence that there is none."""
+    """Stiff: angles, clearances, grooves and numbers of balls at the ends of what is made have their equilibrium."""
     bearing, operation, load = EXTREMES[name]
     for model in (CAGE, HARD):
-        groups = {
-            "bearing": bearing,
-            "operation": {"inner_speed_rpm": speed, "load_N": load[:3], "moment_Nm": None, **operation},
-        }
-        case_ = scene(LARGE, **groups, model=model)
+        case_ = scene(
+            LARGE,
+            bearing=bearing,
+            operation={"inner_speed_rpm": speed, "load_N": load[:3], "moment_Nm": None, **operation},
+            model=model,
+        )
         parts = row_of(case_)
-        found = solve(parts.row, parts.control, np.array(load), given_of(case_))
-        assert np.isfinite(found.displacement).all() and not math.isnan(found.residual)
-        if model is CAGE:
-            assert found.found, found.status
-        if found.found:
-            balanced(parts.row, parts.control, np.array(load), given_of(case_))
-        else:
-            assert found.status == "" or "no equilibrium was found" in found.status
-    if name == "one ball loaded":
-        assert np.count_nonzero(found.inner_load > 1e-9) == 1
+        found = balanced(parts.row, parts.control, np.array(load), given_of(case_))
+        if name == "one ball loaded":
+            assert np.count_nonzero(found.inner_load > 1e-9) == 1
+
+
+def test_stiff_where_there_is_no_equilibrium_a_sentence_tells():
+    """Stiff: nearly no load that brings race control in lets a ball have several orbits: a sentence with a remedy, nothing raised."""
+    load = np.array([0.0, 0.0, 100.0, 0.0, 0.0])
+    abrupt = {"raceway_control": "inner", "light_load_share": 1e-3}
+    row, control = model_of(LARGE, operation={"inner_speed_rpm": 30_000.0}, model=abrupt)
+    lost = solve(row, control, load)
+    assert not lost.found
+    assert "no equilibrium was found" in lost.status and "raise model.light_load_share" in lost.status
+    assert not any(np.isnan(part).any() for part in lost if isinstance(part, np.ndarray))
+    balanced(
+        *model_of(LARGE, operation={"inner_speed_rpm": 30_000.0}, model={"raceway_control": "inner"}), load
+    )
 
 
 def test_limit_without_friction_no_gyroscopic_moment_is_held():

@@ -276,6 +276,7 @@ def test_command_line_json_keys_of_a_ball_bearing():
     assert set(record["displacement_mm"]) == {"x", "y", "z"} and set(record["tilt_mrad"]) == {"x", "y"}
     assert set(record["max_stress_MPa"]) == {"inner", "outer"}
     assert {"x_N_per_um", "y_N_per_um", "z_N_per_um"} <= set(record["stiffness"])
+    assert {"L10_Mrev", "L10_h", "method"} <= set(record["life"])
     assert record["cost"]["solve_us"] > 0.0 and record["iterations"] > 0
     assert record["residual_N"] < 1e-9 * 200.0
     case = BallScene.load(BALLS)
