@@ -1,10 +1,19 @@
-"""Ball bearings that several tests share: tables of scenes."""
+"""Ball bearings that several tests share: tables of scenes, and solutions that are checked."""
 
 from __future__ import annotations
 
 import copy
 
+import numpy as np
+
 from rbdyn import BallScene
+from rbdyn.quasistatic.equilibrium import solve
+from rbdyn.quasistatic.model import row_of
+
+FREE = np.full(5, np.nan)
+AT_REST = {"inner_speed_rpm": 0.0, "outer_speed_rpm": 0.0}
+CAGE = {"raceway_control": "common_cage"}
+HARD = {"raceway_control": "outer"}
 
 # 71808 of Hu et al. 2021, Table 1, at the third condition of their Table 3.
 SMALL = {
@@ -56,3 +65,23 @@ def changed(table, **groups):
 def scene(table, **groups):
     """A scene of a table with changes."""
     return BallScene.from_dict(changed(table, **groups))
+
+
+def model_of(table, **groups):
+    """Row and control of a table with changes."""
+    model = row_of(scene(table, **groups))
+    return model.row, model.control
+
+
+def balanced(row, control, load, given=None, start=None):
+    """A solution, which must be one: its residual and that of the ring below 1e-9 of the largest force."""
+    found = solve(row, control, np.asarray(load, float), given, start)
+    assert found.found, found.status
+    largest = max(
+        np.abs(found.inner_load).max(), np.abs(found.outer_load).max(), np.abs(load[:3]).max(), 1e-9
+    )
+    assert found.residual <= 1e-9 * largest
+    assert all(np.isfinite(part).all() for part in found if isinstance(part, np.ndarray))
+    lacking = np.where(np.isnan(FREE if given is None else given), load - found.reaction, 0.0)
+    assert np.abs(lacking / np.array([1.0, 1.0, 1.0, row.lever, row.lever])).max() <= 1e-9 * largest
+    return found
