@@ -58,11 +58,18 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
     except ValidationError as error:
         faults = _sentences(model, error, source)
         # A table with a bad key is not checked as a whole: without that key it may show more faults.
-        rest = _without(data, [fault["loc"] for fault in error.errors()])
+        bad = [fault["loc"] for fault in error.errors()]
+        rest = _without(data, bad)
     try:
         model.model_validate(rest)
     except ValidationError as error:
-        faults += _sentences(model, error, source, only="value_error")
+        more = _sentences(model, error, source, only="value_error")
+        # What is bad was not left out, even if it is missed now.
+        faults += [
+            fault
+            for fault in more
+            if ": missing; " not in fault or not any(_key(place) in fault for place in bad)
+        ]
     raise InputError(dict.fromkeys(faults))
 
 
@@ -107,7 +114,7 @@ def _sentences(
         )
         if (kind == alien and _names_a_kind(str(fault["loc"][-1]))) or (only and kind != only):
             continue
-        place = tuple(part for part in fault["loc"] if isinstance(part, int) or not _names_a_kind(part))
+        place = _place(fault["loc"])
         key = _dotted(place)
         if kind == "extra_forbidden":
             sentences.append(f"{source}: {key}: unknown key; {_nearest(model, place)}")
@@ -127,9 +134,19 @@ def _sentences(
     return sentences + [f"{head}: {', or '.join(dict.fromkeys(mend))}" for head, mend in mends.items()]
 
 
+def _place(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    """The keys of a location, without the kinds that a key may be of."""
+    return tuple(part for part in location if isinstance(part, int) or not _names_a_kind(part))
+
+
+def _key(location: tuple[int | str, ...]) -> str:
+    """The last key of a location."""
+    return str(_place(location)[-1]) if _place(location) else ""
+
+
 def _names_a_kind(part: str) -> bool:
     """Whether a part of a location names one of the kinds that a key may be of, not a key."""
-    return part[:1].isupper() or "[" in part or part in ("float", "int", "str", "constrained-float")
+    return part[:1].isupper() or "[" in part or part in ("bool", "float", "int", "str", "constrained-float")
 
 
 def _mend(kind: str, fault: Any) -> str:

@@ -14,7 +14,15 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 from rbdyn.contact import damping, film, hertz_line, traction
-from rbdyn.elementary import eighteenth_root, fast_atan, fast_cos_sin, fast_exp, fast_log, tenth_root
+from rbdyn.elementary import (
+    eighteenth_root,
+    fast_atan,
+    fast_cos_sin,
+    fast_exp,
+    fast_expm1,
+    fast_log,
+    tenth_root,
+)
 from rbdyn.lubricants import oil_at
 from rbdyn.materials import MATERIALS, equivalent_modulus
 
@@ -40,6 +48,11 @@ def compiled_rolling(model, load, speed):
 @njit
 def compiled_exp(x):
     return fast_exp(x)
+
+
+@njit
+def compiled_expm1(x):
+    return fast_expm1(x)
 
 
 @njit
@@ -249,6 +262,14 @@ def test_unit_viscosity_slope(name):
 def ulps_apart(function, exact, points):
     """Largest relative difference, in which a double can be wrong by 1.1e-16 at best."""
     return max(abs(function(x) - exact(x)) / max(abs(exact(x)), 1e-300) for x in points)
+
+
+def test_unit_fast_expm1_keeps_its_figures_near_zero():
+    """Unit: within 6e-16 of the C library from the smallest normal number to the largest result; nil at 0; NaN comes through."""
+    points = np.concatenate((np.geomspace(1e-300, 700.0, 20_000), np.linspace(0.0, 2.0, 20_001)[1:]))
+    assert max(abs(compiled_expm1(x) / math.expm1(x) - 1.0) for x in points) < 6e-16
+    assert compiled_expm1(0.0) == 0.0 and math.isnan(compiled_expm1(math.nan))
+    assert fast_expm1(1e-9) == math.expm1(1e-9)
 
 
 def test_unit_fast_exp_and_log():

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numba import njit
 from test_scene import TABLE
@@ -101,6 +101,8 @@ def test_invariant_traction_is_odd_and_never_drives(name, slip, load):
     slip=st.floats(allow_nan=False, allow_infinity=False),
     load=st.floats(allow_nan=False, allow_infinity=False),
 )
+@example(slip=4.528728074098563e-10, load=1.0)
+@example(slip=-1e-300, load=5000.0)
 @settings(max_examples=200, deadline=None)
 def test_invariant_surface_takes_any_number(name, slip, load):
     """Invariant: any finite slip and load, however absurd, give a coefficient below one along the slip."""

@@ -23,8 +23,8 @@ SENTENCES = {
     NOT_CONVEX_MINIMUM: "no equilibrium was found even with one common cage speed",
 }
 LOST = (
-    "no equilibrium was found with this raceway control, only with one common cage speed: friction cannot hold the balls' "
-    "gyroscopic moments there"
+    "no equilibrium was found with this raceway control, only with one common cage speed: the control or friction leaves the "
+    "balls none, or several; raise model.light_load_share or set model.raceway_control = 'common_cage'"
 )
 
 

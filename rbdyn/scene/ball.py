@@ -66,7 +66,8 @@ class BallRow(Strict):
                 f"ball_diameter_mm = {self.ball_diameter_mm:g}: leaves no inner raceway on a pitch circle of "
                 f"{self.pitch_diameter_mm:g} mm; make the ball smaller"
             )
-        return or_refuse(self, faults + self._clearance_faults() + self._ring_faults())
+        # Only a contact angle that is known tells where the races are.
+        return or_refuse(self, faults + (self._clearance_faults() or self._ring_faults()))
 
     def _clearance_faults(self) -> list[str]:
         angle, clearance = self.contact_angle_deg, self.radial_clearance_mm
