@@ -7,6 +7,7 @@ Where a row has several equilibria (see ``light_load_share``) a start from the n
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -23,7 +24,7 @@ from rbdyn.quasistatic.newton import CONVERGED, COUNTERS, space
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.ring import BALL, RING
 from rbdyn.quasistatic.sweep_figures import Columns, Rating, overloads, ring_columns, row_columns, told
-from rbdyn.quasistatic.sweep_march import NUMBERS, PLACES, Found, Points, empty, leaves, march_through
+from rbdyn.quasistatic.sweep_march import LEVER, Found, Points, empty, leaves, march_through
 from rbdyn.quasistatic.sweep_points import Axis, axes_of, scenes, snake
 from rbdyn.quasistatic.sweep_result import SweepResult
 from rbdyn.scene import BallScene, Scene, balls_only
@@ -130,28 +131,27 @@ def _march(
 def _packed(
     scene: SingleRowScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]]
 ) -> tuple[RowModel, Points, list[Rating]]:
-    """The last row, and what changes from point to point. The row is made again only where a key that it depends on changes."""
-    count, size = len(order), scene.bearing.balls
-    shapes = [place for place, axis in enumerate(axes) if not axis.key.startswith(LOAD_KEYS)]
-    drawn = [place for place in shapes if axes[place].key.startswith("bearing.")]
-    places, numbers = np.empty((len(PLACES), count, size)), np.empty((count, len(NUMBERS)))
-    control: list[list[float]] = []
+    """The last row, and what changes from point to point; each part is made again only where a key that it depends on changes."""
+    loading = [place for place, axis in enumerate(axes) if axis.key.startswith(LOAD_KEYS)]
+    shaping = [place for place in range(len(axes)) if place not in loading]
+    drawing = [place for place in shaping if axes[place].key.startswith("bearing.")]
+    places: list[tuple[Vector, ...]] = []
+    numbers: list[tuple[float, ...]] = []
+    controls: list[list[float]] = []
+    ratings: list[Rating] = []
     loads: list[Vector] = []
     givens: list[Vector] = []
-    ratings: list[Rating] = []
     made: RowModel | None = None
-    last_shape: list[float] = []
-    last_drawing: list[float] = []
-    capacities = (1.0, 1.0)
-    for k, (values, point) in enumerate(scenes(scene, axes, order)):
+    loaded = shaped = drawn = [math.nan]
+    for values, point in scenes(scene, axes, order):
         assert isinstance(point, SingleRowScene)
-        shape = [values[place] for place in shapes]
-        if made is None or shape != last_shape:
-            drawing = [values[place] for place in drawn]
-            if made is None or drawing != last_drawing:
-                capacities, last_drawing = reference_capacities(point.bearing), drawing
-            made, last_shape = row_of(point), shape
-            kept = leaves(made.control)
+        now = [values[place] for place in shaping]
+        if made is None or now != shaped:
+            made, shaped = row_of(point), now
+            at_place, number, control = made.row[2:6], made.row[6:], leaves(made.control)
+            now = [values[place] for place in drawing]
+            if now != drawn:
+                capacities, drawn = reference_capacities(point.bearing), now
             inner_speed, outer_speed = point.operation.inner_speed_rpm, point.operation.outer_speed_rpm
             rating = Rating(
                 point.bearing,
@@ -161,25 +161,25 @@ def _packed(
                 turning_rings(inner_speed, outer_speed),
                 inner_speed - outer_speed,
             )
-            for i, name in enumerate(PLACES):
-                places[i, k] = getattr(made.row, name)
-            numbers[k] = [getattr(made.row, name) for name in NUMBERS]
-        else:
-            places[:, k], numbers[k] = places[:, k - 1], numbers[k - 1]
-        control.append(kept)
+        now = [values[place] for place in loading]
+        if now != loaded:
+            load, given, loaded = load_of(point), given_of(point), now
+        places.append(at_place)
+        numbers.append(number)
+        controls.append(control)
         ratings.append(rating)
-        loads.append(load_of(point))
-        givens.append(given_of(point))
+        loads.append(load)
+        givens.append(given)
     assert made is not None
-    load, given = np.array(loads), np.array(givens)
-    units = _units(numbers)
-    free = np.isnan(given)
+    number_table, given_table = np.array(numbers), np.array(givens)
+    units = _units(number_table)
+    free = np.isnan(given_table)
     points = Points(
-        places,
-        numbers,
-        np.array(control),
-        load / units,
-        np.where(free, 0.0, given) * units,
+        np.ascontiguousarray(np.array(places).transpose(1, 0, 2)),
+        number_table,
+        np.array(controls),
+        np.array(loads) / units,
+        np.where(free, 0.0, given_table) * units,
         free.astype(float),
     )
     return made, points, ratings
@@ -188,7 +188,7 @@ def _packed(
 def _units(numbers: Vector) -> Vector:
     """(n, 5): what tilts count over."""
     units = np.ones((len(numbers), RING))
-    units[:, 3:] = numbers[:, [NUMBERS.index("lever")]]
+    units[:, 3:] = numbers[:, [LEVER]]
     return units
 
 

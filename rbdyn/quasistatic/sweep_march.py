@@ -8,23 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.kernel import entry, kernel, law
-from rbdyn.quasistatic.control import CommonCage, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.equilibrium import TOLD, solve_row
 from rbdyn.quasistatic.newton import COLD_STARTS, CONVERGED, STEPS
 from rbdyn.quasistatic.ring import RING, TAKEN
 from rbdyn.quasistatic.row import Row
 
-# Order of the fields of ``Row`` in ``Points``: arrays over the balls, then numbers.
-PLACES = ("axial", "radial", "inner_reach", "outer_reach")
-NUMBERS = (
-    "inner_stiffness",
-    "outer_stiffness",
-    "lever",
-    "inner_groove_radius",
-    "centrifugal_force",
-    "rest_deflection",
-    "rest_energy",
-)
+# Fields of ``Row`` that change from point to point: arrays over the balls, then numbers.
+PLACES, NUMBERS = Row._fields[2:6], Row._fields[6:]
 LEVER = NUMBERS.index("lever")
 
 
@@ -71,9 +62,9 @@ def empty(points: int, balls: int) -> Found:
     )
 
 
-def leaves(control: Any) -> list[float]:
+def leaves(control: Control) -> list[float]:
     """Numbers of a control, as ``with_numbers`` takes them."""
-    return [leaf for part in control for leaf in (leaves(part) if isinstance(part, tuple) else [part])]
+    return [control[0], *(() if isinstance(control, CommonCage) else control.spinning)]
 
 
 @law

@@ -160,7 +160,10 @@ def scenes(
     scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]]
 ) -> Iterator[tuple[tuple[float, ...], BallScene]]:
     """Values and validated scene of each point. Raises InputError naming a point that the scene refuses."""
-    data, kind = tables(scene), type(scene)
+    whole, kind = tables(scene), type(scene)
+    # Tables that no key touches are valid as they are; the others stay in ``whole``, which can so be read again as one.
+    touched = {name: whole.setdefault(name, {}) for name in (str(axis.path[0]) for axis in axes)}
+    data = {name: getattr(scene, name) for name in kind.model_fields} | touched
     holders = [_holder(data, axis.path) for axis in axes]
     for indices in order:
         values = tuple(axis.values[index] for axis, index in zip(axes, indices, strict=True))
@@ -170,7 +173,7 @@ def scenes(
             made = kind.model_validate(data)
         except ValidationError:
             named = ", ".join(f"{axis.key} = {value:g}" for axis, value in zip(axes, values, strict=True))
-            made = validated(kind, data, f"sweep point ({named})")
+            made = validated(kind, whole, f"sweep point ({named})")
         yield values, made
 
 
