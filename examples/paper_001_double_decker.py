@@ -18,7 +18,7 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 import typer
-from published.common import Check, Table, canvas, save
+from published.common import Check, Table, canvas, save, tell
 
 from rbdyn import BallScene, equilibrium
 
@@ -234,16 +234,7 @@ def main(
     out: Annotated[Path | None, typer.Option(help="Folder for the numbers and pictures.")] = None,
 ) -> None:
     """Regenerate the figures and print what the paper states beside ours."""
-    check = paper_001()
-    print(f"# {check.title}\n")
-    for table in check.tables:
-        print(table.markdown())
-    print(check.conclusion)
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        check.frame.to_csv(out / "paper_001.csv", index=False, float_format="%.8g")
-        check.draw(out / "paper_001.png")
-        print(f"written to {out}: paper_001.csv, paper_001.png, paper_001_materials.png")
+    tell(paper_001(), out, "paper_001")
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ from typing import Annotated
 import typer
 from published.common import Check, Effort
 from published.operating import figure14, friction
-from published.preload import preload_and_clearance
 from published.sensitivity import QUICK, sensitivity
 from published.skidding import QUICK as QUICK_ASSUMPTIONS
 from published.skidding import nu215
@@ -36,7 +35,6 @@ FULL: dict[str, Callable[[], Check]] = {
     "friction": lambda: friction(SHORT),
     "sensitivity": lambda: sensitivity(SHORT),
     "whirl": lambda: whirl(MEDIUM),
-    "preload": preload_and_clearance,
 }
 BRIEF: dict[str, Callable[[], Check]] = {
     "table4": lambda: table4(SHORT),
@@ -47,7 +45,6 @@ BRIEF: dict[str, Callable[[], Check]] = {
     "friction": lambda: friction(SHORT, (12000, 24000, 30000), (650, 1300, 2600)),
     "sensitivity": lambda: sensitivity(SHORT, QUICK, whole_design=False),
     "whirl": lambda: whirl(SHORT, (1.0, 0.1, 0.01, 0.001), ("four_constant",), 5.0),
-    "preload": preload_and_clearance,
 }  # fmt: skip
 
 

@@ -137,3 +137,16 @@ def canvas(rows: int, columns: int, width: float = 4.2, height: float = 3.6) -> 
     from matplotlib import pyplot as plt
 
     return plt.subplots(rows, columns, figsize=(width * columns, height * rows), squeeze=False)
+
+
+def tell(check: Check, out: Path | None, name: str) -> None:
+    """Print a check; where a folder is given, write its numbers and pictures there as ``name``."""
+    print(f"# {check.title}\n")
+    for table in check.tables:
+        print(table.markdown())
+    print(check.conclusion)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        check.frame.to_csv(out / f"{name}.csv", index=False, float_format="%.8g")
+        check.draw(out / f"{name}.png")
+        print(f"written to {out}: {', '.join(sorted(path.name for path in out.glob(f'{name}*')))}")

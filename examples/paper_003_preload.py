@@ -1,4 +1,6 @@
-"""Check 7: stress and life of an angular contact ball bearing against preload and clearance (Sensors 2023, 23, 4503).
+"""Stress and life of an angular contact ball bearing against preload and clearance (Sensors 2023, 23, 4503).
+
+    python examples/paper_003_preload.py [--out DIR]
 
 Tables 3 and 4 of that paper beside ours: at rest between rings that stay parallel, which is what its stresses belong
 to, and at its 63000 rpm with centrifugal forces and gyroscopic moments, the ring held or free to tilt.
@@ -9,12 +11,13 @@ from __future__ import annotations
 import functools
 import math
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
+import typer
+from published.common import Check, Table, canvas, percent, save, tell
 
-from published.common import Check, Table, canvas, percent, save
 from rbdyn import BallScene
 from rbdyn.contact.hertz_point import peak_pressure
 from rbdyn.quasistatic import fatigue, preload, rating
@@ -368,3 +371,14 @@ def _draw(path: Path) -> None:
     for panel in axes.flat:
         panel.legend(fontsize=7)
     save(figure, path)
+
+
+def main(
+    out: Annotated[Path | None, typer.Option(help="Folder for the numbers and pictures.")] = None,
+) -> None:
+    """Regenerate both tables and print what they belong to."""
+    tell(preload_and_clearance(), out, "paper_003")
+
+
+if __name__ == "__main__":
+    typer.run(main)
