@@ -128,6 +128,20 @@ def test_invariant_the_order_of_points_does_not_matter(grid):
             assert other == pytest.approx(column, rel=1e-8, abs=1e-10 * np.abs(column).max() + 1e-12)
 
 
+def test_unit_three_keys_stand_in_the_order_of_the_table():
+    """Unit: whatever way the snake went, a row of the table has the figures of its own keys."""
+    radial = "operation.radial_load_N"
+    table = sweep(
+        scene_with(), {LOAD: [150.0, 250.0], radial: [100.0, 200.0], SPEED: [5e3, 1e4, 2e4]}
+    ).table()
+    assert table[SPEED].tolist() == [5e3, 1e4, 2e4] * 4 and table[LOAD].tolist() == [150.0] * 6 + [250.0] * 6
+    assert table["force_z_N"].to_numpy() == pytest.approx(table[LOAD].to_numpy(), rel=1e-8)
+    assert table["force_x_N"].to_numpy() == pytest.approx(table[radial].to_numpy(), rel=1e-8)
+    assert (table["L10_h"] * table[SPEED] * 60.0 / 1e6).to_numpy() == pytest.approx(
+        table["L10_Mrev"].to_numpy()
+    )
+
+
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=4))
 @settings(max_examples=40, deadline=None)
 def test_invariant_a_snake_visits_all_and_steps_by_one(sizes):

@@ -111,12 +111,9 @@ def march_through(
             n[0], n[1], n[2], n[3], n[4], n[5], n[6],
         )  # fmt: skip
         free = points.free[k]
-        lengthened = row.lever / points.numbers[max(k - 1, 0), LEVER]
         for i in range(RING):
             if not warm or free[i] == 0.0:
                 q[i] = points.given[k, i]
-            elif i >= 3:
-                q[i] *= lengthened
         ours = with_numbers(control, points.race_control[k])
         outcome, worst = solve_row(ours, row, points.load[k], free, warm, q, balls, at, counts, found.told[k])
         found.displacement[k] = q
