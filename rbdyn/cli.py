@@ -84,8 +84,19 @@ def simulate(
 def ball(
     scene: SceneFile,
     assignments: Set = None,
+    sweeps: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sweep",
+            metavar="KEY=VALUES",
+            help="Sweep a number of the scene, start:stop:count or a,b,c; repeatable for a grid.",
+        ),
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write result.json, balls.csv and pictures here.")
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Write result.json and balls.csv, or the sweep, with pictures here."
+        ),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -98,6 +109,10 @@ def ball(
         from rbdyn.scene import Scene, balls_only
 
         loaded = balls_only(Scene.load(scene, assignments or []))
+        if sweeps:
+            from rbdyn.sweep_command import run as run_sweep
+
+            raise typer.Exit(run_sweep(loaded, sweeps, out, as_json, quiet))
         folder = output_folder(out) if out else None
         from rbdyn.ball_command import print_result, write
         from rbdyn.quasistatic.bearing import equilibrium

@@ -7,7 +7,8 @@ k = a/b >= 1 (Harris, Rolling Bearing Analysis, chapter on contact stress; Johns
     delta = (2 K/pi) [pi/(2 k^2 E)]^(1/3) [3 Q/(S E')]^(2/3) S/2
 
 K and E have the parameter m = 1 - 1/k^2; k is the root of ((k^2+1) E - 2 K)/[(k^2-1) E] = F, the difference of the
-curvatures over their sum. Plain functions for setting up rows of balls and for reports.
+curvatures over their sum. Plain functions for setting up rows of balls and for reports; the root is compiled, for sweeps seek
+many.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from rbdyn.kernel import entry, kernel
 
 
 class PointContact(NamedTuple):
@@ -37,6 +40,7 @@ class Ellipse(NamedTuple):
     curvature_rest: float  # 1 - F
 
 
+@kernel
 def ellipse(log_ellipticity: float) -> Ellipse:
     """Integrals and curvatures of the ellipse with ln k = ``log_ellipticity`` >= 0, by the arithmetic-geometric mean.
 
@@ -60,14 +64,15 @@ def ellipse(log_ellipticity: float) -> Ellipse:
     return Ellipse(first, first * share, difference, rest)
 
 
-def _log_ellipticity(curvature_difference: float) -> float:
-    """Root ln k >= 0 of F(k) = ``curvature_difference`` by secants.
+@entry
+def _shape(curvature_difference: float) -> tuple[float, Ellipse]:
+    """Root ln k >= 0 of F(k) = ``curvature_difference`` by secants, and the ellipse there.
 
     ln[(1 + F)/(1 - F)] is almost a straight line in ln k (pi/2 at its start, 1.6 at k = 10, 2 in the end): few steps,
     each well inside the range.
     """
     if curvature_difference == 0.0:
-        return 0.0
+        return 0.0, ellipse(0.0)
     target = math.log1p(2.0 * curvature_difference / (1.0 - curvature_difference))
     last, now, last_miss = 0.0, target / 1.5, -target
     for _ in range(50):
@@ -79,7 +84,7 @@ def _log_ellipticity(curvature_difference: float) -> float:
         last, now, last_miss = now, now - step, miss
         if abs(step) <= 1e-15 * now:
             break
-    return now
+    return now, ellipse(now)
 
 
 def point_contact(
@@ -98,8 +103,7 @@ def point_contact(
         )
     if not equivalent_modulus > 0.0:
         raise ValueError(f"equivalent modulus {equivalent_modulus:g} Pa must be positive")
-    log_ellipticity = _log_ellipticity(curvature_difference)
-    shape = ellipse(log_ellipticity)
+    log_ellipticity, shape = _shape(curvature_difference)
     return _contact(curvature_sum, equivalent_modulus, math.exp(log_ellipticity), shape.first, shape.second)
 
 

@@ -4,6 +4,7 @@
 - ``contacts``: load, slip and heat around the bearing; power by loss
 - ``solvers``: solvers of the equilibrium of balls at work
 - ``accuracy``: error against run time; ``scaling``: run time over rollers and slices
+- ``ball``: one equilibrium of a ball bearing; ``ball_sweep``: many, over one or two keys of the scene
 - ``drawing``: the bearing at one moment, clearances magnified; shared by ``animation`` (GIF or MP4) and ``player`` (HTML)
 """
 

@@ -42,8 +42,8 @@ SMALLEST_STRIDE = 1e-5
 SHORTEST_CONVEX, SHORTEST_FULL = 1e-10, 1e-3
 # Largest turn of a contact line in one whole step [rad], and steps without progress that are waited for.
 FURTHEST, PATIENCE = 0.5, 8
-# Counters: Newton steps, assemblies, continuations.
-STEPS, ASSEMBLIES, STRIDES, COUNTERS = range(4)
+# Counters: Newton steps, assemblies, continuations, starts from nothing.
+STEPS, ASSEMBLIES, STRIDES, COLD_STARTS, COUNTERS = range(5)
 
 
 class Space(NamedTuple):
@@ -327,6 +327,7 @@ def find(
         at.work[:, LOADED] = 1.0
         if march(control, 1.0, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts):
             return CONVERGED
+    counts[COLD_STARTS] += 1
     for i in range(RING):
         if free[i] > 0.0:
             q[i] = 0.0

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbdyn.contact import point_film
 from rbdyn.contact.film_thickness import lambda_ratio
@@ -182,10 +183,23 @@ def notes(drawing: BallRow, model: RowModel, solution: Solution, name: str = "")
 
 
 def beyond_hertz(drawing: BallRow, model: RowModel, solution: Solution) -> str | None:
-    """Why the loads are none that contacts could carry, or None: an ellipse as long as its groove is deep."""
+    """Why the loads are none that contacts could carry, or None."""
+    return overload(
+        drawing, model.inner_contact, model.outer_contact, solution.inner_load, solution.outer_load
+    )
+
+
+def overload(
+    drawing: BallRow,
+    inner_contact: PointContact,
+    outer_contact: PointContact,
+    inner_load: NDArray[np.float64],
+    outer_load: NDArray[np.float64],
+) -> str | None:
+    """Why loads (Z,) [N] are none that contacts could carry, or None: an ellipse as long as its groove is deep."""
     for race, contact, loads, factor in (
-        ("inner", model.inner_contact, solution.inner_load, drawing.inner_groove_factor),
-        ("outer", model.outer_contact, solution.outer_load, drawing.outer_groove_factor),
+        ("inner", inner_contact, inner_load, drawing.inner_groove_factor),
+        ("outer", outer_contact, outer_load, drawing.outer_groove_factor),
     ):
         worst = int(np.argmax(loads))
         semi_major = 1e3 * contact.semi_major * float(loads[worst]) ** (1.0 / 3.0)

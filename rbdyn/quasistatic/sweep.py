@@ -1,0 +1,291 @@
+"""Equilibria over one or several keys of a scene, each started from its neighbour.
+
+Grids are walked as a snake ploughs: along the last key there and back again, so that each point has a solved neighbour.
+A single row goes through one compiled loop; a double-decker, another solver, or a changing number of balls point by point.
+Where a row has several equilibria (see ``light_load_share``) a start from the neighbour may stay on another than a fresh start.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.quasistatic.bearing import equilibrium
+from rbdyn.quasistatic.double_decker_model import middle_speed
+from rbdyn.quasistatic.equilibrium import LOST, OK, SENTENCES
+from rbdyn.quasistatic.fatigue import reference_capacities, turning_rings
+from rbdyn.quasistatic.model import RPM, RowModel, contacts, given_of, load_of, row_of
+from rbdyn.quasistatic.newton import CONVERGED, COUNTERS, space
+from rbdyn.quasistatic.result import BallResult
+from rbdyn.quasistatic.ring import BALL, RING
+from rbdyn.quasistatic.sweep_figures import Columns, Rating, overloads, ring_columns, row_columns, told
+from rbdyn.quasistatic.sweep_march import LEVER, Found, Points, empty, leaves, march_through
+from rbdyn.quasistatic.sweep_points import Axis, axes_of, scenes, snake
+from rbdyn.quasistatic.sweep_result import SweepResult
+from rbdyn.scene import BallScene, Scene, balls_only
+from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
+
+# Keys that change only what loads the ring: the row stays as it is.
+LOAD_KEYS = (
+    "operation.radial_load_N",
+    "operation.axial_load_N",
+    "operation.load_N",
+    "operation.moment_Nm",
+    "operation.preload_",
+    "operation.prescribed.",
+)
+# Points between two reports of progress, and two looks for Ctrl-C.
+CHUNK = 2000
+Progress = Callable[[int, int], None]
+Vector = NDArray[np.float64]
+Group = tuple[NDArray[np.int64], Vector]
+
+
+class Walked(NamedTuple):
+    """What a sweep found, in the order in which it went; ``balls`` as ``SweepResult.told``."""
+
+    columns: Columns
+    statuses: list[str]
+    balls: Mapping[str, Sequence[Vector] | Vector]
+    cold: int
+
+
+def sweep(
+    scene: BallScene | Scene, keys: Mapping[str, Sequence[float]], progress: Progress | None = None
+) -> SweepResult:
+    """Equilibrium at every point of the grid of ``keys``: dotted names of numbers in the scene, and their values.
+
+    List items count from 1, ``operation.load_N[3]``. Values rise or fall. Points without an equilibrium are records of their cause.
+    Raises InputError for keys that cannot be swept and naming a point that the scene refuses.
+    """
+    scene = balls_only(scene)
+    axes = axes_of(scene, keys)
+    order = snake(axes)
+    began = time.perf_counter()
+    compiled = (
+        isinstance(scene, SingleRowScene) and scene.model.solver == "convex" and "bearing.balls" not in keys
+    )
+    walked = (_march if compiled else _one_by_one)(scene, axes, order, progress or (lambda done, total: None))
+    shape = tuple(len(axis.values) for axis in axes)
+    # From the order of the snake to that of the table.
+    visited = np.ravel_multi_index(np.array(order).T, shape)
+    back = np.argsort(visited)
+    failed = np.array([walked.statuses[place] != OK for place in back])
+    columns = {}
+    for name, column in walked.columns.items():
+        columns[name] = column[back]
+        columns[name][failed] = np.nan
+    return SweepResult(
+        {axis.key: axis.values for axis in axes},
+        columns,
+        tuple(walked.statuses[place] for place in back),
+        walked.cold,
+        time.perf_counter() - began,
+        scene.model_dump(mode="json"),
+        {name: _sorted(balls, back) for name, balls in walked.balls.items()},
+    )
+
+
+def _sorted(balls: Sequence[Vector] | Vector, back: NDArray[np.int64]) -> list[Group]:
+    """Arrays (Z, 6) in the order of the table, those of equal Z together."""
+    if isinstance(balls, np.ndarray):
+        return [(np.arange(len(balls)), balls[back])]
+    sizes: dict[int, list[int]] = {}
+    for place, index in enumerate(back):
+        sizes.setdefault(len(balls[index]), []).append(place)
+    return [
+        (np.array(places), np.array([balls[back[place]] for place in places])) for places in sizes.values()
+    ]
+
+
+def _march(
+    scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress
+) -> Walked:
+    """A single row through the compiled loop."""
+    assert isinstance(scene, SingleRowScene)
+    model, points, ratings = _packed(scene, axes, order)
+    row, size, count = model.row, model.row.cosine.size, len(order)
+    found, at, counts = empty(count, size), space(size), np.zeros(COUNTERS, np.int64)
+    q, balls, warm = np.zeros(RING), np.zeros((size, BALL)), False
+    for first in range(0, count, CHUNK):
+        last = min(first + CHUNK, count)
+        warm = march_through(
+            model.control, row.cosine, row.sine, points, first, last, warm, q, balls, at, counts, found
+        )
+        progress(last, count)
+    columns = _columns(points, found, ratings)
+    statuses = [
+        OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST) for outcome in found.outcome.tolist()
+    ]
+    for k, why in overloads(found.told, ratings).items():
+        if statuses[k] == OK:
+            statuses[k] = why
+    return Walked(columns, statuses, {"row": found.told}, int(found.cold.sum()))
+
+
+def _packed(
+    scene: SingleRowScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]]
+) -> tuple[RowModel, Points, list[Rating]]:
+    """The last row, and what changes from point to point; each part is made again only where a key that it depends on changes."""
+    loading = [place for place, axis in enumerate(axes) if axis.key.startswith(LOAD_KEYS)]
+    shaping = [place for place in range(len(axes)) if place not in loading]
+    drawing = [place for place in shaping if axes[place].key.startswith("bearing.")]
+    places: list[tuple[Vector, ...]] = []
+    numbers: list[tuple[float, ...]] = []
+    controls: list[list[float]] = []
+    ratings: list[Rating] = []
+    loads: list[Vector] = []
+    givens: list[Vector] = []
+    made: RowModel | None = None
+    loaded = shaped = drawn = [math.nan]
+    for values, point in scenes(scene, axes, order):
+        assert isinstance(point, SingleRowScene)
+        now = [values[place] for place in shaping]
+        if made is None or now != shaped:
+            made, shaped = row_of(point), now
+            at_place, number, control = made.row[2:6], made.row[6:], leaves(made.control)
+            now = [values[place] for place in drawing]
+            if now != drawn:
+                capacities, drawn = reference_capacities(point.bearing), now
+            inner_speed, outer_speed = point.operation.inner_speed_rpm, point.operation.outer_speed_rpm
+            rating = Rating(
+                point.bearing,
+                made.inner_contact,
+                made.outer_contact,
+                capacities,
+                turning_rings(inner_speed, outer_speed),
+                inner_speed - outer_speed,
+            )
+        now = [values[place] for place in loading]
+        if now != loaded:
+            load, given, loaded = load_of(point), given_of(point), now
+        places.append(at_place)
+        numbers.append(number)
+        controls.append(control)
+        ratings.append(rating)
+        loads.append(load)
+        givens.append(given)
+    assert made is not None
+    number_table, given_table = np.array(numbers), np.array(givens)
+    units = _units(number_table)
+    free = np.isnan(given_table)
+    points = Points(
+        np.ascontiguousarray(np.array(places).transpose(1, 0, 2)),
+        number_table,
+        np.array(controls),
+        np.array(loads) / units,
+        np.where(free, 0.0, given_table) * units,
+        free.astype(float),
+    )
+    return made, points, ratings
+
+
+def _units(numbers: Vector) -> Vector:
+    """(n, 5): what tilts count over."""
+    units = np.ones((len(numbers), RING))
+    units[:, 3:] = numbers[:, [LEVER]]
+    return units
+
+
+def _columns(points: Points, found: Found, ratings: Sequence[Rating]) -> Columns:
+    units = _units(points.numbers)
+    return {
+        **ring_columns(
+            found.displacement / units,
+            found.taken * units,
+            found.matrix * units[:, :, np.newaxis] * units[:, np.newaxis, :],
+        ),
+        **row_columns(found.told, ratings),
+        "residual_N": found.residual,
+        "iterations": found.steps.astype(float),
+    }
+
+
+def _one_by_one(
+    scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress
+) -> Walked:
+    """Any bearing, through ``rbdyn.equilibrium``."""
+    rows: list[dict[str, float]] = []
+    statuses: list[str] = []
+    told_of: dict[str, list[Vector]] = {}
+    before: BallResult | None = None
+    balls, cold = 0, 0
+    for place, (_, point) in enumerate(list(scenes(scene, axes, order))):
+        # A start needs as many balls; their number is only swept in a single row.
+        count = point.bearing.balls if isinstance(point, SingleRowScene) else 0
+        if count != balls:
+            before, balls = None, count
+        result = equilibrium(point, before)
+        started = before is not None
+        if started and not result.found:
+            result, started = equilibrium(point), False
+        cold += not started
+        statuses.append(result.status)
+        rows.append({})
+        if result.found:
+            rows[-1], told_rows = _figures(point, result)
+        for name in ("row",) if isinstance(point, SingleRowScene) else ("inner", "outer"):
+            size = count or getattr(point.bearing, name).balls
+            told_of.setdefault(name, []).append(
+                told_rows[name] if result.found else np.full((size, 6), np.nan)
+            )
+        before = result if result.found else None
+        progress(place + 1, len(order))
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+    return Walked(columns, statuses, told_of, cold)
+
+
+def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Vector]]:
+    """Figures of one point, and what is known of each ball by row."""
+    record = result.record
+    load = record.get("reaction")
+    if load is None:
+        reaction = result.rows[0].reaction
+    else:
+        reaction = np.array([*load["load_N"].values(), *load["moment_Nm"].values()])
+    stiffness = np.array(record["stiffness"]["matrix_SI"])
+    columns = ring_columns(result.displacement[np.newaxis], reaction[np.newaxis], stiffness[np.newaxis])
+    balls = {}
+    for (name, rating), solution in zip(_ratings(scene).items(), result.rows, strict=True):
+        balls[name] = told(solution)
+        prefix = "" if name == "row" else f"{name}_row_"
+        columns |= {
+            f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()
+        }
+    figures = {name: float(value[0]) for name, value in columns.items()}
+    if "middle_ring" in record:
+        figures["middle_ring_speed_rpm"] = record["middle_ring"]["speed_rpm"]
+    return {**figures, "residual_N": record["residual_N"], "iterations": float(record["iterations"])}, balls
+
+
+def _ratings(scene: BallScene) -> dict[str, Rating]:
+    """What pressure and life need, by row."""
+    speed = scene.operation
+    if isinstance(scene, DoubleDeckerScene):
+        middle = middle_speed(scene).speed / RPM
+        rows = {
+            "inner": (scene.bearing.inner, "inner_ring", "middle_ring", speed.inner_speed_rpm, middle),
+            "outer": (scene.bearing.outer, "middle_ring", "outer_ring", middle, speed.outer_speed_rpm),
+        }
+    else:
+        assert isinstance(scene, SingleRowScene)
+        rows = {
+            "row": (scene.bearing, "inner_ring", "outer_ring", speed.inner_speed_rpm, speed.outer_speed_rpm)
+        }
+    ball = scene.material("ball")
+    return {
+        name: Rating(
+            drawing,
+            *contacts(drawing, ball, scene.material(under), scene.material(over)),
+            reference_capacities(drawing),
+            turning_rings(below, above),
+            below - above,
+        )
+        for name, (drawing, under, over, below, above) in rows.items()
+    }
