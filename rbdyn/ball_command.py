@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rbdyn.quasistatic.result import BallResult
+from rbdyn.scene import BallScene
 from rbdyn.terminal import print_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
@@ -22,18 +27,40 @@ def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
         _print_middle_ring(record)
     if "fits" in record:
         _print_fits(record["fits"])
+    if "runout" in record:
+        told = record["runout"]
+        print(
+            f"runout over {told['turns']} turns: radial {told['indicator_um']:.3g} um by an indicator, {told['minimum_zone_um']:.3g} um "
+            f"between circles, axial {told['axial_um']:.3g} um, face {told['face_um']:.3g} um; asynchronous {told['asynchronous_radial_um']:.3g} um"
+        )
     if not quiet:
         for note in record.get("notes", ()):
             print(f"note: {note}")
 
 
-def write(result: BallResult, folder: Path) -> list[str]:
-    """Write result.json and balls.csv; returns the names of the files."""
+def with_runout(scene: BallScene, result: BallResult) -> tuple[BallResult, pd.DataFrame | None]:
+    """The result with the runout of its ring and the path it takes, where the scene has form errors."""
+    if scene.errors is None or not result.found:
+        return result, None
+    from rbdyn.ball_studies import runout_record
+
+    record, followed = runout_record(scene)
+    return replace(result, record={**result.record, "runout": record}), followed.table()
+
+
+def write(result: BallResult, folder: Path, path: pd.DataFrame | None = None) -> list[str]:
+    """Write result.json, balls.csv, pictures and the ``path`` of a turning ring; returns the names of the files."""
     result.save(folder / "result.json")
     if not result.found:
         return ["result.json"]
+    from rbdyn.plots.ball import pictures
+
     result.table().to_csv(folder / "balls.csv", index=False, float_format="%.8g")
-    return ["result.json", "balls.csv"]
+    files = ["result.json", "balls.csv", *pictures(result, folder)]
+    if path is not None:
+        path.to_csv(folder / "runout.csv", index=False, float_format="%.8g")
+        files.append("runout.csv")
+    return files
 
 
 def _print_row(title: str, record: dict[str, Any], verbose: bool) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any, cast, get_args
 
 from rbdyn.faults import InputError
@@ -14,8 +15,11 @@ from rbdyn.quasistatic.runout_lots import Lot
 from rbdyn.quasistatic.runout_model import bench_of, follow_ring, single_row
 from rbdyn.quasistatic.tolerance_design import RaceLimits, design
 from rbdyn.quasistatic.turn import Followed
+from rbdyn.ranges import axis_values
+from rbdyn.result import write_json
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
+from rbdyn.terminal import output_folder, print_json, print_table
 
 # What a study sweeps: function, unit of the values and that unit in SI.
 SWEPT = {
@@ -134,3 +138,64 @@ def _single(scene: BallScene, option: str) -> SingleRowScene:
         return single_row(scene)
     except InputError:
         raise InputError([f"--{option}: is a study of one row of balls; a double-decker has two"]) from None
+
+
+def run(
+    scene: BallScene, asked: Mapping[str, str | None], wanted: float, out: Path | None, as_json: bool
+) -> int:
+    """Carry out the one study asked for, print and write it; returns the exit code. Raises InputError."""
+    chosen = {name: value for name, value in asked.items() if value is not None}
+    if len(chosen) > 1:
+        flags = " and ".join(f"--{name.replace('_', '-')}" for name in chosen)
+        raise InputError([f"{flags}: are studies of their own; choose one"])
+    ((name, value),) = chosen.items()
+    folder = output_folder(out) if out else None
+    if name == "race_limits":
+        record = race_limits(scene, value, wanted)
+    else:
+        record = optimum_study(scene, name, axis_values(value, f"--{name}"))
+    if folder:
+        write_json(folder / f"{name}.json", record)
+    if as_json:
+        print_json(record)
+        return 0
+    _print_limits(record) if name == "race_limits" else _print_optimum(record)
+    if folder:
+        print(f"written to {folder}: {name}.json")
+    return 0
+
+
+def _print_optimum(record: dict[str, Any]) -> None:
+    what = record["swept"].replace("_", " [") + "]"
+    rows = [
+        (f"{point['value']:.4g}", point["status"], "", "")
+        if "L10_Mrev" not in point
+        else (
+            f"{point['value']:.4g}",
+            f"{point['inner_stress_MPa']:.0f}",
+            f"{point['outer_stress_MPa']:.0f}",
+            "unloaded" if point["L10_Mrev"] is None else f"{point['L10_Mrev']:.4g}",
+        )
+        for point in record["points"]
+    ]
+    print_table("", (what, "inner stress [MPa]", "outer stress [MPa]", "L10r [million turns]"), rows)
+    for best, title in (("least_stress", "least stress"), ("longest_life", "longest life")):
+        at = record[best]
+        print(
+            f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns"
+        )
+    for note in record["notes"]:
+        print(f"note: {note}")
+
+
+def _print_limits(record: dict[str, Any]) -> None:
+    rows = [
+        (race, f"{record[f'{race}_roundness_um']:.3g}", f"{record[f'{race}_sway_um']:.3g}")
+        for race in ("inner", "outer")
+    ]
+    title = f"class {record['class']}: {record['radial_limit_um']:g} um radial, {record['axial_limit_um']:g} um axial runout"
+    print_table(title, ("race", "roundness up to [um]", "side-sway up to [um]"), rows)
+    print(
+        f"yield {100.0 * record['yield']:.1f} +- {100.0 * record['standard_error']:.1f} % (standard error) of {record['bearings']} bearings, "
+        f"{record['solved_in_full']} of them solved in full, seed {record['seed']}"
+    )

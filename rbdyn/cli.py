@@ -92,11 +92,26 @@ def ball(
             help="Sweep a number of the scene, start:stop:count or a,b,c; repeatable for a grid.",
         ),
     ] = None,
+    preload: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N", help="Stress and life over axial preload, start:stop:count or a,b,c, instead."
+        ),
+    ] = None,
+    clearance: Annotated[
+        str | None, typer.Option(metavar="UM", help="The same over the diametral clearance, instead.")
+    ] = None,
+    wear: Annotated[
+        str | None, typer.Option(metavar="UM", help="The same over the diameter that balls lose, instead.")
+    ] = None,
+    race_limits: Annotated[
+        str | None,
+        typer.Option(metavar="CLASS", help="Race errors with which bearings meet P2, P4 or P5, instead."),
+    ] = None,
+    wanted: Annotated[float, typer.Option("--yield", help="Share of bearings that must meet it.")] = 0.95,
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR", help="Write result.json and balls.csv, or the sweep, with pictures here."
-        ),
+        typer.Option(metavar="DIR", help="Write result.json and tables, with pictures, here."),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -113,12 +128,17 @@ def ball(
             from rbdyn.sweep_command import run as run_sweep
 
             raise typer.Exit(run_sweep(loaded, sweeps, out, as_json, quiet))
+        asked = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
+        if any(value is not None for value in asked.values()):
+            from rbdyn.ball_studies import run as run_study
+
+            raise typer.Exit(run_study(loaded, asked, wanted, out, as_json))
         folder = output_folder(out) if out else None
-        from rbdyn.ball_command import print_result, write
+        from rbdyn.ball_command import print_result, with_runout, write
         from rbdyn.quasistatic.bearing import equilibrium
 
-        result = equilibrium(loaded)
-        files = write(result, folder) if folder else []
+        result, path = with_runout(loaded, equilibrium(loaded))
+        files = write(result, folder, path) if folder else []
         if as_json:
             print_json(result.as_dict())
         else:
@@ -219,8 +239,9 @@ def slip_map(
         loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
         folder = output_folder(out) if out else None
         from rbdyn import slip_map as study
+        from rbdyn.ranges import axis_values
 
-        axes = study.axis_values(speed, "--speed"), study.axis_values(load, "--load")
+        axes = axis_values(speed, "--speed"), axis_values(load, "--load")
         with progress_bar("mapping", quiet or as_json) as progress:
             found = study.slip_map(loaded, *axes, workers, progress)
         files = study.write(found, folder) if folder else []

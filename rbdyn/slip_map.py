@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -105,22 +104,6 @@ class SlipMap:
         """Values of a figure, shape (loads, speeds); NaN where a point failed."""
         values = [point.figures[figure].value if point.figures else np.nan for point in self.points]
         return np.array(values).reshape(len(self.loads_N), len(self.speeds_rpm))
-
-
-def axis_values(text: str, option: str) -> list[float]:
-    """Values of ``start:stop:count`` (evenly spaced) or ``a,b,c``. Raises InputError naming ``option``."""
-    mend = "write start:stop:count or values with commas, rising"
-    try:
-        if ":" in text:
-            start, stop, count = text.split(":")
-            values = [float(value) for value in np.linspace(float(start), float(stop), int(count))]
-        else:
-            values = [float(value) for value in text.split(",")]
-    except ValueError:
-        raise InputError([f"{option} {text}: not a list of numbers; {mend}"]) from None
-    if not values or not np.isfinite(values).all() or any(b <= a for a, b in pairwise(values)):
-        raise InputError([f"{option} {text}: the values must rise; {mend}"])
-    return values
 
 
 def slip_map(

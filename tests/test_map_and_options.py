@@ -10,8 +10,9 @@ import pytest
 from rbdyn import accuracy
 from rbdyn.faults import InputError
 from rbdyn.option_cost import OPTIONS, option_costs, study, with_options
+from rbdyn.ranges import axis_values
 from rbdyn.scene import Scene
-from rbdyn.slip_map import FIGURES, axis_values, slip_map, write
+from rbdyn.slip_map import FIGURES, slip_map, write
 
 SPEEDS, LOADS = (12000.0, 24000.0), (60.0, 1300.0)
 
