@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rbdyn.ball_cli import ball
+from rbdyn.command_options import Json, Out, Quiet, Replicates, SceneFile, Seed, Set, Turns, Verbose, Workers
 from rbdyn.terminal import FAILED, guarded, output_folder, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
@@ -19,20 +21,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 # Length of the history that --out draws.
 TRACE_TURNS = 10.0
 
-SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to simulate.")]
-Set = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replace a key; repeatable.")
-]
-Turns = Annotated[float | None, typer.Option(help="Counted shaft turns [numerics.turns].")]
-Replicates = Annotated[int | None, typer.Option(help="Seeded replicates [numerics.replicates].")]
-Seed = Annotated[int | None, typer.Option(help="Seed [numerics.seed].")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all processors by default.")]
-Out = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Write result.json, history.csv and pictures here.")
-]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no notes.")]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print power terms and cost.")]
+app.command()(ball)
 
 
 @app.callback()
@@ -78,75 +67,6 @@ def simulate(
             _print(result, quiet, verbose)
             if folder:
                 print(f"written to {folder}: result.json, history.csv, cage_orbit.png, pocket_forces.png")
-
-
-@app.command()
-def ball(
-    scene: SceneFile,
-    assignments: Set = None,
-    sweeps: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--sweep",
-            metavar="KEY=VALUES",
-            help="Sweep a number of the scene, start:stop:count or a,b,c; repeatable for a grid.",
-        ),
-    ] = None,
-    preload: Annotated[
-        str | None,
-        typer.Option(
-            metavar="N", help="Stress and life over axial preload, start:stop:count or a,b,c, instead."
-        ),
-    ] = None,
-    clearance: Annotated[
-        str | None, typer.Option(metavar="UM", help="The same over the diametral clearance, instead.")
-    ] = None,
-    wear: Annotated[
-        str | None, typer.Option(metavar="UM", help="The same over the diameter that balls lose, instead.")
-    ] = None,
-    race_limits: Annotated[
-        str | None,
-        typer.Option(metavar="CLASS", help="Race errors with which bearings meet P2, P4 or P5, instead."),
-    ] = None,
-    wanted: Annotated[float, typer.Option("--yield", help="Share of bearings that must meet it.")] = 0.95,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Write result.json and tables, with pictures, here."),
-    ] = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Also the stiffness matrix and cost.")
-    ] = False,
-) -> None:
-    """Find the equilibrium of a ball bearing: contact angles, loads, stiffness, stress, life."""
-    with guarded(as_json):
-        from rbdyn.scene import Scene, balls_only
-
-        loaded = balls_only(Scene.load(scene, assignments or []))
-        if sweeps:
-            from rbdyn.sweep_command import run as run_sweep
-
-            raise typer.Exit(run_sweep(loaded, sweeps, out, as_json, quiet))
-        asked = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
-        if any(value is not None for value in asked.values()):
-            from rbdyn.ball_studies import run as run_study
-
-            raise typer.Exit(run_study(loaded, asked, wanted, out, as_json))
-        folder = output_folder(out) if out else None
-        from rbdyn.ball_command import print_result, with_runout, write
-        from rbdyn.quasistatic.bearing import equilibrium
-
-        result, path = with_runout(loaded, equilibrium(loaded))
-        files = write(result, folder, path) if folder else []
-        if as_json:
-            print_json(result.as_dict())
-        else:
-            print_result(result, quiet, verbose)
-            if folder:
-                print(f"written to {folder}: {', '.join(files)}")
-    if not result.found:
-        raise typer.Exit(FAILED)
 
 
 @app.command()

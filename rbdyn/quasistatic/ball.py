@@ -1,4 +1,4 @@
-"""Forces on one ball and on the inner ring from it, with their derivatives (PHYSICS of Jones 1960; Harris).
+"""Forces on one ball and on the inner ring from it, with their derivatives (Jones 1960; Harris, *Rolling Bearing Analysis*).
 
 With T = lambda M_g/D the friction forces that take the gyroscopic moment:
 

@@ -1,0 +1,79 @@
+"""The command ``rbdyn ball``. Physics is imported inside it, so that help comes at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rbdyn.command_options import Json, Quiet, SceneFile, Set
+from rbdyn.terminal import FAILED, guarded, output_folder, print_json
+
+
+def ball(
+    scene: SceneFile,
+    assignments: Set = None,
+    sweeps: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sweep",
+            metavar="KEY=VALUES",
+            help="Sweep a number of the scene, start:stop:count or a,b,c; repeatable for a grid.",
+        ),
+    ] = None,
+    preload: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N", help="Stress and life over axial preload, start:stop:count or a,b,c, instead."
+        ),
+    ] = None,
+    clearance: Annotated[
+        str | None, typer.Option(metavar="UM", help="The same over the diametral clearance, instead.")
+    ] = None,
+    wear: Annotated[
+        str | None, typer.Option(metavar="UM", help="The same over the diameter that balls lose, instead.")
+    ] = None,
+    race_limits: Annotated[
+        str | None,
+        typer.Option(metavar="CLASS", help="Race errors with which bearings meet P2, P4 or P5, instead."),
+    ] = None,
+    wanted: Annotated[float, typer.Option("--yield", help="Share of bearings that must meet it.")] = 0.95,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write result.json and tables, with pictures, here."),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also the stiffness matrix and cost.")
+    ] = False,
+) -> None:
+    """Find the equilibrium of a ball bearing: contact angles, loads, stiffness, stress, life."""
+    with guarded(as_json):
+        from rbdyn.scene import Scene, balls_only
+
+        loaded = balls_only(Scene.load(scene, assignments or []))
+        if sweeps:
+            from rbdyn.sweep_command import run as run_sweep
+
+            raise typer.Exit(run_sweep(loaded, sweeps, out, as_json, quiet))
+        asked = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
+        if any(value is not None for value in asked.values()):
+            from rbdyn.ball_studies import run as run_study
+
+            raise typer.Exit(run_study(loaded, asked, wanted, out, as_json))
+        folder = output_folder(out) if out else None
+        from rbdyn.ball_command import print_result, with_runout, write
+        from rbdyn.quasistatic.bearing import equilibrium
+
+        result, path = with_runout(loaded, equilibrium(loaded))
+        files = write(result, folder, path) if folder else []
+        if as_json:
+            print_json(result.as_dict())
+        else:
+            print_result(result, quiet, verbose)
+            if folder:
+                print(f"written to {folder}: {', '.join(files)}")
+    if not result.found:
+        raise typer.Exit(FAILED)
