@@ -67,9 +67,9 @@ class DoubleDeckerSolution(NamedTuple):
 
     ``displacement`` (5,): of the inner ring against the outer ring; ``inner.displacement`` is that against the middle ring.
     ``middle_displacement`` (5,) and ``middle_load`` (5,): of the middle ring, and what the inner balls put on it.
-    ``reaction`` (5,): the load that the inner ring takes. ``stiffness`` (5, 5): of both layers in series, the derivative of
-    ``reaction`` by ``displacement`` while the middle ring follows. ``residual``: largest force left over [N], balls and
-    rings. ``steps``: of Newton on the middle ring, 0 where loads alone rule. ``status``: "ok" or why there is none.
+    ``reaction`` (5,): the load that the inner ring takes. ``residual``: largest force left over [N], balls and rings.
+    ``steps``: of Newton on the middle ring, 0 where loads alone rule. ``status``: "ok" or why there is none. ``stack, free``: what
+    was solved, and the components (5,) in which the middle ring is free to move.
     """
 
     inner: Solution
@@ -78,15 +78,30 @@ class DoubleDeckerSolution(NamedTuple):
     middle_displacement: Vector
     middle_load: Vector
     reaction: Vector
-    stiffness: Vector
     residual: float
     steps: int
     status: str
+    stack: Stack
+    free: NDArray[np.bool_]
 
     @property
     def found(self) -> bool:
         """Whether this is an equilibrium."""
         return self.status == OK
+
+    @property
+    def stiffness(self) -> Vector:
+        """Stiffness (5, 5) of both layers in series: ``reaction`` by ``displacement`` while the middle ring follows.
+
+        Computed when asked for: it takes ten more solves of the inner row.
+        """
+        to_inner, free = carried(self.stack.arm_0), self.free
+        # Middle ring in balance: (K_o + G T) dq_m = G dq with G the derivative of its load; what the inner row then feels.
+        onto_by = _onto_by_relative(self.stack, self.inner)
+        whole = (self.outer.stiffness + onto_by @ to_inner)[np.ix_(free, free)]
+        follows = np.zeros((5, 5))
+        follows[free] = np.linalg.lstsq(whole, onto_by[free], rcond=1e-12)[0]
+        return self.inner.stiffness @ (np.eye(5) - to_inner @ follows)
 
 
 def outer_friction(layer: Layer, solution: Solution) -> Vector:
@@ -265,11 +280,6 @@ def _result(
     steps: int,
 ) -> DoubleDeckerSolution:
     to_inner = carried(stack.arm_0)
-    # Middle ring in balance: (K_o + G T) dq_m = G dq with G the derivative of its load; what the inner row then feels.
-    onto_by = _onto_by_relative(stack, inner)
-    whole = (outer.stiffness + onto_by @ to_inner)[np.ix_(free, free)]
-    follows = np.zeros((5, 5))
-    follows[free] = np.linalg.lstsq(whole, onto_by[free], rcond=1e-12)[0]
     left = (onto - outer.reaction)[free & (np.arange(5) < 3)]
     residual = float(max(inner.residual, outer.residual, np.abs(left).max(initial=0.0)))
     status = next((row.status for row in (inner, outer) if not row.found), OK)
@@ -282,8 +292,9 @@ def _result(
         middle_displacement=outer.displacement,
         middle_load=onto,
         reaction=inner.reaction,
-        stiffness=inner.stiffness @ (np.eye(5) - to_inner @ follows),
         residual=residual,
         steps=steps,
         status=status,
+        stack=stack,
+        free=free,
     )
