@@ -135,8 +135,11 @@ def ball_forces(
     """
 
 
-@ball_forces.body(CommonCage)
-def _going_with_the_cage(control, strength, row, a_axial, a_radial, x, y, di, do):
+@kernel
+def elastic_forces(
+    row: Any, a_axial: float, a_radial: float, x: float, y: float, di: float, do: float
+) -> Any:
+    """What ``ball_forces`` returns for a ball that goes with the cage: springs and the common centrifugal force."""
     one_i, si, ci = line(a_axial - x, a_radial - y)
     one_o, so, co = line(x, y)
     qi, ki = spring(di, row.inner_stiffness)
@@ -156,27 +159,22 @@ def _going_with_the_cage(control, strength, row, a_axial, a_radial, x, y, di, do
     )
 
 
+@ball_forces.body(CommonCage)
+def _going_with_the_cage(control, strength, row, a_axial, a_radial, x, y, di, do):
+    return elastic_forces(row, a_axial, a_radial, x, y, di, do)
+
+
 @ball_forces.body(FixedShare, FrictionShare)
 def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
     one_i, si, ci = line(a_axial - x, a_radial - y)
     one_o, so, co = line(x, y)
     qi, ki = spring(di, row.inner_stiffness)
     qo, ko = spring(do, row.outer_stiffness)
-    aa, ar, rr = tangent(qi, ki, one_i, si, ci)
-    oaa, oar, orr = tangent(qo, ko, one_o, so, co)
     spinning = control.spinning
     if strength == 0.0 or qi <= 0.0 or qo <= 0.0 or ci <= 0.0:
-        pull = row.centrifugal_force
-        return (
-            (qi * si - qo * so, qi * ci - qo * co + pull),
-            (qi * si, qi * ci, 0.0),
-            (aa, ar, ar, rr),
-            (-aa - oaa, -ar - oar, -ar - oar, -rr - orr),
-            (aa, ar, ar, rr, 0.0, 0.0),
-            (-aa, -ar, -ar, -rr, 0.0, 0.0),
-            pull,
-            0.0,
-        )
+        return elastic_forces(row, a_axial, a_radial, x, y, di, do)
+    aa, ar, rr = tangent(qi, ki, one_i, si, ci)
+    oaa, oar, orr = tangent(qo, ko, one_o, so, co)
     share, share_i, share_o = spin_share(control, di, do)
     (f, f_i, f_o, f_s), (m, m_i, m_o, m_s) = orbit_and_spin(spinning, share, ci, si, co, so)
     # A lightly loaded ball, or one across the groove, goes with the cage; otherwise the race control alone rules.
