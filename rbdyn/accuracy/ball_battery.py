@@ -18,6 +18,7 @@ from rbdyn.quasistatic.battery import CONTROLS, LOADS, SCENES, SEED, Case, Probl
 from rbdyn.quasistatic.equilibrium import Solution
 from rbdyn.quasistatic.finite_search import loaded
 from rbdyn.quasistatic.full_system import system_of, unknowns
+from rbdyn.quasistatic.row import component_lengths
 from rbdyn.scene.ball import BallScene
 
 FORMAT = "rbdyn.accuracy.battery/1"
@@ -144,7 +145,7 @@ def _refused_by_rule_a(runs: Sequence[Run], problems: Sequence[Problem]) -> int:
         if r.solution.found:
             system = system_of(problem.row, problem.load, problem.given)
             lever = problem.row.lever
-            q = r.solution.displacement * np.array([1.0, 1.0, 1.0, lever, lever])
+            q = r.solution.displacement * component_lengths(lever)
             count += not loaded(system, unknowns(system, q, r.solution.balls))
     return count
 

@@ -15,6 +15,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.turns import hours
+
 # Life of a race falls with the fourth power of its load; 9/8 is the slope of the Weibull line.
 LOAD_LIFE = 4.0
 WEIBULL = 9.0 / 8.0
@@ -43,8 +45,7 @@ class ReferenceLife:
 
     def hours(self, inner_speed: float, outer_speed: float = 0.0) -> float:
         """Life in hours at ring speeds [rad/s]; infinite where they do not turn against each other."""
-        speed = abs(inner_speed - outer_speed)
-        return self.million_turns * 1e6 * 2.0 * math.pi / speed / 3600.0 if speed > 0.0 else math.inf
+        return hours(self.million_turns, inner_speed, outer_speed)
 
 
 def capacity_factor(gamma: float) -> float:

@@ -75,9 +75,8 @@ def held(force: float, limit: float) -> tuple[float, float, float]:
 
 
 @law
-def spin_share(control: Any, inner_deflection: float, outer_deflection: float) -> tuple[float, float, float]:
+def spin_share(control: Any, inner_deflection: float, outer_deflection: float) -> Any:
     """Inner share s of spin and gyroscopic moment, and its derivatives by the deflections [1/m]."""
-    raise NotImplementedError
 
 
 @spin_share.body(FixedShare)
@@ -97,9 +96,8 @@ def _by_friction(
 
 
 @law
-def rules(control: Any) -> bool:
+def rules(control: Any) -> Any:
     """Whether there is more to the equilibrium than one common cage speed."""
-    raise NotImplementedError
 
 
 @rules.body(CommonCage)

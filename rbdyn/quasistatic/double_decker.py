@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rbdyn.quasistatic.control import CommonCage, Control, FixedShare
 from rbdyn.quasistatic.equilibrium import OK, Solution, solve
-from rbdyn.quasistatic.row import Row
+from rbdyn.quasistatic.row import Row, component_lengths
 
 Vector = NDArray[np.float64]
 
@@ -205,7 +205,7 @@ def _follow(
     """Newton on the free components of the middle ring's displacement, guarded by the length of what is left over."""
     to_inner = carried(stack.arm_0)
     held = ~np.isnan(given)
-    unit = np.array([1.0, 1.0, 1.0, stack.outer.row.lever, stack.outer.row.lever])
+    unit = component_lengths(stack.outer.row.lever)
 
     def rows(
         middle: Vector, inner: Solution | None, outer: Solution | None
@@ -259,7 +259,7 @@ def _onto_by_relative(stack: Stack, inner: Solution) -> Vector:
     """Derivative (5, 5) of the load on the middle ring by the inner row's displacement, balls in balance."""
     row = stack.inner.row
     deflection = (max(float(inner.outer_load.max()), 1e-6) / row.outer_stiffness) ** (2.0 / 3.0)
-    steps = DIFFERENCE * deflection / np.array([1.0, 1.0, 1.0, row.lever, row.lever])
+    steps = DIFFERENCE * deflection / component_lengths(row.lever)
     columns = []
     for k, step in enumerate(steps):
         ends = []

@@ -14,7 +14,7 @@ from rbdyn.quasistatic.control import Control
 from rbdyn.quasistatic.newton import CONVERGED, COUNTERS, NOT_CONVEX_MINIMUM, Space, find, space, unbalance
 from rbdyn.quasistatic.place import groove_centre
 from rbdyn.quasistatic.ring import BALL, INNER_DEPTH, LOADED, OUTER_DEPTH, RING, TAKEN
-from rbdyn.quasistatic.row import Row
+from rbdyn.quasistatic.row import Row, component_lengths
 
 # What ``tell`` leaves of a ball.
 INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, TOLD = range(7)
@@ -118,7 +118,7 @@ def solve(
     ``status``.
     """
     size = row.cosine.size
-    unit = np.array([1.0, 1.0, 1.0, row.lever, row.lever])
+    unit = component_lengths(row.lever)
     free = np.ones(RING) if given is None else np.where(np.isnan(given), 1.0, 0.0)
     q = np.zeros(RING) if given is None else np.where(free > 0.0, 0.0, given) * unit
     balls = np.zeros((size, BALL))
@@ -152,7 +152,7 @@ def told_solution(
     worst: float,
 ) -> Solution:
     """What a compiled solve left, in the units and names of a Solution."""
-    unit = np.array([1.0, 1.0, 1.0, row.lever, row.lever])
+    unit = component_lengths(row.lever)
     return Solution(
         displacement=q / unit,
         balls=balls[:, :INNER_DEPTH],

@@ -19,7 +19,7 @@ from rbdyn.quasistatic.equilibrium import TOLD, Solution, tell, told_solution
 from rbdyn.quasistatic.newton import COUNTERS, space
 from rbdyn.quasistatic.place import groove_centre
 from rbdyn.quasistatic.ring import BALL, LOADED, RING, assemble
-from rbdyn.quasistatic.row import Row
+from rbdyn.quasistatic.row import Row, component_lengths
 
 
 class System(NamedTuple):
@@ -42,7 +42,7 @@ class System(NamedTuple):
 
 def system_of(row: Row, load: NDArray[np.float64], given: NDArray[np.float64] | None = None) -> System:
     """The system of ``equilibrium.solve(row, ..., load, given)``."""
-    unit = _unit(row)
+    unit = component_lengths(row.lever)
     held = np.full(RING, np.nan) if given is None else np.asarray(given, float)
     return System(
         row,
@@ -151,7 +151,3 @@ def solution_at(
     _finish(control, row, system.load, q, balls, at, told)
     found = told_solution(row, at, q, balls, counts, told, 0, residual)
     return found._replace(status=status, searches=searches)
-
-
-def _unit(row: Row) -> NDArray[np.float64]:
-    return np.array([1.0, 1.0, 1.0, row.lever, row.lever])

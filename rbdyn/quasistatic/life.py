@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.quasistatic.rating import ball_size_term, groove_ratio
+from rbdyn.turns import hours
 
 LOAD_LIFE = 3.0
 WEIBULL = 10.0 / 9.0
@@ -44,8 +45,7 @@ class BallLife:
 
     def hours(self, inner_speed: float, outer_speed: float = 0.0) -> float:
         """Life in hours at ring speeds [rad/s]; infinite where they do not turn against each other."""
-        speed = abs(inner_speed - outer_speed)
-        return self.million_turns * 1e6 * 2.0 * math.pi / speed / 3600.0 if speed > 0.0 else math.inf
+        return hours(self.million_turns, inner_speed, outer_speed)
 
 
 def lundberg_palmgren_capacities(

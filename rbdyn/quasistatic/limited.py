@@ -16,11 +16,11 @@ from rbdyn.quasistatic.newton import (
     ASSEMBLIES,
     CONVEX_MARCH,
     COUNTERS,
-    ROUGHLY,
     STEPS,
     descend,
     go_back,
     march,
+    roughly,
     space,
 )
 from rbdyn.quasistatic.ring import BALL, RING
@@ -36,10 +36,7 @@ def _within(
     along_the_load(row, load, free, q, at.step, at.base)
     settle_all(row, q, balls, at.work)
     start_q, start = q.copy(), balls.copy()
-    enough = 0.0
-    if rules(control):
-        for i in range(RING):
-            enough = max(enough, ROUGHLY * abs(load[i]) * free[i])
+    enough = roughly(load, free) if rules(control) else 0.0
     found = march(control, 0.0, enough, min(limit, CONVEX_MARCH), row, load, free, q, balls, at, counts)
     if not found and limit > counts[STEPS]:
         go_back(q, balls, start_q, start)

@@ -32,7 +32,7 @@ from rbdyn.quasistatic.ring import (
 from rbdyn.quasistatic.start import along_the_load, settle_all
 
 # Outcomes of ``find``.
-CONVERGED, NOT_CONVEX_MINIMUM, RACE_CONTROL_LOST, NOT_FINITE = range(4)
+CONVERGED, NOT_CONVEX_MINIMUM, RACE_CONTROL_LOST = range(3)
 # Largest residual over largest force: aimed at, and accepted where rounding allows no better.
 AIM, ACCEPTED = 1e-12, 1e-9
 # Residual over the load that is good enough for the convex problem where the full equations follow.
@@ -228,6 +228,15 @@ def bound(row: Any, step: Any, at: Any, furthest: float) -> float:
     return scale
 
 
+@kernel
+def roughly(load: Any, free: Any) -> float:
+    """Residual [N] that is good enough for the convex problem where the full equations follow."""
+    enough = 0.0
+    for i in range(RING):
+        enough = max(enough, ROUGHLY * abs(load[i]) * free[i])
+    return enough
+
+
 @routine
 def march(
     control: Any,
@@ -336,12 +345,9 @@ def find(
     start_q, start = q.copy(), balls.copy()
     if rules(control):
         # Most often a rough minimum is start enough.
-        enough = 0.0
-        for i in range(RING):
-            enough = max(enough, ROUGHLY * abs(load[i]) * free[i])
-        if march(control, 0.0, enough, CONVEX_MARCH, row, load, free, q, balls, at, counts) and march(
-            control, 1.0, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts
-        ):
+        if march(
+            control, 0.0, roughly(load, free), CONVEX_MARCH, row, load, free, q, balls, at, counts
+        ) and march(control, 1.0, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts):
             return CONVERGED
         go_back(q, balls, start_q, start)
     if not march(control, 0.0, 0.0, CONVEX_MARCH, row, load, free, q, balls, at, counts):

@@ -19,7 +19,7 @@ from rbdyn.quasistatic.equilibrium import OK, Solution
 from rbdyn.quasistatic.full_system import System, forces, solution_at, system_of, unknowns
 from rbdyn.quasistatic.newton import ACCEPTED
 from rbdyn.quasistatic.ring import BALL, BALL_WORK
-from rbdyn.quasistatic.row import Row
+from rbdyn.quasistatic.row import Row, component_lengths
 from rbdyn.quasistatic.start import settle_all
 
 STEPS = 100
@@ -103,4 +103,4 @@ def solve(
 
 def _from(system: System, start: Solution) -> NDArray[np.float64]:
     lever = system.row.lever
-    return unknowns(system, start.displacement * np.array([1.0, 1.0, 1.0, lever, lever]), start.balls)
+    return unknowns(system, start.displacement * component_lengths(lever), start.balls)

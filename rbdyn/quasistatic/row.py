@@ -35,6 +35,11 @@ class Row(NamedTuple):
     rest_energy: float
 
 
+def component_lengths(lever: float) -> NDArray[np.float64]:
+    """What makes lengths of (x, y, z, theta_x, theta_y) and forces of (Fx, Fy, Fz, Mx, My): times and over (1, 1, 1, R, R)."""
+    return np.array([1.0, 1.0, 1.0, lever, lever])
+
+
 def at_rest(centrifugal_force: float, outer_stiffness: float) -> tuple[float, float]:
     """Outer deflection [m] under the centrifugal force alone, and energy [J] there."""
     deflection = float((centrifugal_force / outer_stiffness) ** (2.0 / 3.0))

@@ -70,7 +70,6 @@ def leaves(control: Control) -> list[float]:
 @law
 def with_numbers(control: Any, numbers: Any) -> Any:
     """A control of the same kind with other ``numbers``."""
-    raise NotImplementedError
 
 
 @with_numbers.body(CommonCage)

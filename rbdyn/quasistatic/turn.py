@@ -13,7 +13,7 @@ from rbdyn.quasistatic.control import Control
 from rbdyn.quasistatic.newton import COUNTERS, space
 from rbdyn.quasistatic.race_errors import BallPath
 from rbdyn.quasistatic.ring import BALL, RING
-from rbdyn.quasistatic.row import Row
+from rbdyn.quasistatic.row import Row, component_lengths
 from rbdyn.quasistatic.runout import Runout, runout
 from rbdyn.quasistatic.walk import LARGEST_LOAD, RESIDUAL, TOLD, WALKED, walk
 
@@ -63,7 +63,7 @@ def follow(
     of ``equilibrium.solve``. Raises RunError naming the step where no equilibrium is found.
     """
     steps, size = balls.azimuth.shape
-    unit = np.array([1.0, 1.0, 1.0, row.lever, row.lever])
+    unit = component_lengths(row.lever)
     free = np.ones(RING) if given is None else np.where(np.isnan(given), 1.0, 0.0)
     q = np.zeros(RING) if given is None else np.where(free > 0.0, 0.0, given) * unit
     changes = np.stack(
