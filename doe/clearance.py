@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.store import Store, run_key
+from doe.study.store import Store, run_key
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml
 from rbdyn.result import SimulationResult, versions

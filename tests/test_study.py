@@ -15,9 +15,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from doe import clearance, report
-from doe.store import Store, run_key
-from doe.study import Confirmed, Gain, _gains, find_front, fit_surfaces, read_runs, run_design, run_study
+from doe import clearance
+from doe.report.files import write
+from doe.report.front import front_record
+from doe.study import run_study
+from doe.study.confirmation import Confirmed, Gain, gains
+from doe.study.front import find_front
+from doe.study.runs import read_runs, run_design
+from doe.study.store import Store, run_key
+from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError
 
@@ -49,7 +55,7 @@ def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     study = Study.load(short_study(folder))
     outcome = run_study(study, folder, None, lambda title: silent)
-    return outcome, folder, report.write(outcome, folder)
+    return outcome, folder, write(outcome, folder)
 
 
 def test_every_file_is_written(finished):
@@ -213,7 +219,7 @@ def test_reference_of_another_design_is_refused(tmp_path):
 def test_front_on_the_published_table_improves_on_its_baseline(tmp_path):
     study = Study.load(short_study(tmp_path))
     surfaces = fit_surfaces(study, read_runs(study, EXAMPLES / "ccd_table4.csv"))
-    record = report.front_record(study, surfaces, find_front(study, surfaces))
+    record = front_record(study, surfaces, find_front(study, surfaces))
     pick, baseline = record["pick"]["responses"], record["baseline"]["responses"]
     assert all(pick[name] <= baseline[name] for name in study.responses)
     assert all(
@@ -227,9 +233,9 @@ def test_gain_counts_only_beyond_its_error(tmp_path):
     none = np.zeros(3)
     baseline = Confirmed(study.baseline, np.array([100.0, 1.0, 50.0]), np.array([3.0, 0.0, 0.0]), none)
     pick = Confirmed(study.baseline, np.array([96.0, 0.9, 51.0]), np.array([4.0, 0.0, 0.0]), none)
-    gains = _gains(study, baseline, pick)
-    assert [gain.verdict for gain in gains] == ["within error", "better", "worse"]
-    assert gains[0] == Gain("impact_force_N", pytest.approx(4.0), pytest.approx(5.0))
+    found = gains(study, baseline, pick)
+    assert [gain.verdict for gain in found] == ["within error", "better", "worse"]
+    assert found[0] == Gain("impact_force_N", pytest.approx(4.0), pytest.approx(5.0))
 
 
 def test_store_keeps_and_refuses(tmp_path):

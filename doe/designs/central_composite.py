@@ -1,4 +1,4 @@
-"""Designs of experiments in coded units: centre 0, cube corners -1 and +1, one column a factor."""
+"""Central composite designs in coded units: centre 0, cube corners -1 and +1, one column a factor."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -53,21 +53,3 @@ def axial_distance(factors: int, alpha: float | str) -> float:
     if not (math.isfinite(alpha) and alpha > 0):
         raise ValueError(f"alpha = {alpha}: must be a positive number")
     return float(alpha)
-
-
-def to_actual(coded: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
-    """Actual factor values of coded points (..., k); ``centre`` and ``step`` (k,) are in actual units."""
-    actual: Array = np.asarray(centre, float) + np.asarray(coded, float) * np.asarray(step, float)
-    return actual
-
-
-def to_coded(actual: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
-    """Coded values of actual points (..., k); the inverse of `to_actual`.
-
-    Raises ValueError when a step is zero.
-    """
-    step = np.asarray(step, float)
-    if np.any(step == 0):
-        raise ValueError(f"step = {step.tolist()}: every step must differ from zero")
-    coded: Array = (np.asarray(actual, float) - np.asarray(centre, float)) / step
-    return coded

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from doe.study_file.chain_section import StudyChain
+from doe.study_file.design_section import Design, Factor
+from doe.study_file.fit_section import Fitted
+from doe.study_file.front_section import Front, Goal
 from rbdyn.faults import InputError, Strict, read_toml, validated
 
 Array = NDArray[np.float64]
@@ -24,42 +27,10 @@ class SceneFile(Strict):
     set: list[str] = []
 
 
-class Factor(Strict):
-    """A factor: its name in tables, its key in the scene, and its values at coded 0 and per coded unit.
-
-    The pick is rounded to a multiple of ``resolution``, the smallest step that a drawing makes.
-    """
+class Response(Fitted, Goal):
+    """A response of the simulation, the surface fitted to it and what is wanted of it."""
 
     name: Annotated[str, Field(min_length=1)]
-    key: Annotated[str, Field(min_length=3)]
-    centre: float
-    step: Annotated[float, Field(gt=0.0)]
-    resolution: Annotated[float, Field(gt=0.0)] | None = None
-
-
-class Design(Strict):
-    """Central composite design."""
-
-    kind: Literal["central_composite"] = "central_composite"
-    alpha: Literal["rotatable"] | Annotated[float, Field(gt=0.0, le=10.0)] = "rotatable"
-    centre_replicates: Annotated[int, Field(ge=0, le=100)] = 6
-    seed: Annotated[int, Field(ge=0)] = 1
-
-
-class Response(Strict):
-    """A response of the simulation and the surface fitted to it."""
-
-    name: Annotated[str, Field(min_length=1)]
-    model: Literal["linear", "quadratic", "reduced"] = "quadratic"
-    goal: Literal["min", "max"] = "min"
-
-
-class Front(Strict):
-    """NSGA-II on the surfaces, within the box of the design's axial points."""
-
-    population: Annotated[int, Field(ge=8, le=10000)] = 100
-    generations: Annotated[int, Field(ge=1, le=100000)] = 200
-    seed: Annotated[int, Field(ge=0)] = 1
 
 
 class Confirmation(Strict):
@@ -67,16 +38,6 @@ class Confirmation(Strict):
 
     replicates: Annotated[int, Field(ge=2, le=10000)] = 16
     set: list[str] = []
-
-
-class StudyChain(Strict):
-    """Dimension chain whose closing link is the picked value of ``factor``, within +- ``half_width_mm``."""
-
-    name: Annotated[str, Field(min_length=1)]
-    factor: str
-    half_width_mm: Annotated[float, Field(gt=0.0)]
-    link: Annotated[list[dict[str, Any]], Field(min_length=1)]
-    allocate: dict[str, Any] = {}
 
 
 class Reference(Strict):
@@ -206,9 +167,3 @@ class Study:
         if faults:
             raise InputError(faults)
         return table[self.factors].to_numpy(float), table[self.responses].to_numpy(float)
-
-
-def chain_table(chain: StudyChain, value: float) -> Mapping[str, Any]:
-    """CHAIN.toml contents of a study's chain at a picked value [mm]."""
-    limits = {"lower_mm": value - chain.half_width_mm, "upper_mm": value + chain.half_width_mm}
-    return {"closing_link": limits, "link": chain.link, "allocate": chain.allocate}

@@ -1,0 +1,21 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+StudyPath = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study to run.")]
+Data = Annotated[
+    Path | None, typer.Option(metavar="TABLE.csv", help="Runs of a table instead of simulated ones.")
+]
+Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all processors by default.")]
+Out = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder of results and of the store of finished runs.")
+]
+Save = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Also write the JSON record here.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the answer.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print the analysis of variance.")]

@@ -1,0 +1,48 @@
+"""What the commands share: runs and surfaces of a study, and where a record goes."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rbdyn.terminal import output_folder, progress_bar
+
+if TYPE_CHECKING:
+    from doe.response_surface import Surface
+    from doe.study_file import Study
+
+
+def save(out: Path | None, name: str, record: dict[str, Any]) -> None:
+    """Write the JSON record of a command into the folder of ``--out``, if one is given."""
+    if out is not None:
+        from rbdyn.result import write_json
+
+        write_json(output_folder(out) / name, record)
+
+
+def fitted(
+    path: Path, data: Path | None, out: Path | None, workers: int | None, quiet: bool
+) -> tuple[Study, list[Surface]]:
+    """The study and its surfaces, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
+    from doe.study.runs import read_runs, run_design
+    from doe.study.surfaces import fit_surfaces
+    from doe.study_file import Study
+
+    loaded = Study.load(path)
+    if data is not None:
+        return loaded, fit_surfaces(loaded, read_runs(loaded, data))
+    with _store_folder(out) as folder, progress_bar("design runs", quiet) as progress:
+        return loaded, fit_surfaces(loaded, run_design(loaded, folder, workers, progress))
+
+
+@contextmanager
+def _store_folder(out: Path | None) -> Iterator[Path]:
+    """The given folder, or one that lasts as long as the command."""
+    if out is not None:
+        yield output_folder(out)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)

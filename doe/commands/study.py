@@ -1,0 +1,47 @@
+"""``doe study``."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+
+from doe.commands.options import Json, Out, Quiet, StudyPath, Verbose, Workers
+from rbdyn.terminal import guarded, output_folder, print_json, progress_bar
+
+
+def study(
+    path: StudyPath,
+    out: Out = None,
+    workers: Workers = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Design, simulate, fit, optimise, confirm and dimension in one go; resumes by itself."""
+    with guarded(as_json), ExitStack() as bars:
+        from doe.study_file import Study
+
+        loaded = Study.load(path)
+        folder = output_folder(out or Path(f"{path.stem}_results"))
+        from doe.report.answer import print_outcome
+        from doe.report.files import write
+        from doe.report.fit import print_fit
+        from doe.report.summary import summary
+        from doe.study import run_study
+
+        outcome = run_study(
+            loaded,
+            folder,
+            workers,
+            lambda title: bars.enter_context(progress_bar(title, quiet or as_json)),
+        )
+        bars.close()
+        written = write(outcome, folder)
+        if as_json:
+            print_json(summary(outcome))
+            return
+        if verbose:
+            print_fit(outcome.surfaces)
+        print_outcome(outcome, quiet)
+        print(f"{outcome.cost['total_s']:.1f} s, of which design runs {outcome.cost['design_s']:.1f} s")
+        print(f"written to {folder}: {', '.join(written)}")

@@ -1,0 +1,122 @@
+"""What a study leaves behind in its folder: tables, summary.json, pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from doe.report.front import front_record
+from doe.report.summary import summary
+from rbdyn.result import write_json
+
+if TYPE_CHECKING:
+    from doe.dimension_chain import Part
+    from doe.study import Outcome
+    from doe.study.runs import Runs
+    from doe.study_file import Study
+
+# Shaft turns of the motion that is drawn.
+DRAWN_TURNS = 10.0
+
+
+def write(outcome: Outcome, folder: Path) -> list[str]:
+    """Write everything into ``folder``; returns the file names."""
+    import pandas as pd
+
+    from doe import clearance
+    from doe.report import plots
+
+    study, front = outcome.study, outcome.front
+    tables = {
+        "design_runs.csv": _runs_table(study, outcome.runs),
+        "anova.csv": [
+            {"response": surface.name, **row} for surface in outcome.surfaces for row in surface.anova
+        ],
+        "coefficients.csv": [
+            {"response": s.name, "term": term, "coefficient": c, "standard_error": e}
+            for s in outcome.surfaces
+            for term, c, e in zip(s.terms, s.coefficients, np.sqrt(np.diag(s.covariance)), strict=True)
+        ],
+        "front.csv": [
+            {**point["factors"], **point["responses"]}
+            for point in front_record(study, outcome.surfaces, front)["front"]
+        ],
+        "confirmation.csv": _confirmation_table(outcome),
+        "part_dimensions.csv": [
+            {"chain": name, "part": part.name, **_dimension(part)}
+            for name, chain in outcome.chains.items()
+            for part in chain.allocation
+        ],
+    }
+    if outcome.reference_values is not None:
+        tables["beside_reference.csv"] = _beside_table(outcome)
+    for name, rows in tables.items():
+        pd.DataFrame(rows).to_csv(folder / name, index=False)
+    pictures = []
+    for surface in outcome.surfaces:
+        pictures.append(f"surface_{surface.name}.png")
+        plots.response_surface(study, surface, folder / pictures[-1])
+    confirmed = np.array([outcome.baseline.values, outcome.pick.values])
+    plots.pareto_front(study, front, outcome.surfaces, confirmed, folder / "pareto_front.png")
+    points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
+    pictures += ["pareto_front.png", *clearance.draw_motion(study, points, DRAWN_TURNS, folder)]
+    write_json(folder / "summary.json", summary(outcome))
+    return ["summary.json", *tables, *pictures]
+
+
+def _runs_table(study: Study, runs: Runs) -> list[dict[str, Any]]:
+    return [
+        {
+            "run": run + 1,
+            **{f"coded_{name}": x for name, x in zip(study.factors, coded, strict=True)},
+            **dict(zip(study.factors, actual, strict=True)),
+            **dict(zip(study.responses, values, strict=True)),
+            **{f"{name}_error": e for name, e in zip(study.responses, errors, strict=True)},
+        }
+        for run, (coded, actual, values, errors) in enumerate(
+            zip(runs.coded, runs.actual, runs.values, runs.errors, strict=True)
+        )
+    ]
+
+
+def _beside_table(outcome: Outcome) -> list[dict[str, Any]]:
+    study, runs = outcome.study, outcome.runs
+    assert outcome.reference_values is not None
+    return [
+        {
+            "run": run + 1,
+            **dict(zip(study.factors, runs.actual[run], strict=True)),
+            **{f"{name}_ours": x for name, x in zip(study.responses, runs.values[run], strict=True)},
+            **{f"{name}_theirs": x for name, x in zip(study.responses, theirs, strict=True)},
+        }
+        for run, theirs in enumerate(outcome.reference_values)
+    ]
+
+
+def _confirmation_table(outcome: Outcome) -> list[dict[str, Any]]:
+    return [
+        {
+            "response": gain.response,
+            "baseline": outcome.baseline.values[i],
+            "baseline_statistical_error": outcome.baseline.statistical[i],
+            "baseline_numerical_error": outcome.baseline.numerical[i],
+            "pick": outcome.pick.values[i],
+            "pick_statistical_error": outcome.pick.statistical[i],
+            "pick_numerical_error": outcome.pick.numerical[i],
+            "improvement_percent": gain.percent,
+            "improvement_error_percent": gain.error,
+            "verdict": gain.verdict,
+        }
+        for i, gain in enumerate(outcome.gains)
+    ]
+
+
+def _dimension(part: Part) -> dict[str, Any]:
+    return {
+        "nominal_mm": part.nominal_mm,
+        "upper_mm": part.upper_mm,
+        "lower_mm": part.lower_mm,
+        "grade": part.grade,
+    }

@@ -1,0 +1,60 @@
+"""Runs of a design: simulated, or read from a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.designs import central_composite, to_actual, to_coded
+from doe.study_file import Study
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths.
+
+    ``notes``: what the simulations warn of, once each; none for a table that was read.
+    """
+
+    coded: Array
+    actual: Array
+    values: Array
+    errors: Array
+    notes: tuple[str, ...] = ()
+
+
+def design_points(study: Study) -> Array:
+    """Coded design points (n, k)."""
+    design = study.file.design
+    return central_composite(
+        len(study.factors), alpha=design.alpha, centre_replicates=design.centre_replicates
+    )
+
+
+def run_design(study: Study, folder: Path, workers: int | None, progress: Progress) -> Runs:
+    """Design runs, from the store in ``folder`` or simulated. Raises InputError, RunError, KeyboardInterrupt."""
+    from doe import clearance
+    from doe.study.store import Store
+
+    clearance.check_responses(study)
+    coded = design_points(study)
+    actual = to_actual(coded, study.centre, study.step)
+    scenes = clearance.design_scenes(study, actual)
+    labels = [f"design run {run + 1}" for run in range(len(scenes))]
+    with Store(folder / "study.sqlite") as store:
+        results = clearance.run_scenes(scenes, labels, store, workers, progress)
+    notes = dict.fromkeys(note for result in results for note in result.notes)
+    return Runs(coded, actual, *clearance.responses(study, results), tuple(notes))
+
+
+def read_runs(study: Study, path: Path) -> Runs:
+    """Runs of a CSV table instead of simulated ones. Raises InputError."""
+    actual, values = study.read_table(path)
+    return Runs(to_coded(actual, study.centre, study.step), actual, values, np.full_like(values, np.nan))
