@@ -11,7 +11,7 @@ from scipy import stats
 from doe.response_surface.box_cox import backward, box_cox, check_positive, forward, slope
 
 # Survival times [10 h] of 48 animals: four treatments (rows of three poisons of four animals each).
-# Box and Cox (1964), Table 1.
+# Box and Cox (1964), their first example.
 SURVIVAL = [
     [0.31, 0.45, 0.46, 0.43, 0.36, 0.29, 0.40, 0.23, 0.22, 0.21, 0.18, 0.23],
     [0.82, 1.10, 0.88, 0.72, 0.92, 0.61, 0.49, 1.24, 0.30, 0.37, 0.38, 0.29],
@@ -28,7 +28,7 @@ def additive_model() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_literature_survival_times_call_for_the_reciprocal():
-    """Literature: Box and Cox (1964), section 4: lambda = -0.75, 95 % interval -1.13 to -0.37; they take -1."""
+    """Literature: Box and Cox (1964): lambda = -0.75, 95 % interval -1.13 to -0.37; they take -1."""
     found = box_cox(*additive_model(), name="survival")
     assert found["lambda"] == pytest.approx(-0.75, abs=0.005)
     assert found["interval"] == pytest.approx([-1.13, -0.37], abs=0.02)

@@ -54,7 +54,7 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
     ------
     ValueError when a value is not positive, the values are all equal, or no more runs than columns are given.
 
-    Source: Box and Cox (1964), eqs 8 and 9.
+    Source: Box and Cox (1964), maximized likelihood.
     """
     columns, response = np.asarray(matrix, float), np.asarray(values, float)
     check_positive(response, name)
