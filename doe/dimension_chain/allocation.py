@@ -9,13 +9,12 @@ meets its upper limit; for a yield, so that its mean (with functions, the middle
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import sqrt
+from math import inf, isfinite, sqrt
 
 import numpy as np
-from scipy.optimize import brentq
 
 from doe.dimension_chain.closing import ClosingFunction, closing_function, middle
 from doe.dimension_chain.cost import cheapest
@@ -24,10 +23,11 @@ from doe.dimension_chain.iso286 import grade_tolerances, tolerance_unit
 from doe.dimension_chain.links import DIGITS, SLACK, Chain, Link, Mode, Part
 from doe.dimension_chain.monte_carlo import Assemblies, draw
 from doe.dimension_chain.parts import allocated_part, given_part
-from doe.dimension_chain.yields import closing_moments, exact_shares, sampled_yields
+from doe.dimension_chain.yields import closing_moments, exact_shares, sampled_yields, standard_error
 
 SAMPLES = 100_000  # assemblies that judge a yield where no convolution can
-HALVINGS = 30
+HALVINGS = 26
+NEWTON_STEPS = 30
 WIDEST = 64.0  # times the tolerances of the linear rule
 
 Tolerances = Mapping[str, float]
@@ -57,7 +57,10 @@ class Allocation:
         return free[wanted] if wanted else min(free.values(), key=lambda link: link.coefficient < 0)
 
     def parts(self, tolerances: Tolerances, grades: Mapping[str, str] | None = None) -> list[Part]:
-        """All parts, those that are not fixed with the given tolerances, mm, and one nominal moved."""
+        """All parts, those that are not fixed with the given tolerances, mm, and one nominal moved.
+
+        Raises ValueError where no nominal of that part brings the closing link to its limits.
+        """
         by_name = {link.name: link for link in self.chain.link}
         parts = [
             allocated_part(link, tolerances[link.name], (grades or {}).get(link.name))
@@ -66,45 +69,52 @@ class Allocation:
             for link in self.chain.link
             if link.is_dimension or link.thermal_growth
         ]
-        moved, coefficient = self.adjusted.name, self.adjusted.coefficient
-        # One step is exact unless a function uses the part that is moved.
-        for _ in range(1 if moved not in self.function.arguments else 20):
-            step = self._missing(parts) / coefficient
+        moved = self.adjusted.name
+        # One step is exact unless a function uses the part that is moved; then these are steps of Newton.
+        for _ in range(NEWTON_STEPS):
+            slope = self.function.sensitivities(middle(parts))[moved]
+            step = self._missing(parts) / slope if slope else inf
             parts = [
                 replace(part, nominal_mm=round(part.nominal_mm + step, DIGITS))
                 if part.name == moved
                 else part
                 for part in parts
             ]
-            if abs(step) < SLACK:
+            if moved not in self.function.arguments or abs(step) < SLACK:
+                return parts
+            if not isfinite(step):
                 break
-        return parts
+        raise ValueError("no nominal of it brings the closing link to its limits; name another part")
 
     def kept(self, parts: list[Part]) -> bool:
         """Whether parts keep the limits in the mode of the chain."""
         if self.mode == "yield":
-            return self.yield_of(parts) >= self.chain.allocate.target_yield
+            return self.sure_yield(parts) >= self.chain.allocate.target_yield
         limits, (low, high) = self.chain.closing_link, interval(self.function, parts, self.mode)
         return limits.lower_mm - SLACK <= low and high <= limits.upper_mm + SLACK
 
-    def yield_of(self, parts: list[Part]) -> float:
-        """Yield with each part's own distribution: by convolution, or by Monte Carlo where functions are in it."""
+    def sure_yield(self, parts: list[Part]) -> float:
+        """Yield with each part's own distribution: by convolution; with functions, two errors below a Monte Carlo."""
         limits = self.chain.closing_link
         if self.function.linear:
             return 1 - sum(exact_shares(self.function, parts, limits))
-        return sampled_yields(self._drawn(parts))["as_given"]
+        share = sampled_yields(self._drawn(parts))["as_given"]
+        return share - 2 * standard_error(share, SAMPLES)
 
     def allocated(self) -> list[Part]:
         """Parts whose tolerances together fill the limits, snapped to grades where that is asked for."""
-        wish = self._linear_rule()
+        wish = self.linear_rule()
         scale = 1.0 if self.function.linear and self.mode != "yield" else self._scale(wish)
         tolerances = {name: scale * t for name, t in wish.items()}
         if not self.chain.allocate.grades:
             return self.parts(tolerances)
         return self._snapped(tolerances)
 
-    def _linear_rule(self) -> dict[str, float]:
-        """Tolerances, mm, that fill the limits of the linear chain."""
+    def linear_rule(self) -> dict[str, float]:
+        """Tolerances, mm, that fill the limits of the linear chain.
+
+        Raises ValueError where the narrowest tolerances of cost curves fill more.
+        """
         rule, free = self.chain.allocate, self.chain.free
         bare = self.parts({link.name: 0.0 for link in free})
         slopes = self.function.sensitivities(middle(bare))
@@ -125,17 +135,20 @@ class Allocation:
     def _scale(self, wish: Tolerances) -> float:
         """Factor on the tolerances at which they just keep the limits."""
 
-        def parts(scale: float) -> list[Part]:
-            return self.parts({name: scale * t for name, t in wish.items()})
+        def kept(scale: float) -> bool:
+            try:
+                return self.kept(self.parts({name: scale * t for name, t in wish.items()}))
+            except ValueError:
+                # Too wide for the functions to have a value, or for the nominal to follow.
+                return False
 
-        if self.mode == "yield":
-            return _last_kept(lambda scale: self.kept(parts(scale)))
-
-        def excess(scale: float) -> float:
-            low, high = interval(self.function, parts(scale), self.mode)
-            return (high - low) / self.chain.width_mm - 1
-
-        return WIDEST if excess(WIDEST) < 0 else brentq(excess, 0.0, WIDEST, xtol=1e-12)
+        low, high = 0.0, 1.0
+        while high < WIDEST and kept(high):
+            low, high = high, 2 * high
+        for _ in range(HALVINGS):
+            half = (low + high) / 2
+            low, high = (half, high) if kept(half) else (low, half)
+        return low
 
     def _snapped(self, tolerances: Tolerances) -> list[Part]:
         """Each tolerance at the widest grade within it; one finer than IT01 keeps its width without a grade."""
@@ -184,13 +197,3 @@ class Allocation:
     def _drawn(self, parts: list[Part]) -> Assemblies:
         seed, limits = self.chain.monte_carlo.seed, self.chain.closing_link
         return draw(self.function, parts, limits, samples=SAMPLES, seed=seed, laws=())
-
-
-def _last_kept(kept: Callable[[float], bool]) -> float:
-    low, high = 0.0, 1.0
-    while high < WIDEST and kept(high):
-        low, high = high, 2 * high
-    for _ in range(HALVINGS):
-        half = (low + high) / 2
-        low, high = (half, high) if kept(half) else (low, half)
-    return low

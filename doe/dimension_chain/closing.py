@@ -17,6 +17,10 @@ STEP = 1e-5  # mm of the central differences that give sensitivities
 Sizes = Mapping[str, Any]
 
 
+class NoValueError(ValueError):
+    """A size at which a function has no finite value."""
+
+
 @dataclass(frozen=True)
 class Function:
     """A link that follows from others: its name, coefficient and value at their sizes."""
@@ -47,12 +51,20 @@ class ClosingFunction:
         return sum(c * sizes[name] for name, c in self.coefficients.items()) + self.bent(sizes)
 
     def bent(self, sizes: Sizes) -> Any:
-        """Share of the functions alone, mm; only the sizes of ``arguments`` are needed."""
+        """Share of the functions alone, mm; only the sizes of ``arguments`` are needed.
+
+        Raises NoValueError where a function has no finite value.
+        """
         known = dict(sizes)
         total: Any = 0.0
-        for function in self.functions:
-            known[function.name] = function.value(known)
-            total = total + function.coefficient * known[function.name]
+        with np.errstate(all="ignore"):
+            for function in self.functions:
+                known[function.name] = function.value(known)
+                total = total + function.coefficient * known[function.name]
+        if not np.isfinite(np.sum(total)):
+            raise NoValueError(
+                "some sizes that are within reach give no finite closing link; mend the functions"
+            )
         return total
 
     def sensitivities(self, sizes: Sizes) -> dict[str, float]:
@@ -100,6 +112,27 @@ def used_links(link: Link) -> list[str]:
     return names_in(link.expression) if link.expression else []
 
 
+def fit_factor(fit: PressFit, bore_nominal: float) -> float:
+    """Change of the raceway's diameter per interference of a press fit. Raises ValueError as `press_fit_factor`."""
+    fit_mm = fit.fit_mm or bore_nominal
+    outer = fit.raceway_mm > fit_mm
+    # The raceway bounds the part that it stands on, unless told otherwise.
+    shaft_bore = (0.0 if outer else fit.raceway_mm) if fit.shaft_bore_mm is None else fit.shaft_bore_mm
+    outside = fit.raceway_mm if fit.outside_mm is None else fit.outside_mm
+    if fit.outside_mm is None and not outer:
+        raise ValueError("outside_mm is missing: give the outside diameter of what holds the ring")
+    return press_fit_factor(
+        fit_mm=fit_mm,
+        raceway_mm=fit.raceway_mm,
+        shaft_bore_mm=shaft_bore,
+        outside_mm=outside,
+        shaft_modulus_GPa=fit.shaft_modulus_GPa,
+        bore_modulus_GPa=fit.bore_modulus_GPa,
+        shaft_poisson=fit.shaft_poisson,
+        bore_poisson=fit.bore_poisson,
+    )
+
+
 def middle(parts: Sequence[Part]) -> dict[str, float]:
     """Sizes of the parts at mid-tolerance, mm."""
     return {part.name: part.nominal_mm + part.middle_mm for part in parts}
@@ -117,24 +150,5 @@ def _function(link: Link, by_name: Mapping[str, Link]) -> Callable[[Sizes], Any]
 
 
 def _press_fit(fit: PressFit, bore_nominal: float) -> Callable[[Sizes], Any]:
-    fit_mm = fit.fit_mm or bore_nominal
-    outer = fit.raceway_mm > fit_mm
-    shaft_bore, outside = fit.shaft_bore_mm, fit.outside_mm
-    if shaft_bore is None:
-        shaft_bore = 0.0 if outer else fit.raceway_mm
-    if outside is None:
-        if not outer:
-            raise ValueError("outside_mm is missing: give the outside diameter of what holds the ring")
-        outside = fit.raceway_mm
-    factor = press_fit_factor(
-        fit_mm=fit_mm,
-        raceway_mm=fit.raceway_mm,
-        shaft_bore_mm=shaft_bore,
-        outside_mm=outside,
-        shaft_modulus_GPa=fit.shaft_modulus_GPa,
-        bore_modulus_GPa=fit.bore_modulus_GPa,
-        shaft_poisson=fit.shaft_poisson,
-        bore_poisson=fit.bore_poisson,
-    )
-    change = fit.interference_change_mm
+    factor, change = fit_factor(fit, bore_nominal), fit.interference_change_mm
     return lambda sizes: factor * np.maximum(sizes[fit.shaft] - sizes[fit.bore] + change, 0.0)

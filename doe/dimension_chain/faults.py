@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import closing_function, is_part, used_links
+from doe.dimension_chain.closing import fit_factor, is_part, used_links
 from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.iso286 import LARGEST, positioned
 from doe.dimension_chain.links import SLACK, Allocate, Chain, Link
@@ -38,7 +39,7 @@ def faults(chain: Chain) -> list[str]:
 def _used(links: list[Link]) -> set[str]:
     names: set[str] = set()
     for link in links:
-        if _sentence(lambda link=link: used_links(link)) is None:  # type: ignore[misc]
+        if _sentence(partial(used_links, link)) is None:
             names |= set(used_links(link))
     return names
 
@@ -112,7 +113,7 @@ def _reference_faults(chain: Chain) -> list[str]:
     found = []
     before: dict[str, Link] = {}
     for link in chain.link:
-        if _sentence(lambda link=link: used_links(link)) is None:  # type: ignore[misc]
+        if _sentence(partial(used_links, link)) is None:
             names = used_links(link)
             found += [
                 f'link "{link.name}": uses "{name}", which no link before it is called; name one of '
@@ -125,9 +126,14 @@ def _reference_faults(chain: Chain) -> list[str]:
                 found.append(
                     f'link "{link.name}": thermal_growth.of = "{grown.name}": must be a positive dimension'
                 )
+        bore = link.press_fit and before.get(link.press_fit.bore)
+        if (
+            link.press_fit
+            and bore
+            and (wrong := _sentence(partial(fit_factor, link.press_fit, bore.nominal)))
+        ):
+            found.append(f'link "{link.name}": press_fit: {wrong}')
         before.setdefault(link.name, link)
-    if not found and (wrong := _sentence(lambda: closing_function(chain.link))):
-        found.append(f"link.press_fit: {wrong}")
     return found
 
 
@@ -159,10 +165,13 @@ def _allocation_faults(chain: Chain, free: list[str]) -> list[str]:
 def _room_faults(chain: Chain) -> list[str]:
     """Fixed links, or the narrowest tolerances of cost curves, that leave no room within the limits."""
     search, free = Allocation(chain), chain.free
-    bare = search.parts({link.name: 0.0 for link in free})
+    bare_widths = {link.name: 0.0 for link in free}
+    if lost := _sentence(partial(search.parts, bare_widths)):
+        return [f'allocate.adjust = "{search.adjusted.name}": {lost}']
+    bare = search.parts(bare_widths)
     limits, width = chain.closing_link, chain.width_mm
     if chain.allocate.mode == "yield":
-        share, target = search.yield_of(bare), chain.allocate.target_yield
+        share, target = search.sure_yield(bare), chain.allocate.target_yield
         if share < target:
             return [
                 f"allocate.target_yield = {target:g}: the fixed links alone give {share:.4g}; narrow or unfix one, or "
@@ -178,7 +187,7 @@ def _room_faults(chain: Chain) -> list[str]:
                 "mm; narrow or unfix one, or widen the limits: the nearest that can be met are wider than "
                 f"{middle - consumed / 2:.4f} to {middle + consumed / 2:.4f} mm"
             ]
-    if chain.allocate.method == "cost" and (tight := _sentence(search.allocated)):
+    if chain.allocate.method == "cost" and (tight := _sentence(search.linear_rule)):
         return [f"link.cost: {tight}; widen the limits or let a process go narrower"]
     return []
 

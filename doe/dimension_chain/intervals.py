@@ -74,7 +74,9 @@ def _least(function: ClosingFunction, parts: list[Part], sign: int) -> float:
 
     generator = np.random.default_rng(0)
     if len(varying) <= CORNERS:
-        corners = np.array(list(product((0.0, 1.0), repeat=len(varying)))).reshape(-1, len(varying))
+        corners = np.array(list(product((0.0, 1.0), repeat=len(varying)))).reshape(
+            2 ** len(varying), len(varying)
+        )
     else:
         corners = generator.integers(0, 2, (2**CORNERS, len(varying))).astype(float)
     at_corners = value(corners)

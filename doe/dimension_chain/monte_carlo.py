@@ -48,6 +48,7 @@ def draw(
     """Draw assemblies with each part's own distribution, and with all parts of each of ``laws``.
 
     ``threads``: as many as there are processors unless given; they change no bit of the result.
+    Raises NoValueError where a function has no finite value.
     """
     values = np.empty(samples)
     starts = range(0, samples, CHUNK)

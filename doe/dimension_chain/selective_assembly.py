@@ -29,7 +29,7 @@ class SelectiveAssembly:
     """What matching in classes gives.
 
     ``matched`` is the share of the pairs made of which each class holds both parts; ``good`` the share of the matched
-    assemblies within the limits, ``random`` that of assemblies at random; both with ``standard_error``. ``yield`` of
+    assemblies within the limits, with its ``standard_error``, ``random`` that of assemblies at random. ``yield`` of
     the whole is matched times good. ``worst_case_mm`` holds over all classes, ``edges_mm`` are the sizes at which
     each part is sorted. ``classes_needed``: the fewest classes whose worst case keeps the limits, None above 100.
     """
@@ -81,13 +81,12 @@ def selective_assembly(
     mates = {part.name: sizes[part.name][index] for part, index in zip(pair, chosen, strict=True)}
     matched = np.asarray(function.value({name: x[: len(chosen[0])] for name, x in sizes.items()} | mates))
     good, random = _good(matched, limits), _good(closing, limits)
-    count = max(len(matched), 1)
     return SelectiveAssembly(
         classes=wish.classes,
         matched=len(matched) / wish.samples,
         good=good,
         random=random,
-        standard_error=max(standard_error(good, count), standard_error(random, wish.samples)),
+        standard_error=standard_error(good, max(len(matched), 1)),
         matched_deviation_mm=float(matched.std()) if len(matched) else 0.0,
         random_deviation_mm=float(closing.std()),
         worst_case_mm=class_worst_case(function, parts, wish),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import ClosingFunction
+from doe.dimension_chain.closing import ClosingFunction, NoValueError
 from doe.dimension_chain.contributions import contributions
 from doe.dimension_chain.cost import total_cost
 from doe.dimension_chain.faults import faults
@@ -51,8 +51,8 @@ class ChainResult:
     """The closing link of a chain, mm, and the allocated parts.
 
     ``yields`` maps "as_given" (each part's own distribution), "normal", "truncated_normal" and "uniform" (all
-    parts alike) to the share of assemblies within the limits, by Monte Carlo. ``standard_error`` is the largest of
-    these four: half the Wilson interval of one standard deviation, 1/(2 samples) where all or none pass.
+    parts alike) to the share of assemblies within the limits, by Monte Carlo, ``standard_errors`` to half the Wilson
+    interval of one standard deviation, 1/(2 samples) where all or none pass; ``standard_error`` is the largest.
     ``rejected`` are the assemblies per million below and above the limits; ``exact_yields`` the yields without
     sampling, None unless the chain is linear; ``normal_yield`` that of a normal closing link. ``contributions`` are
     in percent, the variance by each part's own distribution. ``mean_mm``, ``standard_deviation_mm`` and
@@ -63,7 +63,7 @@ class ChainResult:
     worst_case_mm: Interval
     rss_mm: Interval
     yields: dict[str, float]
-    standard_error: float
+    standard_errors: dict[str, float]
     contributions: dict[str, dict[str, float]]
     allocation: tuple[Part, ...]
     status: str
@@ -78,6 +78,11 @@ class ChainResult:
     selective: SelectiveAssembly | None
     samples: int
     seed: int
+
+    @property
+    def standard_error(self) -> float:
+        """The largest standard error of the yields."""
+        return max(self.standard_errors.values())
 
     @property
     def refused(self) -> bool:
@@ -102,6 +107,7 @@ class ChainResult:
                 "standard_deviation_mm": self.standard_deviation_mm,
                 "quantiles_mm": {f"{share:g}": size for share, size in self.quantiles_mm.items()},
             },
+            "yield_standard_errors": self.standard_errors,
             "rejected": self.rejected,
             "exact_yield": self.exact_yields,
             "normal_yield": self.normal_yield,
@@ -130,8 +136,14 @@ def solve(
     found = faults(chain) + ([f"samples = {samples}: must be at least 1"] if samples < 1 else [])
     if found:
         raise InputError(found)
-    search = Allocation(chain)
-    function, limits = search.function, chain.closing_link
+    try:
+        return _solved(Allocation(chain), samples, seed, threads)
+    except NoValueError as error:
+        raise InputError([f"link: {error}"]) from None
+
+
+def _solved(search: Allocation, samples: int, seed: int, threads: int | None) -> ChainResult:
+    chain, function, limits = search.chain, search.function, search.chain.closing_link
     allocation = search.allocated()
     given = all(has_deviations(link) for link in chain.free)
     parts = given_parts(chain.link) if given else allocation
@@ -142,7 +154,7 @@ def solve(
         worst_case_mm=interval(function, parts, "worst_case"),
         rss_mm=interval(function, parts, "rss"),
         yields=yields,
-        standard_error=max(standard_error(share, samples) for share in yields.values()),
+        standard_errors={law: standard_error(share, samples) for law, share in yields.items()},
         contributions=contributions(function, parts),
         allocation=tuple(allocation),
         status=_status(search, parts, allocation, yields["as_given"], given),
@@ -201,7 +213,7 @@ def _cost(chain: Chain, allocation: Sequence[Part]) -> float | None:
 def _status(search: Allocation, parts: list[Part], allocation: list[Part], share: float, given: bool) -> str:
     if not given:
         return "ok: deviations allocated"
-    if search.kept(parts):
+    if _kept(search, parts, share):
         return "ok"
     limits, mode, width = search.chain.closing_link, search.mode, search.chain.width_mm
     low, high = interval(search.function, parts, mode)
@@ -217,6 +229,13 @@ def _status(search: Allocation, parts: list[Part], allocation: list[Part], share
         f"refused: the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm where "
         f"{limits.lower_mm:.4f} to {limits.upper_mm:.4f} mm is allowed ({why}); the nearest that fits is {nearest}"
     )
+
+
+def _kept(search: Allocation, parts: list[Part], share: float) -> bool:
+    """Whether given parts keep the limits; a sampled yield is judged by the large Monte Carlo."""
+    if search.mode == "yield" and not search.function.linear:
+        return share >= search.chain.allocate.target_yield
+    return search.kept(parts)
 
 
 def part_text(part: Part) -> str:

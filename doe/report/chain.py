@@ -59,15 +59,18 @@ def _print_yields(chain: ChainResult) -> None:
     rows = [
         (
             kind.replace("_", " "),
-            f"{share:.6f}",
+            f"{share:.6f} ± {chain.standard_errors[kind]:.1g}",
             f"{exact[kind]:.6f}" if kind in exact else "",
-            f"{chain.rejected[kind]['low_ppm']:.0f} ± {chain.rejected[kind]['low_standard_error_ppm']:.1g}",
-            f"{chain.rejected[kind]['high_ppm']:.0f} ± {chain.rejected[kind]['high_standard_error_ppm']:.1g}",
+            *(_ppm(chain.rejected[kind], side) for side in ("low", "high")),
         )
         for kind, share in chain.yields.items()
     ]
     header = ("distribution of the parts", "yield", "without sampling", "ppm below", "ppm above")
-    print_table(f"yield of {chain.samples} assemblies, ± {chain.standard_error:.1g}", header, rows)
+    print_table(f"yield of {chain.samples} assemblies", header, rows)
+
+
+def _ppm(rejected: Mapping[str, float], side: str) -> str:
+    return f"{rejected[f'{side}_ppm']:.0f} ± {rejected[f'{side}_standard_error_ppm']:.1f}"
 
 
 def _print_answer(chain: ChainResult) -> None:
@@ -75,7 +78,7 @@ def _print_answer(chain: ChainResult) -> None:
     print(
         f"{'as given: ' if chain.refused else ''}closing link {low:.4f} to {high:.4f} mm in worst case, "
         f"{least:.4f} to {most:.4f} mm by root sum square, yield "
-        f"{chain.yields['as_given']:.6f} ± {chain.standard_error:.1g} "
+        f"{chain.yields['as_given']:.6f} ± {chain.standard_errors['as_given']:.1g} "
         f"({out['low_ppm']:.0f} ppm below, {out['high_ppm']:.0f} ppm above)"
     )
     if chain.linearisation is not None:
