@@ -40,9 +40,9 @@ def test_point_is_judged_beside_the_front(tmp_path):
     by_name = "pocket_clearance_mm=0.285, radial_clearance_mm=0.017,guide_clearance_mm=0.187"
     record = json.loads(command(study, "--point", by_name, "--json").output)
     assert record["point"]["predicted_gains"]["impact_force_N"]["percent"] == pytest.approx(5.27, abs=0.01)
-    assert record["point"]["inside_region"] and record["point"]["dominated_by"] >= 0
+    assert not record["point"]["beyond_runs"] and record["point"]["dominated_by"] >= 0
     far = json.loads(command(study, "--point", "radial_clearance_mm=0.1", "--json").output)
-    assert not far["point"]["inside_region"] and "extrapolated" in far["point"]["statement"]
+    assert far["point"]["beyond_runs"] and "extrapolate there" in far["point"]["statement"]
 
 
 @pytest.mark.parametrize(

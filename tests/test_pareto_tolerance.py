@@ -24,14 +24,6 @@ def some_quadratic(seed, factors):
     return Quadratic(1.0, random.normal(size=factors), (matrix + matrix.T) / 2)
 
 
-def test_quadratic_of_terms_is_the_polynomial():
-    surface = Quadratic.of(["1", "A", "B", "AB", "A^2"], np.array([1.0, 2.0, 3.0, 4.0, 5.0]), 3)
-    a, b = 0.7, -1.3
-    assert surface.predict(np.array([a, b, 9.0])) == pytest.approx(1 + 2 * a + 3 * b + 4 * a * b + 5 * a * a)
-    with pytest.raises(ValueError, match="ABC: is not of second order"):
-        Quadratic.of(["ABC"], np.array([1.0]), 3)
-
-
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 10**6), factors=st.integers(1, 3))
 def test_range_over_a_box_is_that_of_brute_force(seed, factors):

@@ -6,10 +6,10 @@ import pytest
 import statsmodels.formula.api as smf
 from pareto_cases import TABLE, edited_study, table_surfaces
 
+from doe.designs import to_coded
 from doe.pareto import Goals, front, hypervolume, non_dominated
 from doe.pareto.uncertainty import contrast_error, draw_coefficients, front_uncertainty, non_dominated_share
-from doe.response_surface.surface import model_matrix
-from doe.study.drawn import draw_surfaces, jacobian, predict_draws, predict_paired, quadratics
+from doe.study.drawn import draw_all, jacobian, predict_all, predict_draws, predict_paired
 from doe.study.front import find_front
 from doe.study.predicted import predicted_gains, statement
 
@@ -68,11 +68,22 @@ def test_shared_error_cancels_in_a_difference():
     assert contrast_error(np.array([0.0, 0.0]), covariance) == 0.0
 
 
-def test_derivatives_by_the_coefficients_are_the_row_of_the_model(table):
-    _, surfaces = table
-    point = np.array([0.3, -1.2, 0.7])
-    for surface in surfaces:
-        assert jacobian(surface, point) == pytest.approx(model_matrix(point, surface.terms), abs=1e-7)
+@pytest.mark.parametrize("transform", ["none", 0.0, -1.0])
+def test_gain_of_a_transformed_response_is_judged_in_its_own_units(tmp_path, transform):
+    word = f'"{transform}"' if transform == "none" else str(transform)
+    study = edited_study(
+        tmp_path, ('model = "linear"\ngoal = "min"', f'model = "linear"\ntransform = {word}\ngoal = "min"')
+    )
+    surfaces = table_surfaces(study)
+    gain = predicted_gains(study, surfaces, PAPER_PICK)[0]
+    points = to_coded(np.stack([study.baseline, PAPER_PICK]), study.centre, study.step)
+    # To first order, the quantiles of the drawn difference.
+    drawn = predict_draws(surfaces, draw_all(surfaces, 20000, 1), points)[:, :, 0]
+    low, high = np.quantile(drawn[:, 0] - drawn[:, 1], [0.025, 0.975]) / gain.baseline * 100.0
+    assert gain.error == pytest.approx((high - low) / 2.0, rel=0.03)
+    shifts = 1e-6 * np.eye(4)
+    up, down = (surfaces[0].draws(points[1], surfaces[0].coefficients + s * shifts) for s in (1, -1))
+    assert jacobian(surfaces[0], points[1]) == pytest.approx((up - down) / 2e-6, rel=1e-5)
 
 
 def test_drawn_coefficients_have_the_quantiles_of_t():
@@ -88,10 +99,10 @@ def test_drawn_coefficients_have_the_quantiles_of_t():
 
 def test_draws_in_pairs_are_the_diagonal_of_all_draws(table):
     _, surfaces = table
-    drawn = draw_surfaces(surfaces, 5, 1)
+    drawn = draw_all(surfaces, 5, 1)
     points = np.random.default_rng(1).uniform(-1, 1, (5, 3))
-    everything = predict_draws(drawn, points)
-    assert predict_paired(drawn, points) == pytest.approx(
+    everything = predict_draws(surfaces, drawn, points)
+    assert predict_paired(surfaces, drawn, points) == pytest.approx(
         np.array([everything[i, i] for i in range(5)]), rel=1e-12
     )
 
@@ -126,10 +137,10 @@ def dense_front(responses, reach, rounds):
 
 
 def test_front_of_the_published_table_has_the_hypervolume_of_a_dense_one(table):
-    surfaces, reach = quadratics(table[1], 3), 2**0.75
+    surfaces, reach = table[1], 2**0.75
 
     def responses(points):
-        return np.column_stack([surface.predict(points) for surface in surfaces])
+        return predict_all(surfaces, points)
 
     dense = dense_front(responses, reach, 3)
     ideal, nadir = dense.min(axis=0), dense.max(axis=0)

@@ -6,11 +6,10 @@ was transformed before it was fitted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from string import ascii_uppercase
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,33 +34,6 @@ class Quadratic:
     linear: Array
     matrix: Array
     link: Callable[[Array], Array] = identity
-
-    @classmethod
-    def of(
-        cls,
-        terms: Sequence[str],
-        coefficients: Array,
-        factors: int,
-        link: Callable[[Array], Array] = identity,
-    ) -> Quadratic:
-        """From coefficients of the terms "1", "A", "AB" and "A^2".
-
-        Raises ValueError for a term of higher order.
-        """
-        constant, linear, matrix = 0.0, np.zeros(factors), np.zeros((factors, factors))
-        for term, value in zip(terms, coefficients.tolist(), strict=True):
-            letters = [ascii_uppercase.index(letter) for letter in term.removesuffix("^2") if letter != "1"]
-            letters = letters * 2 if term.endswith("^2") else letters
-            if len(letters) > 2:
-                raise ValueError(f"term {term}: is not of second order; choose a quadratic model")
-            if len(letters) == 2:
-                matrix[letters[0], letters[1]] += value / 2
-                matrix[letters[1], letters[0]] += value / 2
-            elif letters:
-                linear[letters[0]] = value
-            else:
-                constant = value
-        return cls(constant, linear, matrix, link)
 
     def predict(self, points: Array) -> Array:
         """Values (...) at coded points (..., k)."""

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.designs import to_actual, to_coded
+from doe.designs import to_coded
 from doe.pareto.indicators import REFERENCE
 from doe.report.tolerance_aware import print_tolerance_aware, tolerance_aware_record
 from doe.study.drawn import predict_all
 from doe.study.front import half_widths
-from doe.study.goals import goals_of, region_of
+from doe.study.goals import beyond_runs, goals_of
 from doe.study.predicted import PredictedGain, predicted_gains, statement
 from rbdyn.terminal import print_table
 
@@ -48,7 +48,7 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         "ideal": _extreme(study, front, front.costs.argmin(axis=0)),
         "nadir": _extreme(study, front, front.costs.argmax(axis=0)),
         "knee": points[front.knee],
-        "pick": {**points[front.pick], "reason": front.pick_reason},
+        "pick": {**points[front.pick], "reason": front.pick_reason, "beyond_runs": _far(study, front)},
         "picks": picks,
         "baseline": point_record(study, surfaces, study.baseline),
         "pick_dominates_baseline": {
@@ -65,10 +65,16 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         "generations": front.generations,
         "seed": front.seed,
     }
+    if record["pick"]["beyond_runs"]:
+        record["statement"] += " The pick lies farther out than any run: the surfaces extrapolate there."
     if front.tolerance_aware is not None:
         record["tolerance_aware"] = tolerance_aware_record(study, surfaces, front.tolerance_aware)
         picks["tolerance_aware"] = record["tolerance_aware"]["pick"]
     return record
+
+
+def _far(study: Study, front: ParetoFront) -> bool:
+    return beyond_runs(study, to_coded(front.points[front.pick], study.centre, study.step))
 
 
 def point_record(study: Study, surfaces: list[Surface], point: Array) -> dict[str, Any]:
@@ -88,25 +94,13 @@ def asked_point_record(
     gains = predicted_gains(study, surfaces, point)
     coded = to_coded(point, study.centre, study.step)
     costs = goals_of(study).costs(predict_all(surfaces, coded[None])[0])
-    reach = region_of(study)
-    rim = [
-        f"{name} from {low:.5g} to {high:.5g}"
-        for name, x, limit, low, high in zip(
-            study.factors,
-            coded,
-            reach,
-            to_actual(-reach, study.centre, study.step),
-            to_actual(reach, study.centre, study.step),
-            strict=True,
-        )
-        if abs(x) > limit * (1.0 + 1e-4)
-    ]
-    outside = f" The point is outside the region ({', '.join(rim)}): extrapolated." if rim else ""
+    beyond = beyond_runs(study, coded)
+    outside = " The point lies farther out than any run: the surfaces extrapolate there." if beyond else ""
     return {
         **point_record(study, surfaces, point),
         "predicted_gains": gains_record(gains),
         "dominated_by": int(dominates(front.costs, costs).sum()),
-        "inside_region": not rim,
+        "beyond_runs": beyond,
         "constraints": _limits(study, predict_all(surfaces, coded[None])[0]),
         "sentences": [gain.sentence for gain in gains],
         "statement": statement(gains) + outside,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doe.designs import to_actual, to_coded
-from doe.study.drawn import draw_surfaces, predict_draws, quadratics
+from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import goals_of, region_of, tolerances_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
@@ -36,7 +36,6 @@ def find_front(study: Study, surfaces: Sequence[Surface]) -> ParetoFront:
     goals, settings, reach = goals_of(study), study.file.front, region_of(study)
     if len(goals.objectives) < 2:
         raise InputError([f"{study.path}: response: one alone has no front; add a second with a goal"])
-    smooth = quadratics(surfaces, len(study.factors))
     half = None if settings.tolerance_aware == "none" else tolerances_of(study)
 
     def coded(points: Array) -> Array:
@@ -44,7 +43,7 @@ def find_front(study: Study, surfaces: Sequence[Surface]) -> ParetoFront:
 
     with _named(study, goals, np.zeros(1), np.ones(1), ""):
         found = front(
-            lambda points: np.column_stack([surface.predict(coded(points)) for surface in smooth]),
+            lambda points: predict_all(surfaces, coded(points)),
             to_actual(-reach, study.centre, study.step),
             to_actual(reach, study.centre, study.step),
             goals=goals,
@@ -80,9 +79,9 @@ def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) 
     from doe.pareto.uncertainty import front_uncertainty
 
     assert found.standard_errors is not None
-    drawn = draw_surfaces(surfaces, study.file.front.draws, study.file.front.seed)
+    drawn = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
     points = np.vstack([found.points, study.baseline])
-    values = predict_draws(drawn, to_coded(points, study.centre, study.step))
+    values = predict_draws(surfaces, drawn, to_coded(points, study.centre, study.step))
     return front_uncertainty(
         values[:, :-1],
         half_widths(surfaces, found.standard_errors),
@@ -124,7 +123,7 @@ def _tolerance_aware(
 
 @contextmanager
 def _named(study: Study, goals: Goals, centre: Array, step: Array, after: str) -> Iterator[None]:
-    """Turns a search without a point that keeps all limits into a sentence; ``centre`` and ``step`` of its points."""
+    """Turns a search that finds nothing into a sentence; ``centre`` and ``step`` are those of its points."""
     from doe.pareto import InfeasibleError
 
     try:
@@ -143,3 +142,5 @@ def _named(study: Study, goals: Goals, centre: Array, step: Array, after: str) -
                 f"closest ({where}) misses {' and '.join(missed)}; loosen a limit or widen the design"
             ]
         ) from None
+    except ValueError as error:
+        raise InputError([f"{study.path}: front{after}: {error}"]) from None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from doe.study.design import design_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
 
@@ -32,11 +33,15 @@ def goals_of(study: Study) -> Goals:
 
 
 def region_of(study: Study) -> Array:
-    """Half ranges (k,) of the region in coded units, about its centre 0: up to the axial points."""
-    from doe.designs import axial_distance
+    """Half ranges (k,) in coded units, about the centre 0, of the box in which the design searches."""
+    return np.full(len(study.factors), design_of(study).reach)
 
-    reach = max(1.0, axial_distance(len(study.factors), study.file.design.alpha))
-    return np.full(len(study.factors), reach)
+
+def beyond_runs(study: Study, coded: Array) -> bool:
+    """Whether a coded point (k,) is farther out than the region that the runs reach: the surfaces extrapolate there."""
+    design = design_of(study)
+    distance = np.linalg.norm(coded) if design.region == "ball" else np.abs(coded).max()
+    return bool(distance > design.extent * (1.0 + 1e-4))
 
 
 def known_tolerances(study: Study) -> dict[str, float]:

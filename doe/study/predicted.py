@@ -87,9 +87,11 @@ def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> 
         if dof > 0:
             error = float(stats.t.ppf(0.975, dof)) * contrast_error(rows[0] - rows[1], surface.covariance)
         pure = surface.pure_error
-        if pure["ms"] is not None:
+        if pure["ms"] is not None and surface.residual_mean_square > 0.0:
             constant = surface.terms.index("1")
-            single = math.sqrt(pure["ms"] * sum(float(row[constant]) ** 2 for row in rows))
+            # With weights the mean squares have no unit; the variance of a run has.
+            variance = pure["ms"] / surface.residual_mean_square * surface.observation_variance
+            single = math.sqrt(variance * sum(float(row[constant]) ** 2 for row in rows))
             scatter = float(stats.t.ppf(0.975, pure["df"])) * single
         gains.append(
             PredictedGain(

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.designs import central_composite, to_actual, to_coded
+from doe.designs import to_actual, to_coded
+from doe.study.design import check_runs, design_of
 from doe.study_file import Study
 
 Array = NDArray[np.float64]
@@ -20,7 +21,8 @@ Progress = Callable[[int, int], None]
 class Runs:
     """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths.
 
-    ``notes``: what the simulations warn of, once each; none for a table that was read.
+    ``notes``: what the simulations warn of, once each; none for a table that was read. ``replicates`` (n,)
+    behind the half-widths (0: unknown) and ``block`` (n,) of each run; None: all unknown, one block.
     """
 
     coded: Array
@@ -28,14 +30,13 @@ class Runs:
     values: Array
     errors: Array
     notes: tuple[str, ...] = ()
+    replicates: NDArray[np.int64] | None = None
+    block: NDArray[np.int64] | None = None
 
 
 def design_points(study: Study) -> Array:
-    """Coded design points (n, k)."""
-    design = study.file.design
-    return central_composite(
-        len(study.factors), alpha=design.alpha, centre_replicates=design.centre_replicates
-    )
+    """Coded design points (n, k) in the order of the runs. Raises InputError when the design is impossible."""
+    return design_of(study).coded
 
 
 def run_design(study: Study, folder: Path, workers: int | None, progress: Progress) -> Runs:
@@ -44,9 +45,11 @@ def run_design(study: Study, folder: Path, workers: int | None, progress: Progre
     from doe.study.store import Store
 
     clearance.check_responses(study)
-    coded = design_points(study)
+    design = design_of(study)
+    check_runs(study, design)
+    coded = design.coded
     actual = to_actual(coded, study.centre, study.step)
-    scenes = clearance.design_scenes(study, actual)
+    scenes = clearance.design_scenes(study, actual, design.order.tolist())
     labels = [f"design run {run + 1}" for run in range(len(scenes))]
     with Store(folder / "study.sqlite") as store:
         results = clearance.run_scenes(scenes, labels, store, workers, progress)
@@ -56,5 +59,8 @@ def run_design(study: Study, folder: Path, workers: int | None, progress: Progre
 
 def read_runs(study: Study, path: Path) -> Runs:
     """Runs of a CSV table instead of simulated ones. Raises InputError."""
-    actual, values = study.read_table(path)
-    return Runs(to_coded(actual, study.centre, study.step), actual, values, np.full_like(values, np.nan))
+    table = study.read_table(path)
+    coded = to_coded(table.actual, study.centre, study.step)
+    return Runs(
+        coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block
+    )

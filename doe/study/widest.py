@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doe.designs import to_coded
-from doe.study.drawn import draw_surfaces, predict_all, predict_paired, quadratics
+from doe.study.drawn import draw_all, predict_all, predict_paired
 from doe.study.goals import goals_of, known_tolerances, region_of
 from doe.study_file import Study
 from doe.study_file.front_section import Tolerances
@@ -35,13 +35,12 @@ def widest_of(
     base, nominal = (to_coded(each, study.centre, study.step)[None] for each in (study.baseline, point))
     gain = (goals.costs(predict_all(surfaces, base)) - goals.costs(predict_all(surfaces, nominal)))[0]
     keep = np.where(gain > 0.0, settings.keep * gain, gain)
-    smooth = quadratics(surfaces, len(study.factors))
-    drawn = draw_surfaces(surfaces, settings.samples, settings.seed) if settings.surface_uncertainty else None
+    drawn = draw_all(surfaces, settings.samples, settings.seed) if settings.surface_uncertainty else None
 
     def responses(coded: Array) -> Array:
         if drawn is None:
-            return np.column_stack([surface.predict(coded) for surface in smooth])
-        return predict_paired(drawn, coded)
+            return predict_all(surfaces, coded)
+        return predict_paired(surfaces, drawn, coded)
 
     def objectives(points: Array) -> Array:
         values = responses(to_coded(points, study.centre, study.step))
