@@ -67,7 +67,7 @@ def pareto_front(
 
     ``confirmed``: simulated responses of baseline and pick, shape (2, m), or None.
     """
-    values = front.values * study.signs
+    values = front.values
     baseline = np.array(
         [surface.predict((study.baseline - study.centre) / study.step) for surface in surfaces]
     )

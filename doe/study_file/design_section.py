@@ -12,7 +12,8 @@ from rbdyn.faults import Strict
 class Factor(Strict):
     """A factor: its name in tables, its key in the scene, and its values at coded 0 and per coded unit.
 
-    The pick is rounded to a multiple of ``resolution``, the smallest step that a drawing makes.
+    The pick is rounded to a multiple of ``resolution``, the smallest step that a drawing makes. ``tolerance`` is the
+    half width of what manufacture makes of it.
     """
 
     name: Annotated[str, Field(min_length=1)]
@@ -20,6 +21,7 @@ class Factor(Strict):
     centre: float
     step: Annotated[float, Field(gt=0.0)]
     resolution: Annotated[float, Field(gt=0.0)] | None = None
+    tolerance: Annotated[float, Field(gt=0.0)] | None = None
 
 
 Kind = Literal["central_composite", "box_behnken", "full_factorial", "latin_hypercube", "sobol"]
