@@ -62,11 +62,16 @@ def scene_at(
     return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments])
 
 
-def design_scenes(study: Study, points: Array) -> list[Scene]:
-    """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError."""
+def design_scenes(study: Study, points: Array, order: Sequence[int] | None = None) -> list[Scene]:
+    """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError.
+
+    ``order``: place of each run in the standard order, which sets its seed; as given unless told.
+    """
     data, first = read_scene(study), study.file.design.seed
+    places = range(len(points)) if order is None else order
     return [
-        scene_at(study, data, point, first + run, study.file.scene.set) for run, point in enumerate(points)
+        scene_at(study, data, point, first + place, study.file.scene.set)
+        for place, point in zip(places, points, strict=True)
     ]
 
 

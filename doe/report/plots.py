@@ -13,7 +13,8 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-from doe.designs import axial_distance, to_actual
+from doe.designs import to_actual
+from doe.study.design import design_of
 
 if TYPE_CHECKING:
     from doe.pareto import ParetoFront
@@ -34,7 +35,7 @@ def label(name: str) -> str:
 def response_surface(study: Study, surface: Surface, path: Path) -> None:
     """Surface over the first factor and each other one, the rest at their centre, with contours beneath."""
     factors = len(study.factors)
-    reach = axial_distance(factors, study.file.design.alpha)
+    reach = design_of(study).reach
     grid = np.linspace(-reach, reach, 41)
     figure = plt.figure(figsize=(6.2 * (factors - 1), 5.2))
     for panel in range(1, factors):

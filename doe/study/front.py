@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doe.designs import to_coded
+from doe.study.design import design_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
 
@@ -20,13 +21,12 @@ Array = NDArray[np.float64]
 
 
 def find_front(study: Study, surfaces: Sequence[Surface]) -> ParetoFront:
-    """Pareto front on the surfaces, within the axial points; all signs turned so that small is good."""
-    from doe.designs import axial_distance
+    """Pareto front on the surfaces, within the reach of the design; all signs turned so that small is good."""
     from doe.pareto import front
 
     if len(surfaces) < 2:
         raise InputError([f"{study.path}: response: one alone has no front; add a second"])
-    reach = max(1.0, axial_distance(len(study.factors), study.file.design.alpha)) * study.step
+    reach = design_of(study).reach * study.step
 
     def objectives(points: Array) -> Array:
         coded = to_coded(points, study.centre, study.step)

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.designs import central_composite, to_actual, to_coded
+from doe.designs import to_actual, to_coded
+from doe.study.design import check_runs, design_of
 from doe.study_file import Study
 
 Array = NDArray[np.float64]
@@ -35,11 +36,8 @@ class Runs:
 
 
 def design_points(study: Study) -> Array:
-    """Coded design points (n, k)."""
-    design = study.file.design
-    return central_composite(
-        len(study.factors), alpha=design.alpha, centre_replicates=design.centre_replicates
-    )
+    """Coded design points (n, k) in the order of the runs. Raises InputError when the design is impossible."""
+    return design_of(study).coded
 
 
 def run_design(study: Study, folder: Path, workers: int | None, progress: Progress) -> Runs:
@@ -48,9 +46,11 @@ def run_design(study: Study, folder: Path, workers: int | None, progress: Progre
     from doe.study.store import Store
 
     clearance.check_responses(study)
-    coded = design_points(study)
+    design = design_of(study)
+    check_runs(study, design)
+    coded = design.coded
     actual = to_actual(coded, study.centre, study.step)
-    scenes = clearance.design_scenes(study, actual)
+    scenes = clearance.design_scenes(study, actual, design.order.tolist())
     labels = [f"design run {run + 1}" for run in range(len(scenes))]
     with Store(folder / "study.sqlite") as store:
         results = clearance.run_scenes(scenes, labels, store, workers, progress)
