@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 
 from doe.designs import central_composite
+from doe.designs.model import model_terms
 from doe.response_surface import describe, fit, model_matrix
 from doe.response_surface.least_squares import solve
-from doe.response_surface.terms import model_terms
 from doe.study.runs import Runs
 from doe.study.surfaces import independent_values, standard_errors, with_rivals
 
