@@ -247,6 +247,8 @@ def test_blocks_are_told_and_left_out_of_the_surface():
     surface = surface_of(values, model="linear", block=block)
     assert surface.coefficients[0] == pytest.approx(12.0, abs=0.2)
     assert surface.blocks == {"0": pytest.approx(-2.0, abs=0.2), "1": pytest.approx(2.0, abs=0.2)}
+    known = surface_of(values, model="linear", block=block, standard_errors=np.full(20, 0.1)).known_variance
+    assert known.covariance.shape == surface.covariance.shape == (4, 4)
     assert "the blocks differ" in sentence(surface, "blocks")
 
 
