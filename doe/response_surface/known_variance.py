@@ -67,9 +67,9 @@ def compare(
 ) -> KnownVariance:
     """Set the residual and the pure error of a fit against ``variances`` (n,) of the runs.
 
-    ``matrix`` (n, p) is that of the fit, its first ``count`` columns those of the surface, ``groups`` (n,) marks repeated points, and ``replicates`` (n,) are
-    behind each variance (0: unknown, taken as known exactly). With weights 1 / variance the residual sum is
-    the chi-square; with equal weights it is divided by the mean variance.
+    ``matrix`` (n, p) is that of the fit, its first ``count`` columns those of the surface; ``groups`` (n,) marks
+    repeated points; ``replicates`` (n,) are behind each variance (0: unknown, taken as known exactly). With weights
+    1 / variance the residual sum is the chi-square; with equal weights it is divided by the mean variance.
     """
     unit = solution.weights * variances
     weighted = bool(np.ptp(solution.weights) > 0)
