@@ -21,7 +21,8 @@ Progress = Callable[[int, int], None]
 class Runs:
     """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths.
 
-    ``notes``: what the simulations warn of, once each; none for a table that was read.
+    ``notes``: what the simulations warn of, once each; none for a table that was read. ``replicates`` (n,)
+    behind the half-widths (0: unknown) and ``block`` (n,) of each run; None: all unknown, one block.
     """
 
     coded: Array
@@ -29,6 +30,8 @@ class Runs:
     values: Array
     errors: Array
     notes: tuple[str, ...] = ()
+    replicates: NDArray[np.int64] | None = None
+    block: NDArray[np.int64] | None = None
 
 
 def design_points(study: Study) -> Array:
@@ -56,5 +59,8 @@ def run_design(study: Study, folder: Path, workers: int | None, progress: Progre
 
 def read_runs(study: Study, path: Path) -> Runs:
     """Runs of a CSV table instead of simulated ones. Raises InputError."""
-    actual, values = study.read_table(path)
-    return Runs(to_coded(actual, study.centre, study.step), actual, values, np.full_like(values, np.nan))
+    table = study.read_table(path)
+    coded = to_coded(table.actual, study.centre, study.step)
+    return Runs(
+        coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block
+    )
