@@ -8,6 +8,7 @@ from chains import by_name
 from test_doe_command_line import doe
 
 from doe.dimension_chain import read_chains, solve
+from doe.report.chain import print_chain
 from doe.study_file.chain_section import StudyChain, chain_table
 from rbdyn.faults import InputError, read_toml
 from rbdyn.materials import Material
@@ -57,6 +58,14 @@ def test_the_radial_chain_loses_what_the_rings_of_the_simulator_lose(solved):
     assert (low + high) / 2 == pytest.approx(1e3 * mounted.operating, abs=1e-9)
 
 
+def test_the_example_of_all_keys_is_solved():
+    chain = read_chains(EXAMPLES / "guide_chain_options.toml")["guide_chain_options"]
+    result = solve(chain, samples=100_000)
+    assert result.yields["as_given"] >= 0.999
+    assert all(by_name(result)[link.name].grade for link in chain.free)
+    assert result.selective.good >= result.yields["as_given"] - 3 * result.standard_errors["as_given"]
+
+
 def test_matching_rings_narrows_the_clearance(solved):
     found = solved["radial"].selective
     assert found.matched_deviation_mm < 0.75 * found.random_deviation_mm
@@ -79,8 +88,10 @@ def test_several_chains_print_one_json_object():
     )
 
 
-def test_text_shows_parts_limits_yield_ppm_contributions_and_classes():
-    text = doe("chain", str(BEARING), "--verbose").stdout
+def test_text_shows_parts_limits_yield_ppm_contributions_and_classes(solved, capsys):
+    for name, result in solved.items():
+        print_chain(name, result, verbose=True)
+    text = capsys.readouterr().out
     for words in (
         "48.1300 +0.0250/0", "in worst case", "by root sum square", "ppm below", "contributions", "█",
         "matched in 4 classes", "a linear chain would miss", "quantiles of the closing link",
