@@ -54,7 +54,7 @@ class Outline(HTMLParser):
 
     def handle_data(self, data):
         if self.open and self.open[-1] not in ("script", "style"):
-            self.words.append(data)
+            self.words.append(data.replace("\xa0", " "))
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,8 @@ from doe.report.content.blocks import Block, Section, Table, Tile, Tiles, Words
 from doe.report.content.record import Factor, Record, factors, part, responses, scalars
 from doe.report.words import dimension, half_width, label, percentage, shown, with_error
 
+# Characters above which a value is a sentence, to be broken.
+LONG = 40
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
 
 
@@ -231,4 +233,5 @@ def _limit(limited_by: Any) -> str:
 def record_table(caption: str, record: Record | None, folded: bool = False) -> Table | None:
     """Everything in nested tables, a row each."""
     rows = list(scalars(record or {}))
-    return Table(caption, ("", "value"), rows, folded=folded) if rows else None
+    prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
+    return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose) if rows else None

@@ -102,7 +102,11 @@ def _one(name: str, fitted: Record) -> list[Block]:
     if rows:
         header = ("source", "sum of squares", "df", "mean square", "F", "p")
         blocks.append(Table(f"Analysis of variance of {label(name)}", header, rows))
-    rest = {key: fitted[key] for key in FURTHER if isinstance(fitted.get(key), Mapping)}
+    rest = {
+        key: {name: value for name, value in fitted[key].items() if name != "sentence"}
+        for key in FURTHER
+        if isinstance(fitted.get(key), Mapping)
+    }
     if table := record_table(f"Further figures of {label(name)}", rest, folded=True):
         blocks.append(table)
     return blocks

@@ -116,10 +116,12 @@ def _thread(point: Record, axes: Sequence[tuple[str, str, Range]]) -> str:
 
 def _axis(number: int, axes: int, name: str, limits: Range) -> str:
     u = _across(number, axes)
-    words, unit = quantity(name)
+    # Names in two lines by turns, so that long ones keep apart.
+    line = 14 + 18 * (number % 2)
     parts = [f'<line class="frame" x1="{u:.1f}" x2="{u:.1f}" y1="{TOP}" y2="{HIGH - BOTTOM}"/>']
-    parts.append(f'<text class="axis" x="{u:.1f}" y="14" text-anchor="middle">{escape(words)}</text>')
-    parts.append(f'<text x="{u:.1f}" y="28" text-anchor="middle">{escape(unit)}</text>')
+    parts.append(
+        f'<text class="axis" x="{u:.1f}" y="{line}" text-anchor="middle">{escape(label(name))}</text>'
+    )
     values = ticks(*limits, 4)
     for value in values:
         v = TOP + (HIGH - TOP - BOTTOM) * (limits[1] - value) / (limits[1] - limits[0])

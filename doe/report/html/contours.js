@@ -24,16 +24,19 @@ const contours = (() => {
     return found;
   }
 
-  // Each line is labelled where it crosses a diagonal of the map, alternating so that labels keep apart.
-  function label(pen, lines, words, place, n, diagonal) {
+  // Each line is labelled near a diagonal of the map, where neither a point nor another label is in the way.
+  function label(pen, lines, words, place, n, diagonal, taken) {
+    const ROOM = 26;
     let best = null, least = Infinity;
     for (const [a] of lines) {
-      const off = Math.abs(diagonal ? a[0] - a[1] : a[0] + a[1] - n + 1);
+      const off = Math.abs(diagonal ? a[0] - a[1] : a[0] + a[1] - n + 1), at = place(...a);
       const edge = Math.min(a[0], a[1], n - 1 - a[0], n - 1 - a[1]);
-      if (edge > 2 && off < least) { least = off; best = a; }
+      const free = taken.every(each => Math.hypot(each[0] - at[0], each[1] - at[1]) > ROOM);
+      if (edge > 2 && free && off < least) { least = off; best = at; }
     }
     if (!best) return;
-    const [u, v] = place(best[0], best[1]), wide = pen.measureText(words).width + 6;
+    taken.push(best);
+    const [u, v] = best, wide = pen.measureText(words).width + 6;
     pen.fillStyle = page.colour("paper");
     pen.fillRect(u - wide / 2, v - 8, wide, 16);
     pen.fillStyle = page.colour("ink");
@@ -66,16 +69,10 @@ const contours = (() => {
     const left = 62, top = 14, wide = width - left - 80, high = height - top - 50;
     const place = (i, j) => [left + wide * i / (n - 1), top + high * (1 - j / (n - 1))];
     const share = value => (value - s.low) / (s.high - s.low);
-    const cell_wide = wide / (n - 1), cell_high = high / (n - 1);
-    for (let i = 0; i < n; i++)
-      for (let j = 0; j < n; j++) {
-        if (!Number.isFinite(s.z[i][j])) continue;
-        const [u, v] = place(i, j);
-        const a = Math.max(u - cell_wide / 2, left), b = Math.min(u + cell_wide / 2, left + wide);
-        const c = Math.max(v - cell_high / 2, top), d = Math.min(v + cell_high / 2, top + high);
-        pen.fillStyle = viridis.css(share(s.z[i][j]));
-        pen.fillRect(a, c, b - a + 0.6, d - c + 0.6);
-      }
+    // A pixel a grid point, enlarged smoothly; the outer half of the rim is beyond the axes.
+    pen.drawImage(pixels(s.z, share), 0.5, 0.5, n - 1, n - 1, left, top, wide, high);
+    const at = (x, y) => place((n - 1) * (x - s.x[0]) / (s.x[1] - s.x[0]), (n - 1) * (y - s.y[0]) / (s.y[1] - s.y[0]));
+    const taken = [...s.points, ...s.marks].map(each => at(each.x, each.y));
     pen.font = "12px system-ui, sans-serif";
     pen.textAlign = "center";
     const levels = page.ticks(s.low, s.high, 9);
@@ -87,10 +84,9 @@ const contours = (() => {
       for (const [a, b] of lines) { pen.moveTo(...place(...a)); pen.lineTo(...place(...b)); }
       pen.stroke();
     });
-    levels.forEach((level, k) => label(pen, segments(s.z, level), levels.text(level), place, n, k % 2));
+    levels.forEach((level, k) => label(pen, segments(s.z, level), levels.text(level), place, n, k % 2, taken));
     axes(pen, s, left, top, wide, high, ink);
     scale(pen, s, left + wide + 14, top, high, ink);
-    const at = (x, y) => place((n - 1) * (x - s.x[0]) / (s.x[1] - s.x[0]), (n - 1) * (y - s.y[0]) / (s.y[1] - s.y[0]));
     for (const p of s.points) symbol(pen, ...at(p.x, p.y), "dot", p.here ? "#fff" : null, p.here ? "#000" : "#fff");
     for (const p of s.marks) symbol(pen, ...at(p.x, p.y), p.shape, p.here ? "#d55e00" : null, "#fff");
     const [u, v] = at(...s.marker);
@@ -102,6 +98,17 @@ const contours = (() => {
       pen.stroke();
     }
     return (p, q) => [(p - left) / wide, 1 - (q - top) / high];
+  }
+
+  function pixels(z, share) {
+    const n = z.length, small = document.createElement("canvas"), pen = small.getContext("2d");
+    small.width = small.height = n;
+    z.forEach((line, i) => line.forEach((value, j) => {
+      if (!Number.isFinite(value)) return;
+      pen.fillStyle = viridis.css(share(value));
+      pen.fillRect(i, n - 1 - j, 1, 1);
+    }));
+    return small;
   }
 
   function axes(pen, s, left, top, wide, high, ink) {

@@ -47,7 +47,7 @@ def _table(table: Table) -> str:
     rows = []
     for name, *cells in table.rows:
         columns = "".join(
-            f"<td{_kind(place, words)}>{escape(cell)}</td>" for place, cell in enumerate(cells, 1)
+            f"<td{_kind(place, words)}>{_cell(cell)}</td>" for place, cell in enumerate(cells, 1)
         )
         rows.append(f"<tr><th scope='row'>{escape(name)}</th>{columns}</tr>")
     note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
@@ -61,6 +61,11 @@ def _table(table: Table) -> str:
         if table.folded
         else f'<div class="table">{body}</div>'
     )
+
+
+def _cell(text: str) -> str:
+    """Escaped; on a narrow page it may break before its error, nowhere else."""
+    return escape(text).replace(" %", "&nbsp;%").replace("± ", "±&nbsp;")
 
 
 def _kind(place: int, words: set[int]) -> str:

@@ -20,7 +20,7 @@ const surface_3d = (() => {
     const size = Math.min((width - 70) / 2.95, (height - 50) / 2.5);
     const screen = (x, y, z) => {
       const [right, up, near] = see(x, y, z);
-      return [width / 2 + 8 + size * right, height / 2 - 4 - size * up, near];
+      return [width / 2 + 8 + size * right, height / 2 - 12 - size * up, near];
     };
     pen.font = "12px system-ui, sans-serif";
     pen.textAlign = "center";
@@ -47,10 +47,9 @@ const surface_3d = (() => {
     pen.stroke();
     const middle = screen(0.5, 0.5, 0);
     const y_side = screen(0.5, 0, 0)[2] > screen(0.5, 1, 0)[2] ? 0 : 1, x_side = screen(0, 0.5, 0)[2] > screen(1, 0.5, 0)[2] ? 0 : 1;
-    const axis = (limits, at, words) => {
+    const axis = (limits, at) => {
       const values = page.ticks(limits[0], limits[1], 4);
       const [u, v] = at(0.5), side = Math.sign(u - middle[0]);
-      // Words on their own side of the corner below, ticks between them and the axis.
       const slope = Math.abs(u - middle[0]) / (Math.hypot(u - middle[0], v - middle[1]) || 1);
       pen.fillStyle = ink;
       pen.textAlign = slope < 0.35 ? "center" : side > 0 ? "left" : "right";
@@ -59,11 +58,16 @@ const surface_3d = (() => {
         pen.fillText(values.text(value), p + 6 * side * slope, q + 14);
       }
       pen.textAlign = "center";
-      const half = pen.measureText(words).width / 2 + 2, wide = pen.canvas.clientWidth;
-      pen.fillText(words, Math.min(Math.max(u + 62 * side * slope, half), wide - half), v + 36);
+      return u;
     };
-    axis(s.x, share => screen(share, y_side, 0), s.labels[0]);
-    axis(s.y, share => screen(x_side, share, 0), s.labels[1]);
+    const x_at = axis(s.x, share => screen(share, y_side, 0)), y_at = axis(s.y, share => screen(x_side, share, 0));
+    // Names at the foot, each on the side of its axis: there nothing is in their way.
+    const foot = pen.canvas.clientHeight - 8, names = x_at < y_at ? s.labels : [s.labels[1], s.labels[0]];
+    pen.textAlign = "left";
+    pen.fillText(`↖ ${names[0]}`, 6, foot);
+    pen.textAlign = "right";
+    pen.fillText(`${names[1]} ↗`, pen.canvas.clientWidth - 6, foot);
+    pen.textAlign = "center";
     upright(pen, s, screen, ink, line);
   }
 
