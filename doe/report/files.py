@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from doe.report.front import front_record
+from doe.report.html import html_report
+from doe.report.markdown import markdown_report
 from doe.report.summary import summary
 from rbdyn.result import write_json
 
@@ -61,9 +63,14 @@ def write(outcome: Outcome, folder: Path) -> list[str]:
     confirmed = np.array([outcome.baseline.values, outcome.pick.values])
     plots.pareto_front(study, front, outcome.surfaces, confirmed, folder / "pareto_front.png")
     points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
-    pictures += ["pareto_front.png", *clearance.draw_motion(study, points, DRAWN_TURNS, folder)]
-    write_json(folder / "summary.json", summary(outcome))
-    return ["summary.json", *tables, *pictures]
+    motions = clearance.histories(study, points, DRAWN_TURNS)
+    pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
+    record = summary(outcome)
+    write_json(folder / "summary.json", record)
+    page = html_report(record, clearance.motion_record(motions))
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    (folder / "report.md").write_text(markdown_report(record, pictures), encoding="utf-8")
+    return ["report.html", "report.md", "summary.json", *tables, *pictures]
 
 
 def _runs_table(study: Study, runs: Runs) -> list[dict[str, Any]]:
