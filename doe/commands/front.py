@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from doe.commands.options import Data, Json, Out, Quiet, StudyPath, Workers
+from doe.commands.options import Data, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import fitted, save
 from rbdyn.terminal import guarded, print_json
 
@@ -16,6 +16,8 @@ def front(
     data: Data = None,
     out: Out = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also every point of the front.")] = False,
@@ -25,7 +27,7 @@ def front(
         from doe.report.front import front_record, print_front
         from doe.study.front import find_front
 
-        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json)
+        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)
         record = front_record(loaded, surfaces, find_front(loaded, surfaces))
         save(out, "front.json", record)
         if as_json:

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from doe.designs import to_actual
 from doe.study.confirmation import Confirmed, Gain, gains, with_errors
+from doe.study.failure import successes
 from doe.study.front import find_front
 from doe.study.reference import Beside, beside, reference_runs
-from doe.study.runs import Progress, Runs, design_points, run_design
+from doe.study.runs import STORE, Progress, Runs, design_points, run_design
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from doe.study_file.chain_section import chain_table
@@ -46,9 +47,17 @@ class Outcome:
 
 
 def run_study(
-    study: Study, folder: Path, workers: int | None, progress: Callable[[str], Progress]
+    study: Study,
+    folder: Path,
+    workers: int | None,
+    progress: Callable[[str], Progress],
+    scheduler: str | None = None,
+    retry: bool = False,
 ) -> Outcome:
-    """All of it; ``progress(title)`` gives the progress of a stage. Raises InputError, RunError, KeyboardInterrupt."""
+    """All of it; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster to run on.
+
+    ``retry``: run those again that failed before. Raises InputError, RunError, KeyboardInterrupt.
+    """
     from doe import clearance
     from doe.dimension_chain import solve
     from doe.study.store import Store
@@ -61,17 +70,21 @@ def run_study(
     _chains(study, study.centre)
     reference = reference_runs(study)
     prepared = time.perf_counter()
-    runs = run_design(study, folder, workers, progress("design runs"))
+    runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry)
+    if reference is not None:
+        reference = reference.only(runs.places)
     simulated = time.perf_counter()
     surfaces = fit_surfaces(study, runs)
     found = find_front(study, surfaces)
     points = (study.baseline, study.rounded(found.points[found.pick]))
     scenes = [clearance.confirmation_scene(study, point) for point in points]
-    with Store(folder / "study.sqlite") as store:
-        results = clearance.run_scenes(scenes, ["baseline", "pick"], store, workers, progress("confirmation"))
+    with Store(folder / STORE, study.path.stem) as store:
+        results = clearance.run_scenes(
+            scenes, ["baseline", "pick"], store, workers, progress("confirmation"), scheduler, retry=retry
+        )
     confirmed = [
         Confirmed(point, *with_errors(study, result.as_dict()))
-        for point, result in zip(points, results, strict=True)
+        for point, result in zip(points, successes(results), strict=True)
     ]
     chains = {name: solve(chain) for name, chain in _chains(study, confirmed[1].point).items()}
     return Outcome(
