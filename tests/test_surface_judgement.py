@@ -7,10 +7,11 @@ import pytest
 from scipy import stats
 
 from doe.designs import central_composite
+from doe.designs.model import model_terms
 from doe.response_surface import describe, fit, model_matrix
 from doe.response_surface.least_squares import solve
-from doe.response_surface.terms import model_terms
-from doe.study.surfaces import standard_errors, with_rivals
+from doe.study.runs import Runs
+from doe.study.surfaces import independent_values, standard_errors, with_rivals
 
 POINTS = central_composite(3)
 CENTRE, STEP = np.array([0.02, 0.15, 0.3]), np.array([0.005, 0.05, 0.05])
@@ -166,9 +167,21 @@ def test_unknown_errors_leave_no_comparison():
 
 
 def test_half_widths_become_standard_errors_by_students_t():
-    found = standard_errors(np.ones((3, 2)), np.array([0, 2, 8]))
-    assert found[:, 0] == pytest.approx([1 / 1.959964, 1 / 12.7062, 1 / 2.364624], rel=1e-6)
-    assert standard_errors(np.ones((2, 1)), None) == pytest.approx(np.full((2, 1), 1 / 1.959964))
+    found = standard_errors(np.ones((2, 2)), np.array([[0, 2], [8, 1]]))
+    assert found.ravel() == pytest.approx([1 / 1.959964, 1 / 12.7062, 1 / 2.364624, 1 / 1.959964], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        (None, [[0, 0], [0, 0]]),
+        (np.array([8, 9]), [[8, 8], [9, 9]]),
+        (np.array([[1, 2], [3, 4]]), [[1, 2], [3, 4]]),
+    ],
+)
+def test_independent_values_are_counted_a_run_or_a_response(given, expected):
+    none = np.zeros((2, 2))
+    assert independent_values(Runs(none, none, none, none, replicates=given)).tolist() == expected
 
 
 def test_transformed_fit_is_the_fit_of_the_transform():
@@ -234,6 +247,8 @@ def test_blocks_are_told_and_left_out_of_the_surface():
     surface = surface_of(values, model="linear", block=block)
     assert surface.coefficients[0] == pytest.approx(12.0, abs=0.2)
     assert surface.blocks == {"0": pytest.approx(-2.0, abs=0.2), "1": pytest.approx(2.0, abs=0.2)}
+    known = surface_of(values, model="linear", block=block, standard_errors=np.full(20, 0.1)).known_variance
+    assert known.covariance.shape == surface.covariance.shape == (4, 4)
     assert "the blocks differ" in sentence(surface, "blocks")
 
 

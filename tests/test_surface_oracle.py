@@ -11,7 +11,7 @@ from scipy import stats
 from statsmodels.stats.anova import anova_lm
 from statsmodels.stats.outliers_influence import variance_inflation_factor
 
-from doe.designs import to_coded
+from doe.designs import central_composite_design, to_coded
 from doe.response_surface import fit
 
 TABLE = Path(__file__).parents[1] / "examples" / "ccd_table4.csv"
@@ -177,10 +177,14 @@ def test_blocks_are_a_source_of_their_own():
     assert found["B"]["f"] == close(partial.loc["b", "F"])
     assert found["residual"]["ss"] == close(oracle.ssr)
     effects = oracle.params[["C(block, Sum)[S.0]", "C(block, Sum)[S.1]"]].to_numpy()
-    assert list(ours.blocks.values()) == close([*effects, -effects.sum()])
-    names = [name for name in oracle.params.index if "block" not in name]
-    assert ours.coefficients == close(oracle.params[names], np.abs(oracle.params).max())
-    assert ours.covariance == close(oracle.cov_params().loc[names, names], 1e-3)
+    # The oracle's effects sum to zero over the blocks, ours over the runs.
+    by_block = np.array([*effects, -effects.sum()])
+    shift = by_block[block].mean()
+    assert list(ours.blocks.values()) == close(by_block - shift)
+    assert ours.coefficients[0] == close(oracle.params["Intercept"] + shift)
+    names = [name for name in oracle.params.index if "block" not in name and name != "Intercept"]
+    assert ours.coefficients[1:] == close(oracle.params[names], np.abs(oracle.params).max())
+    assert ours.covariance[1:, 1:] == close(oracle.cov_params().loc[names, names], 1e-3)
     alone = smf.ols("y ~ C(block, Sum)", frame).fit()
     assert ours.r2 == close(1 - oracle.ssr / alone.ssr)
     model = anova_lm(alone, oracle)
@@ -196,3 +200,14 @@ def test_pure_error_counts_within_blocks():
     saturated = smf.ols("y ~ C(cell)", frame.assign(cell=frame.groupby([0, 1, 2, "block"]).ngroup())).fit()
     assert ours.pure_error["ss"] == close(saturated.ssr)
     assert ours.pure_error["df"] == saturated.df_resid == 4
+
+
+def test_orthogonal_blocks_leave_the_surface_as_it_is():
+    design = central_composite_design(3, alpha="orthogonal_blocks", centre_replicates=6, blocks=True)
+    values = 10 + design.coded @ [1.0, 2.0, 3.0] + np.random.default_rng(5).normal(size=len(design.coded))
+    with_blocks, without = (
+        fit(design.coded, values, name="y", centre=CENTRE, step=STEP, block=block)
+        for block in (design.block, None)
+    )
+    assert with_blocks.coefficients == close(without.coefficients)
+    assert with_blocks.blocks and not without.blocks

@@ -40,7 +40,7 @@ def evaluate(
     terms : terms of the model, with "1".
     block : block of each run (n,); effects of blocks are estimated along, predictions are means over them.
     region, reach : where predictions count, a "ball" of radius or a "box" of half-width ``reach``. Unless
-        given: a box as wide as the design if a run stands in a corner of it, else a ball through the
+        given: the box as wide as the design if a run stands in a corner of it, else the ball through the
         outermost runs.
 
     Returns
@@ -71,11 +71,11 @@ def evaluate(
     if lost:
         raise ValueError(f"the {runs} runs cannot tell {', '.join(lost)} from the other terms")
     widest = float(np.abs(points).max())
+    farthest = float(np.linalg.norm(points, axis=1).max())
     if region is None:
-        farthest = float(np.linalg.norm(points, axis=1).max())
         region = "box" if farthest > 0.999 * widest * math.sqrt(factors) else "ball"
+    if reach is None:
         reach = widest if region == "box" else farthest
-    reach = widest if reach is None else reach
     matrix, contrasts = term_columns(points, terms), block_contrasts(groups)
     whole = np.column_stack([matrix, contrasts])
     size = matrix.shape[1]

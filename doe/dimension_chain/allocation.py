@@ -111,25 +111,29 @@ class Allocation:
         return self._snapped(tolerances)
 
     def linear_rule(self) -> dict[str, float]:
-        """Tolerances, mm, that fill the limits of the linear chain.
+        """Tolerances, mm, that fill the limits of the linear chain; for a yield by root sum square.
 
-        Raises ValueError where the narrowest tolerances of cost curves fill more.
+        Raises ValueError where no tolerances can: see the sentences.
         """
         rule, free = self.chain.allocate, self.chain.free
+        mode: Mode = "worst_case" if rule.mode == "worst_case" else "rss"
         bare = self.parts({link.name: 0.0 for link in free})
         slopes = self.function.sensitivities(middle(bare))
-        fixed = total([abs(slopes[part.name]) * part.tolerance_mm for part in bare], rule.mode)
+        fixed = total([abs(slopes[part.name]) * part.tolerance_mm for part in bare], mode)
         width = self.chain.width_mm
         # A bent chain may have more room than its tangent says: any positive width starts the search.
-        rest = sqrt(max(width**2 - fixed**2, 0.0)) if rule.mode == "rss" else width - fixed
+        rest = sqrt(max(width**2 - fixed**2, 0.0)) if mode == "rss" else width - fixed
         rest = rest if rest > 0 else width
+        idle = [link.name for link in free if slopes[link.name] == 0]
+        if idle and (rule.method == "cost" or len(idle) == len(free)):
+            raise ValueError(f'"{idle[0]}" does not move the closing link; fix it')
         if rule.method == "cost":
             curves = [link.cost for link in free if link.cost is not None]
-            found = cheapest(curves, [slopes[link.name] for link in free], rest, rule.mode)
+            found = cheapest(curves, [slopes[link.name] for link in free], rest, mode)
             return {link.name: t for link, t in zip(free, found, strict=True)}
         iso = rule.method == "iso286"
         weights = {link.name: tolerance_unit(link.nominal) if iso else 1.0 for link in free}
-        share = rest / total([abs(slopes[name]) * weight for name, weight in weights.items()], rule.mode)
+        share = rest / total([abs(slopes[name]) * weight for name, weight in weights.items()], mode)
         return {name: share * weight for name, weight in weights.items()}
 
     def _scale(self, wish: Tolerances) -> float:

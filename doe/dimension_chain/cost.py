@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import exp, inf
 
-from scipy.optimize import brentq
-
 from doe.dimension_chain.intervals import total
 from doe.dimension_chain.links import Cost, Mode
 
@@ -24,6 +22,8 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
     Where even the widest fill less than the width, these. Raises ValueError, with the width that is needed, where
     even the narrowest fill more.
     """
+
+    from scipy.optimize import brentq
 
     def tolerances(log_multiplier: float) -> list[float]:
         found = []
@@ -43,7 +43,8 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
     if excess(SPAN) > 0:
         needed = width * (1 + excess(SPAN))
         raise ValueError(
-            f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm"
+            f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm; widen the limits or "
+            "let a process go narrower"
         )
     if excess(-SPAN / 4) < 0:
         return tolerances(-SPAN / 4)

@@ -187,9 +187,8 @@ def _room_faults(chain: Chain) -> list[str]:
                 "mm; narrow or unfix one, or widen the limits: the nearest that can be met are wider than "
                 f"{middle - consumed / 2:.4f} to {middle + consumed / 2:.4f} mm"
             ]
-    if chain.allocate.method == "cost" and (tight := _sentence(search.linear_rule)):
-        return [f"link.cost: {tight}; widen the limits or let a process go narrower"]
-    return []
+    tight = _sentence(search.linear_rule)
+    return [f'allocate.method = "{chain.allocate.method}": {tight}'] if tight else []
 
 
 def _sentence(attempt: Callable[[], object]) -> str | None:

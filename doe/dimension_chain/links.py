@@ -202,3 +202,9 @@ class Part:
     def sigma_mm(self) -> float:
         """Standard deviation before truncation of a normal part."""
         return self.tolerance_mm / (6 * self.capability)
+
+    @property
+    def text(self) -> str:
+        """'9.2900 0/-0.0050'."""
+        upper, lower = (f"{value:+.4f}" if value else "0" for value in (self.upper_mm, self.lower_mm))
+        return f"{self.nominal_mm:.4f} {upper}/{lower}"

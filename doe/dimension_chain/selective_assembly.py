@@ -7,6 +7,7 @@ applications, 1961).
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -136,11 +137,13 @@ def class_worst_case(function: ClosingFunction, parts: Sequence[Part], wish: Sel
 def _classes_needed(
     function: ClosingFunction, parts: Sequence[Part], limits: ClosingLink, wish: Selective
 ) -> int | None:
-    for classes in range(1, MOST_CLASSES + 1):
+    def enough(classes: int) -> bool:
         low, high = class_worst_case(function, parts, wish.model_copy(update={"classes": classes}))
-        if limits.lower_mm - SLACK <= low and high <= limits.upper_mm + SLACK:
-            return classes
-    return None
+        return limits.lower_mm - SLACK <= low and high <= limits.upper_mm + SLACK
+
+    # More classes never widen the worst case.
+    fewest = 1 + bisect_left(range(1, MOST_CLASSES + 1), True, key=enough)
+    return fewest if fewest <= MOST_CLASSES else None
 
 
 def _pair(parts: Sequence[Part], wish: Selective) -> tuple[Part, Part]:

@@ -37,13 +37,14 @@ class Linearisation:
     """How far a chain with functions is from its linear form at mid-tolerance, mm.
 
     ``worst_case_error_mm``: the larger distance of the linear worst case from the true one. ``mean_shift_mm`` and
-    ``deviation_error_percent``: the linear mean and standard deviation less those of the Monte Carlo.
+    ``deviation_error_percent``: the linear mean and standard deviation less those of the Monte Carlo;
+    the latter None where nothing varies.
     """
 
     linear_worst_case_mm: Interval
     worst_case_error_mm: float
     mean_shift_mm: float
-    deviation_error_percent: float
+    deviation_error_percent: float | None
 
 
 @dataclass(frozen=True)
@@ -198,7 +199,7 @@ def _linearisation(function: ClosingFunction, parts: Sequence[Part], drawn: Asse
         linear_worst_case_mm=linear,
         worst_case_error_mm=max(abs(a - b) for a, b in zip(linear, true, strict=True)),
         mean_shift_mm=mean - float(drawn.values.mean()),
-        deviation_error_percent=100 * (deviation / sampled - 1) if sampled > 0 else 0.0,
+        deviation_error_percent=100 * (deviation / sampled - 1) if sampled > 0 else None,
     )
 
 
@@ -218,7 +219,7 @@ def _status(search: Allocation, parts: list[Part], allocation: list[Part], share
     limits, mode, width = search.chain.closing_link, search.mode, search.chain.width_mm
     low, high = interval(search.function, parts, mode)
     by_name = {link.name: link for link in search.chain.link}
-    nearest = ", ".join(part_text(part) for part in allocation if not by_name[part.name].fixed)
+    nearest = ", ".join(f"{part.name} {part.text}" for part in allocation if not by_name[part.name].fixed)
     if mode == "yield":
         wanted = f"a yield of {search.chain.allocate.target_yield:g} is wanted"
         why = f"worst-case tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g} where {wanted}"
@@ -236,9 +237,3 @@ def _kept(search: Allocation, parts: list[Part], share: float) -> bool:
     if search.mode == "yield" and not search.function.linear:
         return share >= search.chain.allocate.target_yield
     return search.kept(parts)
-
-
-def part_text(part: Part) -> str:
-    """'roller 9.0000 +0.0050/0'."""
-    upper, lower = (f"{value:+.4f}" if value else "0" for value in (part.upper_mm, part.lower_mm))
-    return f"{part.name} {part.nominal_mm:.4f} {upper}/{lower}"

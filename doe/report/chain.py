@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rbdyn.terminal import print_table
 
 if TYPE_CHECKING:
-    from doe.dimension_chain import ChainResult, Part
+    from doe.dimension_chain import ChainResult
 
 BAR = 20  # characters of a contribution of 100 %
 
@@ -23,7 +23,7 @@ def chains_record(results: Mapping[str, ChainResult]) -> dict[str, Any]:
 def print_chain(name: str, chain: ChainResult, quiet: bool = False, verbose: bool = False) -> None:
     """Parts, contributions, closing link and yield of a dimension chain; verbosely also the yields by distribution."""
     title = f"dimension chain {name}" + (": the nearest parts that meet the limits" if chain.refused else "")
-    rows = [(part.name, part_text(part), part.grade or "") for part in chain.allocation]
+    rows = [(part.name, part.text, part.grade or "") for part in chain.allocation]
     print_table(title, ("part", "dimension [mm]", "grade"), rows)
     if quiet:
         return
@@ -39,15 +39,6 @@ def print_chain(name: str, chain: ChainResult, quiet: bool = False, verbose: boo
     _print_answer(chain)
     if chain.selective is not None:
         _print_selective(chain, verbose)
-
-
-def part_text(part: Part) -> str:
-    """'9.2900 0/-0.0050'."""
-
-    def deviation(value: float) -> str:
-        return "0" if value == 0.0 else f"{value:+.4f}"
-
-    return f"{part.nominal_mm:.4f} {deviation(part.upper_mm)}/{deviation(part.lower_mm)}"
 
 
 def _percent(percent: float) -> str:
@@ -85,7 +76,7 @@ def _print_answer(chain: ChainResult) -> None:
         bent = chain.linearisation
         print(
             f"a linear chain would miss the worst case by {bent.worst_case_error_mm:.4f} mm, the mean by "
-            f"{bent.mean_shift_mm:+.4f} mm and the standard deviation by {bent.deviation_error_percent:+.1f} %"
+            f"{bent.mean_shift_mm:+z.4f} mm and the standard deviation by {bent.deviation_error_percent or 0.0:+z.1f} %"
         )
     if chain.cost is not None:
         print(f"cost of the allocated tolerances {chain.cost:.4g}")

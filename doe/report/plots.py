@@ -14,22 +14,13 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 from doe.designs import to_actual
+from doe.report.words import label
 from doe.study.design import design_of
 
 if TYPE_CHECKING:
     from doe.pareto import ParetoFront
     from doe.response_surface import Surface
     from doe.study_file import Study
-
-UNITS = {"mm": "mm", "N": "N", "W": "W", "rpm": "rpm"}
-
-
-def label(name: str) -> str:
-    """'impact_force_N' as 'impact force [N]'."""
-    words = name.split("_")
-    if words[-1] in UNITS:
-        return f"{' '.join(words[:-1])} [{UNITS[words[-1]]}]"
-    return " ".join(words)
 
 
 def response_surface(study: Study, surface: Surface, path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from doe.response_surface.gaussian_process import fit_gaussian
+from doe.response_surface.gaussian_process import THREADS, fit_gaussian
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -77,22 +77,24 @@ def compare(
     means, misses = [], []
     for first in np.unique(group):
         out, kept = np.flatnonzero(group == first), np.flatnonzero(group != first)
-        try:
-            if leverage[out].sum() > INDISPENSABLE:
-                continue
-            polynomial = refit(kept)
-        except ValueError:
+        if leverage[out].sum() > INDISPENSABLE:
             continue
-        process = fit_gaussian(
-            points[kept],
-            response[kept],
-            name=name,
-            standard_errors=None if errors is None else errors[kept],
-            seed=seed,
-            start=whole,
-        )
+        with THREADS.limit(limits=1):
+            try:
+                polynomial = refit(kept)
+            except ValueError:
+                continue
+            process = fit_gaussian(
+                points[kept],
+                response[kept],
+                name=name,
+                standard_errors=None if errors is None else errors[kept],
+                seed=seed,
+                start=whole,
+            )
+            foretold = [float(rival.predict(points[first])) for rival in (polynomial, process)]
         means.append(float(response[out].mean()))
-        misses.append([means[-1] - float(rival.predict(points[first])) for rival in (polynomial, process)])
+        misses.append([means[-1] - each for each in foretold])
     if len(misses) < 3:
         raise ValueError(
             f"{name}: only {len(misses)} points can be left out of the polynomial, too few to compare; "

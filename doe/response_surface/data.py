@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from doe.designs.evaluation import block_contrasts
 from doe.response_surface.least_squares import dependent_columns
 
 Array = NDArray[np.float64]
@@ -38,10 +39,11 @@ class Data:
 
     @property
     def block_columns(self) -> Array:
-        """Columns that tell the blocks apart, coded so that their effects sum to zero, shape (n, blocks - 1)."""
-        labels = np.unique(self.block)
-        member = (self.block[:, None] == labels[None, :]).astype(float)
-        return member[:, :-1] - member[:, -1:]
+        """Columns that tell the blocks apart, each of mean zero, shape (n, blocks - 1).
+
+        The surface then stands for the mean over all runs, and blocks that are orthogonal leave it as it is.
+        """
+        return block_contrasts(self.block)
 
 
 def checked(

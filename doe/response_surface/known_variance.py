@@ -30,7 +30,7 @@ class KnownVariance:
 
     ``chi_square`` of the residual over the known variance, with ``df`` and ``p``; ``pure_error`` is the ANOVA
     row of the replicate variance at the repeated points, whose ``f`` is pure error over it and whose ``p`` is
-    two-sided (f and p None without repeats); ``covariance`` (p, p) of the coefficients from the known
+    two-sided (f and p None without repeats); ``covariance`` of the surface's coefficients from the known
     variances alone; ``dof`` of the variance of one run (None: known exactly).
     """
 
@@ -63,12 +63,13 @@ def compare(
     variances: Array,
     replicates: NDArray[np.int64],
     groups: NDArray[np.int64],
+    count: int,
 ) -> KnownVariance:
     """Set the residual and the pure error of a fit against ``variances`` (n,) of the runs.
 
-    ``matrix`` (n, p) is that of the fit, ``groups`` (n,) marks repeated points, and ``replicates`` (n,) are
-    behind each variance (0: unknown, taken as known exactly). With weights 1 / variance the residual sum is
-    the chi-square; with equal weights it is divided by the mean variance.
+    ``matrix`` (n, p) is that of the fit, its first ``count`` columns those of the surface; ``groups`` (n,) marks
+    repeated points; ``replicates`` (n,) are behind each variance (0: unknown, taken as known exactly). With weights
+    1 / variance the residual sum is the chi-square; with equal weights it is divided by the mean variance.
     """
     unit = solution.weights * variances
     weighted = bool(np.ptp(solution.weights) > 0)
@@ -77,7 +78,7 @@ def compare(
     df = solution.dof
     chi_square = solution.residual_sum / float(unit.mean())
     spread = _Spread(unit, dof, weighted)
-    project = solution.inverse @ (matrix * solution.weights[:, None]).T
+    project = solution.inverse[:count] @ (matrix * solution.weights[:, None]).T
     return KnownVariance(
         chi_square=chi_square,
         df=df,
@@ -105,7 +106,7 @@ def describe_known_variance(name: str, found: KnownVariance, alpha: float) -> li
     f, p = found.pure_error["f"], found.pure_error["p"]
     if f is None or p is None:
         return sentences
-    head = f"{name}: repeated runs scatter with {f:.3g} of the variance that their replicates tell ({p_text(p)}): "
+    head = f"{name}: repeated runs scatter with {f:.3g} times the variance that their replicates tell ({p_text(p)}): "
     if p > alpha:
         return [*sentences, head + "the two agree, so the errors of the runs can be relied on."]
     why = (

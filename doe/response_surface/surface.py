@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
+from doe.designs.model import model_terms
 from doe.response_surface.anova import AnovaRow, anova, complement, find, ratio, replicate_groups, sum_within
 from doe.response_surface.canonical import Canonical, StationaryPoint, canonical, stationary_point
 from doe.response_surface.data import Data, check_errors, check_matrix, checked
@@ -25,7 +26,7 @@ from doe.response_surface.diagnostics import Diagnostics, diagnose, press
 from doe.response_surface.elimination import Removal, eliminate
 from doe.response_surface.known_variance import KnownVariance, compare
 from doe.response_surface.least_squares import LeastSquares, solve
-from doe.response_surface.terms import MODELS, Model, in_actual_units, model_matrix, model_terms, second_order
+from doe.response_surface.terms import MODELS, Model, in_actual_units, model_matrix, second_order
 from doe.response_surface.words import describe
 
 Array = NDArray[np.float64]
@@ -49,7 +50,7 @@ class Surface:
     mean square has no unit, and `known_variance` tells what it should be.
     ``observation_variance`` is that of a new run about the surface (of the mean run, if they differ).
     ``r2``, ``adjusted_r2`` and ``predicted_r2`` leave out what the blocks differ by; ``blocks`` are their
-    effects by label, about the average for which the surface stands. ``vif`` follows ``terms`` (NaN for "1").
+    effects by label, about the mean over all runs for which the surface stands. ``vif`` follows ``terms`` (NaN for "1").
     ``stationary_point`` is None for a surface that has none or no single one, ``canonical`` for one without
     curvature, ``known_variance`` where the errors of the runs are not known, ``rival`` until
     `doe.study.surfaces.with_rivals` has compared it with a Gaussian process.
@@ -276,7 +277,9 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
     covariance = solution.mean_square * solution.inverse
     groups = replicate_groups(data.points, data.block)
     known = (
-        None if variances is None else compare(solution, matrix, response, variances, data.replicates, groups)
+        None
+        if variances is None
+        else compare(solution, matrix, response, variances, data.replicates, groups, count)
     )
     table = anova(terms, solution, response, data.points, data.block)
     if known is not None:
@@ -359,5 +362,5 @@ def _summary(
 def _block_effects(data: Data, effects: Array) -> dict[str, float]:
     if not effects.size:
         return {}
-    all_effects = [*effects.tolist(), -float(effects.sum())]
-    return {str(label): effect for label, effect in zip(np.unique(data.block), all_effects, strict=True)}
+    labels, first = np.unique(data.block, return_index=True)
+    return dict(zip(map(str, labels), (data.block_columns[first] @ effects).tolist(), strict=True))

@@ -1,9 +1,11 @@
-"""Terms of a polynomial in coded factors: "1", "A", "AB" (interaction), "A^2" (square)."""
+"""Columns and hierarchy of the second-order terms "1", "A", "AB", "A^2"; `doe.designs.model` lists those of a model.
+
+A prediction stands in the innermost loop of every search, so no columns of powers are built here.
+"""
 
 from __future__ import annotations
 
 from functools import cache
-from itertools import combinations
 from string import ascii_uppercase
 from typing import Literal, get_args
 
@@ -18,14 +20,6 @@ MODELS: tuple[str, ...] = get_args(Model)
 def letters(factors: int) -> str:
     """Letters of the factors in the order of the columns."""
     return ascii_uppercase[:factors]
-
-
-def model_terms(factors: int, model: Model) -> tuple[str, ...]:
-    """Terms of a model: linear, then interactions, then squares. A reduced model starts from the quadratic."""
-    names = letters(factors)
-    products = ["".join(pair) for pair in combinations(names, 2)] if model != "linear" else []
-    squares = [f"{name}^2" for name in names] if model in ("quadratic", "reduced") else []
-    return ("1", *names, *products, *squares)
 
 
 def needed(term: str, terms: tuple[str, ...]) -> bool:

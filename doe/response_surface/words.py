@@ -83,7 +83,7 @@ def _blocks(surface: Surface, alpha: float) -> str:
     if p is None:
         return ""
     verdict = "differ" if p <= alpha else "do not differ significantly"
-    return f"{surface.name}: the blocks {verdict} ({p_text(p)}); predictions are for their average."
+    return f"{surface.name}: the blocks {verdict} ({p_text(p)}); predictions are for the mean over all runs."
 
 
 def _summary(surface: Surface) -> str:

@@ -21,8 +21,9 @@ Progress = Callable[[int, int], None]
 class Runs:
     """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths.
 
-    ``notes``: what the simulations warn of, once each; none for a table that was read. ``replicates`` (n,)
-    behind the half-widths (0: unknown) and ``block`` (n,) of each run; None: all unknown, one block.
+    ``notes``: what the simulations warn of, once each; none for a table that was read. ``replicates``, (n,)
+    or (n, m), count the independent values behind the half-widths (0: unknown), ``block`` (n,) labels each run; None:
+    all unknown, one block.
     """
 
     coded: Array

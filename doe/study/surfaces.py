@@ -24,8 +24,10 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
     from doe.response_surface import fit
 
     surfaces, faults = [], []
-    errors = standard_errors(runs.errors, runs.replicates)
-    for response, values, error in zip(study.file.response, runs.values.T, errors.T, strict=True):
+    number = independent_values(runs)
+    errors = standard_errors(runs.errors, number)
+    columns = zip(study.file.response, runs.values.T, errors.T, number.T, strict=True)
+    for response, values, error, behind in columns:
         try:
             surfaces.append(
                 fit(
@@ -36,7 +38,7 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
                     centre=study.centre,
                     step=study.step,
                     standard_errors=error,
-                    replicates=runs.replicates,
+                    replicates=behind,
                     weighting=response.weighting,
                     block=runs.block,
                     transform=response.transform,
@@ -54,37 +56,48 @@ def with_rivals(surfaces: Sequence[Surface], seed: int = 1) -> list[Surface]:
 
     It takes of the order of a second a response. ``rival`` stays None where too few points can be left out.
     """
+    from threadpoolctl import threadpool_limits
+
+    # Threads of their own cost more than they give on matrices of a few dozen runs.
+    with threadpool_limits(1):
+        return [_with_rival(surface, seed) for surface in surfaces]
+
+
+def _with_rival(surface: Surface, seed: int) -> Surface:
     from doe.response_surface import model_matrix
     from doe.response_surface.comparison import compare
 
-    compared = []
-    for surface in surfaces:
-        data = surface.data
-        try:
-            rival = compare(
-                data.points,
-                data.values,
-                surface.refit,
-                name=surface.name,
-                matrix=model_matrix(data.points, surface.terms),
-                standard_errors=data.standard_errors if surface.weighting == "replicates" else None,
-                seed=seed,
-            )
-        except ValueError:
-            compared.append(surface)
-        else:
-            compared.append(replace(surface, rival=rival))
-    return compared
+    data = surface.data
+    try:
+        rival = compare(
+            data.points,
+            data.values,
+            surface.refit,
+            name=surface.name,
+            matrix=model_matrix(data.points, surface.terms),
+            standard_errors=data.standard_errors if surface.weighting == "replicates" else None,
+            seed=seed,
+        )
+    except ValueError:
+        return surface
+    return replace(surface, rival=rival)
 
 
-def standard_errors(half_widths: Array, replicates: NDArray[np.int64] | None) -> Array:
+def independent_values(runs: Runs) -> NDArray[np.int64]:
+    """How many are behind each half width, shape (n, m), from ``runs.replicates``: (n,), (n, m) or None; 0: unknown."""
+    given = np.zeros(len(runs.values)) if runs.replicates is None else np.asarray(runs.replicates)
+    per_response = given if given.ndim == 2 else given[:, None]
+    return np.array(np.broadcast_to(per_response, runs.values.shape), np.int64)
+
+
+def standard_errors(half_widths: Array, number: NDArray[np.int64]) -> Array:
     """Standard errors of means from the half widths (n, m) of their 95 % intervals.
 
-    The quantile is Student's with ``replicates`` - 1 degrees of freedom; of unknown numbers (0) the normal one.
+    The quantile is Student's with ``number`` - 1 degrees of freedom, where ``number`` (n, m) counts the independent
+    values behind each mean; of unknown numbers (0) it is the normal one.
     """
     from scipy import special
 
-    number = np.zeros(len(half_widths)) if replicates is None else np.asarray(replicates, float)
-    quantile = np.where(number > 1, special.stdtrit(np.maximum(number - 1, 1), 0.975), special.ndtri(0.975))
-    errors: Array = half_widths / quantile[:, None]
+    student = special.stdtrit(np.maximum(number - 1, 1), 0.975)
+    errors: Array = half_widths / np.where(number > 1, student, special.ndtri(0.975))
     return errors
