@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from doe.commands.options import Data, Json, Out, Quiet, StudyPath, Workers
+from doe.commands.options import Data, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import fitted, save
 from rbdyn.terminal import guarded, print_json
 
@@ -16,6 +16,8 @@ def fit(
     data: Data = None,
     out: Out = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[
@@ -27,7 +29,7 @@ def fit(
         from doe.report.fit import fit_record, fit_tables, print_fit
         from doe.study.surfaces import with_rivals
 
-        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json)
+        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)
         surfaces = with_rivals(surfaces)
         record = fit_record(surfaces)
         save(out, "fit.json", record)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doe.commands.options import Data, Json, Out, Quiet, StudyPath, Workers
+from doe.commands.options import Data, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import fitted, save
 from rbdyn.faults import InputError
 from rbdyn.terminal import guarded, print_json
@@ -28,6 +28,8 @@ def front(
     data: Data = None,
     out: Out = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
     point: Point = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -40,7 +42,7 @@ def front(
         from doe.study_file import Study
 
         values = None if point is None else _point(Study.load(path), point)
-        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json)
+        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)
         found = find_front(loaded, surfaces)
         record = front_record(loaded, surfaces, found)
         if values is not None:
