@@ -30,12 +30,15 @@ from rbdyn.sources import source_digest
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.ensemble import Stop
+    from rbdyn.dynamics.history import History
 
 Array = NDArray[np.float64]
 
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
 # Confirmation runs use seeds that no design run has.
 CONFIRMATION_SEEDS = 1_000_000
+# Of a motion that goes into a report.
+ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
 
 def check_responses(study: Study) -> None:
@@ -74,11 +77,16 @@ def scene_at(
     return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments])
 
 
-def design_scenes(study: Study, points: Array) -> list[Scene]:
-    """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError."""
+def design_scenes(study: Study, points: Array, order: Sequence[int] | None = None) -> list[Scene]:
+    """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError.
+
+    ``order``: place of each run in the standard order, which sets its seed; as given unless told.
+    """
     data, first = read_scene(study), study.file.design.seed
+    places = range(len(points)) if order is None else order
     return [
-        scene_at(study, data, point, first + run, study.file.scene.set) for run, point in enumerate(points)
+        scene_at(study, data, point, first + place, study.file.scene.set)
+        for place, point in zip(places, points, strict=True)
     ]
 
 
@@ -227,13 +235,46 @@ def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array,
     return np.array(values), np.array(errors, dtype=float)
 
 
-def draw_motion(study: Study, points: dict[str, Array], turns: float, folder: Path) -> list[str]:
-    """Draw cage orbits and pocket forces at points; returns the names of the pictures."""
-    from rbdyn import plots
+def histories(study: Study, points: dict[str, Array], turns: float) -> dict[str, History]:
+    """Motion of the confirmation scene at each point, over at most ``turns`` shaft turns. Raises RunError."""
     from rbdyn.dynamics.history import history
 
     scenes = {name: confirmation_scene(study, point) for name, point in points.items()}
-    histories = {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
-    plots.cage_orbit(histories, folder / "cage_orbit.png")
-    plots.pocket_forces(histories, folder / "pocket_forces.png")
+    return {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
+
+
+def draw_motion(motions: Mapping[str, History], folder: Path) -> list[str]:
+    """Draw cage orbits and pocket forces; returns the names of the pictures."""
+    from rbdyn import plots
+
+    plots.cage_orbit(motions, folder / "cage_orbit.png")
+    plots.pocket_forces(motions, folder / "pocket_forces.png")
     return ["cage_orbit.png", "pocket_forces.png"]
+
+
+def motion_record(motions: Mapping[str, History]) -> dict[str, Any]:
+    """Motions small enough to be mailed, by name: the orbit of the cage in its guide, and frames to be played.
+
+    Each holds ``t_s`` and ``cage_orbit_um`` {"x", "y"}: the whole motion, thinned to at most ORBIT_POINTS;
+    ``guide_radius_um``, None without a guide; ``moving``: FRAMES frames of PLAYED_TURNS shaft turns about the
+    largest pocket force, as rbdyn.plots.player.motion_record keeps them.
+    """
+    from rbdyn.plots.drawing import drawing
+    from rbdyn.plots.player import motion_record as frames
+
+    record = {}
+    for name, motion in motions.items():
+        kept = slice(None, None, -(-len(motion.time) // ORBIT_POINTS))
+        x, y = motion.guide_eccentricity
+        clearance = motion.scene.guide_clearance_m
+        picture = drawing(motion, PLAYED_TURNS, round(FRAMES / PLAYED_TURNS), FRAMES)
+        record[name] = {
+            "t_s": np.round(motion.time[kept], 8).tolist(),
+            "cage_orbit_um": {
+                "x": np.round(1e6 * x[kept], 2).tolist(),
+                "y": np.round(1e6 * y[kept], 2).tolist(),
+            },
+            "guide_radius_um": None if clearance is None else round(1e6 * clearance, 3),
+            "moving": frames(motion, picture),
+        }
+    return record

@@ -61,6 +61,7 @@ def finished(tmp_path_factory):
 def test_every_file_is_written(finished):
     _, folder, files = finished
     assert {"summary.json", "design_runs.csv", "anova.csv", "front.csv", "part_dimensions.csv"} <= set(files)
+    assert {"report.html", "report.md"} <= set(files)
     assert {"pareto_front.png", "cage_orbit.png", "pocket_forces.png"} <= set(files)
     assert sum(name.startswith("surface_") for name in files) == 3
     for name in files:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from doe.report.front import front_record
+from doe.report.html import html_report
+from doe.report.markdown import markdown_report
 from doe.report.summary import summary
 from rbdyn.result import write_json
 
@@ -61,9 +63,14 @@ def write(outcome: Outcome, folder: Path) -> list[str]:
     confirmed = np.array([outcome.baseline.values, outcome.pick.values])
     plots.pareto_front(study, front, outcome.surfaces, confirmed, folder / "pareto_front.png")
     points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
-    pictures += ["pareto_front.png", *clearance.draw_motion(study, points, DRAWN_TURNS, folder)]
-    write_json(folder / "summary.json", summary(outcome))
-    return ["summary.json", *tables, *pictures]
+    motions = clearance.histories(study, points, DRAWN_TURNS)
+    pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
+    record = summary(outcome)
+    write_json(folder / "summary.json", record)
+    page = html_report(record, clearance.motion_record(motions))
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    (folder / "report.md").write_text(markdown_report(record, pictures), encoding="utf-8")
+    return ["report.html", "report.md", "summary.json", *tables, *pictures]
 
 
 def _runs_table(study: Study, runs: Runs) -> list[dict[str, Any]]:
@@ -96,21 +103,26 @@ def _beside_table(outcome: Outcome) -> list[dict[str, Any]]:
 
 
 def _confirmation_table(outcome: Outcome) -> list[dict[str, Any]]:
-    return [
-        {
-            "response": gain.response,
-            "baseline": outcome.baseline.values[i],
-            "baseline_statistical_error": outcome.baseline.statistical[i],
-            "baseline_numerical_error": outcome.baseline.numerical[i],
-            "pick": outcome.pick.values[i],
-            "pick_statistical_error": outcome.pick.statistical[i],
-            "pick_numerical_error": outcome.pick.numerical[i],
-            "improvement_percent": gain.percent,
-            "improvement_error_percent": gain.error,
-            "verdict": gain.verdict,
-        }
-        for i, gain in enumerate(outcome.gains)
-    ]
+    study = outcome.study
+    rows = []
+    for name, each in outcome.confirmed.items():
+        gains = {gain.response: gain for gain in outcome.gains.get(name, [])}
+        for index, response in enumerate(study.responses):
+            gain = gains.get(response)
+            rows.append(
+                {
+                    "point": name,
+                    **dict(zip(study.factors, each.point, strict=True)),
+                    "response": response,
+                    "value": each.values[index],
+                    "statistical_error": each.statistical[index],
+                    "numerical_error": each.numerical[index],
+                    "improvement_percent": None if gain is None else gain.percent,
+                    "improvement_error_percent": None if gain is None else gain.error,
+                    "verdict": "" if gain is None else gain.verdict,
+                }
+            )
+    return rows
 
 
 def _dimension(part: Part) -> dict[str, Any]:

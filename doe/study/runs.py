@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.designs import central_composite, to_actual, to_coded
+from doe.designs import Design, to_actual, to_coded
+from doe.designs.model import model_terms
+from doe.study.design import check_runs, design_of
 from doe.study.failure import Failure, sentence, successes
 from doe.study_file import Study
 from rbdyn.faults import RunError
@@ -24,8 +26,9 @@ STORE = "study.sqlite"
 class Runs:
     """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths.
 
-    ``notes``: what the simulations warn of, once each; none for a table that was read. ``replicates`` (n,): how many
-    each run is the mean of, 0 where that is not known. ``failures``: design runs that failed; they are not in the arrays.
+    ``notes``: what the simulations warn of, once each; none for a table that was read. ``replicates``, (n,)
+    or (n, m), count the independent values behind the half-widths (0: unknown), ``block`` (n,) labels each run; None:
+    all unknown, one block. ``failures``: design runs that failed; they are not in the arrays.
     """
 
     coded: Array
@@ -33,12 +36,9 @@ class Runs:
     values: Array
     errors: Array
     notes: tuple[str, ...] = ()
-    replicates: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    replicates: NDArray[np.int64] | None = None
+    block: NDArray[np.int64] | None = None
     failures: tuple[Failure, ...] = ()
-
-    def __post_init__(self) -> None:
-        if not self.replicates.size:
-            object.__setattr__(self, "replicates", np.zeros(len(self.coded), dtype=np.int64))
 
     @property
     def places(self) -> list[int]:
@@ -48,18 +48,17 @@ class Runs:
 
     def only(self, places: list[int]) -> Runs:
         """The rows at these places."""
-        coded, actual, values, errors = (
-            array[places] for array in (self.coded, self.actual, self.values, self.errors)
+        coded, actual, values, errors, replicates, block = (
+            None if column is None else column[places]
+            for column in (self.coded, self.actual, self.values, self.errors, self.replicates, self.block)
         )
-        return Runs(coded, actual, values, errors, self.notes, self.replicates[places])
+        assert coded is not None and actual is not None and values is not None and errors is not None
+        return Runs(coded, actual, values, errors, self.notes, replicates, block)
 
 
 def design_points(study: Study) -> Array:
-    """Coded design points (n, k)."""
-    design = study.file.design
-    return central_composite(
-        len(study.factors), alpha=design.alpha, centre_replicates=design.centre_replicates
-    )
+    """Coded design points (n, k) in the order of the runs. Raises InputError when the design is impossible."""
+    return design_of(study).coded
 
 
 def run_design(
@@ -78,9 +77,11 @@ def run_design(
     from doe.study.store import Store
 
     clearance.check_responses(study)
-    coded = design_points(study)
+    design = design_of(study)
+    check_runs(study, design)
+    coded = design.coded
     actual = to_actual(coded, study.centre, study.step)
-    scenes = clearance.design_scenes(study, actual)
+    scenes = clearance.design_scenes(study, actual, design.order.tolist())
     labels = [f"design run {run + 1}" for run in range(len(scenes))]
     factors = [dict(zip(study.factors, point.tolist(), strict=True)) for point in actual]
     with Store(folder / STORE, study.path.stem) as store:
@@ -89,7 +90,7 @@ def run_design(
         )
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
-    if failures and len(left) < (needed := fewest_runs(study)):
+    if failures and len(left) < (needed := fewest_runs(study, design)):
         raise RunError(
             f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}: "
             f"{sentence(failures)}"
@@ -100,17 +101,20 @@ def run_design(
         notes[f"{len(failures)} design runs failed and are left out: {sentence(failures)}"] = None
     values, errors = clearance.responses(study, found)
     replicates = np.array([result.replicates for result in found])
-    return Runs(coded[left], actual[left], values, errors, tuple(notes), replicates, failures)
+    block = design.block[left] if design.blocks > 1 else None
+    return Runs(coded[left], actual[left], values, errors, tuple(notes), replicates, block, failures)
 
 
-def fewest_runs(study: Study) -> int:
-    """Runs that the largest response model needs: one a term, and one to judge the fit."""
-    k = len(study.factors)
-    terms = {"linear": k + 1, "interaction": k * (k + 1) // 2 + 1}
-    return 1 + max(terms.get(response.model, (k + 1) * (k + 2) // 2) for response in study.file.response)
+def fewest_runs(study: Study, design: Design) -> int:
+    """Runs that the largest response model needs: one a term, one a block beyond the first, one to judge the fit."""
+    factors = len(study.factors)
+    return design.blocks + max(len(model_terms(factors, response.model)) for response in study.file.response)
 
 
 def read_runs(study: Study, path: Path) -> Runs:
     """Runs of a CSV table instead of simulated ones. Raises InputError."""
-    actual, values = study.read_table(path)
-    return Runs(to_coded(actual, study.centre, study.step), actual, values, np.full_like(values, np.nan))
+    table = study.read_table(path)
+    coded = to_coded(table.actual, study.centre, study.step)
+    return Runs(
+        coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block
+    )
