@@ -68,17 +68,28 @@ class Front(Strict):
 class Direct(Strict):
     """NSGA-II on the simulator itself.
 
-    ``replicates`` and ``turns`` of each evaluation; ``confidence`` at which differences count in the search;
-    ``resample``: share of the evaluations for fresh runs of the points found.
+    ``replicates`` of each evaluation, each of ``turns`` shaft turns of which the first ``discard_turns`` are left out as
+    transient; ``confidence`` at which differences count in the search;
+    ``resample``: share of the evaluations for fresh runs of the points found; ``set`` replaces keys of the scene.
     """
 
     evaluations: Annotated[int, Field(ge=50, le=10_000_000)] = 2000
     population: Annotated[int, Field(ge=8, le=10000)] = 50
     replicates: Annotated[int, Field(ge=2, le=10000)] = 4
     turns: Annotated[float, Field(gt=0.0)] = 40.0
+    discard_turns: Annotated[float, Field(ge=0.0)] = 8.0
     seed: Annotated[int, Field(ge=0)] = 1
     confidence: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
     resample: Annotated[float, Field(ge=0.1, le=0.9)] = 0.3
+    set: list[str] = []
+
+    @model_validator(mode="after")
+    def _something_is_counted(self) -> Direct:
+        if self.discard_turns >= self.turns:
+            raise ValueError(
+                f"discard_turns = {self.discard_turns:g}: must be below turns = {self.turns:g}; discard fewer"
+            )
+        return self
 
 
 class Tolerances(Strict):

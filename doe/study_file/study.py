@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Design, Factor
 from doe.study_file.fit_section import Fitted
-from doe.study_file.front_section import Front, Goal
+from doe.study_file.front_section import Direct, Front, Goal, Tolerances
 from doe.study_file.table import Table, read_table
 from rbdyn.faults import Strict, read_toml, validated
 
@@ -57,6 +57,8 @@ class StudyFile(Strict):
     response: Annotated[list[Response], Field(min_length=1)]
     design: Design = Design()
     front: Front = Front()
+    direct: Direct = Direct()
+    tolerances: Tolerances | None = None
     confirmation: Confirmation = Confirmation()
     baseline: dict[str, float] = {}
     chain: list[StudyChain] = []
