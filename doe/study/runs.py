@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.designs import to_actual, to_coded
+from doe.designs import Design, to_actual, to_coded
 from doe.designs.model import model_terms
 from doe.study.design import check_runs, design_of
 from doe.study.failure import Failure, sentence, successes
@@ -91,7 +91,7 @@ def run_design(
         )
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
-    if failures and len(left) < (needed := fewest_runs(study)):
+    if failures and len(left) < (needed := fewest_runs(study, design)):
         raise RunError(
             f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}: "
             f"{sentence(failures)}"
@@ -101,15 +101,14 @@ def run_design(
     if failures:
         notes[f"{len(failures)} design runs failed and are left out: {sentence(failures)}"] = None
     values, errors, independent = clearance.responses(study, found)
-    return Runs(
-        coded[left], actual[left], values, errors, tuple(notes), independent, design.block[left], failures
-    )
+    block = design.block[left] if design.blocks > 1 else None
+    return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)
 
 
-def fewest_runs(study: Study) -> int:
-    """Runs that the largest response model needs: one a term, and one to judge the fit."""
+def fewest_runs(study: Study, design: Design) -> int:
+    """Runs that the largest response model needs: one a term, one a block beyond the first, one to judge the fit."""
     factors = len(study.factors)
-    return 1 + max(len(model_terms(factors, response.model)) for response in study.file.response)
+    return design.blocks + max(len(model_terms(factors, response.model)) for response in study.file.response)
 
 
 def read_runs(study: Study, path: Path) -> Runs:
