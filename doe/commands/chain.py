@@ -14,23 +14,32 @@ from rbdyn.terminal import BAD_INPUT, guarded, print_json
 
 
 def chain(
-    path: Annotated[Path, typer.Argument(metavar="CHAIN.toml", help="Dimension chain to solve.")],
+    path: Annotated[
+        Path, typer.Argument(metavar="CHAIN.toml", help="Dimension chain to solve, or several as [[chain]].")
+    ],
     out: Save = None,
     as_json: Json = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Parts only.")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also yields and contributions.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also yields by distribution, quantiles, classes.")
+    ] = False,
 ) -> None:
-    """Solve a dimension chain: limits, yield, contributions, allocation. One that misses its limits is refused."""
+    """Solve dimension chains: limits, yield, contributions, allocation. One that misses its limits is refused."""
     with guarded(as_json):
-        from doe.dimension_chain import read_chain, solve
-        from doe.report.chain import print_chain
+        from doe.dimension_chain import is_several, read_chains, solve
+        from doe.report.chain import chains_record, print_chain
 
-        result = solve(read_chain(path))
-        save(out, "chain.json", result.as_dict())
+        several = is_several(path)
+        results = {name: solve(each) for name, each in read_chains(path).items()}
+        record = chains_record(results) if several else next(iter(results.values())).as_dict()
+        save(out, "chain.json", record)
         if as_json:
-            print_json(result.as_dict())
+            print_json(record)
         else:
-            print_chain(path.stem, result, quiet, verbose)
-        if result.status.startswith("refused"):
-            print(f"{path}: {result.status}", file=sys.stderr)
+            for name, result in results.items():
+                print_chain(name, result, quiet, verbose)
+        refused = {name: result.status for name, result in results.items() if result.refused}
+        for name, status in refused.items():
+            print(f"{path}: {f'chain {name}: ' if several else ''}{status}", file=sys.stderr)
+        if refused:
             raise typer.Exit(BAD_INPUT)

@@ -24,7 +24,13 @@ def save(out: Path | None, name: str, record: dict[str, Any]) -> None:
 
 
 def fitted(
-    path: Path, data: Path | None, out: Path | None, workers: int | None, quiet: bool
+    path: Path,
+    data: Path | None,
+    out: Path | None,
+    workers: int | None,
+    quiet: bool,
+    scheduler: str | None,
+    retry: bool,
 ) -> tuple[Study, list[Surface]]:
     """The study and its surfaces, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
     from doe.study.runs import read_runs, run_design
@@ -35,7 +41,7 @@ def fitted(
     if data is not None:
         return loaded, fit_surfaces(loaded, read_runs(loaded, data))
     with _store_folder(out) as folder, progress_bar("design runs", quiet) as progress:
-        return loaded, fit_surfaces(loaded, run_design(loaded, folder, workers, progress))
+        return loaded, fit_surfaces(loaded, run_design(loaded, folder, workers, progress, scheduler, retry))
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from pathlib import Path
 
-from doe.commands.options import Json, Out, Quiet, StudyPath, Verbose, Workers
+from doe.commands.options import Json, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
 from rbdyn.terminal import guarded, output_folder, print_json, progress_bar
 
 
@@ -13,6 +13,8 @@ def study(
     path: StudyPath,
     out: Out = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -34,6 +36,8 @@ def study(
             folder,
             workers,
             lambda title: bars.enter_context(progress_bar(title, quiet or as_json)),
+            scheduler,
+            retry,
         )
         bars.close()
         written = write(outcome, folder)

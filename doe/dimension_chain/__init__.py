@@ -1,23 +1,32 @@
-"""Dimension chains: a closing link, its parts and their tolerances."""
+"""Dimension chains: a closing link, its parts and their tolerances.
 
-from doe.dimension_chain.chain import (
-    Chain,
-    ChainResult,
-    Part,
-    chain_from,
-    grade_tolerances,
-    read_chain,
-    solve,
-    tolerance_unit,
-)
+``links`` is what a chain is made of, ``reading`` and ``faults`` its TOML, ``closing`` the closing link as a function of
+its parts (``fits`` and ``expressions`` are the links that are no sums), ``intervals``, ``monte_carlo``, ``yields`` and
+``contributions`` what comes of given tolerances, ``allocation`` and ``cost`` the way back from limits to tolerances,
+``iso286`` and ``iso492`` the standards as data, ``selective_assembly`` parts sorted into classes. ``solve`` answers all.
+"""
+
+from doe.dimension_chain.faults import faults
+from doe.dimension_chain.iso286 import continuous_grades, fit_limits, grade_tolerances, tolerance_unit
+from doe.dimension_chain.iso492 import ring_limits
+from doe.dimension_chain.links import Chain, Link, Part
+from doe.dimension_chain.reading import chain_from, is_several, read_chain, read_chains
+from doe.dimension_chain.solution import ChainResult, solve
 
 __all__ = [
     "Chain",
     "ChainResult",
+    "Link",
     "Part",
     "chain_from",
+    "continuous_grades",
+    "faults",
+    "fit_limits",
     "grade_tolerances",
+    "is_several",
     "read_chain",
+    "read_chains",
+    "ring_limits",
     "solve",
     "tolerance_unit",
 ]

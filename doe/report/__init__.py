@@ -1,6 +1,6 @@
 """What a person sees of a study.
 
-- ``fit``, ``front``, ``chain``: JSON and tables of each step
+- ``design``, ``fit``, ``front``, ``chain``: JSON and tables of each step
 - ``answer``: the end of a study on the terminal
 - ``summary``: summary.json, everything found
 - ``files``: all files of a study; ``plots`` draws the pictures

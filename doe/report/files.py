@@ -103,21 +103,26 @@ def _beside_table(outcome: Outcome) -> list[dict[str, Any]]:
 
 
 def _confirmation_table(outcome: Outcome) -> list[dict[str, Any]]:
-    return [
-        {
-            "response": gain.response,
-            "baseline": outcome.baseline.values[i],
-            "baseline_statistical_error": outcome.baseline.statistical[i],
-            "baseline_numerical_error": outcome.baseline.numerical[i],
-            "pick": outcome.pick.values[i],
-            "pick_statistical_error": outcome.pick.statistical[i],
-            "pick_numerical_error": outcome.pick.numerical[i],
-            "improvement_percent": gain.percent,
-            "improvement_error_percent": gain.error,
-            "verdict": gain.verdict,
-        }
-        for i, gain in enumerate(outcome.gains)
-    ]
+    study = outcome.study
+    rows = []
+    for name, each in outcome.confirmed.items():
+        gains = {gain.response: gain for gain in outcome.gains.get(name, [])}
+        for index, response in enumerate(study.responses):
+            gain = gains.get(response)
+            rows.append(
+                {
+                    "point": name,
+                    **dict(zip(study.factors, each.point, strict=True)),
+                    "response": response,
+                    "value": each.values[index],
+                    "statistical_error": each.statistical[index],
+                    "numerical_error": each.numerical[index],
+                    "improvement_percent": None if gain is None else gain.percent,
+                    "improvement_error_percent": None if gain is None else gain.error,
+                    "verdict": "" if gain is None else gain.verdict,
+                }
+            )
+    return rows
 
 
 def _dimension(part: Part) -> dict[str, Any]:

@@ -1,0 +1,203 @@
+"""Allocation: from the limits of the closing link back to tolerances of its parts.
+
+"equal" gives every part that is not fixed the same tolerance, "iso286" one in proportion to its tolerance unit,
+"cost" the cheapest by the curves of the links. What they fill is the worst case, the root sum square, or what keeps
+a yield. Where the chain is not linear, or a yield is wanted, the tolerances of the linear rule are widened or
+narrowed together until they fill the limits. The nominal of one part is moved: so that the closing link's maximum
+meets its upper limit; for a yield, so that its mean (with functions, the middle of its tails) lies midway.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf, isfinite, sqrt
+
+import numpy as np
+
+from doe.dimension_chain.closing import ClosingFunction, closing_function, middle
+from doe.dimension_chain.cost import cheapest
+from doe.dimension_chain.intervals import interval, total
+from doe.dimension_chain.iso286 import grade_tolerances, tolerance_unit
+from doe.dimension_chain.links import DIGITS, SLACK, Chain, Link, Mode, Part
+from doe.dimension_chain.monte_carlo import Assemblies, draw
+from doe.dimension_chain.parts import allocated_part, given_part
+from doe.dimension_chain.yields import closing_moments, exact_shares, sampled_yields, standard_error
+
+SAMPLES = 100_000  # assemblies that judge a yield where no convolution can
+HALVINGS = 26
+NEWTON_STEPS = 30
+WIDEST = 64.0  # times the tolerances of the linear rule
+
+Tolerances = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Allocation:
+    """The search for tolerances of a checked chain."""
+
+    chain: Chain
+
+    @cached_property
+    def function(self) -> ClosingFunction:
+        """The closing link of the chain."""
+        return closing_function(self.chain.link)
+
+    @property
+    def mode(self) -> Mode:
+        """What the tolerances fill."""
+        return self.chain.allocate.mode
+
+    @property
+    def adjusted(self) -> Link:
+        """The link whose nominal is moved."""
+        free = {link.name: link for link in self.chain.free if link.coefficient != 0}
+        wanted = self.chain.allocate.adjust
+        return free[wanted] if wanted else min(free.values(), key=lambda link: link.coefficient < 0)
+
+    def parts(self, tolerances: Tolerances, grades: Mapping[str, str] | None = None) -> list[Part]:
+        """All parts, those that are not fixed with the given tolerances, mm, and one nominal moved.
+
+        Raises ValueError where no nominal of that part brings the closing link to its limits.
+        """
+        by_name = {link.name: link for link in self.chain.link}
+        parts = [
+            allocated_part(link, tolerances[link.name], (grades or {}).get(link.name))
+            if link.name in tolerances
+            else given_part(link, by_name)
+            for link in self.chain.link
+            if link.is_dimension or link.thermal_growth
+        ]
+        moved = self.adjusted.name
+        # One step is exact unless a function uses the part that is moved; then these are steps of Newton.
+        for _ in range(NEWTON_STEPS):
+            slope = self.function.sensitivities(middle(parts))[moved]
+            step = self._missing(parts) / slope if slope else inf
+            parts = [
+                replace(part, nominal_mm=round(part.nominal_mm + step, DIGITS))
+                if part.name == moved
+                else part
+                for part in parts
+            ]
+            if moved not in self.function.arguments or abs(step) < SLACK:
+                return parts
+            if not isfinite(step):
+                break
+        raise ValueError("no nominal of it brings the closing link to its limits; name another part")
+
+    def kept(self, parts: list[Part]) -> bool:
+        """Whether parts keep the limits in the mode of the chain."""
+        if self.mode == "yield":
+            return self.sure_yield(parts) >= self.chain.allocate.target_yield
+        limits, (low, high) = self.chain.closing_link, interval(self.function, parts, self.mode)
+        return limits.lower_mm - SLACK <= low and high <= limits.upper_mm + SLACK
+
+    def sure_yield(self, parts: list[Part]) -> float:
+        """Yield with each part's own distribution: by convolution; with functions, two errors below a Monte Carlo."""
+        limits = self.chain.closing_link
+        if self.function.linear:
+            return 1 - sum(exact_shares(self.function, parts, limits))
+        share = sampled_yields(self._drawn(parts))["as_given"]
+        return share - 2 * standard_error(share, SAMPLES)
+
+    def allocated(self) -> list[Part]:
+        """Parts whose tolerances together fill the limits, snapped to grades where that is asked for."""
+        wish = self.linear_rule()
+        scale = 1.0 if self.function.linear and self.mode != "yield" else self._scale(wish)
+        tolerances = {name: scale * t for name, t in wish.items()}
+        if not self.chain.allocate.grades:
+            return self.parts(tolerances)
+        return self._snapped(tolerances)
+
+    def linear_rule(self) -> dict[str, float]:
+        """Tolerances, mm, that fill the limits of the linear chain; for a yield by root sum square.
+
+        Raises ValueError where no tolerances can: see the sentences.
+        """
+        rule, free = self.chain.allocate, self.chain.free
+        mode: Mode = "worst_case" if rule.mode == "worst_case" else "rss"
+        bare = self.parts({link.name: 0.0 for link in free})
+        slopes = self.function.sensitivities(middle(bare))
+        fixed = total([abs(slopes[part.name]) * part.tolerance_mm for part in bare], mode)
+        width = self.chain.width_mm
+        # A bent chain may have more room than its tangent says: any positive width starts the search.
+        rest = sqrt(max(width**2 - fixed**2, 0.0)) if mode == "rss" else width - fixed
+        rest = rest if rest > 0 else width
+        idle = [link.name for link in free if slopes[link.name] == 0]
+        if idle and (rule.method == "cost" or len(idle) == len(free)):
+            raise ValueError(f'"{idle[0]}" does not move the closing link; fix it')
+        if rule.method == "cost":
+            curves = [link.cost for link in free if link.cost is not None]
+            found = cheapest(curves, [slopes[link.name] for link in free], rest, mode)
+            return {link.name: t for link, t in zip(free, found, strict=True)}
+        iso = rule.method == "iso286"
+        weights = {link.name: tolerance_unit(link.nominal) if iso else 1.0 for link in free}
+        share = rest / total([abs(slopes[name]) * weight for name, weight in weights.items()], mode)
+        return {name: share * weight for name, weight in weights.items()}
+
+    def _scale(self, wish: Tolerances) -> float:
+        """Factor on the tolerances at which they just keep the limits."""
+
+        def kept(scale: float) -> bool:
+            try:
+                return self.kept(self.parts({name: scale * t for name, t in wish.items()}))
+            except ValueError:
+                # Too wide for the functions to have a value, or for the nominal to follow.
+                return False
+
+        low, high = 0.0, 1.0
+        while high < WIDEST and kept(high):
+            low, high = high, 2 * high
+        for _ in range(HALVINGS):
+            half = (low + high) / 2
+            low, high = (half, high) if kept(half) else (low, half)
+        return low
+
+    def _snapped(self, tolerances: Tolerances) -> list[Part]:
+        """Each tolerance at the widest grade within it; one finer than IT01 keeps its width without a grade."""
+        free = {link.name: link for link in self.chain.free}
+        ladders = {name: list(grade_tolerances(link.nominal).items()) for name, link in free.items()}
+        steps = {
+            name: sum(width <= tolerances[name] + SLACK for _, width in ladder) - 1
+            for name, ladder in ladders.items()
+        }
+
+        def parts(steps: Mapping[str, int]) -> list[Part]:
+            chosen = {name: ladders[name][step] for name, step in steps.items() if step >= 0}
+            widths = {name: chosen[name][1] if name in chosen else t for name, t in tolerances.items()}
+            return self.parts(widths, {name: grade for name, (grade, _) in chosen.items()})
+
+        while self.chain.allocate.spend_slack:
+            wider = [
+                name
+                for name, step in steps.items()
+                if 0 <= step < len(ladders[name]) - 1 and self.kept(parts({**steps, name: step + 1}))
+            ]
+            if not wider:
+                break
+            best = max(wider, key=lambda name: self._worth(free[name], ladders[name], steps[name]))
+            steps[best] += 1
+        return parts(steps)
+
+    def _worth(self, link: Link, ladder: list[tuple[str, float]], step: int) -> tuple[float, float]:
+        """What the next grade is worth: the cost that it saves; without a curve, how fine the grade still is."""
+        narrow, wide = ladder[step][1], ladder[step + 1][1]
+        if link.cost is None:
+            return 0.0, -step
+        return link.cost.b * (narrow**-link.cost.k - wide**-link.cost.k), -step
+
+    def _missing(self, parts: list[Part]) -> float:
+        """How far the closing link lies too low, mm."""
+        limits = self.chain.closing_link
+        if self.mode != "yield":
+            return limits.upper_mm - interval(self.function, parts, self.mode)[1]
+        target = (limits.lower_mm + limits.upper_mm) / 2
+        if self.function.linear:
+            return target - closing_moments(self.function, parts, None)[0]
+        tail = (1 - self.chain.allocate.target_yield) / 2
+        return target - float(np.quantile(self._drawn(parts).values, (tail, 1 - tail)).mean())
+
+    def _drawn(self, parts: list[Part]) -> Assemblies:
+        seed, limits = self.chain.monte_carlo.seed, self.chain.closing_link
+        return draw(self.function, parts, limits, samples=SAMPLES, seed=seed, laws=())

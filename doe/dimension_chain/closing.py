@@ -1,0 +1,154 @@
+"""The closing link as a function of the parts' sizes, and its sensitivities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from doe.dimension_chain.expressions import evaluate, names_in
+from doe.dimension_chain.fits import press_fit_factor
+from doe.dimension_chain.links import Link, Part, PressFit
+
+STEP = 1e-5  # mm of the central differences that give sensitivities
+
+Sizes = Mapping[str, Any]
+
+
+class NoValueError(ValueError):
+    """A size at which a function has no finite value."""
+
+
+@dataclass(frozen=True)
+class Function:
+    """A link that follows from others: its name, coefficient and value at their sizes."""
+
+    name: str
+    coefficient: float
+    value: Callable[[Sizes], Any]
+
+
+@dataclass(frozen=True)
+class ClosingFunction:
+    """Sum of coefficient times part, plus that of the functions, in their order.
+
+    ``arguments`` names the parts that functions use; without any the chain is linear.
+    """
+
+    coefficients: Mapping[str, float]
+    functions: tuple[Function, ...]
+    arguments: tuple[str, ...]
+
+    @property
+    def linear(self) -> bool:
+        """Whether the closing link is a sum of parts and nothing else."""
+        return not self.functions
+
+    def value(self, sizes: Sizes) -> Any:
+        """Closing link, mm, at sizes of the parts, mm; numbers or arrays of one shape."""
+        return sum(c * sizes[name] for name, c in self.coefficients.items()) + self.bent(sizes)
+
+    def bent(self, sizes: Sizes) -> Any:
+        """Share of the functions alone, mm; only the sizes of ``arguments`` are needed.
+
+        Raises NoValueError where a function has no finite value.
+        """
+        known = dict(sizes)
+        total: Any = 0.0
+        with np.errstate(all="ignore"):
+            for function in self.functions:
+                known[function.name] = function.value(known)
+                total = total + function.coefficient * known[function.name]
+        if not np.isfinite(np.sum(total)):
+            raise NoValueError(
+                "some sizes that are within reach give no finite closing link; mend the functions"
+            )
+        return total
+
+    def sensitivities(self, sizes: Sizes) -> dict[str, float]:
+        """Change of the closing link per change of each part at the given sizes."""
+        found = dict(self.coefficients)
+        for name in self.arguments:
+            above, below = ({**sizes, name: sizes[name] + sign * STEP} for sign in (1, -1))
+            found[name] += float(self.bent(above) - self.bent(below)) / (2 * STEP)
+        return found
+
+
+def closing_function(links: Sequence[Link]) -> ClosingFunction:
+    """The closing link of checked links.
+
+    Raises ValueError for a press fit whose diameters make no rings.
+    """
+    by_name = {link.name: link for link in links}
+    functions = [
+        Function(link.name, link.coefficient, _function(link, by_name))
+        for link in links
+        if not link.is_dimension
+    ]
+    used = [
+        name for link in links for name in (*used_links(link), *([link.name] if link.thermal_growth else []))
+    ]
+    return ClosingFunction(
+        # A thermal growth counts as a function; the part of its name only varies the temperature.
+        {link.name: link.coefficient * link.is_dimension for link in links if is_part(link)},
+        tuple(functions),
+        tuple(name for name in dict.fromkeys(used) if is_part(by_name[name])),
+    )
+
+
+def is_part(link: Link) -> bool:
+    """Whether something varies with the link itself: a dimension, or the temperature of a growth."""
+    return link.is_dimension or link.thermal_growth is not None
+
+
+def used_links(link: Link) -> list[str]:
+    """Links that a link is a function of. Raises ValueError for an expression that cannot be read."""
+    if link.press_fit:
+        return [link.press_fit.shaft, link.press_fit.bore]
+    if link.thermal_growth:
+        return [link.thermal_growth.of]
+    return names_in(link.expression) if link.expression else []
+
+
+def fit_factor(fit: PressFit, bore_nominal: float) -> float:
+    """Change of the raceway's diameter per interference of a press fit. Raises ValueError as `press_fit_factor`."""
+    fit_mm = fit.fit_mm or bore_nominal
+    outer = fit.raceway_mm > fit_mm
+    # The raceway bounds the part that it stands on, unless told otherwise.
+    shaft_bore = (0.0 if outer else fit.raceway_mm) if fit.shaft_bore_mm is None else fit.shaft_bore_mm
+    outside = fit.raceway_mm if fit.outside_mm is None else fit.outside_mm
+    if fit.outside_mm is None and not outer:
+        raise ValueError("outside_mm is missing: give the outside diameter of what holds the ring")
+    return press_fit_factor(
+        fit_mm=fit_mm,
+        raceway_mm=fit.raceway_mm,
+        shaft_bore_mm=shaft_bore,
+        outside_mm=outside,
+        shaft_modulus_GPa=fit.shaft_modulus_GPa,
+        bore_modulus_GPa=fit.bore_modulus_GPa,
+        shaft_poisson=fit.shaft_poisson,
+        bore_poisson=fit.bore_poisson,
+    )
+
+
+def middle(parts: Sequence[Part]) -> dict[str, float]:
+    """Sizes of the parts at mid-tolerance, mm."""
+    return {part.name: part.nominal_mm + part.middle_mm for part in parts}
+
+
+def _function(link: Link, by_name: Mapping[str, Link]) -> Callable[[Sizes], Any]:
+    if link.press_fit:
+        return _press_fit(link.press_fit, by_name[link.press_fit.bore].nominal)
+    if link.thermal_growth:
+        name, of = link.name, link.thermal_growth.of
+        nominal = by_name[of].nominal
+        return lambda sizes: sizes[name] * sizes[of] / nominal
+    text = link.expression or ""
+    return lambda sizes: evaluate(text, sizes)
+
+
+def _press_fit(fit: PressFit, bore_nominal: float) -> Callable[[Sizes], Any]:
+    factor, change = fit_factor(fit, bore_nominal), fit.interference_change_mm
+    return lambda sizes: factor * np.maximum(sizes[fit.shaft] - sizes[fit.bore] + change, 0.0)

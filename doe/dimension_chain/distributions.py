@@ -1,0 +1,85 @@
+"""Distributions of a part between its limits: quantiles, shares below a size, means and variances.
+
+A normal part has the standard deviation T/(6 capability), a truncated normal the same before the cut at its
+limits; uniform and triangular parts fill the tolerance about its middle.
+"""
+
+from __future__ import annotations
+
+from math import exp, pi, sqrt
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from doe.dimension_chain.links import Array, Distribution, Part
+
+NORMAL_REACH = 9.0  # standard deviations beyond which a normal part has a share below 1e-18
+
+
+def standard_limits(part: Part) -> tuple[float, float]:
+    """Limits of a part in standard deviations from its mean; the part must have a tolerance."""
+    return (part.lower_mm - part.mean_mm) / part.sigma_mm, (part.upper_mm - part.mean_mm) / part.sigma_mm
+
+
+def quantile(part: Part, kind: Distribution, probability: Array) -> Array:
+    """Deviation from the nominal, mm, below which a part lies with each probability."""
+    lower, width = part.lower_mm, part.tolerance_mm
+    values: Array
+    if width == 0:
+        values = np.full_like(probability, lower)
+    elif kind == "uniform":
+        values = lower + width * probability
+    elif kind == "triangular":
+        root = np.sqrt(np.minimum(probability, 1 - probability) / 2)
+        values = lower + width * np.where(probability < 0.5, root, 1 - root)
+    else:
+        if kind == "truncated_normal":
+            below, above = (ndtr(limit) for limit in standard_limits(part))
+            probability = below + (above - below) * probability
+        values = part.mean_mm + part.sigma_mm * ndtri(probability)
+    return values
+
+
+def share_below(part: Part, kind: Distribution, deviation: Array) -> Array:
+    """Share of a part's production below each deviation from the nominal, mm."""
+    lower, width = part.lower_mm, part.tolerance_mm
+    shares: Array
+    if width == 0:
+        shares = (deviation >= lower).astype(float)
+    elif kind in ("uniform", "triangular"):
+        place = np.clip((deviation - lower) / width, 0.0, 1.0)
+        bent = np.where(place < 0.5, 2 * place**2, 1 - 2 * (1 - place) ** 2)
+        shares = place if kind == "uniform" else bent
+    else:
+        shares = ndtr((deviation - part.mean_mm) / part.sigma_mm)
+        if kind == "truncated_normal":
+            below, above = (ndtr(limit) for limit in standard_limits(part))
+            shares = np.clip((shares - below) / (above - below), 0.0, 1.0)
+    return shares
+
+
+def moments(part: Part, kind: Distribution) -> tuple[float, float]:
+    """Mean deviation from the nominal, mm, and variance, mm^2."""
+    if part.tolerance_mm == 0:
+        return part.lower_mm, 0.0
+    if kind in ("uniform", "triangular"):
+        return part.middle_mm, part.tolerance_mm**2 / (12 if kind == "uniform" else 24)
+    if kind == "normal":
+        return part.mean_mm, part.sigma_mm**2
+    low, high = standard_limits(part)
+    share = float(ndtr(high) - ndtr(low))
+    shift = (_density(low) - _density(high)) / share
+    spread = 1 + (low * _density(low) - high * _density(high)) / share - shift**2
+    return part.mean_mm + part.sigma_mm * shift, part.sigma_mm**2 * spread
+
+
+def support(part: Part, kind: Distribution) -> tuple[float, float]:
+    """Least and greatest deviation from the nominal, mm; a normal part's as far as it matters."""
+    if kind != "normal":
+        return part.lower_mm, part.upper_mm
+    reach = NORMAL_REACH * part.sigma_mm
+    return part.mean_mm - reach, part.mean_mm + reach
+
+
+def _density(z: float) -> float:
+    return exp(-z * z / 2) / sqrt(2 * pi)

@@ -1,0 +1,151 @@
+"""Monte Carlo of assemblies: the same bits whatever the number of threads.
+
+Assemblies are drawn in chunks of one size, each with a random stream of its own (`numpy.random.SeedSequence.spawn`),
+and every part takes one normal and one uniform number; all distributions share them. Numbers of a truncated normal
+are those of the normal with what lies outside the limits drawn again.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from doe.dimension_chain.closing import ClosingFunction
+from doe.dimension_chain.distributions import standard_limits
+from doe.dimension_chain.links import SLACK, Array, ClosingLink, Distribution, Part
+
+CHUNK = 1 << 14  # assemblies: a handful of columns of them stays in the second-level cache
+ALIKE: tuple[Distribution, ...] = ("normal", "truncated_normal", "uniform")  # laws for all parts alike
+
+
+@dataclass(frozen=True)
+class Assemblies:
+    """Assemblies drawn: how many fall below and above the limits, by the law of the parts.
+
+    ``values`` (samples,) are the closing links, mm, with each part's own distribution ("as_given").
+    """
+
+    samples: int
+    below: dict[str, int]
+    above: dict[str, int]
+    values: Array
+
+
+def draw(
+    function: ClosingFunction,
+    parts: Sequence[Part],
+    limits: ClosingLink,
+    *,
+    samples: int,
+    seed: int,
+    laws: Sequence[Distribution] = ALIKE,
+    threads: int | None = None,
+) -> Assemblies:
+    """Draw assemblies with each part's own distribution, and with all parts of each of ``laws``.
+
+    ``threads``: as many as there are processors unless given; they change no bit of the result.
+    Raises NoValueError where a function has no finite value.
+    """
+    values = np.empty(samples)
+    starts = range(0, samples, CHUNK)
+    streams = np.random.SeedSequence(seed).spawn(len(starts))
+    own = {part.distribution for part in parts}
+    # Parts that all follow one law need no draw of their own.
+    shared = own.pop() if len(own) == 1 and own <= set(laws) else None
+
+    def chunk(index: int) -> dict[str, tuple[int, int]]:
+        out = values[starts[index] : starts[index] + CHUNK]
+        closing = _closing(
+            function, parts, laws, shared is None, np.random.default_rng(streams[index]), len(out)
+        )
+        np.copyto(out, closing[shared or "as_given"])
+        return {law: _outside(each, limits) for law, each in closing.items()}
+
+    workers = threads or os.cpu_count() or 1
+    if workers == 1 or len(starts) == 1:
+        counted = [chunk(index) for index in range(len(starts))]
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            counted = list(pool.map(chunk, range(len(starts))))
+    outside = {law: tuple(sum(each[law][side] for each in counted) for side in (0, 1)) for law in counted[0]}
+    if shared is not None:
+        outside["as_given"] = outside[shared]
+    keys = ("as_given", *laws)
+    return Assemblies(samples, {k: outside[k][0] for k in keys}, {k: outside[k][1] for k in keys}, values)
+
+
+def _outside(values: Array, limits: ClosingLink) -> tuple[int, int]:
+    below = np.count_nonzero(values < limits.lower_mm - SLACK)
+    return int(below), int(np.count_nonzero(values > limits.upper_mm + SLACK))
+
+
+def _closing(
+    function: ClosingFunction,
+    parts: Sequence[Part],
+    laws: Sequence[Distribution],
+    own: bool,
+    generator: np.random.Generator,
+    count: int,
+) -> dict[str, Array]:
+    """Closing links of one chunk by law, and by each part's own distribution where ``own``."""
+    keys = [*(["as_given"] if own else []), *laws]
+    sums = {key: np.zeros(count) for key in keys}
+    offsets = dict.fromkeys(keys, 0.0)
+    sizes: dict[str, dict[str, Array]] = {key: {} for key in keys}
+    work = np.empty(count)
+    for part in parts:
+        coefficient = function.coefficients[part.name]
+        needed: dict[str, Distribution] = dict(zip(laws, laws, strict=True))
+        if own:
+            needed["as_given"] = part.distribution
+        drawn = _drawn(part, set(needed.values()), generator, count)
+        for key, law in needed.items():
+            numbers, scale, shift = drawn[law]
+            if part.name in function.arguments:
+                sizes[key][part.name] = part.nominal_mm + shift + scale * numbers
+            if coefficient:
+                np.multiply(numbers, coefficient * scale, out=work)
+                sums[key] += work
+                offsets[key] += coefficient * (part.nominal_mm + shift)
+    for key in keys:
+        sums[key] += offsets[key]
+        if not function.linear:
+            sums[key] += function.bent(sizes[key])
+    return sums
+
+
+def _drawn(
+    part: Part, laws: set[Distribution], generator: np.random.Generator, count: int
+) -> dict[Distribution, tuple[Array, float, float]]:
+    """For each law random numbers and the scale and shift, mm, that make deviations from the nominal of them."""
+    if part.tolerance_mm == 0:
+        return dict.fromkeys(laws, (np.zeros(count), 0.0, part.lower_mm))
+    found: dict[Distribution, tuple[Array, float, float]] = {}
+    if laws & {"normal", "truncated_normal"}:
+        normal = generator.standard_normal(count)
+        found["normal"] = (normal, part.sigma_mm, part.mean_mm)
+        if "truncated_normal" in laws:
+            inside = _redrawn(normal, *standard_limits(part), generator)
+            found["truncated_normal"] = (inside, part.sigma_mm, part.mean_mm)
+    if laws & {"uniform", "triangular"}:
+        uniform = generator.random(count)
+        found["uniform"] = (uniform, part.tolerance_mm, part.lower_mm)
+        if "triangular" in laws:
+            # The sum of two uniform numbers is triangular.
+            found["triangular"] = (uniform + generator.random(count), part.tolerance_mm / 2, part.lower_mm)
+    return found
+
+
+def _redrawn(normal: Array, low: float, high: float, generator: np.random.Generator) -> Array:
+    """Normal numbers with those outside the limits drawn again until none is left."""
+    numbers = normal.copy()
+    outside = np.flatnonzero((numbers < low) | (numbers > high))
+    while len(outside):
+        numbers[outside] = generator.standard_normal(len(outside))
+        again = numbers[outside]
+        outside = outside[(again < low) | (again > high)]
+    return numbers

@@ -1,0 +1,239 @@
+"""All that is asked of a dimension chain, in one record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from doe.dimension_chain.allocation import Allocation
+from doe.dimension_chain.closing import ClosingFunction, NoValueError
+from doe.dimension_chain.contributions import contributions
+from doe.dimension_chain.cost import total_cost
+from doe.dimension_chain.faults import faults
+from doe.dimension_chain.intervals import interval, linear_interval
+from doe.dimension_chain.links import DIGITS, Array, Chain, Distribution, Interval, Part
+from doe.dimension_chain.monte_carlo import ALIKE, Assemblies, draw
+from doe.dimension_chain.parts import given_parts, has_deviations
+from doe.dimension_chain.selective_assembly import SelectiveAssembly, selective_assembly
+from doe.dimension_chain.yields import (
+    closing_moments,
+    exact_shares,
+    normal_yield,
+    sampled_ppm,
+    sampled_yields,
+    standard_error,
+)
+from rbdyn.faults import InputError
+
+# Shares below the quantiles: the median, 95 %, and the 99.73 % of plus and minus three standard deviations.
+QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """How far a chain with functions is from its linear form at mid-tolerance, mm.
+
+    ``worst_case_error_mm``: the larger distance of the linear worst case from the true one. ``mean_shift_mm`` and
+    ``deviation_error_percent``: the linear mean and standard deviation less those of the Monte Carlo;
+    the latter None where nothing varies.
+    """
+
+    linear_worst_case_mm: Interval
+    worst_case_error_mm: float
+    mean_shift_mm: float
+    deviation_error_percent: float | None
+
+
+@dataclass(frozen=True)
+class ChainResult:
+    """The closing link of a chain, mm, and the allocated parts.
+
+    ``yields`` maps "as_given" (each part's own distribution), "normal", "truncated_normal" and "uniform" (all
+    parts alike) to the share of assemblies within the limits, by Monte Carlo, ``standard_errors`` to half the Wilson
+    interval of one standard deviation, 1/(2 samples) where all or none pass; ``standard_error`` is the largest.
+    ``rejected`` are the assemblies per million below and above the limits; ``exact_yields`` the yields without
+    sampling, None unless the chain is linear; ``normal_yield`` that of a normal closing link. ``contributions`` are
+    in percent, the variance by each part's own distribution. ``mean_mm``, ``standard_deviation_mm`` and
+    ``quantiles_mm`` belong to the Monte Carlo as given. ``cost`` is that of the allocation, where all have curves.
+    """
+
+    nominal_mm: float
+    worst_case_mm: Interval
+    rss_mm: Interval
+    yields: dict[str, float]
+    standard_errors: dict[str, float]
+    contributions: dict[str, dict[str, float]]
+    allocation: tuple[Part, ...]
+    status: str
+    mean_mm: float
+    standard_deviation_mm: float
+    quantiles_mm: dict[float, float]
+    rejected: dict[str, dict[str, float]]
+    exact_yields: dict[str, float] | None
+    normal_yield: float
+    linearisation: Linearisation | None
+    cost: float | None
+    selective: SelectiveAssembly | None
+    samples: int
+    seed: int
+
+    @property
+    def standard_error(self) -> float:
+        """The largest standard error of the yields."""
+        return max(self.standard_errors.values())
+
+    @property
+    def refused(self) -> bool:
+        """Whether the given deviations miss the limits."""
+        return self.status.startswith("refused")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers, lists and dicts, ready for JSON."""
+        shown = ("nominal_mm", "upper_mm", "lower_mm", "grade")
+        return {
+            "closing_link": {
+                "nominal_mm": self.nominal_mm,
+                "worst_case_mm": list(self.worst_case_mm),
+                "rss_mm": list(self.rss_mm),
+            },
+            "yield": {**self.yields, "standard_error": self.standard_error},
+            "contributions": self.contributions,
+            "allocation": {part.name: {key: getattr(part, key) for key in shown} for part in self.allocation},
+            "status": self.status,
+            "distribution": {
+                "mean_mm": self.mean_mm,
+                "standard_deviation_mm": self.standard_deviation_mm,
+                "quantiles_mm": {f"{share:g}": size for share, size in self.quantiles_mm.items()},
+            },
+            "yield_standard_errors": self.standard_errors,
+            "rejected": self.rejected,
+            "exact_yield": self.exact_yields,
+            "normal_yield": self.normal_yield,
+            "linearisation": None if self.linearisation is None else _plain(self.linearisation),
+            "cost": self.cost,
+            "selective_assembly": None if self.selective is None else self.selective.as_dict(),
+            "samples": self.samples,
+            "seed": self.seed,
+        }
+
+
+def solve(
+    chain: Chain, *, samples: int | None = None, seed: int | None = None, threads: int | None = None
+) -> ChainResult:
+    """Intervals, yield, contributions and allocation of a chain.
+
+    A chain without deviations is judged with the allocated ones (status "ok: deviations allocated"). A chain
+    whose given deviations miss the limits, by the interval or yield of its allocation mode, is refused: its status
+    starts with "refused: " and names the numbers and the allocation. Otherwise the status is "ok". ``samples`` and
+    ``seed`` are those of the chain unless given; ``threads`` change no bit.
+
+    Raises InputError with every fault of the chain (see `faults`), or for fewer than one sample.
+    """
+    samples = chain.monte_carlo.samples if samples is None else samples
+    seed = chain.monte_carlo.seed if seed is None else seed
+    found = faults(chain) + ([f"samples = {samples}: must be at least 1"] if samples < 1 else [])
+    if found:
+        raise InputError(found)
+    try:
+        return _solved(Allocation(chain), samples, seed, threads)
+    except NoValueError as error:
+        raise InputError([f"link: {error}"]) from None
+
+
+def _solved(search: Allocation, samples: int, seed: int, threads: int | None) -> ChainResult:
+    chain, function, limits = search.chain, search.function, search.chain.closing_link
+    allocation = search.allocated()
+    given = all(has_deviations(link) for link in chain.free)
+    parts = given_parts(chain.link) if given else allocation
+    drawn = draw(function, parts, limits, samples=samples, seed=seed, threads=threads)
+    yields = sampled_yields(drawn)
+    return ChainResult(
+        nominal_mm=round(float(function.value({part.name: part.nominal_mm for part in parts})), DIGITS),
+        worst_case_mm=interval(function, parts, "worst_case"),
+        rss_mm=interval(function, parts, "rss"),
+        yields=yields,
+        standard_errors={law: standard_error(share, samples) for law, share in yields.items()},
+        contributions=contributions(function, parts),
+        allocation=tuple(allocation),
+        status=_status(search, parts, allocation, yields["as_given"], given),
+        mean_mm=float(drawn.values.mean()),
+        standard_deviation_mm=float(drawn.values.std()),
+        quantiles_mm=_quantiles(drawn.values),
+        rejected=sampled_ppm(drawn),
+        exact_yields=_exact(search, parts),
+        normal_yield=normal_yield(function, parts, limits),
+        linearisation=None if function.linear else _linearisation(function, parts, drawn),
+        cost=_cost(chain, allocation),
+        selective=None
+        if chain.selective is None
+        else selective_assembly(function, parts, limits, chain.selective),
+        samples=samples,
+        seed=seed,
+    )
+
+
+def _plain(record: Linearisation) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in vars(record).items()}
+
+
+def _quantiles(values: Array) -> dict[float, float]:
+    return dict(zip(QUANTILES, np.quantile(values, QUANTILES).tolist(), strict=True))
+
+
+def _exact(search: Allocation, parts: Sequence[Part]) -> dict[str, float] | None:
+    if not search.function.linear:
+        return None
+    limits = search.chain.closing_link
+    laws: dict[str, Distribution | None] = {"as_given": None, **{law: law for law in ALIKE}}
+    return {key: 1 - sum(exact_shares(search.function, parts, limits, law)) for key, law in laws.items()}
+
+
+def _linearisation(function: ClosingFunction, parts: Sequence[Part], drawn: Assemblies) -> Linearisation:
+    linear, true = (rule(function, parts, "worst_case") for rule in (linear_interval, interval))
+    mean, deviation = closing_moments(function, parts, None)
+    sampled = float(drawn.values.std())
+    return Linearisation(
+        linear_worst_case_mm=linear,
+        worst_case_error_mm=max(abs(a - b) for a, b in zip(linear, true, strict=True)),
+        mean_shift_mm=mean - float(drawn.values.mean()),
+        deviation_error_percent=100 * (deviation / sampled - 1) if sampled > 0 else None,
+    )
+
+
+def _cost(chain: Chain, allocation: Sequence[Part]) -> float | None:
+    widths = {part.name: part.tolerance_mm for part in allocation}
+    curves = {link.name: link.cost for link in chain.free if link.cost is not None}
+    if len(curves) < len(chain.free):
+        return None
+    return total_cost(list(curves.values()), [widths[name] for name in curves])
+
+
+def _status(search: Allocation, parts: list[Part], allocation: list[Part], share: float, given: bool) -> str:
+    if not given:
+        return "ok: deviations allocated"
+    if _kept(search, parts, share):
+        return "ok"
+    limits, mode, width = search.chain.closing_link, search.mode, search.chain.width_mm
+    low, high = interval(search.function, parts, mode)
+    by_name = {link.name: link for link in search.chain.link}
+    nearest = ", ".join(f"{part.name} {part.text}" for part in allocation if not by_name[part.name].fixed)
+    if mode == "yield":
+        wanted = f"a yield of {search.chain.allocate.target_yield:g} is wanted"
+        why = f"worst-case tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g} where {wanted}"
+    else:
+        kind = "worst-case" if mode == "worst_case" else "RSS"
+        why = f"{kind} tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g}"
+    return (
+        f"refused: the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm where "
+        f"{limits.lower_mm:.4f} to {limits.upper_mm:.4f} mm is allowed ({why}); the nearest that fits is {nearest}"
+    )
+
+
+def _kept(search: Allocation, parts: list[Part], share: float) -> bool:
+    """Whether given parts keep the limits; a sampled yield is judged by the large Monte Carlo."""
+    if search.mode == "yield" and not search.function.linear:
+        return share >= search.chain.allocate.target_yield
+    return search.kept(parts)
