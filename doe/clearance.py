@@ -5,25 +5,42 @@ The only module of this package that runs bearing simulations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import json
+import os
+import socket
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.study.store import Store, run_key
+from doe.study.failure import Failure
+from doe.study.runner import Give, Outcome, Ran, Take, run_points
+from doe.study.store import Point, Store, run_key
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene
+from rbdyn.sources import source_digest
+
+if TYPE_CHECKING:
+    from rbdyn.dynamics.ensemble import Stop
+    from rbdyn.dynamics.history import History
 
 Array = NDArray[np.float64]
 
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
 # Confirmation runs use seeds that no design run has.
 CONFIRMATION_SEEDS = 1_000_000
+# So do the evaluations of a direct front, one each.
+DIRECT_SEEDS = 2_000_000
+# Of a motion that goes into a report.
+ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
 
 def check_responses(study: Study) -> None:
@@ -62,11 +79,16 @@ def scene_at(
     return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments])
 
 
-def design_scenes(study: Study, points: Array) -> list[Scene]:
-    """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError."""
+def design_scenes(study: Study, points: Array, order: Sequence[int] | None = None) -> list[Scene]:
+    """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError.
+
+    ``order``: place of each run in the standard order, which sets its seed; as given unless told.
+    """
     data, first = read_scene(study), study.file.design.seed
+    places = range(len(points)) if order is None else order
     return [
-        scene_at(study, data, point, first + run, study.file.scene.set) for run, point in enumerate(points)
+        scene_at(study, data, point, first + place, study.file.scene.set)
+        for place, point in zip(places, points, strict=True)
     ]
 
 
@@ -83,70 +105,198 @@ def confirmation_scene(study: Study, point: Array) -> Scene:
     return scene_at(study, read_scene(study), point, seed, overrides)
 
 
+def direct_scene(study: Study, point: Array, number: int) -> Scene:
+    """Scene of an evaluation of the direct front: few turns, a seed of its own."""
+    direct = study.file.direct
+    overrides = [
+        *study.file.scene.set,
+        f"numerics.replicates={direct.replicates}",
+        f"numerics.turns={direct.turns - direct.discard_turns!r}",
+        f"numerics.discard_turns={direct.discard_turns!r}",
+        "numerics.companion=false",
+        *direct.set,
+    ]
+    return scene_at(study, read_scene(study), point, direct.seed + DIRECT_SEEDS + number, overrides)
+
+
 def run_scenes(
     scenes: Sequence[Scene],
     labels: Sequence[str],
     store: Store,
     workers: int | None,
     progress: Callable[[int, int], None],
-) -> list[SimulationResult]:
-    """Results of scenes, from the store or simulated, each stored as soon as it ends.
+    scheduler: str | None = None,
+    *,
+    retry: bool = False,
+    factors: Sequence[Mapping[str, float]] | None = None,
+) -> list[SimulationResult | Failure]:
+    """Results or failures of scenes, from the store or simulated: in threads, or on the cluster of ``scheduler``.
 
-    Raises RunError naming every run that could not go on, after all others have ended; KeyboardInterrupt on
-    Ctrl-C, with all finished runs stored.
+    ``retry``: run those again that failed before. ``factors``: of design runs, which are numbered then. Raises RunError
+    when the store cannot be written, InputError when the cluster is not there, KeyboardInterrupt on Ctrl-C, always with
+    all finished runs stored.
     """
-    version = versions()["rbdyn"]
-    keys = [run_key(scene.model_dump(mode="json"), version) for scene in scenes]
-    stored = {key: store.get(key) for key in keys}
-    missing = {key: scene for key, scene in zip(keys, scenes, strict=True) if stored[key] is None}
-    results = {
-        key: SimulationResult.from_dict(record) for key, record in stored.items() if record is not None
-    }
-    progress(len(results), len(stored))
-    failures: dict[str, RunError] = {}
-    if missing:
-        from rbdyn.dynamics.ensemble import Ended, Stop, run_all
-        from rbdyn.dynamics.model import roller_bearing
-        from rbdyn.dynamics.simulate import prepare, simulate
-
-        # Compiled once here, lest every thread wait for the same compilation.
-        first = next(iter(missing.values()))
-        prepare(first, roller_bearing(first))
-        stop, keys_of_runs = Stop(), list(missing)
-
-        def ended(one: Ended[SimulationResult]) -> None:
-            key = keys_of_runs[one.place]
-            if one.fault is not None:
-                failures[key] = one.fault
-                return
-            results[key] = one.result()
-            store.put(key, results[key].as_dict())
-            progress(len(results), len(stored))
-
-        run_all([partial(simulate, scene, 1, None, stop) for scene in missing.values()], workers, stop, ended)
-    if failures:
-        causes = [
-            f"{label}: {failures[key]}" for label, key in zip(labels, keys, strict=True) if key in failures
-        ]
-        raise RunError("; ".join(causes))
-    return [results[key] for key in keys]
+    points = points_of(scenes, labels, factors)
+    if scheduler is None:
+        by_key = dict(zip((point.key for point in points), scenes, strict=True))
+        engine = partial(_in_threads, by_key, workers)
+    else:
+        texts = {point.key: scene.model_dump_json() for point, scene in zip(points, scenes, strict=True)}
+        engine = partial(_on_cluster, texts, scheduler)
+    found = run_points(points, store, engine, progress, retry)
+    return [_result(point, found[point.key]) for point in points]
 
 
-def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array]:
-    """Values and 95 % statistical half-widths (NaN where there is none), each (runs, responses)."""
+def points_of(
+    scenes: Sequence[Scene], labels: Sequence[str], factors: Sequence[Mapping[str, float]] | None = None
+) -> list[Point]:
+    """Scenes as points of the store; those with factors are design runs, numbered from 1."""
+    version = code_version()
+    places: list[tuple[int | None, Mapping[str, float]]] = (
+        [(None, {})] * len(scenes) if factors is None else list(enumerate(factors, start=1))
+    )
+    return [
+        Point(run_key(scene.model_dump(mode="json"), version), label, *place)
+        for scene, label, place in zip(scenes, labels, places, strict=True)
+    ]
+
+
+def code_version() -> str:
+    """Version of everything that the bits of a run depend on, the source code included."""
+    packages = {name: version for name, version in versions().items() if name != "python"}
+    return json.dumps({**packages, "sources": source_digest()}, sort_keys=True)
+
+
+def _result(point: Point, found: Outcome) -> SimulationResult | Failure:
+    if isinstance(found, Failure):
+        return replace(found, label=point.label, run=point.run, factors=dict(point.factors))
+    return SimulationResult.from_dict(found)
+
+
+def _in_threads(
+    scenes: Mapping[str, Scene], workers: int | None, points: Sequence[Point], take: Take, give: Give
+) -> None:
+    """Engine of this process. A point is claimed when a thread is free for it, so that processes share the work."""
+    from rbdyn.dynamics.ensemble import Stop, run_all
+    from rbdyn.dynamics.model import roller_bearing
+    from rbdyn.dynamics.simulate import prepare
+
+    stop, taken = Stop(), list[Point]()
+
+    def runs() -> Iterator[Callable[[], Ran]]:
+        for point in points:
+            if take([point]):
+                scene = scenes[point.key]
+                if not taken:
+                    # Compiled once here, lest every thread wait for the same compilation; faults are the run's to tell.
+                    with suppress(Exception):
+                        prepare(scene, roller_bearing(scene))
+                taken.append(point)
+                yield partial(attempt, scene, stop)
+
+    run_all(runs(), workers, stop, lambda one: give(taken[one.place], one.result()))
+
+
+def _on_cluster(
+    texts: Mapping[str, str], scheduler: str, points: Sequence[Point], take: Take, give: Give
+) -> None:
+    """Engine of a cluster, whose scheduler knows best what runs where: it gets all points at once."""
+    from doe.study.cluster import run_on_cluster
+
+    taken: list[Point] = []
+
+    def tasks() -> list[str]:
+        taken.extend(take(points))
+        return [texts[point.key] for point in taken]
+
+    work = partial(attempt_text, version=code_version())
+    run_on_cluster(scheduler, work, tasks, lambda place, ran: give(taken[place], ran))
+
+
+def attempt(scene: Scene, stop: Stop | None = None) -> Ran:
+    """Simulate a scene in one thread; whatever is wrong with it is the cause of a failure."""
+    from rbdyn.dynamics.ensemble import CancelledError
+    from rbdyn.dynamics.simulate import simulate
+
+    started = time.perf_counter()
+    result, cause = None, None
+    try:
+        result = simulate(scene, 1, None, stop).as_dict()
+    except (CancelledError, MemoryError, OSError):
+        raise
+    except (RunError, InputError) as error:
+        cause = str(error)
+    except Exception as error:
+        cause = f"unexpected {type(error).__name__}: {error}"
+    return Ran(result, cause, time.perf_counter() - started)
+
+
+def attempt_text(text: str, version: str) -> Ran:
+    """The same on a worker of a cluster, of a scene in JSON. Raises InputError where the worker runs other code."""
+    host, pid = socket.gethostname(), os.getpid()
+    if code_version() != version:
+        raise InputError(
+            [
+                f"worker {host}, process {pid}: runs another version of rbdyn or of its sources; install the same"
+            ]
+        )
+    return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
+
+
+def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Values, 95 % statistical half-widths (NaN where there is none), and about how many independent values are behind
+    each, each of shape (runs, responses)."""
+    from rbdyn.dynamics.batch_means import MOST_BATCHES
+
     records: list[dict[str, Any]] = [result.as_dict() for result in results]
-    values = [[record[name]["value"] for name in study.responses] for record in records]
-    errors = [[record[name]["statistical_error"] for name in study.responses] for record in records]
-    return np.array(values), np.array(errors, dtype=float)
+    values, errors, samples = (
+        [[record[name][key] for name in study.responses] for record in records]
+        for key in ("value", "statistical_error", "effective_samples")
+    )
+    behind = np.minimum(np.array(samples), MOST_BATCHES).astype(np.int64)
+    return np.array(values), np.array(errors, dtype=float), behind
 
 
-def draw_motion(study: Study, points: dict[str, Array], turns: float, folder: Path) -> list[str]:
-    """Draw cage orbits and pocket forces at points; returns the names of the pictures."""
-    from rbdyn import plots
+def histories(study: Study, points: dict[str, Array], turns: float) -> dict[str, History]:
+    """Motion of the confirmation scene at each point, over at most ``turns`` shaft turns. Raises RunError."""
     from rbdyn.dynamics.history import history
 
     scenes = {name: confirmation_scene(study, point) for name, point in points.items()}
-    histories = {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
-    plots.cage_orbit(histories, folder / "cage_orbit.png")
-    plots.pocket_forces(histories, folder / "pocket_forces.png")
+    return {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
+
+
+def draw_motion(motions: Mapping[str, History], folder: Path) -> list[str]:
+    """Draw cage orbits and pocket forces; returns the names of the pictures."""
+    from rbdyn import plots
+
+    plots.cage_orbit(motions, folder / "cage_orbit.png")
+    plots.pocket_forces(motions, folder / "pocket_forces.png")
     return ["cage_orbit.png", "pocket_forces.png"]
+
+
+def motion_record(motions: Mapping[str, History]) -> dict[str, Any]:
+    """Motions small enough to be mailed, by name: the orbit of the cage in its guide, and frames to be played.
+
+    Each holds ``t_s`` and ``cage_orbit_um`` {"x", "y"}: the whole motion, thinned to at most ORBIT_POINTS;
+    ``guide_radius_um``, None without a guide; ``moving``: FRAMES frames of PLAYED_TURNS shaft turns about the
+    largest pocket force, as rbdyn.plots.player.motion_record keeps them.
+    """
+    from rbdyn.plots.drawing import drawing
+    from rbdyn.plots.player import motion_record as frames
+
+    record = {}
+    for name, motion in motions.items():
+        kept = slice(None, None, -(-len(motion.time) // ORBIT_POINTS))
+        x, y = motion.guide_eccentricity
+        clearance = motion.scene.guide_clearance_m
+        picture = drawing(motion, PLAYED_TURNS, round(FRAMES / PLAYED_TURNS), FRAMES)
+        record[name] = {
+            "t_s": np.round(motion.time[kept], 8).tolist(),
+            "cage_orbit_um": {
+                "x": np.round(1e6 * x[kept], 2).tolist(),
+                "y": np.round(1e6 * y[kept], 2).tolist(),
+            },
+            "guide_radius_um": None if clearance is None else round(1e6 * clearance, 3),
+            "moving": frames(motion, picture),
+        }
+    return record

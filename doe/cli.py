@@ -8,11 +8,12 @@ from doe.commands.chain import chain
 from doe.commands.design import design
 from doe.commands.fit import fit
 from doe.commands.front import front
+from doe.commands.status import status
 from doe.commands.study import study
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
-for command in (study, design, fit, front, chain):
+for command in (study, status, design, fit, front, chain):
     app.command()(command)
 
 

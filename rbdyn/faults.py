@@ -21,6 +21,10 @@ class InputError(Exception):
         self.faults = list(faults)
         super().__init__("\n".join(self.faults))
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[list[str]]]:
+        """How it travels between processes: with its faults, not with their text."""
+        return type(self), (self.faults,)
+
 
 class RunError(Exception):
     """A run that could not go on; the message says which, where and why. A command exits with 1."""

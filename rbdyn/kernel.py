@@ -24,6 +24,8 @@ from llvmlite.binding import get_host_cpu_features
 from numba import njit
 from numba.core import types
 
+from rbdyn.sources import source_digest
+
 # No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
 # arrays happen to lie: only when every operation is rounded by itself do both give the same bits. And NaN stays a signal.
 OPTIONS: dict[str, Any] = {"error_model": "numpy"}
@@ -148,9 +150,7 @@ def entry(function: Callable[..., Any]) -> Any:
 @functools.cache
 def cache_folder() -> Path:
     """Folder of the compiled code of exactly these sources; a temporary one where the home is read-only."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(source.read_bytes())
+    digest = hashlib.sha256((numba.__version__ + source_digest()).encode())
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     folder = Path(base) / "rbdyn" / digest.hexdigest()[:16]
     try:

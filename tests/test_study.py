@@ -22,7 +22,7 @@ from doe.study import run_study
 from doe.study.confirmation import Confirmed, Gain, gains
 from doe.study.front import find_front
 from doe.study.runs import read_runs, run_design
-from doe.study.store import Store, run_key
+from doe.study.store import run_key
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError
@@ -61,6 +61,7 @@ def finished(tmp_path_factory):
 def test_every_file_is_written(finished):
     _, folder, files = finished
     assert {"summary.json", "design_runs.csv", "anova.csv", "front.csv", "part_dimensions.csv"} <= set(files)
+    assert {"report.html", "report.md"} <= set(files)
     assert {"pareto_front.png", "cage_orbit.png", "pocket_forces.png"} <= set(files)
     assert sum(name.startswith("surface_") for name in files) == 3
     for name in files:
@@ -151,7 +152,7 @@ def test_killed_study_loses_no_finished_run(finished, tmp_path):
 
 
 def stored(path: Path) -> int:
-    """Rows in a store that another process may be making."""
+    """Finished runs in a store that another process may be making."""
     try:
         return len(rows(path))
     except sqlite3.Error:
@@ -159,20 +160,25 @@ def stored(path: Path) -> int:
 
 
 def rows(path: Path) -> dict[str, str]:
-    """All rows of a store."""
+    """Results in a store by key."""
     if not path.exists():
         return {}
     connection = sqlite3.connect(path)
     try:
-        return dict(connection.execute("SELECT key, result FROM runs"))
+        return dict(connection.execute("SELECT key, result FROM runs WHERE status = 'done'"))
     finally:
         connection.close()
 
 
-def test_run_that_cannot_go_on_is_named_and_the_others_are_kept(tmp_path):
+def test_failed_runs_are_grouped_by_cause_and_too_few_left_end_the_study(tmp_path):
     study = Study.load(short_study(tmp_path, SHORT + ",step_budget_per_turn=100"))
-    with pytest.raises(RunError, match=r"design run 1: .*step budget .*numerics\.step_budget_per_turn"):
+    with pytest.raises(RunError) as refused:
         run_design(study, tmp_path, None, silent)
+    sentence = str(refused.value)
+    assert sentence.startswith("only 0 of 20 design runs went well, of which the response models need 11: ")
+    # One cause, told once with all its runs.
+    assert sentence.count("raise numerics.step_budget_per_turn") == 1
+    assert "design run 1, design run 2, " in sentence
     assert stored(tmp_path / "study.sqlite") == 0
 
 
@@ -236,17 +242,6 @@ def test_gain_counts_only_beyond_its_error(tmp_path):
     found = gains(study, baseline, pick)
     assert [gain.verdict for gain in found] == ["within error", "better", "worse"]
     assert found[0] == Gain("impact_force_N", pytest.approx(4.0), pytest.approx(5.0))
-
-
-def test_store_keeps_and_refuses(tmp_path):
-    with Store(tmp_path / "runs.sqlite") as store:
-        assert store.get("a") is None
-        store.put("a", {"x": 1.5})
-        store.put("a", {"x": 2.5})
-        assert store.get("a") == {"x": 1.5}
-    (tmp_path / "text.sqlite").write_text("not a database, and long enough to be told from one" * 30)
-    with pytest.raises(InputError, match="cannot be used as a store"):
-        Store(tmp_path / "text.sqlite")
 
 
 def test_key_follows_scene_and_version(tmp_path):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from doe.commands.options import Data, Json, Out, Quiet, StudyPath, Workers
+from typing import Annotated
+
+import typer
+
+from doe.commands.options import Data, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import fitted, save
 from rbdyn.terminal import guarded, print_json
 
@@ -12,17 +16,29 @@ def fit(
     data: Data = None,
     out: Out = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also residual, leverage and Cook's distance of each run.")
+    ] = False,
 ) -> None:
     """Fit the response surfaces and print their analysis of variance."""
     with guarded(as_json):
-        from doe.report.fit import fit_record, print_fit
+        from doe.report.fit import fit_record, fit_tables, print_fit
+        from doe.study.surfaces import with_rivals
 
-        _, surfaces = fitted(path, data, out, workers, quiet or as_json)
+        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)
+        surfaces = with_rivals(surfaces)
         record = fit_record(surfaces)
         save(out, "fit.json", record)
+        if out is not None:
+            import pandas as pd
+
+            for name, rows in fit_tables(surfaces).items():
+                pd.DataFrame(rows).to_csv(out / name, index=False)
         if as_json:
             print_json(record)
         else:
-            print_fit(surfaces, quiet)
+            print_fit(surfaces, quiet, verbose, loaded.factors)

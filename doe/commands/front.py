@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doe.commands.options import Data, Json, Out, Quiet, StudyPath, Workers
-from doe.commands.steps import fitted, save
+from doe.commands.options import Data, Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
+from doe.commands.steps import fitted, save, searched
+from rbdyn.faults import InputError
 from rbdyn.terminal import guarded, print_json
+
+if TYPE_CHECKING:
+    from doe.study_file import Study
+
+Point = Annotated[
+    str | None,
+    typer.Option(
+        metavar="A,B,...|NAME=A,...",
+        help="Also what the surfaces say of this point: factor values in order, or by name (the rest at the baseline).",
+    ),
+]
 
 
 def front(
@@ -16,19 +28,65 @@ def front(
     data: Data = None,
     out: Out = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
+    point: Point = None,
+    direct: Direct = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also every point of the front.")] = False,
 ) -> None:
     """Find the Pareto front on the response surfaces."""
     with guarded(as_json):
-        from doe.report.front import front_record, print_front
+        from doe.report.front import asked_point_record, front_record, print_front
         from doe.study.front import find_front
+        from doe.study_file import Study
 
-        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json)
-        record = front_record(loaded, surfaces, find_front(loaded, surfaces))
+        values = None if point is None else _point(Study.load(path), point)
+        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)
+        found = find_front(loaded, surfaces)
+        record = front_record(loaded, surfaces, found)
+        if values is not None:
+            import numpy as np
+
+            record["point"] = asked_point_record(loaded, surfaces, found, np.array(values))
+        if direct:
+            from doe.report.confirmation import direct_record
+
+            record["direct"] = direct_record(
+                loaded, searched(loaded, found, out, workers, quiet or as_json, scheduler, retry)
+            )
         save(out, "front.json", record)
         if as_json:
             print_json(record)
         else:
             print_front(record, verbose)
+
+
+def _point(study: Study, text: str) -> list[float]:
+    """Factor values that ``--point`` names. Raises InputError with every fault."""
+    from math import isfinite
+
+    values = dict(zip(study.factors, study.baseline.tolist(), strict=True))
+    parts = [part.strip() for part in text.split(",")]
+    named = any("=" in part for part in parts)
+    if not named and len(parts) != len(study.factors):
+        raise InputError(
+            [f"--point {text}: give one value a factor ({', '.join(study.factors)}), or name=value"]
+        )
+    pairs = [part.partition("=")[::2] for part in parts] if named else zip(study.factors, parts, strict=True)
+    faults = []
+    for name, number in ((name.strip(), number.strip()) for name, number in pairs):
+        if name not in values:
+            faults.append(f"--point {name}: no such factor; name one of {', '.join(values)}")
+            continue
+        try:
+            values[name] = float(number)
+        except ValueError:
+            faults.append(f"--point {name} = {number}: is not a number; write a plain number")
+            continue
+        if not isfinite(values[name]):
+            faults.append(f"--point {name} = {number}: is not a finite number; write a plain number")
+    if faults:
+        raise InputError(faults)
+    return list(values.values())

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 from rbdyn.terminal import output_folder, progress_bar
 
 if TYPE_CHECKING:
+    from doe.pareto import ParetoFront
     from doe.response_surface import Surface
+    from doe.study.direct import Direct
     from doe.study_file import Study
 
 
@@ -24,7 +26,13 @@ def save(out: Path | None, name: str, record: dict[str, Any]) -> None:
 
 
 def fitted(
-    path: Path, data: Path | None, out: Path | None, workers: int | None, quiet: bool
+    path: Path,
+    data: Path | None,
+    out: Path | None,
+    workers: int | None,
+    quiet: bool,
+    scheduler: str | None,
+    retry: bool,
 ) -> tuple[Study, list[Surface]]:
     """The study and its surfaces, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
     from doe.study.runs import read_runs, run_design
@@ -35,7 +43,32 @@ def fitted(
     if data is not None:
         return loaded, fit_surfaces(loaded, read_runs(loaded, data))
     with _store_folder(out) as folder, progress_bar("design runs", quiet) as progress:
-        return loaded, fit_surfaces(loaded, run_design(loaded, folder, workers, progress))
+        return loaded, fit_surfaces(loaded, run_design(loaded, folder, workers, progress, scheduler, retry))
+
+
+def searched(
+    study: Study,
+    found: ParetoFront,
+    out: Path | None,
+    workers: int | None,
+    quiet: bool,
+    scheduler: str | None,
+    retry: bool,
+) -> Direct:
+    """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
+    from doe.study.direct import find_direct
+    from doe.study.runs import STORE
+    from doe.study.simulations import Simulations
+    from doe.study.store import Store
+
+    with (
+        _store_folder(out) as folder,
+        Store(folder / STORE, study.path.stem) as store,
+        progress_bar("direct front", quiet) as progress,
+    ):
+        return find_direct(
+            study, found, Simulations(store, workers, scheduler, retry, lambda title: progress)
+        )
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from pathlib import Path
 
-from doe.commands.options import Json, Out, Quiet, StudyPath, Verbose, Workers
+from doe.commands.options import Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
 from rbdyn.terminal import guarded, output_folder, print_json, progress_bar
 
 
@@ -13,6 +13,9 @@ def study(
     path: StudyPath,
     out: Out = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
+    direct: Direct = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -34,6 +37,9 @@ def study(
             folder,
             workers,
             lambda title: bars.enter_context(progress_bar(title, quiet or as_json)),
+            scheduler,
+            retry,
+            direct,
         )
         bars.close()
         written = write(outcome, folder)
@@ -41,7 +47,7 @@ def study(
             print_json(summary(outcome))
             return
         if verbose:
-            print_fit(outcome.surfaces)
+            print_fit(outcome.surfaces, factors=loaded.factors)
         print_outcome(outcome, quiet)
         print(f"{outcome.cost['total_s']:.1f} s, of which design runs {outcome.cost['design_s']:.1f} s")
         print(f"written to {folder}: {', '.join(written)}")

@@ -1,6 +1,24 @@
-"""Designs of experiments in coded units, one column a factor; ``coding`` turns them into actual ones."""
+"""Designs of experiments in coded units, one column a factor; ``coding`` turns them into actual ones.
 
-from doe.designs.central_composite import axial_distance, central_composite
+- ``central_composite`` (on ``cube``), ``box_behnken``, ``grids``: the designs, each a ``design.Design``
+- ``evaluation`` (on ``model`` and ``region``): what a design can tell before any run is made
+"""
+
+from doe.designs.box_behnken import box_behnken
+from doe.designs.central_composite import axial_distance, central_composite, central_composite_design
 from doe.designs.coding import to_actual, to_coded
+from doe.designs.design import Design
+from doe.designs.grids import full_factorial, latin_hypercube, sobol
 
-__all__ = ["axial_distance", "central_composite", "to_actual", "to_coded"]
+__all__ = [
+    "Design",
+    "axial_distance",
+    "box_behnken",
+    "central_composite",
+    "central_composite_design",
+    "full_factorial",
+    "latin_hypercube",
+    "sobol",
+    "to_actual",
+    "to_coded",
+]

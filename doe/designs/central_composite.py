@@ -3,53 +3,146 @@
 from __future__ import annotations
 
 import math
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from doe.designs.cube import corner_blocks, cube_points
+from doe.designs.design import Design, assembled
+
 Array = NDArray[np.float64]
 
+WORDS = ("rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "face_centred", "inscribed")
 
-def central_composite(factors: int, *, alpha: float | str = "rotatable", centre_replicates: int = 6) -> Array:
-    """Central composite design in standard order: cube (first factor fastest), axial, centre points.
+
+def central_composite(
+    factors: int, *, alpha: float | str = "rotatable", centre_replicates: int = 6, cube: str = "full"
+) -> Array:
+    """Points (n, k) of a central composite design in standard order: cube (first factor fastest), axial, centre.
+
+    See `central_composite_design` for the parameters and what is raised.
+    """
+    return central_composite_design(
+        factors, alpha=alpha, centre_replicates=centre_replicates, cube=cube
+    ).coded
+
+
+def central_composite_design(
+    factors: int,
+    *,
+    alpha: float | str = "rotatable",
+    centre_replicates: int = 6,
+    cube: str = "full",
+    blocks: bool = False,
+    cube_blocks: int = 1,
+) -> Design:
+    """Central composite design in standard order.
 
     Parameters
     ----------
     factors : number of factors k, at least 2.
-    alpha : axial distance in coded units, or "rotatable" for (2^k)^(1/4), which makes the variance of a
-        predicted quadratic depend on the distance from the centre only.
+    alpha : axial distance in coded units, or one of the words of `axial_distance`; "inscribed" is the
+        rotatable design shrunk until its axial points lie at -1 and +1.
     centre_replicates : number of centre points, from whose scatter pure error is estimated.
-
-    Returns
-    -------
-    Coded points, shape (2^k + 2 k + centre_replicates, k).
+    cube : "full", or "resolution_v" for the tabulated fraction.
+    blocks : run cube and axial points in blocks of their own, the centre points shared between them by
+        `centre_shares`.
+    cube_blocks : blocks of the cube, 1, 2 or 4 (with ``blocks``).
 
     Raises
     ------
-    ValueError when a number is out of its range or ``alpha`` is an unknown word.
+    ValueError when a number is out of its range, ``alpha`` or ``cube`` is an unknown word, no fraction is
+    tabulated, or the blocks are impossible.
 
-    Source: Box and Hunter, Multi-factor experimental designs (1957).
+    Source: Box and Hunter, Multi-factor experimental designs for exploring response surfaces,
+    Ann. Math. Stat. 28 (1957) 195-241.
     """
     if factors < 2:
         raise ValueError(f"factors = {factors}: a central composite design needs at least 2 factors")
     if centre_replicates < 0:
         raise ValueError(f"centre_replicates = {centre_replicates}: must be at least 0")
-    distance = axial_distance(factors, alpha)
-    cube = np.array([corner[::-1] for corner in product((-1.0, 1.0), repeat=factors)])
-    axial = np.kron(np.eye(factors), [[-distance], [distance]])
-    return np.vstack([cube, axial, np.zeros((centre_replicates, factors))])
+    corners = cube_points(factors, cube)
+    number = cube_blocks if blocks else 1
+    shares = centre_shares(factors, len(corners), alpha, centre_replicates, number)
+    distance = axial_distance(factors, alpha, cube_runs=len(corners), centres=shares)
+    axial = np.asarray(np.kron(np.eye(factors), [[-distance], [distance]]), float)
+    if alpha == "inscribed":
+        corners = corners / axial_distance(factors, "rotatable", cube_runs=len(corners))
+    parts = [("cube", corners), ("axial", axial), ("centre", np.zeros((centre_replicates, factors)))]
+    of_run = [0] * (len(corners) + len(axial) + centre_replicates)
+    if blocks:
+        of_cube = corner_blocks(corners, number).tolist()
+        of_centres = [each % number for each in range(shares[0])] + [number] * shares[1]
+        of_run = [*of_cube, *[number] * len(axial), *of_centres]
+    ball = distance > 1.0 or alpha == "inscribed"
+    return assembled(parts, of_run, max(1.0, distance), "ball" if ball else "box")
 
 
-def axial_distance(factors: int, alpha: float | str) -> float:
-    """Axial distance of a full-cube design in coded units, from a number or the word "rotatable".
+def axial_distance(
+    factors: int,
+    alpha: float | str,
+    *,
+    cube_runs: int | None = None,
+    centres: tuple[int, int] = (0, 0),
+) -> float:
+    """Axial distance in coded units, from a number or a word.
+
+    With k factors, F runs of the cube (``cube_runs``; 2^k unless given), ``centres`` centre points with the
+    cube and with the axial points, and N runs in all:
+
+    - "rotatable": F^(1/4); the variance of a predicted quadratic depends on the distance from the centre only
+    - "spherical": sqrt(k); axial points as far out as the corners of the cube
+    - "orthogonal_blocks": alpha^2 = k (1 + n0s/(2k)) / (1 + n0c/F); cube and axial block shift no term
+    - "orthogonal_columns": alpha^2 = (sqrt(F N) - F)/2; square terms are estimated independently of each other
+    - "face_centred": 1; "inscribed": 1, with the cube shrunk
 
     Raises ValueError for an unknown word or a number that is not positive and finite.
+
+    Source: Box and Hunter (1957), rotatability and blocks; Khuri and Cornell, Response Surfaces (1987), columns.
     """
+    cube = 2**factors if cube_runs is None else cube_runs
+    total = cube + 2 * factors + sum(centres)
+    if alpha in ("face_centred", "inscribed"):
+        return 1.0
     if alpha == "rotatable":
-        return math.pow(2.0, factors / 4)
+        return math.pow(cube, 0.25)
+    if alpha == "spherical":
+        return math.sqrt(factors)
+    if alpha == "orthogonal_blocks":
+        return math.sqrt(factors * (1 + centres[1] / (2 * factors)) / (1 + centres[0] / cube))
+    if alpha == "orthogonal_columns":
+        return math.sqrt((math.sqrt(cube * total) - cube) / 2)
     if isinstance(alpha, str):
-        raise ValueError(f'alpha = {alpha!r}: write "rotatable" or a positive number')
+        words = ", ".join(f'"{word}"' for word in WORDS)
+        raise ValueError(f"alpha = {alpha!r}: write {words} or a positive number")
     if not (math.isfinite(alpha) and alpha > 0):
         raise ValueError(f"alpha = {alpha}: must be a positive number")
     return float(alpha)
+
+
+def centre_shares(
+    factors: int, cube_runs: int, alpha: float | str, centre_replicates: int, cube_blocks: int = 1
+) -> tuple[int, int]:
+    """Centre points with the cube and with the axial points, of ``centre_replicates`` in all.
+
+    The share whose orthogonal blocking is nearest to the axial distance that is asked for (the rotatable one
+    for alpha = "orthogonal_blocks"), so that blocks disturb the surface least; every block of the cube gets
+    the same number.
+
+    Raises ValueError for an unknown ``alpha``.
+    """
+    free = ("orthogonal_blocks", "inscribed")
+    wanted = axial_distance(
+        factors,
+        "rotatable" if alpha in free else alpha,
+        cube_runs=cube_runs,
+        centres=(0, centre_replicates),
+    )
+
+    def away(with_cube: int) -> float:
+        shares = (with_cube, centre_replicates - with_cube)
+        found = axial_distance(factors, "orthogonal_blocks", cube_runs=cube_runs, centres=shares)
+        return abs(math.log(found / wanted))
+
+    best = min(range(0, centre_replicates + 1, cube_blocks), key=away)
+    return best, centre_replicates - best

@@ -1,5 +1,17 @@
-"""Pareto fronts: search, picks, errors."""
+"""Pareto fronts: search, picks, errors.
 
-from doe.pareto.nsga2 import ParetoFront, front, hypervolume, knee_depth, non_dominated
+- ``goals``, ``archive``, ``indicators``, ``picks``: costs of responses, what is not dominated, how good, which one
+- ``nsga2``: the front of cheap responses
+- ``uncertainty``: what the surfaces' errors make of a front and of a gain
+- ``quadratic``, ``tolerance_aware``: the front of what manufacture leaves of a point
+- ``tolerance``: backwards from a pick to the widest tolerances that keep its gains
+- ``dominance``, ``direct``, ``surrogate_loss``: the front of a noisy simulator, and what surfaces lose against it
+"""
 
-__all__ = ["ParetoFront", "front", "hypervolume", "knee_depth", "non_dominated"]
+from doe.pareto.archive import non_dominated
+from doe.pareto.goals import Goals
+from doe.pareto.indicators import hypervolume
+from doe.pareto.nsga2 import InfeasibleError, ParetoFront, front
+from doe.pareto.picks import knee_depth
+
+__all__ = ["Goals", "InfeasibleError", "ParetoFront", "front", "hypervolume", "knee_depth", "non_dominated"]

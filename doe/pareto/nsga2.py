@@ -1,7 +1,7 @@
-"""Pareto fronts of cheap objectives: NSGA-II with an archive of every evaluation, a knee and a pick.
+"""Pareto fronts of cheap responses: NSGA-II with an archive of every evaluation, picks and a hypervolume.
 
-All objectives are minimised. Normalised objectives are 0 at the ideal point and 1 at the nadir point of the
-archive's front. The hypervolume is that of normalised objectives up to `REFERENCE` in each of them.
+Responses stay in their own units; the search minimises the costs that their goals make of them. What breaks a limit
+gives way to what keeps it (constrained domination), and only the latter enters the archive.
 
 Source: Deb et al., A fast and elitist multiobjective genetic algorithm: NSGA-II (2002).
 """
@@ -10,41 +10,82 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from doe.pareto.archive import Archive, archives, spread
+from doe.pareto.goals import Goals
+from doe.pareto.indicators import hypervolume, normalised
+from doe.pareto.picks import NAMES, Rule, knee_depth, pick_all
+
+if TYPE_CHECKING:
+    from doe.pareto.tolerance_aware import ToleranceAware
+    from doe.pareto.uncertainty import FrontUncertainty
+
 Array = NDArray[np.float64]
 Objectives = Callable[[Array], Array]
 
-REFERENCE = 1.1  # reference point of the hypervolume: the nadir and a tenth of each range beyond it
+
+class Judged(NamedTuple):
+    """Costs (n, q) of points and by how much they break each limit (n, c)."""
+
+    costs: Array
+    violations: Array
+
+
+class InfeasibleError(ValueError):
+    """No point keeps all limits. ``point`` comes closest and breaks limit c by ``violations`` (c,)."""
+
+    def __init__(self, point: Array, violations: Array) -> None:
+        self.point, self.violations = point, violations
+        super().__init__("no point keeps all limits; loosen one")
 
 
 @dataclass(frozen=True, eq=False)
 class ParetoFront:
-    """Non-dominated points of every point evaluated, in ascending order of the first objective.
+    """Non-dominated points of every point evaluated, in ascending order of the first cost.
 
-    ``points`` (f, k) in the factors' units and ``values`` (f, m) in the objectives' units; ``ideal`` and
-    ``nadir`` (m,) are the best and worst of each objective on the front; ``knee`` and ``pick`` are row
-    numbers. ``archive_size`` counts the front before thinning and ``hypervolume`` is of that front;
-    ``hypervolume_history`` (generations,) is on the same scale. ``baseline_values`` (m,) is None without a
-    baseline.
+    ``points`` (f, k) in the factors' units; ``values`` (f, m) in the responses' units, watched ones too, and
+    ``costs`` (f, q) what their goals make of them. ``ideal`` and ``nadir`` (q,) are the best and worst of each cost on
+    the front; ``knee``, ``pick`` and ``picks`` (the pick of every rule) are row numbers. ``archive_size`` counts the
+    front before thinning and ``hypervolume`` is of that front; ``hypervolume_history`` (generations,) is on the same
+    scale. ``baseline_values`` (m,) and ``baseline_costs`` (q,) are None without a baseline. ``feasible`` is the share
+    of the evaluated points that keep all limits. ``standard_errors`` (f, m), ``uncertainty`` and ``tolerance_aware``
+    are None where they were not asked for.
     """
 
     points: Array
     values: Array
+    costs: Array
     hypervolume: float
     hypervolume_history: Array
     ideal: Array
     nadir: Array
     knee: int
     pick: int
+    picks: dict[Rule, int]
     pick_reason: str
     baseline_values: Array | None
+    baseline_costs: Array | None
     archive_size: int
     evaluations: int
+    feasible: float
     generations: int
     seed: int
+    goals: Goals
+    standard_errors: Array | None = None
+    uncertainty: FrontUncertainty | None = None
+    tolerance_aware: ToleranceAware | None = None
+
+
+class Search(NamedTuple):
+    """Archive after every generation, number of evaluations and the share of them that keep all limits."""
+
+    archives: list[Archive]
+    evaluations: int
+    feasible: float
 
 
 def front(
@@ -52,99 +93,103 @@ def front(
     lower: ArrayLike,
     upper: ArrayLike,
     *,
+    goals: Goals | None = None,
     population: int = 100,
     generations: int = 200,
     seed: int = 1,
     baseline: ArrayLike | None = None,
     keep: int = 200,
+    pick: Rule = "knee",
+    standard_errors: Objectives | None = None,
 ) -> ParetoFront:
-    """Find the Pareto front of objectives over a box; the same seed gives the same bits.
+    """Find the Pareto front of responses over a box; the same seed gives the same bits.
 
     Parameters
     ----------
-    objectives : maps points (n, k) to values (n, m), m >= 2, all to be minimised.
+    objectives : maps points (n, k) to responses (n, m), at least two of them with a goal.
     lower, upper : bounds of the factors, shape (k,).
+    goals : what is wanted of the responses; all to be minimised without it.
     population, generations, seed : of NSGA-II.
-    baseline : a point (k,) to improve on. The pick is then the knee of those front points that dominate it.
+    baseline : a point (k,) to improve on. Picks are then among those front points that dominate it.
     keep : about how many points to return. A larger front is thinned to evenly spread points, among them
-        the best and worst of each objective, the knee and the pick.
+        the best and worst of each cost, the knee and the picks.
+    pick : rule that makes the pick.
+    standard_errors : maps points (n, k) to the standard errors (n, m) of their responses.
 
     Raises
     ------
-    ValueError when the bounds are not a box, a setting is out of range, or an objective is not finite.
+    ValueError when the bounds are not a box, a setting is out of range, or an objective is not finite;
+    InfeasibleError when no point evaluated keeps all limits.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
-    _check(low, high, population, generations, keep)
+    check_search(low, high, population, generations, keep)
     if baseline is not None and np.shape(baseline) != low.shape:
         raise ValueError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
-    history = _evolve(objectives, low, high, population, generations, seed)
-    archives = _archives(history)
-    points, values = archives[-1]
-    ideal, nadir = values.min(axis=0), values.max(axis=0)
+    if goals is None:
+        goals = Goals.of(["min"] * _evaluate(objectives, (low + high)[None, :] / 2).shape[1])
+    wanted = goals
+
+    def judge(points: Array) -> Judged:
+        values = _evaluate(objectives, points)
+        return Judged(wanted.costs(values), wanted.violations(values, values))
+
+    found = search(judge, low, high, population, generations, seed)
+    points, costs = found.archives[-1]
+    ideal, nadir = costs.min(axis=0), costs.max(axis=0)
     baseline_values = None if baseline is None else _evaluate(objectives, np.atleast_2d(baseline))[0]
-    depth = knee_depth(values)
-    best = int(depth.argmax())
-    pick, reason = _pick(values, depth, baseline_values)
-    kept = _spread(_normalised(values, ideal, nadir), keep, [best, pick])
+    baseline_costs = None if baseline_values is None else goals.costs(baseline_values)
+    best = int(knee_depth(costs).argmax())
+    picks, among = pick_all(costs, goals, baseline_costs)
+    kept = spread(normalised(costs, ideal, nadir), keep, [best, *picks.values()])
+    places = {rule: int(np.searchsorted(kept, row)) for rule, row in picks.items()}
     return ParetoFront(
         points=points[kept],
-        values=values[kept],
-        hypervolume=hypervolume(values, ideal, nadir),
-        hypervolume_history=np.array([hypervolume(each, ideal, nadir) for _, each in archives]),
+        values=_evaluate(objectives, points[kept]),
+        costs=costs[kept],
+        hypervolume=hypervolume(costs, ideal, nadir),
+        hypervolume_history=np.array([hypervolume(each.costs, ideal, nadir) for each in found.archives]),
         ideal=ideal,
         nadir=nadir,
         knee=int(np.searchsorted(kept, best)),
-        pick=int(np.searchsorted(kept, pick)),
-        pick_reason=reason,
+        pick=places[pick],
+        picks=places,
+        pick_reason=f"{NAMES[pick]} {among}",
         baseline_values=baseline_values,
-        archive_size=len(values),
-        evaluations=sum(len(values) for _, values in history),
+        baseline_costs=baseline_costs,
+        archive_size=len(costs),
+        evaluations=found.evaluations,
+        feasible=found.feasible,
         generations=generations,
         seed=seed,
+        goals=goals,
+        standard_errors=None if standard_errors is None else standard_errors(points[kept]),
     )
 
 
-def non_dominated(values: Array) -> NDArray[np.intp]:
-    """Row numbers of the non-dominated of ``values`` (n, m), by ascending first objective, no repeats."""
-    from pymoo.util.nds.non_dominated_sorting import find_non_dominated
+def search(
+    judge: Callable[[Array], Judged], low: Array, high: Array, population: int, generations: int, seed: int
+) -> Search:
+    """NSGA-II over a box, with the archive of all evaluations after every generation.
 
-    unique, rows = np.unique(values, axis=0, return_index=True)
-    chosen: NDArray[np.intp] = rows[find_non_dominated(unique)]
-    return chosen
-
-
-def hypervolume(values: Array, ideal: Array, nadir: Array) -> float:
-    """Volume that ``values`` (n, m) dominate, in objectives normalised to ``ideal`` 0 and ``nadir`` 1.
-
-    The reference point is `REFERENCE` in each objective, so the largest volume possible is REFERENCE^m.
-    Fronts compare only under the same ``ideal`` and ``nadir``.
+    Raises InfeasibleError when no point evaluated keeps all limits.
     """
-    from pymoo.indicators.hv import HV
-
-    inside = _normalised(values, ideal, nadir)
-    inside = inside[(inside < REFERENCE).all(axis=1)]
-    return float(HV(ref_point=np.full(values.shape[1], REFERENCE))(inside)) if len(inside) else 0.0
-
-
-def knee_depth(values: Array) -> Array:
-    """Depth (n,) of front points (n, m) below the hyperplane through the best point of each objective.
-
-    The knee is the deepest point. Distances are in normalised objectives. Where the best points do not span
-    a plane that falls in every objective, the plane on which normalised objectives sum to 1 takes its place.
-
-    Source: Das, On characterizing the "knee" of the Pareto curve (1999).
-    """
-    scaled = _normalised(values, values.min(axis=0), values.max(axis=0))
-    extremes = scaled[scaled.argmin(axis=0)]
-    normal = np.ones(scaled.shape[1])
-    if np.linalg.cond(extremes) < 1e8:
-        solved = np.linalg.solve(extremes, normal)
-        normal = solved if (solved > 0).all() else normal
-    depth: Array = (1 - scaled @ normal) / np.linalg.norm(normal)
-    return depth
+    history = _evolve(judge, low, high, population, generations, seed)
+    allowed = [(judged.violations <= 0.0).all(axis=1) for _, judged in history]
+    count = sum(len(points) for points, _ in history)
+    if not any(rows.any() for rows in allowed):
+        points = np.vstack([points for points, _ in history])
+        violations = np.vstack([judged.violations for _, judged in history])
+        closest = _scaled(violations).sum(axis=1).argmin()
+        raise InfeasibleError(points[closest], violations[closest])
+    kept = [
+        Archive(points[rows], judged.costs[rows])
+        for (points, judged), rows in zip(history, allowed, strict=True)
+    ]
+    return Search(archives(kept), count, sum(int(rows.sum()) for rows in allowed) / count)
 
 
-def _check(low: Array, high: Array, population: int, generations: int, keep: int) -> None:
+def check_search(low: Array, high: Array, population: int, generations: int, keep: int) -> None:
+    """Raises ValueError when the bounds are not a box or a setting is out of range."""
     if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low) & np.isfinite(high)).all():
         raise ValueError("lower and upper bounds must be equally long lists of finite numbers")
     wrong = np.flatnonzero(low >= high)
@@ -177,63 +222,36 @@ def _evaluate(objectives: Objectives, points: Array) -> Array:
     return values
 
 
+def _scaled(violations: Array) -> Array:
+    """Violations (n, c) in shares of their largest, so that no unit outweighs another."""
+    largest = violations.max(axis=0, initial=0.0)
+    shares: Array = violations / np.where(largest > 0.0, largest, 1.0)
+    return shares
+
+
 def _evolve(
-    objectives: Objectives, low: Array, high: Array, population: int, generations: int, seed: int
-) -> list[tuple[Array, Array]]:
-    """Points and values of each generation."""
+    judge: Callable[[Array], Judged], low: Array, high: Array, population: int, generations: int, seed: int
+) -> list[tuple[Array, Judged]]:
+    """Points of each generation and what was found of them."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem
     from pymoo.optimize import minimize
 
-    history: list[tuple[Array, Array]] = []
-    count = _evaluate(objectives, (low + high)[None, :] / 2).shape[1]
+    history: list[tuple[Array, Judged]] = []
+    # The scale of the violations is that of points all over the box.
+    sample = judge(np.random.default_rng(seed).uniform(low, high, (population, low.size)))
+    largest = sample.violations.max(axis=0, initial=0.0)
+    scale = np.where(largest > 0.0, largest, 1.0)
 
     class Recorded(Problem):
         def _evaluate(self, x: Array, out: dict[str, Array]) -> None:
-            out["F"] = _evaluate(objectives, x)
-            history.append((x.copy(), out["F"].copy()))
+            found = judge(x)
+            out["F"] = found.costs
+            if scale.size:
+                out["G"] = found.violations / scale
+            history.append((x.copy(), Judged(found.costs.copy(), found.violations.copy())))
 
-    problem = Recorded(n_var=low.size, n_obj=count, xl=low, xu=high)
+    count = sample.costs.shape[1]
+    problem = Recorded(n_var=low.size, n_obj=count, n_ieq_constr=scale.size, xl=low, xu=high)
     minimize(problem, NSGA2(pop_size=population), ("n_gen", generations), seed=seed)
     return history
-
-
-def _archives(history: list[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
-    """Non-dominated points and values of all evaluations up to each generation."""
-    archives = []
-    points, values = (part[:0] for part in history[0])
-    for new_points, new_values in history:
-        points, values = np.vstack([points, new_points]), np.vstack([values, new_values])
-        rows = non_dominated(values)
-        points, values = points[rows], values[rows]
-        archives.append((points, values))
-    return archives
-
-
-def _normalised(values: Array, ideal: Array, nadir: Array) -> Array:
-    span = nadir - ideal
-    scaled: Array = (values - ideal) / np.where(span > 0, span, 1.0)
-    return scaled
-
-
-def _pick(values: Array, depth: Array, baseline: Array | None) -> tuple[int, str]:
-    best = int(depth.argmax())
-    if baseline is None:
-        return best, "the knee of the front, for no baseline is given"
-    better = np.flatnonzero((values <= baseline).all(axis=1) & (values < baseline).any(axis=1))
-    if better.size == 0:
-        return best, "the knee of the front, for no point of the front dominates the baseline"
-    pick = int(better[depth[better].argmax()])
-    return pick, f"the knee among the {better.size} of {len(values)} front points that dominate the baseline"
-
-
-def _spread(scaled: Array, keep: int, wanted: list[int]) -> NDArray[np.intp]:
-    """Rows to keep, ascending: the extremes and the wanted first, then always the row farthest from all."""
-    if len(scaled) <= keep:
-        return np.arange(len(scaled))
-    chosen = sorted({*scaled.argmin(axis=0).tolist(), *scaled.argmax(axis=0).tolist(), *wanted})
-    gap = np.min([np.linalg.norm(scaled - scaled[row], axis=1) for row in chosen], axis=0)
-    while len(chosen) < keep:
-        chosen.append(int(gap.argmax()))
-        gap = np.minimum(gap, np.linalg.norm(scaled - scaled[chosen[-1]], axis=1))
-    return np.sort(chosen)

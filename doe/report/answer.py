@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from doe.report.chain import print_chain
+from doe.study.confirmation import statement
+from doe.study.failure import grouped
 from rbdyn.terminal import print_table
 
 if TYPE_CHECKING:
@@ -18,25 +20,66 @@ def print_outcome(outcome: Outcome, quiet: bool) -> None:
     study = outcome.study
     if not quiet and outcome.beside and study.file.reference:
         _print_beside(study.file.reference.label, outcome)
-    rows = [
-        (name, f"{base:.4g}", f"{pick:.4g}")
-        for name, base, pick in zip(study.factors, outcome.baseline.point, outcome.pick.point, strict=True)
-    ]
-    print_table("chosen clearances", ("", "baseline", "pick"), rows)
-    gains = []
-    for index, gain in enumerate(outcome.gains):
+    if not quiet:
+        _print_other_points(outcome)
+    if outcome.direct is not None:
+        direct = outcome.direct
+        print(
+            f"direct front: {direct.front.evaluations} simulations in {direct.seconds['search']:.0f} s. "
+            f"{direct.loss.sentence}"
+        )
+    _print_clearances(outcome)
+    rows = []
+    for gain in outcome.gains["pick"]:
+        index = study.responses.index(gain.response)
         cells = [_value(each, index) for each in (outcome.baseline, outcome.pick)]
-        gains.append((gain.response, *cells, f"{gain.percent:+.2f} ± {gain.error:.2f} %", gain.verdict))
+        rows.append((gain.response, *cells, f"{gain.percent:+.2f} ± {gain.error:.2f} %", gain.verdict))
     print_table(
-        "confirmed by simulation (95 % intervals)", ("", "baseline", "pick", "improvement", "verdict"), gains
+        "confirmed by simulation (95 % intervals)", ("", "baseline", "pick", "improvement", "verdict"), rows
     )
-    print(f"pick: {outcome.front.pick_reason}")
+    print(statement(outcome.gains["pick"]))
+    print(f"pick: {outcome.pick.reason}")
     for name, chain in outcome.chains.items():
         print_chain(name, chain)
         print(chain.status)
+    for group in grouped(outcome.failures):
+        print(f"failed ({len(group['labels'])}): {', '.join(group['labels'])}: {group['cause']}")
     if not quiet:
-        for note in outcome.runs.notes:
+        for note in outcome.notes:
             print(f"note: {note}")
+
+
+def _print_clearances(outcome: Outcome) -> None:
+    found = outcome.tolerances
+    half_widths = [None] * len(outcome.study.factors) if found is None else found.half_widths.tolist()
+    rows = [
+        (name, f"{base:.4g}", f"{pick:.4g}", *([] if half is None else [f"± {half:.3g}"]))
+        for name, base, pick, half in zip(
+            outcome.study.factors, outcome.baseline.point, outcome.pick.point, half_widths, strict=True
+        )
+    ]
+    header = ("", "baseline", "pick", *([] if found is None else ["widest tolerance"]))
+    print_table("chosen clearances", header, rows)
+    if found is not None:
+        print(f"tolerances: {found.sentence}")
+
+
+def _print_other_points(outcome: Outcome) -> None:
+    """Confirmed points beside the pick."""
+    study = outcome.study
+    others = {name: each for name, each in outcome.confirmed.items() if name not in ("baseline", "pick")}
+    if not others:
+        return
+    rows = [
+        (
+            name.replace("_", " "),
+            *(f"{x:.4g}" for x in each.point),
+            *(f"{gain.percent:+.2f} ± {gain.error:.2f} %" for gain in outcome.gains[name]),
+        )
+        for name, each in others.items()
+    ]
+    wanted = [gain.response for gain in outcome.gains["pick"]]
+    print_table("other points, improvements confirmed by simulation", ("", *study.factors, *wanted), rows)
 
 
 def _print_beside(reference: str, outcome: Outcome) -> None:

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from doe.report.fit import fit_tables
 from doe.report.front import front_record
+from doe.report.html import html_report
+from doe.report.markdown import markdown_report
 from doe.report.summary import summary
 from rbdyn.result import write_json
 
 if TYPE_CHECKING:
     from doe.dimension_chain import Part
     from doe.study import Outcome
-    from doe.study.runs import Runs
-    from doe.study_file import Study
 
 # Shaft turns of the motion that is drawn.
 DRAWN_TURNS = 10.0
@@ -30,15 +31,8 @@ def write(outcome: Outcome, folder: Path) -> list[str]:
 
     study, front = outcome.study, outcome.front
     tables = {
-        "design_runs.csv": _runs_table(study, outcome.runs),
-        "anova.csv": [
-            {"response": surface.name, **row} for surface in outcome.surfaces for row in surface.anova
-        ],
-        "coefficients.csv": [
-            {"response": s.name, "term": term, "coefficient": c, "standard_error": e}
-            for s in outcome.surfaces
-            for term, c, e in zip(s.terms, s.coefficients, np.sqrt(np.diag(s.covariance)), strict=True)
-        ],
+        "design_runs.csv": _runs_table(outcome),
+        **fit_tables(outcome.surfaces),
         "front.csv": [
             {**point["factors"], **point["responses"]}
             for point in front_record(study, outcome.surfaces, front)["front"]
@@ -61,23 +55,29 @@ def write(outcome: Outcome, folder: Path) -> list[str]:
     confirmed = np.array([outcome.baseline.values, outcome.pick.values])
     plots.pareto_front(study, front, outcome.surfaces, confirmed, folder / "pareto_front.png")
     points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
-    pictures += ["pareto_front.png", *clearance.draw_motion(study, points, DRAWN_TURNS, folder)]
-    write_json(folder / "summary.json", summary(outcome))
-    return ["summary.json", *tables, *pictures]
+    motions = clearance.histories(study, points, DRAWN_TURNS)
+    pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
+    record = summary(outcome)
+    write_json(folder / "summary.json", record)
+    page = html_report(record, clearance.motion_record(motions))
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    (folder / "report.md").write_text(markdown_report(record, pictures), encoding="utf-8")
+    return ["report.html", "report.md", "summary.json", *tables, *pictures]
 
 
-def _runs_table(study: Study, runs: Runs) -> list[dict[str, Any]]:
+def _runs_table(outcome: Outcome) -> list[dict[str, Any]]:
+    study, runs, design = outcome.study, outcome.runs, outcome.design
     return [
         {
-            "run": run + 1,
-            **{f"coded_{name}": x for name, x in zip(study.factors, coded, strict=True)},
-            **dict(zip(study.factors, actual, strict=True)),
-            **dict(zip(study.responses, values, strict=True)),
-            **{f"{name}_error": e for name, e in zip(study.responses, errors, strict=True)},
+            "run": place + 1,
+            "kind": design.kind[place],
+            "block": design.block[place],
+            **{f"coded_{name}": x for name, x in zip(study.factors, runs.coded[row], strict=True)},
+            **dict(zip(study.factors, runs.actual[row], strict=True)),
+            **dict(zip(study.responses, runs.values[row], strict=True)),
+            **{f"{name}_error": e for name, e in zip(study.responses, runs.errors[row], strict=True)},
         }
-        for run, (coded, actual, values, errors) in enumerate(
-            zip(runs.coded, runs.actual, runs.values, runs.errors, strict=True)
-        )
+        for row, place in enumerate(runs.places)
     ]
 
 
@@ -96,21 +96,26 @@ def _beside_table(outcome: Outcome) -> list[dict[str, Any]]:
 
 
 def _confirmation_table(outcome: Outcome) -> list[dict[str, Any]]:
-    return [
-        {
-            "response": gain.response,
-            "baseline": outcome.baseline.values[i],
-            "baseline_statistical_error": outcome.baseline.statistical[i],
-            "baseline_numerical_error": outcome.baseline.numerical[i],
-            "pick": outcome.pick.values[i],
-            "pick_statistical_error": outcome.pick.statistical[i],
-            "pick_numerical_error": outcome.pick.numerical[i],
-            "improvement_percent": gain.percent,
-            "improvement_error_percent": gain.error,
-            "verdict": gain.verdict,
-        }
-        for i, gain in enumerate(outcome.gains)
-    ]
+    study = outcome.study
+    rows = []
+    for name, each in outcome.confirmed.items():
+        gains = {gain.response: gain for gain in outcome.gains.get(name, [])}
+        for index, response in enumerate(study.responses):
+            gain = gains.get(response)
+            rows.append(
+                {
+                    "point": name,
+                    **dict(zip(study.factors, each.point, strict=True)),
+                    "response": response,
+                    "value": each.values[index],
+                    "statistical_error": each.statistical[index],
+                    "numerical_error": each.numerical[index],
+                    "improvement_percent": None if gain is None else gain.percent,
+                    "improvement_error_percent": None if gain is None else gain.error,
+                    "verdict": "" if gain is None else gain.verdict,
+                }
+            )
+    return rows
 
 
 def _dimension(part: Part) -> dict[str, Any]:

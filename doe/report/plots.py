@@ -13,28 +13,20 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-from doe.designs import axial_distance, to_actual
+from doe.designs import to_actual
+from doe.report.words import label
+from doe.study.design import design_of
 
 if TYPE_CHECKING:
     from doe.pareto import ParetoFront
     from doe.response_surface import Surface
     from doe.study_file import Study
 
-UNITS = {"mm": "mm", "N": "N", "W": "W", "rpm": "rpm"}
-
-
-def label(name: str) -> str:
-    """'impact_force_N' as 'impact force [N]'."""
-    words = name.split("_")
-    if words[-1] in UNITS:
-        return f"{' '.join(words[:-1])} [{UNITS[words[-1]]}]"
-    return " ".join(words)
-
 
 def response_surface(study: Study, surface: Surface, path: Path) -> None:
     """Surface over the first factor and each other one, the rest at their centre, with contours beneath."""
     factors = len(study.factors)
-    reach = axial_distance(factors, study.file.design.alpha)
+    reach = design_of(study).reach
     grid = np.linspace(-reach, reach, 41)
     figure = plt.figure(figsize=(6.2 * (factors - 1), 5.2))
     for panel in range(1, factors):
@@ -66,7 +58,7 @@ def pareto_front(
 
     ``confirmed``: simulated responses of baseline and pick, shape (2, m), or None.
     """
-    values = front.values * study.signs
+    values = front.values
     baseline = np.array(
         [surface.predict((study.baseline - study.centre) / study.step) for surface in surfaces]
     )

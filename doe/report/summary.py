@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from doe.report.asked import asked_record, design_record
+from doe.report.confirmation import confirmation_record, direct_record, gains_record
 from doe.report.fit import fit_record
 from doe.report.front import front_record
+from doe.study.confirmation import statement
+from doe.study.failure import grouped
 from rbdyn.result import versions
 
 if TYPE_CHECKING:
@@ -18,54 +20,50 @@ FORMAT = "doe.study/1"
 
 def summary(outcome: Outcome) -> dict[str, Any]:
     """JSON of ``doe study``."""
-    study = outcome.study
-    return {
+    study, gains = outcome.study, outcome.gains["pick"]
+    record: dict[str, Any] = {
         "format": FORMAT,
         "status": "ok",
-        "design": {"runs": len(outcome.runs.coded), "factors": study.factors, "responses": study.responses},
+        "asked": asked_record(study),
+        "design": design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),
         "pick": dict(zip(study.factors, outcome.pick.point.tolist(), strict=True)),
-        "confirmation": {
-            name: {
-                "factors": dict(zip(study.factors, each.point.tolist(), strict=True)),
-                "responses": {
-                    response: {
-                        "value": value,
-                        "statistical_error": _or_none(s),
-                        "numerical_error": _or_none(n),
-                    }
-                    for response, value, s, n in zip(
-                        study.responses, each.values.tolist(), each.statistical, each.numerical, strict=True
-                    )
-                },
-            }
-            for name, each in (("baseline", outcome.baseline), ("pick", outcome.pick))
-        },
-        "gains": {
-            gain.response: {"percent": gain.percent, "error_percent": gain.error, "verdict": gain.verdict}
-            for gain in outcome.gains
-        },
+        "confirmation": confirmation_record(outcome),
+        "gains": gains_record(gains),
+        "statement": statement(gains),
         "chains": {name: chain.as_dict() for name, chain in outcome.chains.items()},
-        "beside_reference": {
-            row.response: {
-                "ours_min_mean_max": [float(x) for x in row.our_range],
-                "theirs_min_mean_max": [float(x) for x in row.their_range],
-                "linear_effects": {
-                    factor: {"ours": ours[0], "theirs": theirs[0], "same_sign": ours[0] * theirs[0] > 0.0}
-                    for factor, (ours, theirs) in row.effects.items()
-                },
-                "rank_correlation": row.rank_correlation,
-                "verdict": row.verdict,
-                "why": row.why,
-            }
-            for row in outcome.beside
-        },
-        "notes": list(outcome.runs.notes),
-        "cost": outcome.cost,
+        "beside_reference": _beside_record(outcome),
+        "notes": list(outcome.notes),
+        "failures": grouped(outcome.failures),
+        "cost": dict(outcome.cost),
         "versions": versions(),
+        "seeds": {
+            "design": study.file.design.seed,
+            "front": study.file.front.seed,
+            "direct": study.file.direct.seed,
+        },
     }
+    if outcome.direct is not None:
+        record["direct"] = direct_record(study, outcome.direct)
+    if outcome.tolerances is not None:
+        record["tolerances"] = outcome.tolerances.as_dict(study.factors)
+        record["tolerances_sentence"] = outcome.tolerances.sentence
+    return record
 
 
-def _or_none(value: float) -> float | None:
-    return None if np.isnan(value) else float(value)
+def _beside_record(outcome: Outcome) -> dict[str, Any]:
+    return {
+        row.response: {
+            "ours_min_mean_max": [float(x) for x in row.our_range],
+            "theirs_min_mean_max": [float(x) for x in row.their_range],
+            "linear_effects": {
+                factor: {"ours": ours[0], "theirs": theirs[0], "same_sign": ours[0] * theirs[0] > 0.0}
+                for factor, (ours, theirs) in row.effects.items()
+            },
+            "rank_correlation": row.rank_correlation,
+            "verdict": row.verdict,
+            "why": row.why,
+        }
+        for row in outcome.beside
+    }

@@ -1,5 +1,11 @@
-"""Response surfaces: least-squares polynomials with the statistics to judge them."""
+"""Response surfaces: least-squares polynomials with the statistics to judge them.
 
-from doe.response_surface.surface import Surface, describe, fit, model_matrix
+``surface`` fits and predicts; ``terms`` builds its matrix, ``least_squares`` solves, ``anova``, ``elimination``,
+``canonical``, ``diagnostics`` and ``known_variance`` judge, ``words`` says it in sentences.
+"""
+
+from doe.response_surface.surface import Surface, fit
+from doe.response_surface.terms import model_matrix
+from doe.response_surface.words import describe
 
 __all__ = ["Surface", "describe", "fit", "model_matrix"]

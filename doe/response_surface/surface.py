@@ -11,46 +11,32 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
-from string import ascii_uppercase
-from typing import Any, Literal, TypedDict
+from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import linalg, stats
-from sklearn.preprocessing import PolynomialFeatures
+from scipy import special
 
-from doe.designs import to_actual
+from doe.designs.model import model_terms
+from doe.response_surface.anova import AnovaRow, anova, complement, find, ratio, replicate_groups, sum_within
+from doe.response_surface.canonical import Canonical, StationaryPoint, canonical, stationary_point
+from doe.response_surface.data import Data, check_errors, check_matrix, checked
+from doe.response_surface.diagnostics import Diagnostics, diagnose, press
+from doe.response_surface.elimination import Removal, eliminate
+from doe.response_surface.known_variance import KnownVariance, compare
+from doe.response_surface.least_squares import LeastSquares, solve
+from doe.response_surface.terms import MODELS, Model, in_actual_units, model_matrix, second_order
+from doe.response_surface.words import describe
 
 Array = NDArray[np.float64]
-Model = Literal["linear", "quadratic", "reduced"]
+Weighting = Literal["equal", "replicates"]
+Transform = Literal["none", "box_cox"] | float
 
-SAME_POINT = 1e-9  # coded units within which two runs are replicates
-KEEP_BELOW = 0.05  # p-value up to which backward elimination keeps a term
 STATISTICS = (
     *("anova", "lack_of_fit", "pure_error", "r2", "adjusted_r2", "predicted_r2", "press"),
     *("cv_percent", "adequate_precision", "stationary_point"),
 )
-
-
-class AnovaRow(TypedDict):
-    """One row of an analysis of variance; ``ss`` of a term is partial (type III)."""
-
-    source: str
-    ss: float | None
-    df: int
-    ms: float | None
-    f: float | None
-    p: float | None
-
-
-class StationaryPoint(TypedDict):
-    """Where the gradient vanishes; ``eigenvalues`` are those of the matrix of second-order coefficients."""
-
-    coded: list[float]
-    actual: list[float]
-    eigenvalues: list[float]
-    nature: Literal["minimum", "maximum", "saddle"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +44,16 @@ class Surface:
     """A fitted surface of one response.
 
     ``coefficients`` (p,) and ``covariance`` (p, p) follow ``terms``, in coded units and units of the
-    response. ``stationary_point`` is None for a surface that has none or no single one. The other fields
-    carry the names and meanings of the analysis-of-variance table and its summary.
+    response or of its transform; ``transform`` is the exponent of Box and Cox, None without one. They and all
+    statistics are on the scale of the fit; predictions are in units of the response. ``covariance`` is
+    scaled by ``residual_mean_square`` on ``residual_dof`` degrees of freedom; with weights 1 / variance that
+    mean square has no unit, and `known_variance` tells what it should be.
+    ``observation_variance`` is that of a new run about the surface (of the mean run, if they differ).
+    ``r2``, ``adjusted_r2`` and ``predicted_r2`` leave out what the blocks differ by; ``blocks`` are their
+    effects by label, about the mean over all runs for which the surface stands. ``vif`` follows ``terms`` (NaN for "1").
+    ``stationary_point`` is None for a surface that has none or no single one, ``canonical`` for one without
+    curvature, ``known_variance`` where the errors of the runs are not known, ``rival`` until
+    `doe.study.surfaces.with_rivals` has compared it with a Gaussian process.
     """
 
     name: str
@@ -77,57 +71,144 @@ class Surface:
     cv_percent: float | None
     adequate_precision: float | None
     stationary_point: StationaryPoint | None
+    canonical: Canonical | None
+    vif: Array
+    blocks: dict[str, float]
+    elimination: list[Removal]
+    diagnostics: Diagnostics
+    known_variance: KnownVariance | None
+    observation_variance: float
+    weighting: Weighting
+    transform: float | None
+    data: Data
+    rival: dict[str, Any] | None = None
 
     def predict(self, coded: ArrayLike) -> Array:
-        """Mean response at coded points (..., k), shape (...)."""
-        values: Array = model_matrix(coded, self.terms) @ self.coefficients
-        return values
+        """Response at coded points (..., k), shape (...): its mean, or of a transformed one its median."""
+        points = np.asarray(coded, float)
+        constant, gradient, matrix = self._polynomial
+        return self._back(np.einsum("...i,...i", points @ matrix + gradient, points) + constant)
+
+    def draws(self, coded: ArrayLike, coefficients: ArrayLike) -> Array:
+        """Response at coded points (..., k) for each row of ``coefficients`` (s, p), shape (s, ...)."""
+        columns = model_matrix(coded, self.terms)
+        return self._back(np.moveaxis(columns @ np.asarray(coefficients, float).T, -1, 0))
 
     def prediction_standard_error(self, coded: ArrayLike) -> Array:
         """Standard error of the mean response at coded points (..., k), shape (...).
 
-        A single new observation scatters by ``residual_mean_square`` more (as a variance).
+        A single new observation scatters by ``observation_variance`` more (as a variance). Of a transformed
+        response it is that of the transform over the slope of the transform (first order).
         """
-        matrix = model_matrix(coded, self.terms)
-        variance: Array = np.einsum("...j,jk,...k", matrix, self.covariance, matrix)
-        error: Array = np.sqrt(variance.clip(0.0))
-        return error
+        error = np.sqrt(self._variance(coded))
+        if self.transform is None:
+            return error
+        from doe.response_surface.box_cox import slope
+
+        return error / slope(self.predict(coded), self.transform)
+
+    def confidence_interval(self, coded: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
+        """Lower and upper limit of the mean response at coded points (..., k), by Student's t."""
+        return self._interval(coded, 0.0, level)
+
+    def prediction_interval(self, coded: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
+        """Lower and upper limit of a single new run at coded points (..., k), by Student's t."""
+        return self._interval(coded, self.observation_variance, level)
+
+    def refit(self, rows: NDArray[np.intp]) -> Surface:
+        """The same kind of surface through these runs alone. Raises ValueError when they do not suffice."""
+        transform: Transform = "none" if self.transform is None else self.transform
+        return _fit(self.name, self.data.rows(rows), self.model, self.weighting, transform)
 
     @property
     def lack_of_fit(self) -> dict[str, Any]:
         """What the surface misses against the scatter of replicates: ``ss``, ``df``, ``f``, ``p``."""
-        row = _find(self.anova, "lack_of_fit")
+        row = find(self.anova, "lack_of_fit")
         return {"ss": row["ss"], "df": row["df"], "f": row["f"], "p": row["p"]}
 
     @property
     def pure_error(self) -> dict[str, Any]:
         """Scatter of replicates about their own means: ``ss``, ``df``, ``ms``."""
-        row = _find(self.anova, "pure_error")
+        row = find(self.anova, "pure_error")
         return {"ss": row["ss"], "df": row["df"], "ms": row["ms"]}
+
+    @property
+    def actual_coefficients(self) -> dict[str, float]:
+        """Coefficients of the same terms with the factors in actual units."""
+        values = in_actual_units(self.terms, self.coefficients, self.data.centre, self.data.step)
+        return dict(zip(self.terms, values.tolist(), strict=True))
+
+    @cached_property
+    def box_cox(self) -> dict[str, Any] | None:
+        """Advice on a power transform for an untransformed fit; None where values or fit allow none."""
+        if self.transform is not None or (self.data.values <= 0).any() or self.residual_mean_square == 0:
+            return None
+        from doe.response_surface.box_cox import box_cox
+
+        return dict(box_cox(_columns(self.data, self.terms), self.data.values, name=self.name))
+
+    def coefficient_table(self, level: float = 0.95) -> list[dict[str, Any]]:
+        """For each term: ``term, coefficient, standard_error, t, p, low, high, vif``, in coded units."""
+        errors = np.sqrt(np.diag(self.covariance))
+        reach = special.stdtrit(self.residual_dof, (1 + level) / 2) * errors
+        rows = []
+        for term, c, error, half, vif in zip(
+            self.terms, *(x.tolist() for x in (self.coefficients, errors, reach, self.vif)), strict=True
+        ):
+            t = c / error if error > 0 else None
+            p = None if t is None else 2 * float(special.stdtr(self.residual_dof, -abs(t)))
+            judged = {"t": t, "p": p, "low": c - half, "high": c + half, "vif": None if vif != vif else vif}
+            rows.append({"term": term, "coefficient": c, "standard_error": error, **judged})
+        return rows
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers, lists and dicts, ready for JSON: coefficients by term, and all statistics."""
+        table = self.coefficient_table()
         coefficients = dict(zip(self.terms, self.coefficients.tolist(), strict=True))
-        statistics = {key: getattr(self, key) for key in STATISTICS}
-        return {"model": self.model, "coefficients": coefficients, **statistics}
+        return {
+            "model": self.model,
+            "coefficients": coefficients,
+            **{key: getattr(self, key) for key in STATISTICS},
+            "terms": list(self.terms),
+            "standard_errors": {row["term"]: row["standard_error"] for row in table},
+            "vif": {row["term"]: row["vif"] for row in table if row["term"] != "1"},
+            "tests": {row["term"]: {key: row[key] for key in ("t", "p", "low", "high")} for row in table},
+            "covariance": self.covariance.tolist(),
+            "residual_dof": self.residual_dof,
+            "observation_variance": self.observation_variance,
+            "actual_coefficients": self.actual_coefficients,
+            "weighting": self.weighting,
+            "transform": self.transform,
+            "box_cox": self.box_cox,
+            "blocks": self.blocks,
+            "elimination": self.elimination,
+            "canonical": self.canonical,
+            "known_variance": None if self.known_variance is None else self.known_variance.as_dict(),
+            "diagnostics": self.diagnostics,
+            "rival": self.rival,
+            "sentences": describe(self),
+        }
 
+    @cached_property
+    def _polynomial(self) -> tuple[float, Array, Array]:
+        return second_order(self.terms, self.coefficients, self.data.points.shape[1])
 
-@dataclass(frozen=True, eq=False)
-class _LeastSquares:
-    """Solution of one problem; ``inverse`` is that of X'X, ``leverage`` the diagonal of the hat matrix."""
+    def _variance(self, coded: ArrayLike) -> Array:
+        matrix = model_matrix(coded, self.terms)
+        variance: Array = np.einsum("...j,jk,...k", matrix, self.covariance, matrix)
+        return variance.clip(0.0)
 
-    coefficients: Array
-    inverse: Array
-    residuals: Array
-    leverage: Array
-    mean_square: float
-    dof: int
+    def _interval(self, coded: ArrayLike, extra: float, level: float) -> tuple[Array, Array]:
+        middle = model_matrix(coded, self.terms) @ self.coefficients
+        half = special.stdtrit(self.residual_dof, (1 + level) / 2) * np.sqrt(self._variance(coded) + extra)
+        return self._back(middle - half), self._back(middle + half)
 
-    def tests(self, terms: tuple[str, ...]) -> list[AnovaRow]:
-        """Partial sum of squares, F and p of each coefficient."""
-        squares = (self.coefficients**2 / np.diag(self.inverse)).tolist()
-        pairs = zip(terms, squares, strict=True)
-        return [_row(term, ss, 1, self.mean_square, self.dof) for term, ss in pairs]
+    def _back(self, values: Array) -> Array:
+        if self.transform is None:
+            return values
+        from doe.response_surface.box_cox import backward
+
+        return backward(values, self.transform)
 
 
 def fit(
@@ -138,6 +219,11 @@ def fit(
     model: Model = "quadratic",
     centre: ArrayLike,
     step: ArrayLike,
+    standard_errors: ArrayLike | None = None,
+    replicates: ArrayLike | None = None,
+    weighting: Weighting = "equal",
+    block: ArrayLike | None = None,
+    transform: Transform | None = None,
 ) -> Surface:
     """Fit one response by least squares.
 
@@ -146,251 +232,135 @@ def fit(
     coded : runs in coded units, shape (n, k).
     values : response of each run, shape (n,).
     name : name of the response, for messages.
-    model : "linear"; "quadratic" (full second order); or "reduced", which starts from the quadratic and
-        drops the term of largest p until every p is at most 0.05, keeping each term that a remaining
-        interaction or square is built on (hierarchy).
+    model : "linear"; "interaction" (linear and products of two factors); "quadratic" (full second order); or
+        "reduced", which starts from the quadratic and drops the term of largest p until every p is at most
+        0.05, keeping each term that a remaining interaction or square is built on (hierarchy).
     centre, step : actual value of each factor at coded 0 and its change over one coded unit, shape (k,).
+    standard_errors : of each value, from the replicates of the simulation, shape (n,). They are set beside
+        the scatter of the runs, and weigh them if ``weighting`` says so; NaN where unknown.
+    replicates : number behind each standard error, shape (n,); 0 for errors that count as known exactly.
+    weighting : "equal", or "replicates" for weights 1 / standard_error^2.
+    block : label of the block of each run, whole numbers, shape (n,).
+    transform : "none", "box_cox" for the recommended exponent, or an exponent: (y^lambda - 1)/lambda, ln y for 0.
 
     Raises
     ------
-    ValueError when a value is not finite, shapes differ, the model is unknown, runs are too few for it, or
-    the runs cannot tell its terms apart.
+    ValueError when a value is not finite, all are equal, shapes differ, the model is unknown, runs are too few
+    for it, the runs cannot tell its terms apart, a transform meets a value that is not positive, or weights are
+    asked for and an error is not positive.
     """
-    points, response = np.asarray(coded, float), np.asarray(values, float)
-    _check(points, response, name, model)
-    actual_units = np.broadcast_to(centre, points.shape[1]), np.broadcast_to(step, points.shape[1])
-    terms = _model_terms(points.shape[1], model)
-    _check_matrix(model_matrix(points, terms), terms, name, model)
+    if model not in MODELS:
+        raise ValueError(f"{name}: model = {model!r}: choose {', '.join(MODELS[:-1])} or {MODELS[-1]}")
+    data = checked(name, coded, values, centre, step, standard_errors, replicates, block)
+    if weighting == "replicates":
+        check_errors(name, standard_errors)
+    return _fit(name, data, model, weighting, "none" if transform is None else transform)
+
+
+def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: Transform) -> Surface:
+    terms = model_terms(data.points.shape[1], model)
+    check_matrix(name, model, terms, _columns(data, terms))
+    if not np.ptp(data.values):
+        raise ValueError(
+            f"{name}: all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit; "
+            "check the response or leave it out"
+        )
+    exponent = _exponent(name, data, terms, transform)
+    response, variances = _on_scale_of_fit(data, exponent)
+    weights = 1.0 / variances if weighting == "replicates" and variances is not None else None
+    removed: list[Removal] = []
     if model == "reduced":
-        terms = _eliminate(points, response, terms)
-    solution = _solve(model_matrix(points, terms), response)
-    total, press = _scatter(response), _press(solution)
-    mean_square, dof = solution.mean_square, solution.dof
-    deviation_of_fit = math.sqrt(len(terms) * mean_square / response.size)
+        terms, removed = eliminate(terms, lambda left: solve(_columns(data, left), response, weights))
+    matrix = _columns(data, terms)
+    solution = solve(matrix, response, weights)
+    count = len(terms)
+    covariance = solution.mean_square * solution.inverse
+    groups = replicate_groups(data.points, data.block)
+    known = (
+        None
+        if variances is None
+        else compare(solution, matrix, response, variances, data.replicates, groups, count)
+    )
+    table = anova(terms, solution, response, data.points, data.block)
+    if known is not None:
+        table.insert(len(table) - 1, known.pure_error)
+    coefficients = solution.coefficients[:count]
     return Surface(
         name=name,
         model=model,
         terms=terms,
-        coefficients=solution.coefficients,
-        covariance=mean_square * solution.inverse,
-        residual_mean_square=mean_square,
-        residual_dof=dof,
-        anova=_anova(terms, solution, total, points, response),
-        r2=_complement(mean_square * dof, total),
-        adjusted_r2=_complement(mean_square, total / (response.size - 1)),
-        predicted_r2=None if press is None else _complement(press, total),
-        press=press,
-        cv_percent=_ratio(100 * math.sqrt(mean_square), abs(float(response.mean()))),
-        adequate_precision=_ratio(float(np.ptp(response - solution.residuals)), deviation_of_fit),
-        stationary_point=_stationary_point(terms, solution.coefficients, *actual_units),
-    )
-
-
-def model_matrix(coded: ArrayLike, terms: tuple[str, ...]) -> Array:
-    """Columns of ``terms`` at coded points (..., k), shape (..., number of terms)."""
-    points = np.asarray(coded, float)
-    columns = _columns(points.shape[-1])
-    everything: Array = PolynomialFeatures(2).fit_transform(points.reshape(-1, points.shape[-1]))
-    return everything[:, [columns[term] for term in terms]].reshape(*points.shape[:-1], len(terms))
-
-
-def describe(surface: Surface, alpha: float = 0.05) -> list[str]:
-    """Say in sentences which terms are significant at ``alpha`` and what the lack of fit means."""
-    return [_describe_terms(surface, alpha), _describe_lack_of_fit(surface, alpha)]
-
-
-def _describe_terms(surface: Surface, alpha: float) -> str:
-    tested = [row for row in surface.anova if row["source"] in surface.terms]
-    known = {row["source"]: row["p"] for row in tested if row["p"] is not None}
-    if len(known) < len(tested):
-        return f"{surface.name}: the surface leaves no residual, so its terms cannot be tested."
-    strong = sorted((p, source) for source, p in known.items() if p <= alpha)
-    weak = [source for source, p in known.items() if p > alpha]
-    listed = ", ".join(f"{source} ({_p_text(p)})" for p, source in strong)
-    head = f"significant at {alpha:g}: {listed}" if strong else f"no term is significant at {alpha:g}"
-    return f"{surface.name}: {head}" + (f"; not significant: {', '.join(weak)}." if weak else ".")
-
-
-def _describe_lack_of_fit(surface: Surface, alpha: float) -> str:
-    p, name = surface.lack_of_fit["p"], surface.name
-    if p is not None and p <= alpha:
-        return (
-            f"{name}: lack of fit is significant ({_p_text(p)}): the surface misses more than the scatter of "
-            "replicates explains; enlarge the model, transform the response or narrow the region, and "
-            "confirm predictions by runs."
-        )
-    if p is not None:
-        found = f"lack of fit is not significant ({_p_text(p)})"
-        return f"{name}: {found}: what the surface misses is within the scatter of replicates."
-    if surface.pure_error["df"] == 0:
-        return f"{name}: lack of fit cannot be tested, for no run is replicated; add centre replicates."
-    if surface.lack_of_fit["df"] == 0:
-        return f"{name}: lack of fit cannot be tested, for the model has as many terms as distinct points."
-    return f"{name}: lack of fit cannot be tested, for the replicates agree exactly."
-
-
-def _find(anova: list[AnovaRow], source: str) -> AnovaRow:
-    return next(row for row in anova if row["source"] == source)
-
-
-def _p_text(p: float) -> str:
-    return "p < 0.0001" if p < 1e-4 else f"p = {p:.4f}"
-
-
-@cache
-def _columns(factors: int) -> dict[str, int]:
-    """Column of each second-order term in scikit-learn's order; listed linear, interactions, squares."""
-    powers = PolynomialFeatures(2).fit(np.zeros((1, factors))).powers_
-    order = sorted(range(len(powers)), key=lambda row: (powers[row].sum(), powers[row].max()))
-    return {_term(powers[row]): row for row in order}
-
-
-def _term(powers: NDArray[np.int64]) -> str:
-    letters = zip(ascii_uppercase, powers, strict=False)
-    return "".join(letter if power == 1 else f"{letter}^2" for letter, power in letters if power) or "1"
-
-
-def _model_terms(factors: int, model: Model) -> tuple[str, ...]:
-    terms = tuple(_columns(factors))
-    return terms[: factors + 1] if model == "linear" else terms
-
-
-def _check(points: Array, response: Array, name: str, model: str) -> None:
-    if model not in ("linear", "quadratic", "reduced"):
-        raise ValueError(f"{name}: model = {model!r}: choose linear, quadratic or reduced")
-    if points.ndim != 2 or response.shape != (len(points),):
-        shapes = f"points of shape {points.shape} and values of shape {response.shape}"
-        raise ValueError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
-    if not np.isfinite(points).all():
-        raise ValueError(f"{name}: a coded factor is not a finite number; mend or leave out that run")
-    bad = np.flatnonzero(~np.isfinite(response))
-    if bad.size:
-        found = f"the value of run {bad[0] + 1} is {response[bad[0]]}"
-        raise ValueError(f"{name}: {found}; mend or leave out that run")
-
-
-def _check_matrix(matrix: Array, terms: tuple[str, ...], name: str, model: str) -> None:
-    runs, size = matrix.shape
-    if runs <= size:
-        raise ValueError(
-            f"{name}: {runs} runs are too few for the {model} model; give at least {size + 1} "
-            f"({size} terms and one to judge the fit) or choose a simpler model"
-        )
-    _, triangle, pivots = linalg.qr(matrix / np.linalg.norm(matrix, axis=0).clip(1e-300), pivoting=True)
-    dependent = np.abs(np.diag(triangle)) <= 1e-9
-    if dependent.any():
-        lost = ", ".join(sorted(terms[pivot] for pivot in pivots[dependent]))
-        raise ValueError(
-            f"{name}: the runs cannot tell {lost} from the other terms of the {model} model (its matrix is "
-            "singular); add design points or choose a simpler model"
-        )
-
-
-def _eliminate(points: Array, response: Array, terms: tuple[str, ...]) -> tuple[str, ...]:
-    while True:
-        removable = [
-            (row["p"], row["source"])
-            for row in _solve(model_matrix(points, terms), response).tests(terms)
-            if row["p"] is not None and row["p"] > KEEP_BELOW and not _needed(row["source"], terms)
-        ]
-        if not removable:
-            return terms
-        terms = tuple(term for term in terms if term != max(removable)[1])
-
-
-def _needed(term: str, terms: tuple[str, ...]) -> bool:
-    return term == "1" or any(term in other for other in terms if other != term)
-
-
-def _solve(matrix: Array, response: Array) -> _LeastSquares:
-    orthogonal, triangle = linalg.qr(matrix, mode="economic")
-    coefficients = linalg.solve_triangular(triangle, orthogonal.T @ response)
-    root = linalg.solve_triangular(triangle, np.eye(len(triangle)))
-    residuals = response - matrix @ coefficients
-    dof = matrix.shape[0] - matrix.shape[1]
-    return _LeastSquares(
         coefficients=coefficients,
-        inverse=root @ root.T,
-        residuals=residuals,
-        leverage=(orthogonal**2).sum(axis=1),
-        mean_square=float(residuals @ residuals) / dof,
-        dof=dof,
+        covariance=covariance[:count, :count],
+        residual_mean_square=solution.mean_square,
+        residual_dof=solution.dof,
+        anova=table,
+        **_summary(solution, response, matrix[:, :count] @ coefficients, data.block),
+        stationary_point=stationary_point(terms, coefficients, data.centre, data.step),
+        canonical=canonical(terms, coefficients, covariance[:count, :count], solution.dof, data.points),
+        vif=solution.inflation[:count],
+        blocks=_block_effects(data, solution.coefficients[count:]),
+        elimination=removed,
+        diagnostics=diagnose(solution, response),
+        known_variance=known,
+        observation_variance=_observation_variance(solution),
+        weighting=weighting,
+        transform=exponent,
+        data=data,
     )
 
 
-def _anova(
-    terms: tuple[str, ...], solution: _LeastSquares, total: float, points: Array, response: Array
-) -> list[AnovaRow]:
-    dof, mean_square, model_df = solution.dof, solution.mean_square, len(terms) - 1
-    residual = mean_square * dof
-    return [
-        _row("model", total - residual, model_df, mean_square, dof),
-        *(row for row in solution.tests(terms) if row["source"] != "1"),
-        _row("residual", residual, dof),
-        *_lack_of_fit(points, response, residual, dof),
-        AnovaRow(source="total", ss=total, df=model_df + dof, ms=None, f=None, p=None),
-    ]
+def _columns(data: Data, terms: tuple[str, ...]) -> Array:
+    return np.hstack([model_matrix(data.points, terms), data.block_columns])
 
 
-def _row(source: str, ss: float | None, df: int, error: float | None = None, error_df: int = 0) -> AnovaRow:
-    """A row with its mean square, tested by F against the mean square ``error`` if there is one."""
-    mean_square = None if ss is None else _ratio(ss, df)
-    f = None if mean_square is None or error is None else _ratio(mean_square, error)
-    p = None if f is None else float(stats.f.sf(f, df, error_df))
-    return AnovaRow(source=source, ss=ss, df=df, ms=mean_square, f=f, p=p)
-
-
-def _lack_of_fit(points: Array, response: Array, residual: float, dof: int) -> tuple[AnovaRow, AnovaRow]:
-    apart = np.abs(points[:, None, :] - points[None, :, :]).max(axis=2)
-    group = (apart <= SAME_POINT).argmax(axis=1)
-    pure_df = len(response) - len(np.unique(group))
-    if pure_df == 0:
-        return _row("lack_of_fit", None, dof), _row("pure_error", None, 0)
-    pure = sum(_scatter(response[group == first]) for first in np.unique(group))
-    lack = _row("lack_of_fit", max(residual - pure, 0.0), dof - pure_df, pure / pure_df, pure_df)
-    return lack, _row("pure_error", pure, pure_df)
-
-
-def _scatter(values: Array) -> float:
-    """Sum of squares about the mean; measured from the first value, equal values give exactly zero."""
-    offset = values - values[0]
-    return float(((offset - offset.mean()) ** 2).sum())
-
-
-def _press(solution: _LeastSquares) -> float | None:
-    free = 1.0 - solution.leverage
-    if (free <= 1e-12).any():
+def _exponent(name: str, data: Data, terms: tuple[str, ...], transform: Transform) -> float | None:
+    if transform == "none":
         return None
-    return float(((solution.residuals / free) ** 2).sum())
+    from doe.response_surface.box_cox import box_cox, check_positive
+
+    check_positive(data.values, name)
+    if transform == "box_cox":
+        transform = box_cox(_columns(data, terms), data.values, name=name)["recommended"]
+    # The exponent 1 would only move the response by 1.
+    return None if transform == 1 else float(transform)
 
 
-def _stationary_point(
-    terms: tuple[str, ...], coefficients: Array, centre: Array, step: Array
-) -> StationaryPoint | None:
-    by_term = dict(zip(terms, coefficients.tolist(), strict=True))
-    letters = ascii_uppercase[: centre.size]
-    gradient = np.array([by_term.get(letter, 0.0) for letter in letters])
-    upper = np.array([[by_term.get(f"{a}^2" if a == b else a + b, 0.0) for b in letters] for a in letters])
-    matrix = (upper + upper.T) / 2
-    eigenvalues = np.linalg.eigvalsh(matrix)
-    if np.abs(eigenvalues).min() <= 1e-10 * np.abs(coefficients).max():
-        return None
-    coded = np.linalg.solve(-2 * matrix, gradient)
-    nature: Literal["minimum", "maximum", "saddle"] = (
-        "minimum" if eigenvalues[0] > 0 else "maximum" if eigenvalues[-1] < 0 else "saddle"
-    )
-    return StationaryPoint(
-        coded=coded.tolist(),
-        actual=to_actual(coded, centre, step).tolist(),
-        eigenvalues=eigenvalues.tolist(),
-        nature=nature,
-    )
+def _on_scale_of_fit(data: Data, exponent: float | None) -> tuple[Array, Array | None]:
+    """Response and variance of each run, transformed."""
+    errors = data.standard_errors
+    if exponent is None:
+        return data.values, None if errors is None else errors**2
+    from doe.response_surface.box_cox import forward, slope
+
+    variances = None if errors is None else (errors * slope(data.values, exponent)) ** 2
+    return forward(data.values, exponent), variances
 
 
-def _ratio(a: float, b: float) -> float | None:
-    return a / b if b > 0 and math.isfinite(a / b) else None
+def _observation_variance(solution: LeastSquares) -> float:
+    return solution.mean_square * float((1.0 / solution.weights).mean())
 
 
-def _complement(part: float, whole: float) -> float | None:
-    ratio = _ratio(part, whole)
-    return None if ratio is None else 1.0 - ratio
+def _summary(
+    solution: LeastSquares, response: Array, predicted: Array, block: NDArray[np.int64]
+) -> dict[str, Any]:
+    """R2 and its kin on the scatter within blocks; the others by the definitions of Myers et al."""
+    within = sum_within(response, solution.weights, block)
+    free = len(response) - len(np.unique(block))
+    missed, variance = press(solution), _observation_variance(solution)
+    size = len(solution.coefficients)
+    mean = float(solution.weights @ response / solution.weights.sum())
+    return {
+        "r2": complement(solution.residual_sum, within),
+        "adjusted_r2": complement(solution.mean_square, within / free),
+        "predicted_r2": None if missed is None else complement(missed, within),
+        "press": missed,
+        "cv_percent": ratio(100 * math.sqrt(variance), abs(mean)),
+        "adequate_precision": ratio(float(np.ptp(predicted)), math.sqrt(size * variance / len(response))),
+    }
+
+
+def _block_effects(data: Data, effects: Array) -> dict[str, float]:
+    if not effects.size:
+        return {}
+    labels, first = np.unique(data.block, return_index=True)
+    return dict(zip(map(str, labels), (data.block_columns[first] @ effects).tolist(), strict=True))

@@ -2,30 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from doe.study.failure import Failure
+from doe.study.goals import goals_of
+from doe.study.picks import Choice
 from doe.study_file import Study
+from rbdyn.faults import RunError
+
+if TYPE_CHECKING:
+    from doe.study.simulations import Simulations
+    from rbdyn.result import SimulationResult
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Confirmed:
-    """Simulated responses (m,) at a point, with 95 % statistical and numerical half-widths."""
+    """Simulated responses (m,) at a point, with 95 % statistical and numerical half-widths.
+
+    ``power_terms``: power losses [W] by contact; ``reason``: why the point was chosen.
+    """
 
     point: Array
     values: Array
     statistical: Array
     numerical: Array
+    power_terms: Mapping[str, float] = field(default_factory=dict)
+    reason: str = ""
 
 
 @dataclass(frozen=True)
 class Gain:
-    """Relative improvement [%] of a response at the pick over the baseline, with its 95 % half-width."""
+    """Relative improvement [%] of a response at a point over the baseline, with its 95 % half-width."""
 
     response: str
     percent: float
@@ -39,20 +53,74 @@ class Gain:
         return "better" if self.percent > 0.0 else "worse"
 
 
+def confirm(
+    study: Study, choices: Mapping[str, Choice], simulations: Simulations
+) -> tuple[dict[str, Confirmed], list[Failure]]:
+    """Simulate the baseline and the choices with fresh seeds; returns what went well and what failed.
+
+    Raises RunError where the baseline or the pick cannot be simulated, InputError, KeyboardInterrupt.
+    """
+    from doe import clearance
+
+    wanted = {"baseline": Choice(study.baseline, "the original design"), **choices}
+    scenes = [clearance.confirmation_scene(study, choice.point) for choice in wanted.values()]
+    results = simulations.run(scenes, list(wanted), simulations.progress("confirmation"))
+    confirmed, failures = {}, []
+    for (name, choice), result in zip(wanted.items(), results, strict=True):
+        if not isinstance(result, Failure):
+            confirmed[name] = confirmed_from(study, choice, result)
+        elif name in ("baseline", "pick"):
+            raise RunError(f"confirmation of the {result}")
+        else:
+            failures.append(result)
+    return confirmed, failures
+
+
+def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Confirmed:
+    """The study's responses of a simulation at a chosen point."""
+    record = result.as_dict()
+    quantities = [record[name] for name in study.responses]
+    values, statistical, numerical = (
+        np.array([np.nan if quantity[key] is None else quantity[key] for quantity in quantities])
+        for key in ("value", "statistical_error", "numerical_error")
+    )
+    return Confirmed(choice.point, values, statistical, numerical, result.power_terms, choice.reason)
+
+
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
-    """Improvements with the statistical and numerical errors of both runs, taken as independent."""
+    """Improvements of all responses with a goal; statistical and numerical errors of both runs as independent."""
+    goals = goals_of(study)
+    chosen = goals.objectives
     parts = (baseline.statistical, baseline.numerical, pick.statistical, pick.numerical)
-    error = np.sqrt(sum(np.nan_to_num(part) ** 2 for part in parts))
-    scale = 100.0 / np.abs(baseline.values)
-    percent = study.signs * (baseline.values - pick.values) * scale
+    error = np.sqrt(sum(np.nan_to_num(part[chosen]) ** 2 for part in parts))
+    scale = 100.0 / np.abs(baseline.values[chosen])
+    percent = (goals.costs(baseline.values) - goals.costs(pick.values)) * scale
     return [
-        Gain(name, float(p), float(e))
-        for name, p, e in zip(study.responses, percent, error * scale, strict=True)
+        Gain(study.responses[index], float(p), float(e))
+        for index, p, e in zip(chosen, percent, error * scale, strict=True)
     ]
 
 
-def with_errors(study: Study, record: dict[str, Any]) -> tuple[Array, Array, Array]:
-    quantities = [record[name] for name in study.responses]
-    keys = ("value", "statistical_error", "numerical_error")
-    columns = [np.array([q[key] if q[key] is not None else np.nan for q in quantities]) for key in keys]
-    return columns[0], columns[1], columns[2]
+def statement(gains: Sequence[Gain]) -> str:
+    """Whether the gains are real, in words.
+
+    A gain counts as real where it is more than its error with all responses judged at once: the intervals are widened
+    so that together they hold with 95 % (Bonferroni).
+    """
+    from scipy import special
+
+    wider = float(special.ndtri(1.0 - 0.025 / len(gains)) / special.ndtri(0.975))
+    told = {
+        "real, more than its error": [gain for gain in gains if gain.percent > wider * gain.error],
+        "a real loss, more than its error": [gain for gain in gains if -gain.percent > wider * gain.error],
+        "inside its own noise: no gain is shown": [
+            gain for gain in gains if abs(gain.percent) <= wider * gain.error
+        ],
+    }
+    parts = [
+        f"{', '.join(f'{each.response} {each.percent:+.2f} ± {wider * each.error:.2f} %' for each in group)}: {words}"
+        for words, group in told.items()
+        if group
+    ]
+    together = f" (intervals that hold for all {len(gains)} together)" if len(gains) > 1 else ""
+    return f"Simulated gains over the baseline{together}: {'; '.join(parts)}."

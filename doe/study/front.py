@@ -1,44 +1,149 @@
-"""The Pareto front of a study on its response surfaces."""
+"""The Pareto front of a study on its response surfaces, how sure it is, and what manufacture leaves of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.designs import to_coded
+from doe.designs import to_actual, to_coded
+from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
+from doe.study.goals import goals_of, region_of, tolerances_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
 
 if TYPE_CHECKING:
-    from doe.pareto import ParetoFront
+    from doe.pareto import Goals, ParetoFront
+    from doe.pareto.tolerance_aware import ToleranceAware
+    from doe.pareto.uncertainty import FrontUncertainty
     from doe.response_surface import Surface
 
 Array = NDArray[np.float64]
 
 
 def find_front(study: Study, surfaces: Sequence[Surface]) -> ParetoFront:
-    """Pareto front on the surfaces, within the axial points; all signs turned so that small is good."""
-    from doe.designs import axial_distance
+    """Pareto front on the surfaces within the region of the design, with its uncertainty, and the tolerance-aware one
+    where the study asks for it.
+
+    Raises InputError when fewer than two responses have a goal, no point keeps all limits, or a tolerance is missing.
+    """
     from doe.pareto import front
 
-    if len(surfaces) < 2:
-        raise InputError([f"{study.path}: response: one alone has no front; add a second"])
-    reach = max(1.0, axial_distance(len(study.factors), study.file.design.alpha)) * study.step
+    goals, settings, reach = goals_of(study), study.file.front, region_of(study)
+    if len(goals.objectives) < 2:
+        raise InputError([f"{study.path}: response: one alone has no front; add a second with a goal"])
+    half = None if settings.tolerance_aware == "none" else tolerances_of(study)
 
-    def objectives(points: Array) -> Array:
-        coded = to_coded(points, study.centre, study.step)
-        return np.column_stack([surface.predict(coded) for surface in surfaces]) * study.signs
+    def coded(points: Array) -> Array:
+        return to_coded(points, study.centre, study.step)
 
-    settings = study.file.front
-    return front(
-        objectives,
-        study.centre - reach,
-        study.centre + reach,
+    with _named(study, goals, np.zeros(1), np.ones(1), ""):
+        found = front(
+            lambda points: predict_all(surfaces, coded(points)),
+            to_actual(-reach, study.centre, study.step),
+            to_actual(reach, study.centre, study.step),
+            goals=goals,
+            population=settings.population,
+            generations=settings.generations,
+            seed=settings.seed,
+            baseline=study.baseline,
+            pick=settings.pick,
+            standard_errors=lambda points: np.column_stack(
+                [surface.prediction_standard_error(coded(points)) for surface in surfaces]
+            ),
+        )
+    found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
+    if half is None:
+        return found
+    with _named(study, goals, study.centre, study.step, " after manufacture"):
+        return replace(found, tolerance_aware=_tolerance_aware(study, surfaces, found, half))
+
+
+def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
+    """95 % half widths (..., m) of mean responses; NaN for a surface that leaves no residual."""
+    from scipy import stats
+
+    factors = [
+        float(stats.t.ppf(0.975, surface.residual_dof)) if surface.residual_dof > 0 else np.nan
+        for surface in surfaces
+    ]
+    widths: Array = np.array(factors) * standard_errors
+    return widths
+
+
+def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) -> FrontUncertainty:
+    from doe.pareto.uncertainty import front_uncertainty
+
+    assert found.standard_errors is not None
+    drawn = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
+    points = np.vstack([found.points, study.baseline])
+    values = predict_draws(surfaces, drawn, to_coded(points, study.centre, study.step))
+    return front_uncertainty(
+        values[:, :-1],
+        half_widths(surfaces, found.standard_errors),
+        found.goals,
+        found.values,
+        found.pick,
+        study.file.front.pick,
+        values[:, -1],
+        found.baseline_values,
+    )
+
+
+def _tolerance_aware(
+    study: Study, surfaces: Sequence[Surface], found: ParetoFront, half: Array
+) -> ToleranceAware:
+    from doe.pareto.archive import Archive
+    from doe.pareto.tolerance_aware import ToleranceBox, tolerance_aware_front
+
+    settings, reach = study.file.front, region_of(study)
+    assert settings.tolerance_aware != "none"
+    return tolerance_aware_front(
+        quadratics(surfaces, len(study.factors)),
+        ToleranceBox(
+            half,
+            settings.tolerance_aware,
+            settings.quantile,
+            settings.distribution,
+            settings.tolerance_samples,
+        ),
+        -reach,
+        reach,
+        found.goals,
+        baseline=to_coded(study.baseline, study.centre, study.step),
+        plain=Archive(to_coded(found.points, study.centre, study.step), found.costs),
+        plain_pick=found.pick,
         population=settings.population,
         generations=settings.generations,
         seed=settings.seed,
-        baseline=study.baseline,
+        pick=settings.pick,
     )
+
+
+@contextmanager
+def _named(study: Study, goals: Goals, centre: Array, step: Array, after: str) -> Iterator[None]:
+    """Turns a search that finds nothing into a sentence; ``centre`` and ``step`` are those of its points."""
+    from doe.pareto import InfeasibleError
+
+    try:
+        yield
+    except InfeasibleError as error:
+        missed = [
+            f"{study.responses[index]} {sense} {limit:g} by {by:.4g}"
+            for (index, sense, limit), by in zip(goals.limited, error.violations.tolist(), strict=True)
+            if by > 0.0
+        ]
+        point = to_actual(error.point, centre, step)
+        where = ", ".join(f"{name} = {x:.5g}" for name, x in zip(study.factors, point, strict=True))
+        raise InputError(
+            [
+                f"{study.path}: response.lower, response.upper: no point of the region keeps all limits{after}; the "
+                f"closest ({where}) misses {' and '.join(missed)}; loosen a limit or widen the design"
+            ]
+        ) from None
+    except ValueError as error:
+        raise InputError([f"{study.path}: front{after}: {error}"]) from None

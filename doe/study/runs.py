@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.designs import central_composite, to_actual, to_coded
+from doe.designs import Design, to_actual, to_coded
+from doe.designs.model import model_terms
+from doe.study.design import check_runs, design_of
+from doe.study.failure import Failure, sentence, successes, without_numbers
 from doe.study_file import Study
+from rbdyn.faults import RunError
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
+# Name of the store in the folder of a study.
+STORE = "study.sqlite"
 
 
 @dataclass(frozen=True)
 class Runs:
     """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths.
 
-    ``notes``: what the simulations warn of, once each; none for a table that was read.
+    ``notes``: what the simulations warn of, once each; none for a table that was read. ``replicates``, (n,) or (n, m),
+    count the independent values behind the half-widths (0: unknown), ``block`` (n,) labels each run; None: all unknown,
+    one block. ``failures``: design runs that failed; they are not in the arrays.
     """
 
     coded: Array
@@ -28,33 +36,96 @@ class Runs:
     values: Array
     errors: Array
     notes: tuple[str, ...] = ()
+    replicates: NDArray[np.int64] | None = None
+    block: NDArray[np.int64] | None = None
+    failures: tuple[Failure, ...] = ()
+
+    @property
+    def places(self) -> list[int]:
+        """Place in the design, from 0, of every row."""
+        failed = {failure.run for failure in self.failures}
+        return [row for row in range(len(self.coded) + len(failed)) if row + 1 not in failed]
+
+    def only(self, places: list[int]) -> Runs:
+        """The rows at these places."""
+        coded, actual, values, errors = (
+            array[places] for array in (self.coded, self.actual, self.values, self.errors)
+        )
+        replicates, block = (
+            None if array is None else array[places] for array in (self.replicates, self.block)
+        )
+        return Runs(coded, actual, values, errors, self.notes, replicates, block)
 
 
 def design_points(study: Study) -> Array:
-    """Coded design points (n, k)."""
-    design = study.file.design
-    return central_composite(
-        len(study.factors), alpha=design.alpha, centre_replicates=design.centre_replicates
-    )
+    """Coded design points (n, k) in the order of the runs. Raises InputError when the design is impossible."""
+    return design_of(study).coded
 
 
-def run_design(study: Study, folder: Path, workers: int | None, progress: Progress) -> Runs:
-    """Design runs, from the store in ``folder`` or simulated. Raises InputError, RunError, KeyboardInterrupt."""
+def run_design(
+    study: Study,
+    folder: Path,
+    workers: int | None,
+    progress: Progress,
+    scheduler: str | None = None,
+    retry: bool = False,
+) -> Runs:
+    """Design runs, from the store in ``folder`` or simulated in threads or on a cluster.
+
+    Runs that fail are left out. Raises InputError, KeyboardInterrupt, and RunError when too few are left.
+    """
     from doe import clearance
     from doe.study.store import Store
 
     clearance.check_responses(study)
-    coded = design_points(study)
+    design = design_of(study)
+    check_runs(study, design)
+    coded = design.coded
     actual = to_actual(coded, study.centre, study.step)
-    scenes = clearance.design_scenes(study, actual)
+    scenes = clearance.design_scenes(study, actual, design.order.tolist())
     labels = [f"design run {run + 1}" for run in range(len(scenes))]
-    with Store(folder / "study.sqlite") as store:
-        results = clearance.run_scenes(scenes, labels, store, workers, progress)
-    notes = dict.fromkeys(note for result in results for note in result.notes)
-    return Runs(coded, actual, *clearance.responses(study, results), tuple(notes))
+    factors = [dict(zip(study.factors, point.tolist(), strict=True)) for point in actual]
+    with Store(folder / STORE, study.path.stem) as store:
+        results = clearance.run_scenes(
+            scenes, labels, store, workers, progress, scheduler, retry=retry, factors=factors
+        )
+    failures = tuple(result for result in results if isinstance(result, Failure))
+    left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
+    if failures and len(left) < (needed := fewest_runs(study, design)):
+        raise RunError(
+            f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}: "
+            f"{sentence(failures)}"
+        )
+    found = successes(results[row] for row in left)
+    notes = _told_once(note for result in found for note in result.notes)
+    if failures:
+        notes.append(f"{len(failures)} design runs failed and are left out: {sentence(failures)}")
+    values, errors, independent = clearance.responses(study, found)
+    block = design.block[left] if design.blocks > 1 else None
+    return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)
+
+
+def _told_once(notes: Iterable[str]) -> list[str]:
+    """Notes of all runs; of those that differ in their numbers only the first, and how many there are."""
+    alike: dict[str, list[str]] = {}
+    for note in notes:
+        alike.setdefault(without_numbers(note), []).append(note)
+    return [
+        group[0] if len(set(group)) == 1 else f"{group[0]} (so or similarly {len(group)} runs)"
+        for group in alike.values()
+    ]
+
+
+def fewest_runs(study: Study, design: Design) -> int:
+    """Runs that the largest response model needs: one a term, one a block beyond the first, one to judge the fit."""
+    factors = len(study.factors)
+    return design.blocks + max(len(model_terms(factors, response.model)) for response in study.file.response)
 
 
 def read_runs(study: Study, path: Path) -> Runs:
     """Runs of a CSV table instead of simulated ones. Raises InputError."""
-    actual, values = study.read_table(path)
-    return Runs(to_coded(actual, study.centre, study.step), actual, values, np.full_like(values, np.nan))
+    table = study.read_table(path)
+    coded = to_coded(table.actual, study.centre, study.step)
+    return Runs(
+        coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block
+    )

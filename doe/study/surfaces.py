@@ -1,8 +1,13 @@
-"""A response surface for each response of a study."""
+"""A response surface for each response of a study, and its rival."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from doe.study.runs import Runs
 from doe.study_file import Study
@@ -11,13 +16,18 @@ from rbdyn.faults import InputError
 if TYPE_CHECKING:
     from doe.response_surface import Surface
 
+Array = NDArray[np.float64]
+
 
 def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
     """A surface a response. Raises InputError when the runs do not suffice."""
     from doe.response_surface import fit
 
     surfaces, faults = [], []
-    for response, values in zip(study.file.response, runs.values.T, strict=True):
+    number = independent_values(runs)
+    errors = standard_errors(runs.errors, number)
+    columns = zip(study.file.response, runs.values.T, errors.T, number.T, strict=True)
+    for response, values, error, behind in columns:
         try:
             surfaces.append(
                 fit(
@@ -27,10 +37,67 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
                     model=response.model,
                     centre=study.centre,
                     step=study.step,
+                    standard_errors=error,
+                    replicates=behind,
+                    weighting=response.weighting,
+                    block=runs.block,
+                    transform=response.transform,
                 )
             )
-        except ValueError as error:
-            faults.append(f"{study.path}: {error}")
+        except ValueError as error_of_fit:
+            faults.append(f"{study.path}: {error_of_fit}")
     if faults:
         raise InputError(faults)
     return surfaces
+
+
+def with_rivals(surfaces: Sequence[Surface], seed: int = 1) -> list[Surface]:
+    """The surfaces, each compared with a Gaussian process by leaving out every point in turn.
+
+    It takes of the order of a second a response. ``rival`` stays None where too few points can be left out.
+    """
+    from threadpoolctl import threadpool_limits
+
+    # Threads of their own cost more than they give on matrices of a few dozen runs.
+    with threadpool_limits(1):
+        return [_with_rival(surface, seed) for surface in surfaces]
+
+
+def _with_rival(surface: Surface, seed: int) -> Surface:
+    from doe.response_surface import model_matrix
+    from doe.response_surface.comparison import compare
+
+    data = surface.data
+    try:
+        rival = compare(
+            data.points,
+            data.values,
+            surface.refit,
+            name=surface.name,
+            matrix=model_matrix(data.points, surface.terms),
+            standard_errors=data.standard_errors if surface.weighting == "replicates" else None,
+            seed=seed,
+        )
+    except ValueError:
+        return surface
+    return replace(surface, rival=rival)
+
+
+def independent_values(runs: Runs) -> NDArray[np.int64]:
+    """How many are behind each half width, shape (n, m), from ``runs.replicates``: (n,), (n, m) or None; 0: unknown."""
+    given = np.zeros(len(runs.values)) if runs.replicates is None else np.asarray(runs.replicates)
+    per_response = given if given.ndim == 2 else given[:, None]
+    return np.array(np.broadcast_to(per_response, runs.values.shape), np.int64)
+
+
+def standard_errors(half_widths: Array, number: NDArray[np.int64]) -> Array:
+    """Standard errors of means from the half widths (n, m) of their 95 % intervals.
+
+    The quantile is Student's with ``number`` - 1 degrees of freedom, where ``number`` (n, m) counts the independent
+    values behind each mean; of unknown numbers (0) it is the normal one.
+    """
+    from scipy import special
+
+    student = special.stdtrit(np.maximum(number - 1, 1), 0.975)
+    errors: Array = half_widths / np.where(number > 1, student, special.ndtri(0.975))
+    return errors

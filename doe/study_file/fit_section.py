@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from rbdyn.faults import Strict
 
 
 class Fitted(Strict):
-    """How a surface is fitted to a response."""
+    """How a surface is fitted to a response.
 
-    model: Literal["linear", "quadratic", "reduced"] = "quadratic"
+    ``weighting``: "replicates" weighs each run by the inverse of its variance, known from the replicates of
+    the simulation. ``transform``: of Box and Cox, the recommended one or with the exponent given.
+    """
+
+    model: Literal["linear", "interaction", "quadratic", "reduced"] = "quadratic"
+    weighting: Literal["equal", "replicates"] = "equal"
+    transform: Literal["none", "box_cox"] | Annotated[float, Field(ge=-5.0, le=5.0)] = "none"

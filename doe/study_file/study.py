@@ -14,8 +14,9 @@ from pydantic import Field, model_validator
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Design, Factor
 from doe.study_file.fit_section import Fitted
-from doe.study_file.front_section import Front, Goal
-from rbdyn.faults import InputError, Strict, read_toml, validated
+from doe.study_file.front_section import Direct, Front, Goal, Tolerances
+from doe.study_file.table import Table, read_table
+from rbdyn.faults import Strict, read_toml, validated
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,8 @@ class StudyFile(Strict):
     response: Annotated[list[Response], Field(min_length=1)]
     design: Design = Design()
     front: Front = Front()
+    direct: Direct = Direct()
+    tolerances: Tolerances | None = None
     confirmation: Confirmation = Confirmation()
     baseline: dict[str, float] = {}
     chain: list[StudyChain] = []
@@ -139,31 +142,6 @@ class Study:
         """A file named in the study."""
         return self.path.parent / name
 
-    def read_table(self, path: Path) -> tuple[Array, Array]:
-        """Factor values (n, k) and responses (n, m) of a CSV table with a column for each name.
-
-        Raises InputError when the file, a column or a number is missing.
-        """
-        import pandas as pd
-
-        try:
-            table = pd.read_csv(path)
-        except FileNotFoundError:
-            raise InputError([f"{path}: no such file; check the path"]) from None
-        except (OSError, ValueError) as error:
-            raise InputError([f"{path}: cannot be read as a CSV table ({error}); mend the file"]) from None
-        wanted = [*self.factors, *self.responses]
-        faults = [
-            f"{path}: column {name!r} is missing; add it, or rename the factor or response in {self.path}"
-            for name in wanted
-            if name not in table.columns
-        ]
-        for name in set(wanted) & set(table.columns):
-            numbers = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
-            faults += [
-                f"{path}: {name} in row {row + 1} = {table[name].iloc[row]!r}: is not a finite number; mend it"
-                for row in np.flatnonzero(~np.isfinite(numbers))
-            ]
-        if faults:
-            raise InputError(faults)
-        return table[self.factors].to_numpy(float), table[self.responses].to_numpy(float)
+    def read_table(self, path: Path) -> Table:
+        """Runs of a CSV table with a column for each name. Raises InputError with all faults."""
+        return read_table(path, self.factors, self.responses, self.path)

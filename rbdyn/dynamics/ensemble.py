@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Generic, TypeVar
 
 from rbdyn.faults import RunError
@@ -56,29 +57,42 @@ class Ended(Generic[T]):
 
 
 def run_all(
-    runs: Sequence[Callable[[], T]],
+    runs: Iterable[Callable[[], T]],
     workers: int | None,
     stop: Stop,
     ended: Callable[[Ended[T]], None],
 ) -> None:
     """Run all on ``workers`` threads (all processors by default) and hand over each as it ends.
 
-    Whatever is raised, by ``ended`` or by Ctrl-C, stops the others at their next look at ``stop`` and is raised on.
+    ``runs`` is drawn from as threads become free. Whatever is raised, by ``runs``, ``ended`` or Ctrl-C, stops the others
+    at their next look at ``stop`` and is raised on; on Ctrl-C what has ended by then is handed over first.
     """
-    pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+    workers = workers or os.cpu_count() or 1
+    pool = ThreadPoolExecutor(workers)
+    todo = enumerate(runs)
+    pending: dict[Future[T], int] = {}
+
+    def hand_over(done: Iterable[Future[T]]) -> None:
+        for future in sorted(done, key=pending.__getitem__):
+            place = pending.pop(future)
+            try:
+                one = Ended(place, future.result(), None)
+            except RunError as fault:
+                one = Ended(place, None, fault)
+            ended(one)
+
     try:
-        pending: dict[Future[T], int] = {pool.submit(run): place for place, run in enumerate(runs)}
-        while pending:
-            done, _ = wait(pending, timeout=NAP_S, return_when=FIRST_COMPLETED)
-            for future in sorted(done, key=pending.__getitem__):
-                place = pending.pop(future)
-                try:
-                    one = Ended(place, future.result(), None)
-                except RunError as fault:
-                    one = Ended(place, None, fault)
-                ended(one)
-    except BaseException:
+        while True:
+            # One more than there are threads, so that none waits for the next run to be drawn.
+            for place, run in islice(todo, workers + 1 - len(pending)):
+                pending[pool.submit(run)] = place
+            if not pending:
+                break
+            hand_over(wait(pending, timeout=NAP_S, return_when=FIRST_COMPLETED).done)
+    except BaseException as error:
         stop.event.set()
         pool.shutdown(wait=True, cancel_futures=True)
+        if isinstance(error, KeyboardInterrupt):
+            hand_over([one for one in pending if not one.cancelled() and one.exception() is None])
         raise
     pool.shutdown()

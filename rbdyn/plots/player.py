@@ -21,19 +21,21 @@ FRAMES_PER_TURN = 128
 MOST_NUMBERS = 400_000
 PER_ROLLER, PER_FRAME = 6, 9
 TEMPLATE = Path(__file__).with_name("player.html")
+BEARING = Path(__file__).with_name("bearing.js")
 
 
 def player_html(history: History) -> str:
     """The page, of up to three shaft turns about the largest pocket force; rounded to 0.1 um, 1 mrad and four digits."""
     most_frames = MOST_NUMBERS // (PER_ROLLER * history.scene.bearing.rollers + PER_FRAME)
     picture = drawing(history, TURNS, FRAMES_PER_TURN, most_frames)
-    record = json.dumps(_record(history, picture), separators=(",", ":"), allow_nan=False)
-    page = TEMPLATE.read_text(encoding="utf-8")
+    record = json.dumps(motion_record(history, picture), separators=(",", ":"), allow_nan=False)
+    page = TEMPLATE.read_text(encoding="utf-8").replace("{{BEARING}}", BEARING.read_text(encoding="utf-8"))
     # Data last, so that nothing in it can be taken for a mark to be replaced.
     return page.replace("{{FIRST_FRAME}}", _svg(picture)).replace("{{DATA}}", record.replace("<", "\\u003c"))
 
 
-def _record(history: History, d: Drawing) -> dict[str, Any]:
+def motion_record(history: History, d: Drawing) -> dict[str, Any]:
+    """What ``bearing.js`` draws: sizes [mm], and the motion as flat lists, frame after frame."""
     turn = 2.0 * np.pi
     scene = history.scene
     return {

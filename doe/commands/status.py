@@ -1,0 +1,22 @@
+"""``doe status``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from doe.commands.options import Json, Out, Quiet, StudyPath
+from rbdyn.terminal import guarded, print_json
+
+
+def status(path: StudyPath, out: Out = None, as_json: Json = False, quiet: Quiet = False) -> None:
+    """Tell where a study stands: done, failed by cause, running, missing, time spent and left."""
+    with guarded(as_json):
+        from doe.report.status import print_status
+        from doe.study.status import study_status
+        from doe.study_file import Study
+
+        record = study_status(Study.load(path), out or Path(f"{path.stem}_results"))
+        if as_json:
+            print_json(record)
+        else:
+            print_status(record, quiet)

@@ -1,0 +1,200 @@
+"""What a design can tell before any run is made: precision of terms and predictions, tests, power.
+
+Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., chapters 8 and 9.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from doe.designs.design import Region
+from doe.designs.model import term_columns
+from doe.designs.region import directions, lattice, moment_matrix, sample
+
+Array = NDArray[np.float64]
+
+SAME_POINT = 1e-9  # coded units within which two runs are replicates
+SIGNIFICANCE = 0.05  # of the tests whose power is given
+RADII = 11  # of the variance dispersion graph
+
+
+def evaluate(
+    coded: ArrayLike,
+    terms: Sequence[str],
+    block: ArrayLike | None = None,
+    *,
+    region: Region | None = None,
+    reach: float | None = None,
+) -> dict[str, Any]:
+    """Evaluate a design for a model.
+
+    Parameters
+    ----------
+    coded : points in coded units, shape (n, k).
+    terms : terms of the model, with "1".
+    block : block of each run (n,); effects of blocks are estimated along, predictions are means over them.
+    region, reach : where predictions count, a "ball" of radius or a "box" of half-width ``reach``. Unless
+        given: the box as wide as the design if a run stands in a corner of it, else the ball through the
+        outermost runs.
+
+    Returns
+    -------
+    JSON-ready. ``efficiency_percent`` with X the model matrix, p terms, n runs, factors scaled to -1..+1 over
+    the design: d = |X'X|^(1/p)/n, a = p/(n trace (X'X)^-1), g = p/(largest), i = p/(mean) scaled prediction
+    variance over the region (i has no bound of 100). ``scaled_prediction_variance`` is n var(prediction)/sigma^2:
+    ``centre``, ``mean`` (exact), ``max`` (over a lattice and 4096 points) of the region, and ``box_max`` of the box
+    as wide as the design. ``by_radius``: its ``min``, ``mean`` and ``max`` over 3^k - 1 directions.
+    ``fraction_of_design_space``: ``variance`` that ``percent`` of the region stays within. ``vif``, ``power_percent``
+    by term; power is that of a 5 % t test of a change by one and two sigma, from -1 to +1 for a slope or
+    product, from centre to +-1 for a square (None without residual degrees of freedom). ``leverage`` by run;
+    ``condition_number`` of the model matrix with columns of unit length; ``degrees_of_freedom``; ``blocks``:
+    None for one block, else ``sizes``, whether ``orthogonal`` and the ``largest_cosine`` between block and terms.
+
+    Raises
+    ------
+    ValueError naming the terms that the runs cannot tell apart.
+
+    Source: Atkinson, Donev and Tobias, Optimum Experimental Designs (2007) (efficiencies);
+    Giovannitti-Jensen and Myers, Technometrics 31 (1989) (by radius); Zahran, Anderson-Cook and Myers,
+    J. Qual. Technol. 35 (2003) (fraction of design space).
+    """
+    points = np.asarray(coded, float)
+    runs, factors = points.shape
+    groups = np.zeros(runs, dtype=np.intp) if block is None else np.unique(block, return_inverse=True)[1]
+    lost = untold_terms(points, terms, groups)
+    if lost:
+        raise ValueError(f"the {runs} runs cannot tell {', '.join(lost)} from the other terms")
+    widest = float(np.abs(points).max())
+    farthest = float(np.linalg.norm(points, axis=1).max())
+    if region is None:
+        region = "box" if farthest > 0.999 * widest * math.sqrt(factors) else "ball"
+    if reach is None:
+        reach = widest if region == "box" else farthest
+    matrix, contrasts = term_columns(points, terms), block_contrasts(groups)
+    whole = np.column_stack([matrix, contrasts])
+    size = matrix.shape[1]
+    covariance = np.asarray(np.linalg.inv(whole.T @ whole)[:size, :size], float)
+    variances = _Variances(covariance, terms, runs)
+    mean = runs * float(np.trace(covariance @ moment_matrix(terms, factors, region, reach)))
+    spread = variances(sample(factors, region, reach))
+    radii = np.linspace(0.0, reach, RADII)
+    shells = variances(radii[:, None, None] * directions(factors)[None])
+    edges = shells.ravel() if region == "ball" else variances(lattice(factors, reach))
+    largest = max(float(spread.max()), float(edges.max()))
+    per_width = np.abs(term_columns(np.full(factors, widest), terms))
+    scaled = covariance * np.outer(per_width, per_width)
+    freedom = _degrees_of_freedom(points, groups, size, contrasts.shape[1])
+    orthogonal = np.linalg.qr(whole)[0]
+    return {
+        "terms": list(terms),
+        "runs": runs,
+        "region": {"shape": region, "reach": reach},
+        "efficiency_percent": {
+            "d": 100.0 * math.exp(-float(np.linalg.slogdet(scaled)[1]) / size) / runs,
+            "a": 100.0 * size / (runs * float(np.trace(scaled))),
+            "g": 100.0 * size / largest,
+            "i": 100.0 * size / mean,
+        },
+        "scaled_prediction_variance": {
+            "centre": float(variances(np.zeros(factors))),
+            "mean": mean,
+            "max": largest,
+            "box_max": float(variances(lattice(factors, reach if region == "box" else widest)).max()),
+        },
+        "by_radius": [
+            {
+                "radius": radius,
+                "min": float(shell.min()),
+                "mean": float(shell.mean()),
+                "max": float(shell.max()),
+            }
+            for radius, shell in zip(radii.tolist(), shells, strict=True)
+        ],
+        "fraction_of_design_space": [
+            {"percent": percent, "variance": float(np.percentile(spread, percent))}
+            for percent in range(0, 101, 5)
+        ],
+        "vif": _inflation(matrix, covariance, terms),
+        "leverage": (orthogonal**2).sum(axis=1).tolist(),
+        "condition_number": float(np.linalg.cond(matrix / np.linalg.norm(matrix, axis=0))),
+        "degrees_of_freedom": freedom,
+        "blocks": _blocks(matrix, contrasts, groups),
+        "power_percent": _power(covariance, terms, freedom["residual"]),
+    }
+
+
+class _Variances:
+    """Scaled prediction variance at coded points (..., k)."""
+
+    def __init__(self, covariance: Array, terms: Sequence[str], runs: int) -> None:
+        self._root = math.sqrt(runs) * np.linalg.cholesky(covariance)
+        self._terms = terms
+
+    def __call__(self, points: Array) -> Array:
+        columns: Array = term_columns(points, self._terms) @ self._root
+        return np.einsum("...i,...i->...", columns, columns)
+
+
+def untold_terms(coded: Array, terms: Sequence[str], block: NDArray[np.intp] | None = None) -> list[str]:
+    """Terms that the runs cannot tell from blocks and the terms before them."""
+    groups = np.zeros(len(coded), dtype=np.intp) if block is None else block
+    columns = np.column_stack([block_contrasts(groups), term_columns(coded, terms)])
+    columns = columns / np.linalg.norm(columns, axis=0).clip(1e-300)
+    first = columns.shape[1] - len(terms)
+    ranks = [np.linalg.matrix_rank(columns[:, :end], tol=1e-9) for end in range(first, columns.shape[1] + 1)]
+    return [term for term, rise in zip(terms, np.diff(ranks), strict=True) if rise == 0]
+
+
+def block_contrasts(block: NDArray[np.intp]) -> Array:
+    """Columns (n, b - 1) of the blocks but the last, each of mean zero, so that "1" is the mean over all runs."""
+    indicator = (block[:, None] == np.unique(block)[None, :-1]).astype(float)
+    return indicator - indicator.mean(axis=0)
+
+
+def _inflation(matrix: Array, covariance: Array, terms: Sequence[str]) -> dict[str, float]:
+    """Variance of each coefficient relative to that with a column orthogonal to all others."""
+    alone = ((matrix - matrix.mean(axis=0)) ** 2).sum(axis=0)
+    inflation = (np.diag(covariance) * alone).tolist()
+    return {term: value for term, value in zip(terms, inflation, strict=True) if term != "1"}
+
+
+def _degrees_of_freedom(points: Array, groups: NDArray[np.intp], terms: int, blocks: int) -> dict[str, int]:
+    labelled = np.round(np.column_stack([points, groups]) / SAME_POINT)
+    residual = len(points) - terms - blocks
+    pure = len(points) - len(np.unique(labelled, axis=0))
+    return {
+        "model": terms - 1,
+        "blocks": blocks,
+        "residual": residual,
+        "lack_of_fit": residual - pure,
+        "pure_error": pure,
+    }
+
+
+def _blocks(matrix: Array, contrasts: Array, groups: NDArray[np.intp]) -> dict[str, Any] | None:
+    if contrasts.shape[1] == 0:
+        return None
+    unit = matrix / np.linalg.norm(matrix, axis=0)
+    cosine = float(np.abs(unit.T @ (contrasts / np.linalg.norm(contrasts, axis=0))).max())
+    return {"sizes": np.bincount(groups).tolist(), "orthogonal": cosine < 1e-9, "largest_cosine": cosine}
+
+
+def _power(covariance: Array, terms: Sequence[str], residual: int) -> dict[str, dict[str, float | None]]:
+    power: dict[str, dict[str, float | None]] = {}
+    for term, variance in zip(terms, np.diag(covariance).tolist(), strict=True):
+        if term == "1":
+            continue
+        power[term] = {"one_sigma": None, "two_sigma": None}
+        if residual > 0:
+            limit = stats.f.isf(SIGNIFICANCE, 1, residual)
+            per_sigma = 1.0 if "^2" in term else 0.5
+            for name, change in (("one_sigma", 1.0), ("two_sigma", 2.0)):
+                shift = (per_sigma * change) ** 2 / variance
+                power[term][name] = 100.0 * float(stats.ncf.sf(limit, 1, residual, shift))
+    return power

@@ -1,0 +1,59 @@
+"""Archives of evaluated points: the non-dominated of all, generation by generation, and evenly spread picks of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Archive(NamedTuple):
+    """Points (f, k) and their costs (f, q), none of which dominates another."""
+
+    points: Array
+    costs: Array
+
+
+def non_dominated(values: Array) -> NDArray[np.intp]:
+    """Row numbers of the non-dominated of ``values`` (n, m), by ascending first objective, no repeats."""
+    from pymoo.util.nds.non_dominated_sorting import find_non_dominated
+
+    unique, rows = np.unique(values, axis=0, return_index=True)
+    if not len(unique):
+        return rows
+    chosen: NDArray[np.intp] = rows[find_non_dominated(unique)]
+    return chosen
+
+
+def dominates(better: Array, worse: Array) -> NDArray[np.bool_]:
+    """Whether costs (..., q) are nowhere larger than others and somewhere smaller."""
+    found: NDArray[np.bool_] = np.all(better <= worse, axis=-1) & np.any(better < worse, axis=-1)
+    return found
+
+
+def archives(history: Sequence[Archive]) -> list[Archive]:
+    """Non-dominated points of all generations up to each of ``history``."""
+    kept = []
+    points, costs = (part[:0] for part in history[0])
+    for new in history:
+        points, costs = np.vstack([points, new.points]), np.vstack([costs, new.costs])
+        rows = non_dominated(costs)
+        points, costs = points[rows], costs[rows]
+        kept.append(Archive(points, costs))
+    return kept
+
+
+def spread(scaled: Array, keep: int, wanted: Sequence[int]) -> NDArray[np.intp]:
+    """Rows to keep, ascending: the extremes and the wanted first, then always the row farthest from all."""
+    if len(scaled) <= keep:
+        return np.arange(len(scaled))
+    chosen = sorted({*scaled.argmin(axis=0).tolist(), *scaled.argmax(axis=0).tolist(), *wanted})
+    gap = np.min([np.linalg.norm(scaled - scaled[row], axis=1) for row in chosen], axis=0)
+    while len(chosen) < keep:
+        chosen.append(int(gap.argmax()))
+        gap = np.minimum(gap, np.linalg.norm(scaled - scaled[chosen[-1]], axis=1))
+    return np.sort(chosen)

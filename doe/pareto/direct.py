@@ -1,0 +1,285 @@
+"""The front of a noisy simulator without surfaces: NSGA-II with error-aware dominance and an honest end.
+
+A search keeps whatever was lucky, so what it believes of its survivors is too good (the winner's curse). Three shares
+of the budget mend that: the search; fresh runs at its candidates, which choose the finalists; and again fresh runs
+at the finalists, which alone are reported. Runs that chose a point say nothing of it in the end.
+
+Sources: Deb et al. (2002) for NSGA-II; Hughes (2001) and Teich (2001) for dominance under noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from doe.pareto.archive import dominates, spread
+from doe.pareto.dominance import dominance, error_aware_dominance, order, ranks
+from doe.pareto.goals import Goals
+from doe.pareto.indicators import normalised
+from doe.pareto.nsga2 import check_search
+from doe.pareto.picks import NAMES, Rule, pick_all
+
+Array = NDArray[np.float64]
+Evaluate = Callable[[Array], tuple[Array, Array]]
+
+FAILED = 1e30  # cost of a point whose run failed: behind every other
+SELECTING = 4  # fresh runs a candidate
+REPORTING = 4  # fresh runs a finalist at least
+
+
+class Samples(NamedTuple):
+    """Points (n, k) run, their responses (n, m) and standard errors (n, m); rows of NaN where a run failed."""
+
+    points: Array
+    values: Array
+    errors: Array
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Whether each point's run failed, (n,)."""
+        return np.asarray(np.isnan(self.values).any(axis=1))
+
+    def rows(self, which: Any) -> Samples:
+        """Some of them."""
+        return Samples(*(part[which] for part in self))
+
+
+@dataclass(frozen=True, eq=False)
+class DirectFront:
+    """Front of a noisy simulator, in ascending order of the first cost as it was selected.
+
+    ``points`` (f, k); ``values`` and ``standard_errors`` (f, m) of ``repeats`` fresh runs each, which had no part in
+    the selection, and their ``costs`` (f, q) and ``cost_errors`` (f, q). ``searched_values`` (f, m) is what the
+    search believed of them; ``optimism`` (q,) how much too small that was on average, in shares of the range of the
+    costs. ``pick`` is a row. ``failures`` (x, k) are the points where a run failed.
+    """
+
+    points: Array
+    values: Array
+    standard_errors: Array
+    costs: Array
+    cost_errors: Array
+    searched_values: Array
+    optimism: Array
+    pick: int
+    pick_reason: str
+    baseline_values: Array | None
+    baseline_errors: Array | None
+    repeats: int
+    failures: Array
+    evaluations: int
+    generations: int
+    seed: int
+    goals: Goals
+
+
+def direct_front(
+    evaluate: Evaluate,
+    lower: ArrayLike,
+    upper: ArrayLike,
+    *,
+    goals: Goals,
+    evaluations: int = 2000,
+    population: int = 50,
+    seed: int = 1,
+    baseline: ArrayLike | None = None,
+    confidence: float = 0.95,
+    resample: float = 0.3,
+    pick: Rule = "knee",
+) -> DirectFront:
+    """Find the front of a noisy simulator; the same seed and the same runs give the same bits.
+
+    Parameters
+    ----------
+    evaluate : runs points (n, k), a generation at once, and gives responses (n, m) and their standard errors (n, m),
+        NaN where a run failed. Every row of every call must be a run of its own (a fresh seed, such as a running
+        number), even at a point that was run before.
+    lower, upper : bounds of the factors, shape (k,).
+    goals : what is wanted of the m responses.
+    evaluations : budget of rows, never exceeded. population, seed : of NSGA-II.
+    baseline : a point (k,) to improve on, run like a finalist.
+    confidence : at which a difference counts while the search sorts.
+    resample : share of the budget for fresh runs at the end.
+    pick : rule that makes the pick.
+
+    Raises
+    ------
+    ValueError when the bounds are not a box, a setting is out of range, the budget is below five populations, or
+    every run at the points of a stage failed or breaks a limit.
+    """
+    low, high = np.asarray(lower, float), np.asarray(upper, float)
+    check_search(low, high, population, 1, 2)
+    if not 0.1 <= resample <= 0.9 or not 0.5 < confidence < 1.0:
+        raise ValueError(
+            f"resample = {resample}, confidence = {confidence}: must be in [0.1, 0.9] and (0.5, 1)"
+        )
+    if evaluations < 5 * population:
+        raise ValueError(
+            f"evaluations = {evaluations}: must be at least five populations ({5 * population}); give more runs "
+            "or a smaller population"
+        )
+    generations = int(evaluations * (1.0 - resample)) // population
+    archive = _search(evaluate, low, high, goals, population, generations, seed, confidence)
+    left = evaluations - len(archive.points)
+    candidates = archive.rows(_candidates(archive, goals, confidence, max(left // (2 * SELECTING), 1)))
+    fresh = _repeated(evaluate, candidates.points, SELECTING)
+    left -= SELECTING * len(candidates.points)
+    chosen = _finalists(fresh, goals, max(left // REPORTING - 1, 1))
+    finalists, selected = candidates.rows(chosen), goals.costs(fresh.values[chosen])
+    extra = np.empty((0, low.size)) if baseline is None else np.asarray(baseline, float)[None]
+    repeats = max(left // (len(chosen) + len(extra)), 1)
+    final = _repeated(evaluate, np.vstack([finalists.points, extra]), repeats)
+    failed = [batch.points[batch.failed] for batch in (archive, fresh, final)]
+    ours, base = final.rows(slice(len(chosen))), final.rows(slice(len(chosen), None))
+    kept = np.flatnonzero(~ours.failed)
+    if not kept.size:
+        raise ValueError("every run at the finalists failed; see the failures of the runs")
+    ours, finalists, selected = ours.rows(kept), finalists.rows(kept), selected[kept]
+    base_costs = goals.costs(base.values[0]) if len(extra) and not base.failed[0] else None
+    picks, among = pick_all(selected, goals, base_costs)
+    costs = goals.costs(ours.values)
+    span = np.ptp(costs, axis=0)
+    gap = (costs - goals.costs(finalists.values)).mean(axis=0)
+    return DirectFront(
+        points=ours.points,
+        values=ours.values,
+        standard_errors=ours.errors,
+        costs=costs,
+        cost_errors=ours.errors[:, goals.objectives],
+        searched_values=finalists.values,
+        optimism=gap / np.where(span > 0.0, span, 1.0),
+        pick=picks[pick],
+        pick_reason=f"{NAMES[pick]} {among}",
+        baseline_values=base.values[0] if len(extra) else None,
+        baseline_errors=base.errors[0] if len(extra) else None,
+        repeats=repeats,
+        failures=np.unique(np.vstack(failed), axis=0),
+        evaluations=len(archive.points) + SELECTING * len(candidates.points) + repeats * len(final.points),
+        generations=generations,
+        seed=seed,
+        goals=goals,
+    )
+
+
+def _search(
+    evaluate: Evaluate,
+    low: Array,
+    high: Array,
+    goals: Goals,
+    population: int,
+    generations: int,
+    seed: int,
+    confidence: float,
+) -> Samples:
+    """Every evaluation of NSGA-II whose survivors are told apart beyond their errors only."""
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.evaluator import Evaluator
+    from pymoo.core.problem import Problem
+    from pymoo.core.survival import Survival
+    from pymoo.operators.sampling.lhs import LHS
+    from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance
+    from pymoo.problems.static import StaticProblem
+
+    class Surviving(Survival):
+        def _do(
+            self, problem: Any, pop: Any, *arguments: Any, n_survive: int | None = None, **rest: Any
+        ) -> Any:
+            costs, errors = pop.get("F"), pop.get("errors")
+            place = _behind(order(costs, errors, confidence), pop.get("broken"))
+            crowding = np.zeros(len(pop))
+            for level in np.unique(place):
+                crowding[place == level] = calc_crowding_distance(costs[place == level])
+            pop.set("rank", place)
+            pop.set("crowding", crowding)
+            return pop[np.lexsort((-crowding, place))[:n_survive]]
+
+    problem = Problem(n_var=low.size, n_obj=len(goals.objectives), xl=low, xu=high)
+    algorithm = NSGA2(pop_size=population, sampling=LHS(), survival=Surviving(filter_infeasible=False))
+    algorithm.tournament_type = "comp_by_rank_and_crowding"
+    algorithm.setup(problem, termination=("n_gen", generations), seed=seed)
+    batches: list[Samples] = []
+    for _ in range(generations):
+        infill = algorithm.ask()
+        batch = _run(evaluate, infill.get("X"))
+        bad = batch.failed
+        costs = np.where(bad[:, None], FAILED, goals.costs(batch.values))
+        infill.set("errors", np.where(bad[:, None], 0.0, batch.errors[:, goals.objectives]))
+        infill.set("broken", np.where(bad, np.inf, _broken(batch, goals)))
+        Evaluator().eval(StaticProblem(problem, F=costs), infill)
+        algorithm.tell(infills=infill)
+        batches.append(batch)
+    return Samples(*(np.vstack(part) for part in zip(*batches, strict=True)))
+
+
+def _run(evaluate: Evaluate, points: Array) -> Samples:
+    values, errors = (np.array(part, float) for part in evaluate(points.copy()))
+    failed = ~np.isfinite(values).all(axis=1)
+    values[failed] = np.nan
+    return Samples(points, values, np.where(np.isfinite(errors), errors, 0.0))
+
+
+def _repeated(evaluate: Evaluate, points: Array, times: int) -> Samples:
+    """Means of ``times`` fresh runs at each point, all in one batch; NaN where one of them failed."""
+    batch = _run(evaluate, np.tile(points, (times, 1)))
+    values = batch.values.reshape(times, len(points), -1)
+    stated = np.sqrt((batch.errors.reshape(values.shape) ** 2).sum(axis=0)) / times
+    if times == 1:
+        return Samples(points, values[0], stated)
+    # What the runs themselves scatter by counts where it is more than they state.
+    scatter = values.std(axis=0, ddof=1) / np.sqrt(times)
+    typical = np.sqrt(np.nanmean(scatter**2, axis=0)) if np.isfinite(scatter).any() else 0.0
+    return Samples(points, values.mean(axis=0), np.where(stated > 0.0, stated, typical))
+
+
+def _broken(batch: Samples, goals: Goals) -> Array:
+    """Sum of the broken limits (n,), each in shares of the limit."""
+    scale = np.array([abs(limit) or 1.0 for _, _, limit in goals.limited])
+    total: Array = (goals.violations(batch.values, batch.values) / scale).sum(axis=1)
+    return total
+
+
+def _behind(place: NDArray[np.intp], broken: Array) -> NDArray[np.intp]:
+    """Places with those that break a limit or failed behind all others, by how far."""
+    _, far = np.unique(broken, return_inverse=True)
+    return np.where(broken > 0.0, place.max() + 1 + far.reshape(-1), place)
+
+
+def _allowed(batch: Samples, goals: Goals) -> NDArray[np.intp]:
+    good = ~batch.failed
+    good[good] &= _broken(batch.rows(good), goals) <= 0.0
+    rows = np.flatnonzero(good)
+    if not rows.size:
+        raise ValueError("every run failed or breaks a limit; loosen the limits or see the failures")
+    return rows
+
+
+def _candidates(archive: Samples, goals: Goals, confidence: float, count: int) -> NDArray[np.intp]:
+    """Rows of the archive for fresh runs: the best places first, spread out in the last of them."""
+    rows = _allowed(archive, goals)
+    costs, errors = goals.costs(archive.values[rows]), archive.errors[rows][:, goals.objectives]
+    open_ones = np.flatnonzero(~error_aware_dominance(costs, errors, confidence).any(axis=0))
+    level = ranks(dominance(costs[open_ones]))
+    chosen: list[int] = []
+    for each in np.unique(level):
+        found = open_ones[level == each]
+        room = count - len(chosen)
+        if room <= 0:
+            break
+        scaled = normalised(costs[found], costs[found].min(axis=0), costs[found].max(axis=0))
+        part = found[spread(scaled, max(room, 1), [])] if room < len(found) else found
+        chosen += part[:room].tolist()
+    return rows[np.array(chosen)]
+
+
+def _finalists(fresh: Samples, goals: Goals, count: int) -> NDArray[np.intp]:
+    """Rows of the candidates that their fresh runs leave non-dominated, by ascending first cost."""
+    rows = _allowed(fresh, goals)
+    costs = goals.costs(fresh.values[rows])
+    kept = np.array([row for row in range(len(rows)) if not dominates(costs, costs[row]).any()])
+    scaled = normalised(costs[kept], costs[kept].min(axis=0), costs[kept].max(axis=0))
+    kept = kept[spread(scaled, count, [])][:count]
+    return rows[kept[np.argsort(costs[kept, 0], kind="stable")]]

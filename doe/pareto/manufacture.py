@@ -1,0 +1,42 @@
+"""Where a part falls within its tolerance: samples of offsets in half widths of the tolerance."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Distribution = Literal["normal", "uniform"]
+
+SIGMAS = 3.0  # standard deviations in a half width: the tolerance is six of them
+
+
+def offsets(shares: Array, distribution: Distribution) -> Array:
+    """Offsets in [-1, 1] of cumulative shares in (0, 1), any shape.
+
+    "normal": mean at mid tolerance, tolerance of 6 standard deviations, parts outside it sorted out; "uniform".
+    """
+    if distribution == "uniform":
+        uniform: Array = 2.0 * shares - 1.0
+        return uniform
+    from scipy.stats import norm
+
+    outside = norm.cdf(-SIGMAS)
+    normal: Array = norm.ppf(outside + shares * (1.0 - 2.0 * outside)) / SIGMAS
+    return normal
+
+
+def even_offsets(count: int, factors: int, distribution: Distribution) -> Array:
+    """Offsets (count, factors) that fill the tolerance box evenly (Sobol points, always the same)."""
+    from scipy.stats import qmc
+
+    points = qmc.Sobol(factors, scramble=False).random(count)
+    # Half a cell in, lest a point lie on the rim.
+    return offsets((points + 0.5 / count) % 1.0, distribution)
+
+
+def random_offsets(count: int, factors: int, distribution: Distribution, seed: int) -> Array:
+    """Independent offsets (count, factors) of parts."""
+    return offsets(np.random.default_rng(seed).uniform(size=(count, factors)), distribution)

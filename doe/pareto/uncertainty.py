@@ -1,0 +1,145 @@
+"""What the errors of fitted surfaces make of a front, of a pick and of its gain over a baseline.
+
+Coefficients of a least-squares surface follow a multivariate t distribution about their estimates. One draw of them
+is one surface that the runs might as well have come from; all points on it share its error, and so does a difference
+of two points.
+
+Source: Box and Tiao, Bayesian Inference in Statistical Analysis, section 2.7.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.pareto.archive import dominates
+from doe.pareto.goals import Goals
+from doe.pareto.picks import Rule, pick_all
+
+Array = NDArray[np.float64]
+
+SELECTIONS = 300  # draws on which the rule picks anew; its own error then hides in that of the gain
+
+
+@dataclass(frozen=True, eq=False)
+class FrontUncertainty:
+    """How sure a front is.
+
+    ``half_widths`` (f, m): 95 % half widths of the mean responses of each front point. ``non_dominated`` (f,):
+    probability that a front point is dominated by none of the others. ``pick_dominates``: probability that the
+    pick dominates the baseline. Probabilities carry their Monte Carlo standard errors. ``optimism`` (q,): by how much
+    the rule promises too large a gain of each cost, because it picks what the errors flatter; None without a baseline.
+    """
+
+    half_widths: Array
+    non_dominated: Array
+    non_dominated_error: Array
+    pick_dominates: float | None
+    pick_dominates_error: float | None
+    optimism: Array | None
+    draws: int
+
+
+def draw_coefficients(
+    coefficients: Array, covariance: Array, dof: int, draws: int, random: np.random.Generator
+) -> Array:
+    """Draws (draws, p) of coefficients (p,) from the multivariate t of ``dof`` degrees of freedom.
+
+    ``covariance`` (p, p) is the estimated covariance of the coefficients, the scale matrix of the distribution.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(values.clip(0.0))
+    normal = random.standard_normal((draws, coefficients.size)) @ root.T
+    chi_square = random.chisquare(dof, (draws, 1)) if dof > 0 else np.full((draws, 1), 1.0)
+    drawn: Array = coefficients + normal / np.sqrt(chi_square / max(dof, 1))
+    return drawn
+
+
+def share(hits: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Share of the draws (d, ...) that hit and its Monte Carlo standard error.
+
+    The error is that of the share with one hit and one miss more, lest a few hundred hits of as many pass for sure.
+    """
+    count = len(hits)
+    mean = hits.mean(axis=0)
+    careful = (hits.sum(axis=0) + 1.0) / (count + 2.0)
+    return mean, np.sqrt(careful * (1.0 - careful) / count)
+
+
+def non_dominated_share(costs: Array) -> tuple[Array, Array]:
+    """Probability (f,) that a point is dominated by no other, and its error, from drawn costs (d, f, q)."""
+    kept = np.empty(costs.shape[:2], dtype=bool)
+    for row, drawn in zip(kept, costs, strict=True):
+        better = np.ones((len(drawn), len(drawn)), dtype=bool)
+        for column in drawn.T:
+            better &= column[:, None] <= column[None, :]
+        # Equal points do not dominate each other.
+        equal = better & better.T
+        row[:] = ~(better & ~equal).any(axis=0)
+    return share(kept)
+
+
+def front_uncertainty(
+    drawn: Array,
+    half_widths: Array,
+    goals: Goals,
+    values: Array,
+    pick: int,
+    rule: Rule,
+    baseline: Array | None,
+    baseline_values: Array | None,
+) -> FrontUncertainty:
+    """How sure a front is, from drawn responses.
+
+    Parameters
+    ----------
+    drawn : responses (d, f, m) of the front's points on each drawn set of surfaces.
+    half_widths : 95 % half widths (f, m) of the mean responses.
+    goals : what is wanted of the responses.
+    values : responses (f, m) on the fitted surfaces.
+    pick, rule : row of the pick and the rule that made it.
+    baseline, baseline_values : responses (d, m) of the baseline on the drawn surfaces and (m,) on the fitted ones, or
+        None.
+    """
+    costs = goals.costs(drawn)
+    kept, kept_error = non_dominated_share(costs)
+    wins: tuple[Array, Array] | tuple[None, None] = (None, None)
+    optimism = None
+    if baseline is not None and baseline_values is not None:
+        base = goals.costs(baseline)
+        wins = share(dominates(costs[:, pick], base))
+        real = goals.costs(baseline_values) - goals.costs(values)
+        optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
+    return FrontUncertainty(
+        half_widths=half_widths,
+        non_dominated=kept,
+        non_dominated_error=kept_error,
+        pick_dominates=None if wins[0] is None else float(wins[0]),
+        pick_dominates_error=None if wins[1] is None else float(wins[1]),
+        optimism=optimism,
+        draws=len(drawn),
+    )
+
+
+def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals, rule: Rule) -> Array:
+    """Mean excess (q,) of the gain that a rule promises at its pick over the gain that is there.
+
+    With the fitted surfaces in the place of the truth and drawn ones in that of the fit (parametric bootstrap):
+    ``costs`` (d, f, q) and ``baseline`` (d, q) are drawn, ``real`` (f, q) are the gains on the fitted surfaces.
+    """
+    excess = []
+    for drawn, base in zip(costs, baseline, strict=True):
+        row = pick_all(drawn, goals, base)[0][rule]
+        excess.append(base - drawn[row] - real[row])
+    mean: Array = np.mean(excess, axis=0)
+    return mean
+
+
+def contrast_error(jacobian: Array, covariance: Array) -> float:
+    """Standard error of a difference of predictions: ``jacobian`` (p,) is the difference of their derivatives
+    by the coefficients, ``covariance`` (p, p) that of the coefficients. The error that both share cancels.
+    """
+    return math.sqrt(max(float(jacobian @ covariance @ jacobian), 0.0))

@@ -1,0 +1,104 @@
+"""Confirmed points, their gains and the direct front, as plain numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.study.confirmation import Confirmed, Gain, statement
+
+if TYPE_CHECKING:
+    from doe.study import Outcome
+    from doe.study.direct import Direct
+    from doe.study_file import Study
+
+Array = NDArray[np.float64]
+
+
+def confirmation_record(outcome: Outcome) -> dict[str, Any]:
+    """Every confirmed point by name, with its gains over the baseline and whether they are real."""
+    return {
+        name: {
+            "factors": dict(zip(outcome.study.factors, each.point.tolist(), strict=True)),
+            "reason": each.reason,
+            "responses": _quantities(outcome.study, each),
+            "power_terms_W": dict(each.power_terms),
+            **(
+                {"gains": gains_record(outcome.gains[name]), "statement": statement(outcome.gains[name])}
+                if name in outcome.gains
+                else {}
+            ),
+        }
+        for name, each in outcome.confirmed.items()
+    }
+
+
+def gains_record(gains: Sequence[Gain]) -> dict[str, Any]:
+    """Gains by response."""
+    return {
+        gain.response: {"percent": gain.percent, "error_percent": gain.error, "verdict": gain.verdict}
+        for gain in gains
+    }
+
+
+def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
+    """The direct front beside that of the surfaces run on the simulator, and what these lose."""
+    front, loss = direct.front, direct.loss
+    rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
+    surrogate = zip(
+        direct.surrogate_points, direct.surrogate_values, 1.96 * direct.surrogate_errors, strict=True
+    )
+    points = [_point(study, *row) for row in rows]
+    return {
+        "front": points,
+        "pick": {**points[front.pick], "reason": front.pick_reason},
+        "surrogate_front": [_point(study, *row) for row in surrogate if np.isfinite(row[1]).all()],
+        "hypervolume": loss.hypervolume,
+        "hypervolume_error": loss.hypervolume_error,
+        "surrogate_hypervolume": loss.surrogate_hypervolume,
+        "surrogate_hypervolume_error": loss.surrogate_hypervolume_error,
+        "loss_percent": loss.loss_percent,
+        "loss_error_percent": loss.error_percent,
+        "sentence": loss.sentence,
+        "optimism_percent": dict(
+            zip(
+                [study.responses[index] for index in front.goals.objectives],
+                (100.0 * front.optimism).tolist(),
+                strict=True,
+            )
+        ),
+        "evaluations": front.evaluations,
+        "repeats": front.repeats,
+        "generations": front.generations,
+        "seed": front.seed,
+        "failed": len(direct.failures),
+        "seconds": direct.seconds["search"],
+        "comparison_seconds": direct.seconds["comparison"],
+    }
+
+
+def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:
+    columns = (confirmed.values.tolist(), confirmed.statistical, confirmed.numerical)
+    return {
+        response: {
+            "value": value,
+            "statistical_error": _or_none(statistical),
+            "numerical_error": _or_none(numerical),
+        }
+        for response, value, statistical, numerical in zip(study.responses, *columns, strict=True)
+    }
+
+
+def _point(study: Study, point: Array, values: Array, errors: Array) -> dict[str, Any]:
+    return {
+        "factors": dict(zip(study.factors, point.tolist(), strict=True)),
+        "responses": dict(zip(study.responses, values.tolist(), strict=True)),
+        "errors": dict(zip(study.responses, errors.tolist(), strict=True)),
+    }
+
+
+def _or_none(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)

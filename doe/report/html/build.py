@@ -1,0 +1,85 @@
+"""The page, put together from its parts."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from html import escape
+from importlib.resources import files
+from itertools import groupby
+from typing import Any
+
+from doe.report.content import sections
+from doe.report.content.blocks import Section, Table, Widget
+from doe.report.content.record import Record, known
+from doe.report.content.sections import title
+from doe.report.html.data import page_data
+from doe.report.html.render import render
+
+# In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
+SCRIPTS = {
+    "page": ("page.js", "tables.js"),
+    "surface": ("model.js", "viridis.js", "contours.js", "surface.js", "surface_view.js"),
+    "front": ("front.js",),
+    "bearing": ("motion.js",),
+}
+MARK = re.compile(r"\{\{([A-Z]+)\}\}")
+
+
+def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str:
+    """A study as one HTML page.
+
+    summary : record of ``doe study --json``; parts that are missing or null are left out.
+    motion : record of ``doe.clearance.motion_record``; without it nothing moves.
+    """
+    clean = known(dict(summary))
+    moving = known(dict(motion or {}))
+    found = sections(clean, moving)
+    widgets = {block.name for section in found for block in section.blocks if isinstance(block, Widget)}
+    marks = {
+        "TITLE": escape(title(clean)),
+        "STYLE": text("report.css"),
+        "CONTENTS": "".join(f'<li><a href="#{each.key}">{escape(each.title)}</a></li>' for each in found),
+        "SECTIONS": "\n".join(_section(each) for each in found),
+        "DATA": _json(page_data(clean, moving)),
+        "SCRIPTS": "\n".join(f"<script>\n{script}</script>" for script in _scripts(widgets)),
+    }
+    # In one pass, so that nothing put in can be taken for a mark.
+    return MARK.sub(lambda mark: marks[mark[1]], text("page.html"))
+
+
+def text(name: str) -> str:
+    """A file of this package."""
+    return files("doe.report.html").joinpath(name).read_text(encoding="utf-8")
+
+
+def _section(section: Section) -> str:
+    body = []
+    # Small tables that follow each other stand beside each other where there is room.
+    for together, blocks in groupby(
+        section.blocks, lambda block: isinstance(block, Table) and not block.folded
+    ):
+        parts = [
+            text(f"{block.name}.html") if isinstance(block, Widget) else render(block) for block in blocks
+        ]
+        body += [f'<div class="tables">{"".join(parts)}</div>'] if together else parts
+    return (
+        f'<section id="{section.key}" aria-labelledby="{section.key}_title">\n'
+        f'<h2 id="{section.key}_title">{escape(section.title)}</h2>\n{"".join(body)}\n</section>'
+    )
+
+
+def _scripts(widgets: set[str]) -> list[str]:
+    found = []
+    for part, names in SCRIPTS.items():
+        if part in widgets | {"page"}:
+            if part == "bearing":
+                found.append(files("rbdyn").joinpath("plots", "bearing.js").read_text(encoding="utf-8"))
+            found += [text(name) for name in names]
+    return found
+
+
+def _json(record: Mapping[str, Any]) -> str:
+    """Data inside a script element: no name in it can end the element."""
+    return json.dumps(record, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")

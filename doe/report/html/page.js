@@ -1,0 +1,81 @@
+"use strict";
+// What all pictures share: the data, colours of the style sheet, canvases, drawing again when the page changes.
+const page = (() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const by = id => document.getElementById(id);
+  const drawers = [], probe = document.createElement("span");
+  let waiting = false;
+  probe.hidden = true;
+  document.body.append(probe);
+  document.documentElement.classList.add("live");
+
+  // A colour of the style sheet, resolved for light, dark or paper.
+  function colour(name) {
+    probe.style.color = `var(--${name})`;
+    return getComputedStyle(probe).color;
+  }
+
+  function redraw() { for (const draw of drawers) draw(); }
+
+  // Draw now, and again whenever size, colours or medium change.
+  function draws(draw) { drawers.push(draw); draw(); }
+
+  // A canvas as sharp as the screen; undefined while it has no size.
+  function sharp(canvas) {
+    const dense = Math.max(window.devicePixelRatio || 1, document.documentElement.classList.contains("printing") ? 2 : 1);
+    const width = canvas.clientWidth, height = canvas.clientHeight;
+    if (!width || !height) return undefined;
+    if (canvas.width !== Math.round(width * dense) || canvas.height !== Math.round(height * dense)) {
+      canvas.width = Math.round(width * dense);
+      canvas.height = Math.round(height * dense);
+    }
+    const pen = canvas.getContext("2d");
+    pen.setTransform(dense, 0, 0, dense, 0, 0);
+    pen.clearRect(0, 0, width, height);
+    return {pen, width, height};
+  }
+
+  function later() {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => { waiting = false; redraw(); });
+  }
+
+  function shown(value, digits = 4) {
+    if (value === null || value === undefined || !Number.isFinite(value)) return "";
+    const text = Number(value.toPrecision(digits));
+    return Math.abs(text) >= 1e7 || (text !== 0 && Math.abs(text) < 1e-4) ? value.toPrecision(digits) : String(text);
+  }
+
+  // The error to two digits, the value to the same place.
+  function with_error(value, error) {
+    if (!error || !Number.isFinite(error)) return shown(value, 5);
+    const places = Math.min(Math.max(1 - Math.floor(Math.log10(error)), 0), 9);
+    return `${value.toFixed(places)} ± ${error.toFixed(places)}`;
+  }
+
+  const named = each => each.unit ? `${each.words} [${each.unit}]` : each.words;
+
+  function element(tag, words, attributes = {}) {
+    const made = document.createElement(tag);
+    made.textContent = words;
+    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+    return made;
+  }
+
+  // Multiples of 1, 2 or 5 times a power of ten within a range.
+  function ticks(low, high, wanted = 5) {
+    const raw = (high - low) / wanted, decade = 10 ** Math.floor(Math.log10(raw)), found = [];
+    const step = [1, 2, 5, 10].map(digit => digit * decade).find(each => each >= raw * (1 - 1e-9));
+    for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; n++) found.push(n * step);
+    found.text = value => value.toFixed(Math.max(-Math.floor(Math.log10(step) + 1e-9), 0));
+    return found;
+  }
+
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", later);
+  window.addEventListener("resize", later);
+  // Paper is light whatever the screen is.
+  window.addEventListener("beforeprint", () => { document.documentElement.classList.add("printing"); redraw(); });
+  window.addEventListener("afterprint", () => { document.documentElement.classList.remove("printing"); redraw(); });
+  return {data, by, colour, draws, redraw: later, sharp, shown, with_error, named, element, ticks};
+})();

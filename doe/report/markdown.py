@@ -1,0 +1,65 @@
+"""A study as Markdown: the same answer and tables as the page, with links to the pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from doe.report.content import sections
+from doe.report.content.blocks import Block, Bullets, Heading, Table, Tiles, Words
+from doe.report.content.record import Record, known
+from doe.report.content.sections import title
+
+# Marks that Markdown would take for its own; "<" and "&" for the HTML that it lets through.
+SPECIAL = {mark: f"\\{mark}" for mark in "\\`*_[]|#"} | {"<": "&lt;", "&": "&amp;"}
+
+
+def markdown_report(summary: Record, pictures: Sequence[str] = ()) -> str:
+    """Markdown of the record of ``doe study --json``; ``pictures`` are files beside it."""
+    clean = known(dict(summary))
+    parts = [f"# {_plain(title(clean))}"]
+    for section in sections(clean):
+        written = [text for block in section.blocks if (text := _render(block))]
+        if written:
+            parts += [f"## {_plain(section.title)}", *written]
+    if pictures:
+        parts.append("## Pictures")
+        parts += [f"![{_plain(name.rsplit('.', 1)[0].replace('_', ' '))}](<{name}>)" for name in pictures]
+    return "\n\n".join(parts) + "\n"
+
+
+def _render(block: Block) -> str:
+    match block:
+        case Words(text, role):
+            return f"**{_plain(text)}**" if role == "statement" else _plain(text)
+        case Heading(text):
+            return f"### {_plain(text)}"
+        case Bullets(items):
+            return "\n".join(f"- {_plain(item)}" for item in items)
+        case Tiles(tiles):
+            rows = [
+                (each.name, f"{each.value} {each.unit}".strip(), ", ".join(each.beneath)) for each in tiles
+            ]
+            return _table(Table("", ("clearance", "value", ""), rows, text_columns=(2,)))
+        case Table():
+            return _table(block)
+    return ""
+
+
+def _table(table: Table) -> str:
+    words = {0, *table.text_columns}
+    lines = [f"**{_plain(table.caption)}**", ""] if table.caption else []
+    lines.append(_row(table.header))
+    lines.append(
+        "|" + "|".join(" :-- " if place in words else " --: " for place in range(len(table.header))) + "|"
+    )
+    lines += [_row(row) for row in table.rows]
+    return "\n".join(lines + (["", _plain(table.note)] if table.note else []))
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(map(_plain, cells)) + " |"
+
+
+def _plain(text: str) -> str:
+    """Text as it stands: no mark of it is Markdown or HTML."""
+    return "".join(SPECIAL.get(mark, mark) for mark in text).replace("\n", " ")

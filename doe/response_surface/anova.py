@@ -1,0 +1,132 @@
+"""Analysis of variance with partial (type III) sums of squares, and what repeated runs say of the fit.
+
+Weighted fits have weighted sums. Repeated runs count within a block. Where there are blocks, their differences
+are a source of their own and no part of the model: R2 is judged on the scatter within blocks.
+
+Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., 2.4-2.7 and 7.5.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from doe.response_surface.least_squares import LeastSquares
+
+Array = NDArray[np.float64]
+
+SAME_POINT = 1e-9  # coded units within which two runs are replicates
+
+
+class AnovaRow(TypedDict):
+    """One row of an analysis of variance; ``ss`` of a term is partial (type III).
+
+    ``df`` is None for a variance that is known exactly.
+    """
+
+    source: str
+    ss: float | None
+    df: int | None
+    ms: float | None
+    f: float | None
+    p: float | None
+
+
+def row(source: str, ss: float | None, df: int, error: float | None = None, error_dof: float = 0) -> AnovaRow:
+    """A row with its mean square, tested by F against the mean square ``error`` if there is one."""
+    mean_square = None if ss is None else ratio(ss, df)
+    f = None if mean_square is None or error is None else ratio(mean_square, error)
+    p = None if f is None else float(stats.f.sf(f, df, error_dof))
+    return AnovaRow(source=source, ss=ss, df=df, ms=mean_square, f=f, p=p)
+
+
+def term_rows(terms: tuple[str, ...], solution: LeastSquares) -> list[AnovaRow]:
+    """Partial sum of squares, F and p of each coefficient."""
+    count = len(terms)
+    squares = (solution.coefficients[:count] ** 2 / np.diag(solution.inverse)[:count]).tolist()
+    return [
+        row(term, ss, 1, solution.mean_square, solution.dof) for term, ss in zip(terms, squares, strict=True)
+    ]
+
+
+def anova(
+    terms: tuple[str, ...], solution: LeastSquares, response: Array, points: Array, block: NDArray[np.int64]
+) -> list[AnovaRow]:
+    """The table: model, terms, blocks if any, residual, lack of fit, pure error, total.
+
+    ``solution`` is of the columns of ``terms`` followed by those that tell the blocks apart.
+    """
+    model_df, residual = len(terms) - 1, solution.residual_sum
+    error = solution.mean_square, solution.dof
+    block_columns = range(len(terms), len(solution.coefficients))
+    groups = replicate_groups(points, block)
+    within = sum_within(response, solution.weights, block)
+    return [
+        row("model", max(within - residual, 0.0), model_df, *error),
+        *(each for each in term_rows(terms, solution) if each["source"] != "1"),
+        *(
+            [row("block", solution.partial_sum(block_columns), len(block_columns), *error)]
+            * bool(block_columns)
+        ),
+        row("residual", residual, solution.dof),
+        *_lack_of_fit(response, solution, groups),
+        AnovaRow(
+            source="total",
+            ss=sum_within(response, solution.weights, np.zeros_like(block)),
+            df=len(response) - 1,
+            ms=None,
+            f=None,
+            p=None,
+        ),
+    ]
+
+
+def replicate_groups(points: Array, block: NDArray[np.int64]) -> NDArray[np.int64]:
+    """For each run the first run at the same point of the same block, shape (n,)."""
+    apart = np.abs(points[:, None, :] - points[None, :, :]).max(axis=2)
+    first: NDArray[np.int64] = ((apart <= SAME_POINT) & (block[:, None] == block[None, :])).argmax(axis=1)
+    return first
+
+
+def sum_within(values: Array, weights: Array, group: NDArray[np.int64]) -> float:
+    """Weighted sum of squares about the mean of each group; of equal values exactly zero."""
+    total = 0.0
+    for label in np.unique(group):
+        # Measured from the first value, equal values leave no rounding.
+        offset, weight = values[group == label] - values[group == label][0], weights[group == label]
+        total += float((weight * (offset - weight @ offset / weight.sum()) ** 2).sum())
+    return total
+
+
+def find(rows: list[AnovaRow], source: str) -> AnovaRow:
+    """The row of a source."""
+    return next(each for each in rows if each["source"] == source)
+
+
+def ratio(a: float, b: float) -> float | None:
+    """a / b, or None where that is undefined."""
+    return a / b if b > 0 and math.isfinite(a / b) else None
+
+
+def complement(part: float, whole: float) -> float | None:
+    """1 - part / whole, or None where that is undefined."""
+    share = ratio(part, whole)
+    return None if share is None else 1.0 - share
+
+
+def _lack_of_fit(
+    response: Array, solution: LeastSquares, groups: NDArray[np.int64]
+) -> tuple[AnovaRow, AnovaRow]:
+    pure_df = len(response) - len(np.unique(groups))
+    if pure_df == 0:
+        return row("lack_of_fit", None, solution.dof), row("pure_error", None, 0)
+    pure = sum_within(response, solution.weights, groups)
+    lack = max(solution.residual_sum - pure, 0.0)
+    return (
+        row("lack_of_fit", lack, solution.dof - pure_df, pure / pure_df, pure_df),
+        row("pure_error", pure, pure_df),
+    )

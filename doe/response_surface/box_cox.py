@@ -1,0 +1,167 @@
+"""Power transforms of a positive response: which one, with what certainty, and the way there and back.
+
+A transformed response t = (y^lambda - 1)/lambda, or ln y for lambda = 0, is fitted in place of y where the
+scatter of y grows with its size or a bend is only one of scale.
+
+Source: Box and Cox, An analysis of transformations, J. R. Stat. Soc. B 26 (1964) 211-252.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import linalg, optimize, special, stats
+
+Array = NDArray[np.float64]
+
+USUAL = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
+SEARCHED = (-5.0, 5.0)
+NAMES = {-2.0: "1/y^2", -1.0: "1/y", -0.5: "1/sqrt(y)", 0.0: "ln y", 0.5: "sqrt(y)", 2.0: "y^2"}
+
+BoxCox = TypedDict(
+    "BoxCox",
+    {
+        "lambda": float,
+        "interval": list[float],
+        "searched": list[float],
+        "recommended": float,
+        "sentence": str,
+    },
+)
+
+
+def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", level: float = 0.95) -> BoxCox:
+    """Profile likelihood of the transform's exponent for a response fitted by the columns of ``matrix``.
+
+    Parameters
+    ----------
+    matrix : model matrix (n, p) of the runs, with a column of ones.
+    values : response of each run, shape (n,), all positive.
+    name : name of the response, for the sentences.
+    level : confidence level of the interval.
+
+    Returns
+    -------
+    ``lambda`` of the largest likelihood; ``interval`` of those whose likelihood-ratio statistic is within the
+    chi-squared quantile of ``level``, cut at the range ``searched``; ``recommended``: 1 (no transform) if that
+    lies in the interval, else the usual exponent in it nearest to ``lambda``, else ``lambda`` itself; 1 again
+    where the whole interval lies beyond the usual ones, which speaks of outliers or missing terms.
+
+    Raises
+    ------
+    ValueError when a value is not positive, the values are all equal, or no more runs than columns are given.
+
+    Source: Box and Cox (1964), maximized likelihood.
+    """
+    columns, response = np.asarray(matrix, float), np.asarray(values, float)
+    check_positive(response, name)
+    runs, terms = columns.shape
+    if runs <= terms:
+        raise ValueError(f"{name}: {runs} runs leave no residual beside {terms} terms; add runs")
+    if np.ptp(response) == 0.0:
+        raise ValueError(f"{name}: all values are equal, so no transform can be judged; leave it out")
+    basis = linalg.qr(columns, mode="economic")[0]
+    # Taken relative to the geometric mean, residuals of different exponents compare without a Jacobian.
+    logarithm = np.log(response)
+    logarithm -= logarithm.mean()
+
+    def log_likelihood(exponent: float) -> float:
+        transformed = special.boxcox(np.exp(logarithm), exponent)
+        residual = transformed - basis @ (basis.T @ transformed)
+        # An exact fit is as good as round-off lets it be, not infinitely good.
+        floor = (1e-14 * np.abs(transformed).max()) ** 2
+        return -0.5 * runs * math.log(max(float(residual @ residual) / runs, floor))
+
+    grid = np.union1d(np.linspace(*SEARCHED, 81), USUAL)
+    heights = np.array([log_likelihood(each) for each in grid])
+    top = int(heights.argmax())
+    bracket = grid[max(top - 1, 0)], grid[min(top + 1, grid.size - 1)]
+    peak = optimize.minimize_scalar(
+        lambda exponent: -log_likelihood(exponent), bounds=bracket, method="bounded", options={"xatol": 1e-7}
+    )
+    best, height = (float(grid[top]), float(heights[top]))
+    if -peak.fun > height:
+        best, height = float(peak.x), float(-peak.fun)
+    threshold = height - stats.chi2.ppf(level, 1) / 2
+
+    def end(outwards: NDArray[np.float64]) -> float:
+        """Where the likelihood first falls to the threshold on the way from the best exponent."""
+        inner = best
+        for outer in outwards:
+            if log_likelihood(outer) < threshold:
+                return float(optimize.brentq(lambda x: log_likelihood(x) - threshold, inner, outer))
+            inner = outer
+        return float(inner)
+
+    interval = [end(grid[grid < best][::-1]), end(grid[grid > best])]
+    inside = [each for each in USUAL if interval[0] <= each <= interval[1]]
+    beyond = interval[1] < USUAL[0] or interval[0] > USUAL[-1]
+    nearest = min(inside, key=lambda each: abs(each - best), default=best)
+    recommended = 1.0 if beyond or 1.0 in inside else nearest
+    return {
+        "lambda": best,
+        "interval": interval,
+        "searched": list(SEARCHED),
+        "recommended": recommended,
+        "sentence": _sentence(name, best, interval, recommended, level),
+    }
+
+
+def check_positive(values: ArrayLike, name: str) -> None:
+    """Raises ValueError, naming the first run at fault, unless all values are finite and positive."""
+    response = np.asarray(values, float)
+    bad = np.flatnonzero(~(np.isfinite(response) & (response > 0.0)))
+    if bad.size:
+        found = f"the value of run {bad[0] + 1} is {response[bad[0]]:g}"
+        raise ValueError(
+            f'{name}: {found}, but a power transform needs positive values; use transform = "none"'
+        )
+
+
+def forward(values: ArrayLike, exponent: float) -> Array:
+    """Transformed values t = (y^lambda - 1)/lambda, or ln y for lambda = 0, of positive ``values``.
+
+    Raises ValueError when a value is not positive.
+    """
+    check_positive(values, "transform")
+    transformed: Array = special.boxcox(np.asarray(values, float), exponent)
+    return transformed
+
+
+def backward(transformed: ArrayLike, exponent: float) -> Array:
+    """The inverse of `forward`: of the mean of t, it is the median of y, not its mean.
+
+    Where no y has this t, the limit: 0 (lambda > 0) or infinity (lambda < 0).
+    """
+    t = np.asarray(transformed, float)
+    if exponent == 0.0:
+        return np.asarray(np.exp(t))
+    base = 1.0 + exponent * t
+    values: Array = special.inv_boxcox(np.where(base > 0.0, t, 0.0), exponent)
+    return np.asarray(np.where(base > 0.0, values, 0.0 if exponent > 0.0 else np.inf))
+
+
+def slope(values: ArrayLike, exponent: float) -> Array:
+    """dt/dy = y^(lambda - 1) at positive values of y: a small standard error of y times it is that of t."""
+    derivative: Array = np.asarray(values, float) ** (exponent - 1.0)
+    return derivative
+
+
+def _sentence(name: str, best: float, interval: list[float], recommended: float, level: float) -> str:
+    cut = ", cut at what was searched" if set(interval) & set(SEARCHED) else ""
+    found = (
+        f"{name}: the likelihood is largest for the exponent {best:.2f}, "
+        f"{100 * level:g} % interval {interval[0]:.2f} to {interval[1]:.2f}{cut}"
+    )
+    if interval[0] <= 1.0 <= interval[1]:
+        return f"{found}, which holds 1: no transform is called for."
+    if recommended == 1.0:
+        return (
+            f"{found}, beyond all usual exponents: keep the response as it is, and look for an outlier or a "
+            "missing term."
+        )
+    power = NAMES.get(recommended, f"y^{recommended:.3g}")
+    return f"{found}, which does not hold 1: fit {power} instead of y (transform = {recommended:.3g})."

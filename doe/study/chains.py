@@ -1,0 +1,72 @@
+"""The dimension chains of a study, solved at the pick: from clearances with tolerances to parts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.study.goals import region_of
+from doe.study_file import Study
+from doe.study_file.chain_section import chain_table
+from rbdyn.faults import InputError
+
+if TYPE_CHECKING:
+    from doe.dimension_chain import Chain, ChainResult
+    from doe.pareto.tolerance import WidestTolerances
+
+Array = NDArray[np.float64]
+
+
+def check_chains(study: Study) -> None:
+    """Raises InputError for a chain that has no solution at the centre, or whose half width nothing gives.
+
+    One whose half width is still to be found is tried with the widest that the region allows.
+    """
+    found_later = study.file.tolerances is not None
+    half_widths = region_of(study) * study.step if found_later else np.full(study.step.size, np.nan)
+    faults = []
+    for number in range(len(study.file.chain)):
+        try:
+            _chain(study, number, study.centre, half_widths)
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+
+
+def solve_chains(
+    study: Study, pick: Array, tolerances: WidestTolerances | None
+) -> tuple[dict[str, ChainResult], list[str]]:
+    """Every chain by name at the picked point (k,), and why any has no parts."""
+    from doe.dimension_chain import solve
+
+    half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
+    solved, notes = {}, []
+    for number, chain in enumerate(study.file.chain):
+        widest, given = half_widths[study.factors.index(chain.factor)], chain.half_width_mm
+        if given is not None and given > widest:
+            notes.append(
+                f"{study.path}: chain {chain.name}: half_width_mm = {given:g}: wider than the {widest:.3g} within which "
+                "the gains are kept as [tolerances] asks; narrow it, or keep less"
+            )
+        try:
+            solved[chain.name] = solve(_chain(study, number, pick, half_widths))
+        except InputError as error:
+            notes += error.faults
+    return solved, notes
+
+
+def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain:
+    from doe.dimension_chain import chain_from
+
+    chain = study.file.chain[number]
+    factor = study.factors.index(chain.factor)
+    half_width = float(half_widths[factor]) if half_widths[factor] > 0.0 else None
+    source = f"{study.path}: chain {chain.name}"
+    try:
+        table = chain_table(chain, study.path.parent, float(point[factor]), half_width)
+    except InputError as error:
+        raise InputError([f"{study.path}: {fault}" for fault in error.faults]) from None
+    return chain_from(table, source)

@@ -1,0 +1,85 @@
+"""The design of a study: its points and what they can tell about the models asked for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from doe.designs import (
+    Design,
+    box_behnken,
+    central_composite_design,
+    full_factorial,
+    latin_hypercube,
+    sobol,
+)
+from doe.designs.model import model_terms
+from doe.study_file import Study
+from rbdyn.faults import InputError
+
+
+def design_of(study: Study) -> Design:
+    """The design in the order of its runs. Raises InputError when its settings are impossible."""
+    settings, factors = study.file.design, len(study.factors)
+    centres = settings.centres
+    try:
+        if settings.kind == "central_composite":
+            design = central_composite_design(
+                factors,
+                alpha=settings.alpha,
+                centre_replicates=centres,
+                cube=settings.cube,
+                blocks=settings.blocks,
+                cube_blocks=settings.cube_blocks,
+            )
+        elif settings.kind == "box_behnken":
+            design = box_behnken(factors, centre_replicates=centres, blocks=settings.blocks)
+        elif settings.kind == "full_factorial":
+            design = full_factorial(factors, levels=settings.levels, centre_replicates=centres)
+        else:
+            sampled = latin_hypercube if settings.kind == "latin_hypercube" else sobol
+            design = sampled(factors, runs=settings.runs, seed=settings.seed, centre_replicates=centres)
+    except ValueError as error:
+        raise InputError([f"{study.path}: design.{error}"]) from None
+    return design.by_blocks(settings.seed if settings.order == "random" else None)
+
+
+def check_runs(study: Study, design: Design) -> None:
+    """Raises InputError with every response whose model the runs do not suffice for."""
+    from doe.designs.evaluation import untold_terms
+
+    runs, factors = design.coded.shape
+    faults = []
+    for number, response in enumerate(study.file.response, 1):
+        terms = model_terms(factors, response.model)
+        where = f"{study.path}: response[{number}].model = {response.model!r}"
+        needed = len(terms) + design.blocks
+        what = f"{len(terms)} terms" + (f", {design.blocks - 1} block effects" if design.blocks > 1 else "")
+        if runs < needed:
+            faults.append(
+                f"{where}: the {runs} runs of the design are too few; it needs {needed} ({what} and one to "
+                "judge the fit): enlarge the design or choose a simpler model"
+            )
+        elif lost := untold_terms(design.coded, terms, design.block):
+            faults.append(
+                f"{where}: the runs of the design cannot tell {', '.join(lost)} from the other terms; add "
+                "levels or centre points, or choose a simpler model"
+            )
+    if faults:
+        raise InputError(faults)
+
+
+def evaluation(study: Study, design: Design) -> dict[str, Any]:
+    """What the design can tell about the largest model that a response asks for, with its name as ``model``.
+
+    See `doe.designs.evaluation.evaluate`. Raises InputError when the runs do not suffice.
+    """
+    from doe.designs.evaluation import evaluate
+
+    check_runs(study, design)
+    factors = len(study.factors)
+    model = max(
+        (response.model for response in study.file.response), key=lambda each: len(model_terms(factors, each))
+    )
+    terms = model_terms(factors, model)
+    found = evaluate(design.coded, terms, design.block, region=design.region, reach=design.extent)
+    return {"model": model, **found}

@@ -1,0 +1,129 @@
+"""The front of the simulator itself, and what the response surfaces lose against it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.designs import to_actual
+from doe.study.failure import Failure, grouped
+from doe.study.goals import goals_of, region_of
+from doe.study.surfaces import standard_errors
+from doe.study_file import Study
+from rbdyn.faults import InputError, RunError
+
+if TYPE_CHECKING:
+    from doe.pareto import ParetoFront
+    from doe.pareto.direct import DirectFront
+    from doe.pareto.surrogate_loss import SurrogateLoss
+    from doe.study.runs import Progress
+    from doe.study.simulations import Simulations
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Direct:
+    """Front of the simulator and the surfaces' front run on it.
+
+    ``surrogate_points`` (s, k) of the surfaces' front, in factor units, with the means (s, m) of their runs and the
+    standard errors (s, m) of these. ``failures``: every evaluation that failed. ``seconds``: wall time of the
+    search and of the comparison.
+    """
+
+    front: DirectFront
+    surrogate_points: Array
+    surrogate_values: Array
+    surrogate_errors: Array
+    loss: SurrogateLoss
+    failures: tuple[Failure, ...]
+    seconds: Mapping[str, float]
+
+
+class Evaluator:
+    """Runs generations of points on the simulator, every row with a seed of its own: a running number.
+
+    So a search that is begun again asks for the same runs in the same order, and the store answers at once.
+    """
+
+    def __init__(self, study: Study, simulations: Simulations, progress: Progress, total: int) -> None:
+        self._study, self._simulations = study, simulations
+        self._progress, self._total = progress, total
+        self.done = 0
+        self.failures: list[Failure] = []
+
+    def __call__(self, points: Array) -> tuple[Array, Array]:
+        """Responses (n, m) and their standard errors (n, m) at points (n, k) in factor units; NaN where a run failed."""
+        from doe import clearance
+
+        numbers = range(self.done, self.done + len(points))
+        scenes = [
+            clearance.direct_scene(self._study, point, number)
+            for point, number in zip(points, numbers, strict=True)
+        ]
+        results = self._simulations.run(
+            scenes, [f"direct run {number + 1}" for number in numbers], self._watch
+        )
+        self.done += len(points)
+        values = np.full((len(points), len(self._study.responses)), np.nan)
+        errors, samples = values.copy(), np.zeros(values.shape, dtype=np.int64)
+        for row, result in enumerate(results):
+            if isinstance(result, Failure):
+                self.failures.append(result)
+            else:
+                (values[row],), (errors[row],), (samples[row],) = clearance.responses(self._study, [result])
+        return values, standard_errors(errors, samples)
+
+    def _watch(self, done: int, total: int) -> None:
+        self._progress(self.done + done, max(self._total, self.done + total))
+
+
+def find_direct(study: Study, found: ParetoFront, simulations: Simulations) -> Direct:
+    """Search the front on the simulator, then run as many points of the surfaces' front on it, and compare.
+
+    Raises RunError where every run of a stage fails, InputError for impossible settings, KeyboardInterrupt.
+    """
+    from doe.pareto.archive import spread
+    from doe.pareto.direct import direct_front
+    from doe.pareto.indicators import normalised
+    from doe.pareto.surrogate_loss import compare_with_surrogate
+
+    settings, reach = study.file.direct, region_of(study)
+    evaluate = Evaluator(study, simulations, simulations.progress("direct front"), settings.evaluations)
+    started = time.perf_counter()
+    try:
+        front = direct_front(
+            evaluate,
+            to_actual(-reach, study.centre, study.step),
+            to_actual(reach, study.centre, study.step),
+            goals=goals_of(study),
+            evaluations=settings.evaluations,
+            population=settings.population,
+            seed=settings.seed,
+            baseline=study.baseline,
+            confidence=settings.confidence,
+            resample=settings.resample,
+            pick=study.file.front.pick,
+        )
+        searched = time.perf_counter()
+        scaled = normalised(found.costs, found.costs.min(axis=0), found.costs.max(axis=0))
+        rows = spread(scaled, len(front.points), [found.pick])[: len(front.points)]
+        points = found.points[rows]
+        # As many runs a point as a finalist of the direct front has.
+        values, errors = evaluate(np.tile(points, (front.repeats, 1)))
+        shape = (front.repeats, len(points), values.shape[1])
+        means = values.reshape(shape).mean(axis=0)
+        mean_errors = np.sqrt((errors.reshape(shape) ** 2).sum(axis=0)) / front.repeats
+        loss = compare_with_surrogate(front, means, mean_errors, seed=settings.seed)
+    except ValueError as error:
+        if evaluate.failures:
+            causes = "; ".join(group["cause"] for group in grouped(evaluate.failures))
+            raise RunError(f"direct front: {error} ({causes})") from None
+        raise InputError([f"{study.path}: direct: {error}"]) from None
+    seconds = {"search": searched - started, "comparison": time.perf_counter() - searched}
+    return Direct(front, points, means, mean_errors, loss, tuple(evaluate.failures), seconds)

@@ -1,0 +1,80 @@
+"""Predictions of several surfaces at once: on drawn coefficients, and how they change with the coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from doe.pareto.quadratic import Quadratic
+    from doe.response_surface import Surface
+
+Array = NDArray[np.float64]
+
+
+def predict_all(surfaces: Sequence[Surface], coded: Array) -> Array:
+    """Responses (n, m) at coded points (n, k)."""
+    return np.column_stack([surface.predict(coded) for surface in surfaces])
+
+
+def draw_all(surfaces: Sequence[Surface], draws: int, seed: int) -> list[Array]:
+    """Coefficients (draws, p) of each surface, drawn from their multivariate t independently by response."""
+    from doe.pareto.uncertainty import draw_coefficients
+
+    random = np.random.default_rng(seed)
+    return [
+        draw_coefficients(surface.coefficients, surface.covariance, surface.residual_dof, draws, random)
+        for surface in surfaces
+    ]
+
+
+def predict_draws(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array) -> Array:
+    """Responses (d, n, m) on drawn coefficients at coded points (n, k)."""
+    pairs = zip(surfaces, drawn, strict=True)
+    return np.stack([surface.draws(coded, coefficients) for surface, coefficients in pairs], axis=-1)
+
+
+def predict_paired(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array) -> Array:
+    """Responses (n, m) at coded points (n, k), each on the drawn coefficients (n, p) of its own row."""
+    from doe.response_surface import model_matrix
+
+    columns = [
+        link_of(surface)((model_matrix(coded, surface.terms) * coefficients).sum(axis=-1))
+        for surface, coefficients in zip(surfaces, drawn, strict=True)
+    ]
+    return np.column_stack(columns)
+
+
+def jacobian(surface: Surface, coded: Array) -> Array:
+    """Derivatives (p,) of the prediction at a coded point (k,) by the coefficients."""
+    from doe.response_surface import model_matrix
+
+    row = model_matrix(coded, surface.terms)
+    if surface.transform is None:
+        return row
+    from doe.response_surface.box_cox import slope
+
+    return np.asarray(row / slope(surface.predict(coded), surface.transform))
+
+
+def link_of(surface: Surface) -> Callable[[Array], Array]:
+    """From the scale of the fit to the units of the response."""
+    from doe.pareto.quadratic import identity
+    from doe.response_surface.box_cox import backward
+
+    return identity if surface.transform is None else partial(backward, exponent=surface.transform)
+
+
+def quadratics(surfaces: Sequence[Surface], factors: int) -> list[Quadratic]:
+    """The surfaces as quadratics of the coded factors."""
+    from doe.pareto.quadratic import Quadratic
+    from doe.response_surface.terms import second_order
+
+    return [
+        Quadratic(*second_order(surface.terms, surface.coefficients, factors), link_of(surface))
+        for surface in surfaces
+    ]

@@ -1,0 +1,78 @@
+"""Goals, tolerances and the region of a study as the methods want them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.study.design import design_of
+from doe.study_file import Study
+from rbdyn.faults import InputError
+
+if TYPE_CHECKING:
+    from doe.pareto import Goals
+
+Array = NDArray[np.float64]
+
+
+def goals_of(study: Study) -> Goals:
+    """What is wanted of the study's responses."""
+    from doe.pareto import Goals
+
+    responses = study.file.response
+    return Goals.of(
+        [response.goal for response in responses],
+        target=[response.target for response in responses],
+        lower=[response.lower for response in responses],
+        upper=[response.upper for response in responses],
+        weight=[response.weight for response in responses],
+        desired=[response.desired for response in responses],
+    )
+
+
+def region_of(study: Study) -> Array:
+    """Half ranges (k,) in coded units, about the centre 0, of the box in which the design searches."""
+    return np.full(len(study.factors), design_of(study).reach)
+
+
+def beyond_runs(study: Study, coded: Array) -> bool:
+    """Whether a coded point (k,) is farther out than the region that the runs reach: the surfaces extrapolate there."""
+    design = design_of(study)
+    distance = np.linalg.norm(coded) if design.region == "ball" else np.abs(coded).max()
+    return bool(distance > design.extent * (1.0 + 1e-4))
+
+
+def known_tolerances(study: Study) -> dict[str, float]:
+    """Half widths of the factors in their units: their own, else the narrowest of the chains that close on them."""
+    known = {}
+    for factor in study.file.factor:
+        widths = [chain.half_width_mm for chain in study.file.chain if chain.factor == factor.name]
+        given = [width for width in widths if width is not None]
+        if factor.tolerance is not None:
+            known[factor.name] = factor.tolerance
+        elif given:
+            known[factor.name] = min(given)
+    return known
+
+
+def tolerances_of(study: Study) -> Array:
+    """Half widths (k,) of all factors in coded units. Raises InputError for each that has none or too wide a one."""
+    known = known_tolerances(study)
+    faults = [
+        f"{study.path}: factor.tolerance of {name}: missing; the tolerance-aware front needs the half width that "
+        "manufacture keeps, here or as half_width_mm of a chain that closes on this factor"
+        for name in study.factors
+        if name not in known
+    ]
+    room = region_of(study) * study.step
+    faults += [
+        f"{study.path}: factor.tolerance of {name} = {known[name]:g}: leaves no room in the region, which reaches "
+        f"{limit:g} to either side of the centre; narrow it or widen the design"
+        for name, limit in zip(study.factors, room, strict=True)
+        if known.get(name, 0.0) >= limit
+    ]
+    if faults:
+        raise InputError(faults)
+    return np.array([known[name] for name in study.factors]) / study.step

@@ -1,0 +1,94 @@
+"""Which process works on a run, and whether it still lives."""
+
+from __future__ import annotations
+
+import functools
+import os
+import socket
+import time
+import uuid
+from dataclasses import dataclass, field
+from pathlib import Path
+
+# A process of another machine that has not given a sign of life for so long [s] counts as gone. The clocks of both
+# machines must agree to much less than this.
+LEASE_S = 60.0
+# Signs of life are given as often as this [s].
+BEAT_S = 5.0
+
+# Owners of this process whose store is open.
+_open: set[str] = set()
+
+
+@dataclass(frozen=True)
+class Owner:
+    """One open store of one process. ``machine`` tells apart hosts, their boots and their spaces of process numbers;
+    ``born`` tells apart processes that had the same number one after the other."""
+
+    host: str
+    machine: str
+    pid: int
+    born: str
+    token: str = field(default_factory=lambda: uuid.uuid4().hex)
+
+    def enter(self) -> None:
+        """This owner lives from here on."""
+        _open.add(self.token)
+
+    def leave(self) -> None:
+        """This owner is gone, even if its process lives on."""
+        _open.discard(self.token)
+
+    def lives(self, beat: float) -> bool:
+        """Whether it may still be at work; ``beat``: its last sign of life [s since the epoch].
+
+        On the same machine the process itself is looked at, so a killed one is known at once; elsewhere a lease runs.
+        """
+        if self.machine != _machine():
+            return time.time() - beat < LEASE_S
+        if self.pid == os.getpid() and self.born == _born(self.pid):
+            return self.token in _open
+        return _born(self.pid) == self.born
+
+
+def this_process() -> Owner:
+    """A new owner in this process."""
+    return Owner(socket.gethostname(), _machine(), os.getpid(), _born(os.getpid()))
+
+
+@functools.cache
+def _machine() -> str:
+    parts = [socket.gethostname()]
+    for read in (
+        lambda: Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip(),
+        lambda: os.readlink("/proc/self/ns/pid"),
+    ):
+        try:
+            parts.append(read())
+        except OSError:
+            parts.append("")
+    return "/".join(parts)
+
+
+def _born(pid: int) -> str:
+    """When a process of this machine started, in the words of its system; empty when there is no such process."""
+    try:
+        # Field 2 is the name in brackets, which may hold blanks; state is field 3, start time field 22.
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    except FileNotFoundError:
+        return "" if Path("/proc/self/stat").exists() else _answers(pid)
+    except OSError:
+        return ""
+    # A killed process that nobody has fetched yet is a zombie: it does nothing any more.
+    return "" if fields[0] in "ZX" else fields[19]
+
+
+def _answers(pid: int) -> str:
+    """The same where the system has no /proc: only whether it lives."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return ""
+    except PermissionError:
+        pass
+    return "alive"

@@ -1,0 +1,57 @@
+"""The points of a front that are worth a confirmation, each once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.designs import to_actual
+from doe.study_file import Study
+
+if TYPE_CHECKING:
+    from doe.pareto import ParetoFront
+    from doe.study.direct import Direct
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A point (k,) in factor units, at the resolution of the drawing, and why it was chosen."""
+
+    point: Array
+    reason: str
+
+
+def choices(study: Study, front: ParetoFront, direct: Direct | None) -> dict[str, Choice]:
+    """The pick, then the picks by the other rules and of the direct front, by name.
+
+    Where the study asks for a tolerance-aware front, its pick is the pick. Of those that the drawing cannot tell apart the first stands for all, and its reason says so.
+    """
+    found: dict[str, Choice] = {}
+    for name, point, reason in _candidates(study, front, direct):
+        rounded = study.rounded(point)
+        twin = next((known for known, each in found.items() if np.array_equal(each.point, rounded)), None)
+        if twin is None:
+            found[name] = Choice(rounded, reason)
+        elif name != study.file.front.pick:
+            found[twin] = Choice(rounded, f"{found[twin].reason}; also {reason}")
+    return found
+
+
+def _candidates(study: Study, front: ParetoFront, direct: Direct | None) -> Iterator[tuple[str, Array, str]]:
+    aware = front.tolerance_aware
+    if aware is None:
+        yield "pick", front.points[front.pick], front.pick_reason
+    else:
+        point = to_actual(aware.points[aware.pick], study.centre, study.step)
+        yield "pick", point, f"{aware.pick_reason}, by what its tolerances leave of it"
+        yield "without_tolerances", front.points[front.pick], front.pick_reason
+    for rule, row in front.picks.items():
+        yield rule, front.points[row], f"the pick by {rule}"
+    if direct is not None:
+        yield "direct", direct.front.points[direct.front.pick], "the pick of the direct front"

@@ -1,0 +1,127 @@
+"""What the surfaces promise at any point: gains over the baseline, with the interval of the difference."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.designs import to_coded
+from doe.study.drawn import jacobian, predict_all
+from doe.study.goals import goals_of
+from doe.study_file import Study
+
+if TYPE_CHECKING:
+    from doe.response_surface import Surface
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PredictedGain:
+    """Improvement [%] of a mean response over the baseline, with two 95 % half widths [%].
+
+    ``error`` is that of the difference of the two predictions: the errors that they share cancel (contrast c'Vc with
+    the residual's degrees of freedom). ``scatter`` is by how much two single runs at one point differ (pure error of
+    the replicates). Either is None where the runs do not tell it.
+    """
+
+    response: str
+    baseline: float
+    value: float
+    percent: float
+    error: float | None
+    scatter: float | None
+
+    @property
+    def verdict(self) -> str:
+        """Whether the gain is more than its error."""
+        if self.error is None:
+            return "without error"
+        if abs(self.percent) <= self.error:
+            return "within error"
+        return "better" if self.percent > 0.0 else "worse"
+
+    @property
+    def within_scatter(self) -> bool | None:
+        """Whether two single runs at one point may differ by as much."""
+        return None if self.scatter is None else abs(self.percent) <= self.scatter
+
+    @property
+    def sentence(self) -> str:
+        """The gain in words."""
+        error = "" if self.error is None else f" ± {self.error:.2f}"
+        said = f"{self.response}: {self.baseline:.5g} to {self.value:.5g}, a gain of {self.percent:+.2f}{error} %"
+        judged = {
+            "within error": "which is inside its own noise",
+            "better": "which is more than its error",
+            "worse": "a loss that is more than its error",
+            "without error": "whose error the runs do not tell",
+        }[self.verdict]
+        if self.scatter is None:
+            return f"{said}, {judged}."
+        place = "inside" if self.within_scatter else "outside"
+        return f"{said}, {judged} and {place} the scatter of single runs (± {self.scatter:.2f} %)."
+
+
+def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> list[PredictedGain]:
+    """Gains at a point (k,) in factor units over the study's baseline, for every response that has a goal."""
+    from scipy import stats
+
+    from doe.pareto.uncertainty import contrast_error
+
+    goals = goals_of(study)
+    coded = to_coded(np.stack([study.baseline, point]), study.centre, study.step)
+    values = predict_all(surfaces, coded)
+    costs, slopes = goals.costs(values), goals.slopes(values)
+    gains = []
+    for column, index in enumerate(goals.objectives):
+        surface = surfaces[index]
+        rows = [slopes[end, column] * jacobian(surface, coded[end]) for end in (0, 1)]
+        scale = 100.0 / abs(float(values[0, index])) if values[0, index] else math.nan
+        dof, error, scatter = surface.residual_dof, None, None
+        if dof > 0:
+            error = float(stats.t.ppf(0.975, dof)) * contrast_error(rows[0] - rows[1], surface.covariance)
+        pure = surface.pure_error
+        if pure["ms"] is not None and surface.residual_mean_square > 0.0:
+            constant = surface.terms.index("1")
+            # With weights the mean squares have no unit; the variance of a run has.
+            variance = pure["ms"] / surface.residual_mean_square * surface.observation_variance
+            single = math.sqrt(variance * sum(float(row[constant]) ** 2 for row in rows))
+            scatter = float(stats.t.ppf(0.975, pure["df"])) * single
+        gains.append(
+            PredictedGain(
+                response=surface.name,
+                baseline=float(values[0, index]),
+                value=float(values[1, index]),
+                percent=float(scale * (costs[0, column] - costs[1, column])),
+                error=None if error is None else error * scale,
+                scatter=None if scatter is None else scatter * scale,
+            )
+        )
+    return gains
+
+
+def statement(gains: Sequence[PredictedGain]) -> str:
+    """What the gains amount to, in a sentence."""
+    better = [gain.response for gain in gains if gain.verdict == "better"]
+    worse = [gain.response for gain in gains if gain.verdict == "worse"]
+    noise = [gain.response for gain in gains if gain.verdict == "within error"]
+    unknown = [gain.response for gain in gains if gain.verdict == "without error"]
+    parts = [
+        f"{words}: {', '.join(names)}"
+        for words, names in (
+            ("better beyond its error", better),
+            ("worse beyond its error", worse),
+            ("not told from noise", noise),
+            ("of unknown error", unknown),
+        )
+        if names
+    ]
+    hidden = [gain.response for gain in gains if gain.within_scatter]
+    tail = f" One run each would not show: {', '.join(hidden)}." if hidden else ""
+    return f"On the surfaces, {'; '.join(parts)}.{tail}"

@@ -1,0 +1,101 @@
+"""Where a study stands, from its store: done, failed, running, missing, and the time it took and will take."""
+
+from __future__ import annotations
+
+import os
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from doe.designs import to_actual
+from doe.study.design import design_of
+from doe.study.failure import Failure, grouped
+from doe.study.runs import STORE
+from doe.study.store import Claim, EndedRun, Point, Store
+from doe.study_file import Study
+
+FORMAT = "doe.status/1"
+
+
+def study_status(study: Study, folder: Path) -> dict[str, Any]:
+    """Record of ``doe status``. Changes nothing, not even while the study runs. Raises InputError."""
+    from doe import clearance
+
+    clearance.check_responses(study)
+    design = design_of(study)
+    actual = to_actual(design.coded, study.centre, study.step)
+    factors = [dict(zip(study.factors, point.tolist(), strict=True)) for point in actual]
+    scenes = clearance.design_scenes(study, actual, design.order.tolist())
+    points = clearance.points_of(scenes, [f"design run {run + 1}" for run in range(len(scenes))], factors)
+    if not (folder / STORE).exists():
+        return _record(study, folder, points, {}, [], [])
+    with Store(folder / STORE, read_only=True) as store:
+        return _record(study, folder, points, store.outcomes(points), store.claims(), store.ended())
+
+
+def _record(
+    study: Study,
+    folder: Path,
+    points: list[Point],
+    outcomes: dict[str, dict[str, Any] | Failure],
+    claims: list[Claim],
+    ended: list[EndedRun],
+) -> dict[str, Any]:
+    keys = {point.key for point in points}
+    failures = [outcome for outcome in outcomes.values() if isinstance(outcome, Failure)]
+    claims = [claim for claim in claims if claim.key not in outcomes]
+    running = [claim for claim in claims if claim.key in keys]
+    missing = len(keys) - len(outcomes) - len(running)
+    others = [run.status for run in ended if run.key not in keys]
+    return {
+        "format": FORMAT,
+        "status": "finished" if missing + len(running) == 0 else "running" if claims else "unfinished",
+        "study": str(study.path),
+        "store": str(folder / STORE),
+        "points": {
+            "total": len(keys),
+            "done": len(outcomes) - len(failures),
+            "failed": len(failures),
+            "running": len(running),
+            "missing": missing,
+        },
+        "failures": grouped(failures),
+        "running": [_running(claim) for claim in claims],
+        "other": {
+            "done": others.count("done"),
+            "failed": others.count("failed"),
+            "running": len(claims) - len(running),
+        },
+        "spent_s": sum(run.seconds or 0.0 for run in ended if run.key in keys),
+        "left_s": _left_s(missing + len(running), claims, [run for run in ended if run.key in keys]),
+    }
+
+
+def _running(claim: Claim) -> dict[str, Any]:
+    return {
+        "label": claim.label,
+        "run": claim.run,
+        "host": claim.host,
+        "pid": claim.pid,
+        "since": datetime.fromtimestamp(claim.since, UTC).isoformat(timespec="seconds"),
+        "for_s": max(0.0, time.time() - claim.since),
+    }
+
+
+def _left_s(left: int, claims: list[Claim], ended: list[EndedRun]) -> float | None:
+    """Wall time that the rest takes: at the pace of the processes at work, else at that of all processors here.
+
+    None while nothing has ended that could tell.
+    """
+    if left == 0:
+        return 0.0
+    owners = {claim.owner for claim in claims}
+    fresh = [run for run in ended if run.owner in owners and run.started is not None]
+    if fresh:
+        begun = min(run.started for run in fresh if run.started is not None)
+        return left * (fresh[-1].ended - begun) / len(fresh)
+    seconds = [run.seconds for run in ended if run.seconds is not None]
+    if not seconds:
+        return None
+    return left * sum(seconds) / len(seconds) / min(os.cpu_count() or 1, left)

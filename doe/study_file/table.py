@@ -1,0 +1,92 @@
+"""Tables of runs: a column a factor and a response, optionally errors, replicates and blocks."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.faults import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Factor values (n, k), responses and their 95 % half widths (n, m; NaN where there is none).
+
+    ``replicates`` (n,) behind the errors (0: unknown) and ``block`` (n,) of each run (all 0 without blocks).
+    """
+
+    actual: Array
+    values: Array
+    errors: Array
+    replicates: Whole
+    block: Whole
+
+
+def read_table(path: Path, factors: list[str], responses: list[str], named_in: Path) -> Table:
+    """Read a CSV table with a column for each factor and response.
+
+    A column "<response>_error" holds 95 % half widths (empty where unknown), "replicates" and "block" whole
+    numbers; all three kinds may be missing. ``named_in`` is the file that names the columns.
+
+    Raises InputError, with all faults, when the file, a column or a number is missing or a column comes twice.
+    """
+    import pandas as pd
+
+    try:
+        table = pd.read_csv(path)
+        with path.open(encoding="utf-8", newline="") as lines:
+            header = Counter(next(csv.reader(lines)))
+    except FileNotFoundError:
+        raise InputError([f"{path}: no such file; check the path"]) from None
+    except (OSError, ValueError) as error:
+        raise InputError([f"{path}: cannot be read as a CSV table ({error}); mend the file"]) from None
+    wanted, errors = [*factors, *responses], [f"{name}_error" for name in responses]
+    faults = [
+        f"{path}: column {name!r} is missing; add it, or rename the factor or response in {named_in}"
+        for name in wanted
+        if name not in table.columns
+    ]
+    used = [name for name in (*wanted, *errors, "replicates", "block") if name in table.columns]
+    faults += [
+        f"{path}: column {name!r} comes {header[name]} times; keep one" for name in used if header[name] > 1
+    ]
+    for name in used:
+        faults += _faults_of(
+            path, name, table[name], optional=name in errors, whole=name not in wanted + errors
+        )
+    if faults:
+        raise InputError(faults)
+    nothing = pd.Series(np.nan, index=table.index)
+    return Table(
+        actual=table[factors].to_numpy(float),
+        values=table[responses].to_numpy(float),
+        errors=np.column_stack([table.get(name, nothing).to_numpy(float) for name in errors]),
+        replicates=np.asarray(table.get("replicates", nothing).fillna(0), np.int64),
+        block=np.asarray(table.get("block", nothing).fillna(0), np.int64),
+    )
+
+
+def _faults_of(path: Path, name: str, column: pd.Series, optional: bool, whole: bool) -> list[str]:
+    import pandas as pd
+
+    numbers = pd.to_numeric(column, errors="coerce").to_numpy(float)
+    bad = ~np.isfinite(numbers) & ~(optional & column.isna().to_numpy())
+    if whole:
+        bad |= numbers != np.round(numbers)
+    kind = "whole" if whole else "finite"
+    return [
+        f"{path}: {name} in row {row + 1} = {column.tolist()[row]!r}: is not a {kind} number; mend it"
+        for row in np.flatnonzero(bad)
+    ]

@@ -1,0 +1,196 @@
+"""Statistical Reference Datasets for linear regression, with their certified values to 15 digits.
+
+Source: National Institute of Standards and Technology, Statistical Reference Datasets, itl.nist.gov/div898/strd:
+Longley (1967), Wampler 1-5 (1970), Filippelli.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Regressors (n, p) and response (n,) as printed, and what is certified of their least-squares fit."""
+
+    regressors: list[list[Fraction]]
+    response: list[Fraction]
+    coefficients: list[str]
+    standard_errors: list[str]
+    deviation: str
+    r2: str
+    f: str | None
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """Regressors in extended precision: a power of a printed number has more digits than a double."""
+        return extended(self.regressors)
+
+
+def extended(numbers: list) -> np.ndarray:
+    """Fractions as extended doubles, each rounded once where the machine has 64 bits of mantissa."""
+    if isinstance(numbers[0], list):
+        return np.array([extended(row) for row in numbers])
+    heads = [float(number) for number in numbers]
+    tails = [float(number - Fraction(head)) for number, head in zip(numbers, heads, strict=True)]
+    return np.array(heads, np.longdouble) + np.array(tails, np.longdouble)
+
+
+def polynomial(x: list[Fraction], degree: int) -> list[list[Fraction]]:
+    """Powers 0 to ``degree``."""
+    return [[each**power for power in range(degree + 1)] for each in x]
+
+
+LONGLEY_DATA = """
+60323 83.0 234289 2356 1590 107608 1947
+61122 88.5 259426 2325 1456 108632 1948
+60171 88.2 258054 3682 1616 109773 1949
+61187 89.5 284599 3351 1650 110929 1950
+63221 96.2 328975 2099 3099 112075 1951
+63639 98.1 346999 1932 3594 113270 1952
+64989 99.0 365385 1870 3547 115094 1953
+63761 100.0 363112 3578 3350 116219 1954
+66019 101.2 397469 2904 3048 117388 1955
+67857 104.6 419180 2822 2857 118734 1956
+68169 108.4 442769 2936 2798 120445 1957
+66513 110.8 444546 4681 2637 121950 1958
+68655 112.6 482704 3813 2552 123366 1959
+69564 114.2 502601 3931 2514 125368 1960
+69331 115.7 518173 4806 2572 127852 1961
+70551 116.9 554894 4007 2827 130081 1962
+"""
+FILIP_Y = """
+0.8116 0.9072 0.9052 0.9039 0.8053 0.8377 0.8667 0.8809 0.7975 0.8162 0.8515 0.8766 0.8885 0.8859 0.8959
+0.8913 0.8959 0.8971 0.9021 0.909 0.9139 0.9199 0.8692 0.8872 0.89 0.891 0.8977 0.9035 0.9078 0.7675 0.7705
+0.7713 0.7736 0.7775 0.7841 0.7971 0.8329 0.8641 0.8804 0.7668 0.7633 0.7678 0.7697 0.77 0.7749 0.7796 0.7897
+0.8131 0.8498 0.8741 0.8061 0.846 0.8751 0.8856 0.8919 0.8934 0.894 0.8957 0.9047 0.9129 0.9209 0.9219 0.7739
+0.7681 0.7665 0.7703 0.7702 0.7761 0.7809 0.7961 0.8253 0.8602 0.8809 0.8301 0.8664 0.8834 0.8898 0.8964
+0.8963 0.9074 0.9119 0.9228
+"""
+FILIP_X = """
+-6.860120914 -4.324130045 -4.358625055 -4.358426747 -6.955852379 -6.661145254 -6.355462942 -6.118102026
+-7.115148017 -6.815308569 -6.519993057 -6.204119983 -5.853871964 -6.109523091 -5.79832982 -5.482672118
+-5.171791386 -4.851705903 -4.517126416 -4.143573228 -3.709075441 -3.499489089 -6.300769497 -5.953504836
+-5.642065153 -5.031376979 -4.680685696 -4.329846955 -3.928486195 -8.56735134 -8.363211311 -8.107682739
+-7.823908741 -7.522878745 -7.218819279 -6.920818754 -6.628932138 -6.323946875 -5.991399828 -8.781464495
+-8.663140179 -8.473531488 -8.247337057 -7.971428747 -7.676129393 -7.352812702 -7.072065318 -6.774174009
+-6.478861916 -6.159517513 -6.835647144 -6.53165267 -6.224098421 -5.910094889 -5.598599459 -5.290645224
+-4.974284616 -4.64454848 -4.290560426 -3.885055584 -3.408378962 -3.13200249 -8.726767166 -8.66695597
+-8.511026475 -8.165388579 -7.886056648 -7.588043762 -7.283412422 -6.995678626 -6.691862621 -6.392544977
+-6.067374056 -6.684029655 -6.378719832 -6.065855188 -5.752272167 -5.132414673 -4.811352704 -4.098269308
+-3.66174277 -3.2644011
+"""
+WAMPLER_X = [Fraction(x) for x in range(21)]
+# Wampler 3-5 add 1, 100 and 10000 times this to the polynomial of unit coefficients.
+WAMPLER_SCATTER = [
+    *(759, -2048, 2048, -2048, 2523, -2048, 2048, -2048, 1838, -2048),
+    *(2048, -2048, 1838, -2048, 2048, -2048, 2523, -2048, 2048, -2048, 759),
+]
+WAMPLER_3_ERRORS = (
+    "2152.32624678170 2363.55173469681 779.343524331583 101.475507550350 5.64566512170752 0.112324854679312"
+)
+WAMPLER_4_ERRORS = (
+    "215232.624678170 236355.173469681 77934.3524331583 10147.5507550350 564.566512170752 11.2324854679312"
+)
+WAMPLER_5_ERRORS = (
+    "21523262.4678170 23635517.3469681 7793435.24331583 1014755.07550350 56456.6512170752 1123.24854679312"
+)
+
+
+def wampler(scatter: int, base: Fraction, errors: str, deviation: str, r2: str, f: str | None) -> Reference:
+    """Polynomial of degree 5 with coefficients base^0 to base^5, and ``scatter`` times the printed scatter."""
+    powers = polynomial(WAMPLER_X, 5)
+    true = [base**power for power in range(6)]
+    response = [
+        sum(c * x for c, x in zip(true, row, strict=True)) + scatter * extra
+        for row, extra in zip(powers, WAMPLER_SCATTER, strict=True)
+    ]
+    coefficients = [str(float(each)) for each in true]
+    return Reference(powers, response, coefficients, errors.split(), deviation, r2, f)
+
+
+def longley() -> Reference:
+    """Sixteen years of employment in six regressors that are nearly dependent."""
+    rows = [[Fraction(word) for word in line.split()] for line in LONGLEY_DATA.strip().splitlines()]
+    return Reference(
+        regressors=[[Fraction(1), *row[1:]] for row in rows],
+        response=[row[0] for row in rows],
+        coefficients=[
+            "-3482258.63459582",
+            "15.0618722713733",
+            "-0.0358191792925910",
+            "-2.02022980381683",
+            "-1.03322686717359",
+            "-0.0511041056535807",
+            "1829.15146461355",
+        ],
+        standard_errors=[
+            "890420.383607373",
+            "84.9149257747669",
+            "0.0334910077722432",
+            "0.488399681651699",
+            "0.214274163161675",
+            "0.226073200069370",
+            "455.478499142212",
+        ],
+        deviation="304.854073561965",
+        r2="0.995479004577296",
+        f="330.285339234588",
+    )
+
+
+def filip() -> Reference:
+    """A polynomial of degree 10 far from its origin."""
+    return Reference(
+        regressors=polynomial([Fraction(word) for word in FILIP_X.split()], 10),
+        response=[Fraction(word) for word in FILIP_Y.split()],
+        coefficients=[
+            "-1467.48961422980",
+            "-2772.17959193342",
+            "-2316.37108160893",
+            "-1127.97394098372",
+            "-354.478233703349",
+            "-75.1242017393757",
+            "-10.8753180355343",
+            "-1.06221498588947",
+            "-0.0670191154593408",
+            "-0.00246781078275479",
+            "-0.0000402962525080404",
+        ],
+        standard_errors=[
+            "298.084530995537",
+            "559.779865474950",
+            "466.477572127796",
+            "227.204274477751",
+            "71.6478660875927",
+            "15.2897178747400",
+            "2.23691159816033",
+            "0.221624321934227",
+            "0.0142363763154724",
+            "0.000535617408889821",
+            "0.00000896632837373868",
+        ],
+        deviation="0.00334801051324544",
+        r2="0.996727416185620",
+        f="2162.43954511489",
+    )
+
+
+REFERENCES = {
+    "Longley": longley(),
+    "Wampler 1": wampler(0, Fraction(1), "0 0 0 0 0 0", "0", "1", None),
+    "Wampler 2": wampler(0, Fraction(1, 10), "0 0 0 0 0 0", "0", "1", None),
+    "Wampler 3": wampler(
+        1, Fraction(1), WAMPLER_3_ERRORS, "2360.14502379268", "0.999995559025820", "675524.458240122"
+    ),
+    "Wampler 4": wampler(
+        100, Fraction(1), WAMPLER_4_ERRORS, "236014.502379268", "0.957478440825662", "67.5524458240122"
+    ),
+    "Wampler 5": wampler(
+        10000, Fraction(1), WAMPLER_5_ERRORS, "23601450.2379268", "0.00224668921574940", "0.00675524458240122"
+    ),
+    "Filip": filip(),
+}

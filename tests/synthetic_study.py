@@ -1,0 +1,203 @@
+"""A small made-up record of ``doe study --json`` with every part there is, and a motion to go with it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+
+FACTORS = ["radial_clearance_mm", "guide_clearance_mm", "pocket_clearance_mm"]
+RESPONSES = ["impact_force_N", "whirl_deviation_ratio", "power_loss_W"]
+CENTRE, STEP, REACH = [0.020, 0.15, 0.30], [0.005, 0.05, 0.05], 1.6818
+COEFFICIENTS: dict[str, dict[str, float]] = {
+    "impact_force_N": {"1": 92.0, "A": 0.3, "B": 2.3, "C": 10.2},
+    "whirl_deviation_ratio": {"1": 0.41, "A": -0.004, "B": 0.003, "C": 0.047, "BC": -0.031, "A^2": 0.038},
+    "power_loss_W": {"1": 239.0, "A": -1.0, "B": -9.7, "C": -0.6, "B^2": 2.6},
+}
+VERDICT = {"percent": 11.16, "error_percent": 0.65, "verdict": "better"}
+
+
+def predicted(response: str, coded: list[float]) -> float:
+    """Value of a made-up surface."""
+    a, b, c = coded
+    terms = {"1": 1.0, "A": a, "B": b, "C": c, "BC": b * c, "A^2": a * a, "B^2": b * b}
+    return sum(value * terms[term] for term, value in COEFFICIENTS[response].items())
+
+
+def point(coded: list[float], error: float = 0.01) -> dict[str, Any]:
+    """Factors, responses and errors of a point of the front."""
+    values = {name: predicted(name, coded) for name in RESPONSES}
+    return {
+        "factors": {name: c + s * x for name, c, s, x in zip(FACTORS, CENTRE, STEP, coded, strict=True)},
+        "responses": values,
+        "errors": {name: error * abs(value) for name, value in values.items()},
+    }
+
+
+def fitted(name: str, runs: list[list[float]]) -> dict[str, Any]:
+    """R of ``doe fit`` for a made-up surface."""
+    terms = list(COEFFICIENTS[name])
+    rows = [("model", 3), *((term, 1) for term in terms[1:]), ("residual", 16)]
+    return {
+        "model": "quadratic",
+        "coefficients": COEFFICIENTS[name],
+        "terms": terms,
+        "covariance": (0.01 * np.eye(len(terms))).tolist(),
+        "standard_errors": dict.fromkeys(terms, 0.1),
+        "anova": [
+            {"source": source, "ss": 1.5, "df": df, "ms": 1.5, "f": 4.0, "p": 0.01} for source, df in rows
+        ],
+        "lack_of_fit": {"ss": 1.0, "df": 5, "f": 2.0, "p": 0.2},
+        "pure_error": {"ss": 1.0, "df": 5, "ms": 0.2},
+        **{"r2": 0.98, "adjusted_r2": 0.97, "predicted_r2": 0.9, "press": 3.0},
+        **{"cv_percent": 1.2, "adequate_precision": 20.0},
+        "stationary_point": {
+            "coded": [0.0] * 3,
+            "actual": CENTRE,
+            "eigenvalues": [1.0] * 3,
+            "nature": "minimum",
+        },
+        "diagnostics": {
+            "runs": [
+                {
+                    "run": run + 1,
+                    "observed": predicted(name, coded) + 0.1 * math.sin(run),
+                    "predicted": predicted(name, coded),
+                    "residual": 0.1 * math.sin(run),
+                    "standardized": math.sin(run),
+                    "studentized": math.sin(run),
+                    "leverage": 0.4,
+                    "cook": 0.1,
+                }
+                for run, coded in enumerate(runs)
+            ]
+        },
+        "sentences": [f"{name}: lack of fit is not significant (p = 0.2000)."],
+        "transform": None,
+    }
+
+
+def summary() -> dict[str, Any]:
+    """Every part of the record."""
+    cube: list[list[float]] = [list(corner) for corner in itertools.product((-1.0, 1.0), repeat=3)]
+    runs = [*cube, *([0.0] * 3 for _ in range(4))]
+    front = [point([0.5, 1.0 - 0.1 * k, -1.6 + 0.1 * k]) for k in range(12)]
+    pick, baseline = front[3], point([0.0, 0.0, 0.0])
+    limits = [(c - REACH * s, c + REACH * s) for c, s in zip(CENTRE, STEP, strict=True)]
+    confirmed = {
+        name: {"value": value, "statistical_error": 0.3, "numerical_error": 0.2}
+        for name, value in baseline["responses"].items()
+    }
+    chosen = {"radial_clearance_mm": 0.0225, "guide_clearance_mm": 0.185, "pocket_clearance_mm": 0.235}
+    return {
+        "format": "doe.study/1",
+        "status": "ok",
+        "asked": {
+            "title": "Clearances of a made-up bearing",
+            "study_file": "study.toml",
+            "scene_file": "scene.toml",
+            "scene": {"bearing": {"rollers": 10, "roller_diameter_mm": 9.0, "roller_profile": None}},
+            "factors": [
+                {"letter": "ABC"[k], "name": name, "key": f"bearing.{name}", "centre": CENTRE[k], "step": STEP[k],
+                 "low": limits[k][0], "high": limits[k][1], "resolution": 0.0005, "tolerance": None}
+                for k, name in enumerate(FACTORS)
+            ],
+            "responses": [{"name": name, "goal": "min", "weight": 1.0, "model": "quadratic"} for name in RESPONSES],
+            "replicates": 8,
+            "turns": 40,
+        },
+        "design": {
+            "kind": "central_composite",
+            "runs": len(runs),
+            "factors": FACTORS,
+            "responses": RESPONSES,
+            "points": [
+                {"run": run + 1, "kind": "cube" if run < 8 else "centre", "block": 0, "seed": run + 1,
+                 "factors": point(coded)["factors"],
+                 "responses": {name: {"value": predicted(name, coded), "error": 0.2} for name in RESPONSES}}
+                for run, coded in enumerate(runs)
+            ],
+            "evaluation": {"efficiency_percent": {"d": 68.2, "g": 71.0}, "condition_number": 3.4, "terms": ["1", "A", "B"],
+                           "vif": {"A": 1.0, "B": 1.0, "C": 1.02}, "power_percent": {t: {"one_sigma": 30.0} for t in "ABC"},
+                           "by_radius": [{"radius": r, "min": 1 + r, "mean": 2 + r, "max": 3 + r} for r in (0.0, 1.0)],
+                           "fraction_of_design_space": [{"percent": p, "variance": 3 + p / 50} for p in (0, 50, 100)]},
+            "failures": [{"cause": "step budget used up", "runs": [13]}, {"cause": "step budget used up", "runs": [15]}],
+        },
+        "fit": {"responses": {name: fitted(name, runs) for name in RESPONSES}},
+        "front": {
+            "front": front, "knee": front[5], "pick": {**pick, "reason": "the knee of the front"},
+            "picks": {"desirability": front[8]}, "baseline": baseline, "hypervolume": 0.9, "generations": 3, "seed": 1,
+            "hypervolume_history": [0.7, 0.85, 0.9], "predicted_gains": dict.fromkeys(RESPONSES, VERDICT),
+            "constraints": [{"response": "power_loss_W", "sense": "<=", "limit": 260.0, "value": 230.0, "kept": True}],
+            "tolerance_aware": {"kind": "worst_case", "quantile": None,
+                                "front": [{**each, "robust": each["responses"]} for each in front[:6]]},
+        },
+        "direct": {"front": front[2:7], "hypervolume": 0.9, "sentence": "The surfaces lose 1.0 ± 0.5 %."},
+        "pick": chosen,
+        "tolerances": {FACTORS[0]: {"half_width": 0.004, "probability": 0.95, "limited_by": RESPONSES[0]}},
+        "confirmation": {
+            "baseline": {"factors": baseline["factors"], "responses": confirmed, "power_terms_W": {"land": 70.0, "drag": 36.0}},
+            "pick": {"factors": chosen, "responses": confirmed, "power_terms_W": {"land": 66.0, "drag": 36.0}},
+            "knee": {"factors": chosen, "responses": confirmed, "gains": {RESPONSES[0]: VERDICT}, "reason": "the knee"},
+        },
+        "gains": dict.fromkeys(RESPONSES, VERDICT),
+        "statement": "The gain is real in all three responses.",
+        "chains": {
+            "pocket": {
+                "closing_link": {"nominal_mm": 0.24, "worst_case_mm": [0.23, 0.24], "rss_mm": [0.231, 0.239]},
+                "yield": {"as_given": 0.999976, "standard_error": 5e-6},
+                "contributions": {
+                    "pocket_width": {"variance_percent": 60.0, "worst_case_percent": 55.0},
+                    "roller_diameter": {"variance_percent": 40.0, "worst_case_percent": 45.0},
+                },
+                "allocation": {
+                    "pocket_width": {"nominal_mm": 9.24, "upper_mm": 0.0, "lower_mm": -0.005, "grade": "IT5"},
+                    "roller_diameter": {"nominal_mm": 9.0, "upper_mm": 0.005, "lower_mm": 0.0, "grade": None},
+                },
+                "status": "ok: deviations allocated",
+            }
+        },
+        "beside_reference": {
+            RESPONSES[0]: {
+                "ours_min_mean_max": [77.0, 92.0, 114.0], "theirs_min_mean_max": [145.0, 203.0, 278.0],
+                "linear_effects": {FACTORS[0]: {"ours": 0.3, "theirs": 23.0, "same_sign": True}},
+                "rank_correlation": 0.7, "verdict": f"{RESPONSES[0]}: our mean is 0.45 of theirs.", "why": "They leave out mass.",
+            }
+        },
+        "notes": ["traction: one set of constants"],
+        "failures": [{"cause": "step budget used up", "runs": [13, 15]}],
+        "cost": {"design_s": 31.5, "total_s": 36.1},
+        "versions": {"rbdyn": "0.1.0"},
+        "seeds": {"design": 1},
+    }  # fmt: skip
+
+
+def motion(rollers: int = 6, frames: int = 40) -> dict[str, Any]:
+    """Record of ``doe.clearance.motion_record``: rollers going round at even speed."""
+    turn = 2.0 * math.pi
+    still, each = [0.0] * frames, [0.0] * (frames * rollers)
+    angles = [round(0.4 * turn * frame / frames, 4) for frame in range(frames)]
+    moving = {
+        "title": "a made-up bearing", "frames": frames, "rollers": rollers, "turn_s": 2.5e-3,
+        "pitch": 21.75, "roller": 2.8, "cage_half": 1.1, "outer_gap": 0.01, "inner_gap": 0.01, "pocket_gap": 0.15,
+        "guide_gap": 0.075, "guide_side": 1.0, "race_scale": 100.0, "cage_scale": 10.0, "extent": 34.0,
+        "magnification": 10.0, "largest_magnification": 16.0,
+        "references": [[-30.0, 28.0, -25.0, 28.0, "outer race, 500 N", -22.0]],
+        "time_us": [5000.0 * frame / frames for frame in range(frames)],
+        "inner_angle": [2.0 * turn * frame / frames % turn for frame in range(frames)], "outer_angle": still,
+        "cage_angle": angles, "cage_x_um": still, "cage_y_um": still, "ring_x_um": still, "ring_y_um": still,
+        "ahead_um": each, "out_um": each, "spin": each, "outer_load_N": [500.0] * len(each), "inner_load_N": each,
+        "pocket_load_N": [20.0] * len(each), "land_load_N": still,
+    }  # fmt: skip
+    orbit = {
+        axis: [20.0 * trig(0.1 * k) for k in range(60)] for axis, trig in (("x", math.cos), ("y", math.sin))
+    }
+    one = {
+        "t_s": [1e-5 * k for k in range(60)],
+        "cage_orbit_um": orbit,
+        "guide_radius_um": 75.0,
+        "moving": moving,
+    }
+    return {"baseline": one, "pick": one}

@@ -1,0 +1,246 @@
+"""The report of a study as text: what it says, what it leaves out, and that no name can break it."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+from html.parser import HTMLParser
+from importlib.resources import files
+
+import pytest
+from synthetic_study import FACTORS, RESPONSES, motion, summary
+
+from doe.report.html import html_report
+from doe.report.html.build import SCRIPTS
+from doe.report.markdown import markdown_report
+from doe.report.words import label, percentage, quantity, shown, with_error
+
+VOID = {"meta", "input"}
+OPTIONAL = {
+    "answer": ("pick", "gains", "statement", "chains"), "asked": ("asked",), "design": ("design",), "surfaces": ("fit",),
+    "diagnostics": ("fit",), "front": ("front",), "confirmation": ("confirmation",), "chains": ("chains",),
+    "power": ("confirmation",), "reference": ("beside_reference",), "settings": ("cost", "versions", "seeds"),
+    "notes": ("notes", "failures"),
+}  # fmt: skip
+
+
+class Outline(HTMLParser):
+    """Checks that elements are closed in order; collects ids, links, text outside scripts, and attributes."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.words: list[str] = []
+        self.remote: list[str] = []
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        self.ids += [given["id"]] if "id" in given else []
+        self.links += [given["href"].removeprefix("#")] if tag == "a" else []
+        self.remote += [given[name] for name in ("src", "srcset", "xlink:href", "action") if name in given]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        pass
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] not in ("script", "style"):
+            self.words.append(data.replace("\xa0", " "))
+
+
+@pytest.fixture(scope="module")
+def page():
+    return html_report(summary(), motion())
+
+
+def data_of(page: str) -> dict:
+    (data,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    return json.loads(data)
+
+
+def test_page_is_whole_small_and_fetches_nothing(page):
+    outline = Outline(page)
+    assert outline.open == [] and outline.remote == []
+    assert len(outline.ids) == len(set(outline.ids))
+    assert set(outline.links) <= set(outline.ids)
+    assert not re.search(r"https?://|url\(|@import|\bfetch\(|XMLHttpRequest|import\(", page)
+    assert "default-src 'none'" in page
+    assert len(page.encode()) < 400_000
+
+
+def test_answer_comes_first(page):
+    words = " ".join(Outline(page).words)
+    answer = words[
+        words.index("Skip to the answer") : words.index("What was asked", words.index("radial clearance"))
+    ]
+    for text in (
+        "0.0225",
+        "0.1850",
+        "± 0.004 mm",
+        "The gain is real",
+        "9.2400 0/-0.0050",
+        "+11.16 ± 0.65 %",
+        "▲ better",
+        "pocket 0.999976",
+    ):
+        assert text in answer
+    assert "impact force [N]" in answer and "impact_force_N" not in answer
+
+
+def test_every_section_is_in_the_contents(page):
+    outline = Outline(page)
+    assert outline.links[1:] == [*list(OPTIONAL)[:9], "motion", "reference", "settings", "notes"]
+
+
+@pytest.mark.parametrize("section", OPTIONAL)
+def test_missing_parts_leave_their_section_out(section):
+    record = summary() | dict.fromkeys(OPTIONAL[section])
+    if section == "answer":
+        record["front"] = None
+    outline = Outline(html_report(record))
+    assert section not in outline.ids and section not in outline.links
+    assert set(outline.links) <= set(outline.ids)
+
+
+def test_any_one_key_may_be_missing():
+    whole = summary()
+    second = [(one, two) for one, part in whole.items() if isinstance(part, dict) for two in part]
+    third = [("fit", "responses", RESPONSES[0], key) for key in whole["fit"]["responses"][RESPONSES[0]]]
+    third += [("chains", "pocket", key) for key in whole["chains"]["pocket"]]
+    for *path, last in [*((key,) for key in whole), *second, *third]:
+        record = copy.deepcopy(whole)
+        table = record
+        for key in path:
+            table = table[key]
+        del table[last]
+        outline = Outline(html_report(record))
+        assert outline.open == [] and set(outline.links) <= set(outline.ids), (path, last)
+
+
+def test_least_record_of_all_still_answers():
+    whole = summary()
+    words = " ".join(Outline(html_report({key: whole[key] for key in ("format", "pick", "gains")})).words)
+    assert "0.2350" in words and "Of 3 responses" in words and "3 better" in words
+
+
+def test_without_motion_nothing_moves():
+    outline = Outline(html_report(summary()))
+    assert "bearing" not in outline.ids and "motion" not in outline.links
+
+
+def spoilt(record, name):
+    """The record with another factor name wherever the first one stands."""
+    return json.loads(json.dumps(record).replace(FACTORS[0], json.dumps(name)[1:-1]))
+
+
+@pytest.mark.parametrize(
+    "name", ["</script><b>bold</b>", "a<!--b", "{{DATA}} & 'c'", 'd" onload="e', "|pipe|*star*"]
+)
+def test_no_name_breaks_the_page(name, page):
+    spoiled = html_report(spoilt(summary(), name), motion())
+    outline = Outline(spoiled)
+    assert outline.open == []
+    assert data_of(spoiled)["factors"][0]["name"] == name
+    assert spoiled.count("<script") == page.count("<script") and spoiled.count("<!--") == page.count("<!--")
+    assert "<b>" not in spoiled and ' onload="' not in spoiled
+    assert quantity(name)[0] in " ".join(outline.words)
+
+
+def test_nan_never_appears():
+    record = summary()
+    fit = record["fit"]["responses"][RESPONSES[0]]
+    fit["r2"] = fit["covariance"][0][0] = float("nan")
+    fit["diagnostics"]["runs"][0]["cook"] = float("nan")
+    record["design"]["points"][0]["responses"][RESPONSES[0]] = {"value": float("nan"), "error": float("nan")}
+    record["gains"][RESPONSES[1]] = {"percent": 3.0, "error_percent": float("inf"), "verdict": "within error"}
+    record["front"]["front"][0]["responses"][RESPONSES[0]] = float("nan")
+    text = html_report(record, motion())
+    told = " ".join(Outline(text).words) + json.dumps(data_of(text)) + markdown_report(record)
+    assert not re.search(r"\b(nan|NaN|inf|Infinity|None|null ±)\b", re.sub(r"null", "", told))
+    assert "failed" in told
+
+
+def test_record_is_left_as_it_was():
+    record = summary()
+    before = copy.deepcopy(record)
+    html_report(record, motion())
+    markdown_report(record)
+    assert record == before
+
+
+def test_data_are_the_points_of_the_record(page):
+    record, data = summary(), data_of(page)
+    points = sorted(record["front"]["front"], key=lambda each: each["responses"][RESPONSES[0]])
+    assert [each["words"] for each in data["fronts"]] == [
+        "on the surfaces",
+        "with tolerances",
+        "on the simulator",
+    ]
+    for ours, theirs in zip(data["fronts"][0]["points"], points, strict=True):
+        assert ours["x"] == pytest.approx(list(theirs["factors"].values()), rel=1e-5)
+        assert ours["y"] == pytest.approx(list(theirs["responses"].values()), rel=1e-5)
+    # 8 runs less 4 terms would be a Student factor of its own; the record has 16 degrees of freedom.
+    assert data["surfaces"][0]["student"] == pytest.approx(2.1199, abs=1e-4)
+
+
+def test_every_point_of_the_front_is_in_every_picture(page):
+    count = sum(len(each["points"]) for each in data_of(page)["fronts"])
+    assert count == 12 + 6 + 5
+    for number in range(count):
+        # Three pairs of responses, and parallel coordinates.
+        assert page.count(f'data-point="{number}"') == 4
+
+
+def test_markdown_says_the_same_and_links_the_pictures():
+    text = markdown_report(spoilt(summary(), "a|b<c_mm"), ["pareto_front.png", "cage_orbit.png"])
+    for words in (
+        "# Clearances of a made-up bearing",
+        "**The gain is real",
+        "9.2400 0/-0.0050",
+        "a\\|b&lt;c",
+        "+11.16 ± 0.65 %",
+    ):
+        assert words in text
+    assert text.index("## The answer") < text.index("## What was asked")
+    assert "![pareto front](<pareto_front.png>)" in text and "![cage orbit](<cage_orbit.png>)" in text
+    tables = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
+    assert len(tables) > 20
+    for table in tables:
+        assert len({len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}) == 1
+
+
+def test_scripts_and_styles_are_in_the_package():
+    names = [name for part in SCRIPTS.values() for name in part]
+    for name in [*names, "report.css", "page.html", "surface.html", "front.html", "bearing.html"]:
+        text = files("doe.report.html").joinpath(name).read_text(encoding="utf-8")
+        assert 0 < len(text.splitlines()) < 400
+        assert "</script" not in text or name == "page.html"
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [(87.0943, 0.352, "87.09 ± 0.35"), (239.4076, 0.0441, "239.408 ± 0.044"), (1234.5, 120.0, "1234 ± 120"),
+     (0.367, None, "0.367"), (0.367, 0.0, "0.367"), (None, 1.0, "")],
+)  # fmt: skip
+def test_errors_have_two_digits(value, error, text):
+    assert with_error(value, error) == text
+
+
+def test_names_and_numbers_are_written_for_people():
+    assert [label(name) for name in ("impact_force_N", "cage_slip", "N", "speed_rpm")] == [
+        "impact force [N]", "cage slip", "N", "speed [rpm]",
+    ]  # fmt: skip
+    assert [shown(x) for x in (None, True, 3, 24000.0, 1.23456e-5, float("inf"), [0.1, 2])] == [
+        "", "yes", "3", "24000", "1.235e-05", "", "0.1, 2",
+    ]  # fmt: skip
+    assert percentage({"percent": 9.963, "error_percent": 4.462}) == "+10.0 ± 4.5 %"
+    assert percentage({"percent": -3.0, "error_percent": None}) == "-3.00 %"

@@ -1,0 +1,315 @@
+"""The report in a real browser without a network: it draws, turns, slides, plays, prints, and keys reach all of it."""
+
+from __future__ import annotations
+
+import base64
+import math
+import os
+import re
+import shutil
+from typing import Any
+
+import pytest
+from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, motion, predicted, summary
+
+from doe.report.html import html_report
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+PICTURE = "return document.getElementById(arguments[0]).toDataURL()"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """One headless browser for all tests, with the page in a file."""
+    if CHROMIUM is None or DRIVER is None:
+        pytest.skip(
+            "no chromium with chromedriver is installed (Debian: apt install chromium chromium-driver)"
+        )
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for argument in ("--headless=new", "--disable-dev-shm-usage", "--window-size=1400,900"):
+        options.add_argument(argument)
+    if os.geteuid() == 0:
+        options.add_argument("--no-sandbox")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+    driver.execute_cdp_cmd("Network.enable", {})
+    offline = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
+    driver.execute_cdp_cmd("Network.emulateNetworkConditions", offline)
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "report.html").write_text(html_report(summary(), motion()), encoding="utf-8")
+    yield driver, folder
+    driver.quit()
+
+
+def opened(browser: Any, scheme: str = "light", motion: str = "reduce", name: str = "report.html") -> Any:
+    """The page as just opened, by a reader with these wishes."""
+    driver, folder = browser
+    wishes = {"prefers-color-scheme": scheme, "prefers-reduced-motion": motion}
+    features = [{"name": name, "value": value} for name, value in wishes.items()]
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    driver.get((folder / name).as_uri())
+    return driver
+
+
+def text_of(page: Any, key: str) -> str:
+    return page.execute_script("return document.getElementById(arguments[0]).textContent", key)
+
+
+def keys(page: Any, key: str, *pressed: str) -> None:
+    page.find_element("id", key).send_keys(*pressed)
+
+
+def test_opens_offline_with_the_answer_and_no_complaint(browser):
+    page = opened(browser)
+    answer = page.find_element("id", "answer")
+    for words in ("radial clearance", "0.0225", "The gain is real", "9.2400 0/-0.0050", "11.16"):
+        assert words in answer.text
+    # Found without scrolling.
+    assert page.find_element("css selector", ".tiles").rect["y"] < 200
+    assert page.execute_script("return performance.getEntriesByType('resource').length") == 0
+    assert page.get_log("browser") == []
+
+
+def test_two_factors_of_awkward_names_draw_as_they_are(browser):
+    driver, folder = browser
+    record = summary()
+    record["asked"]["factors"][0] |= {"name": "</script><b>x</b>"}
+    del record["asked"]["factors"][2]
+    for fitted in record["fit"]["responses"].values():
+        fitted["coefficients"] = {"1": 1.0, "A": 2.0, "B": 0.5}
+        del fitted["covariance"]
+    (folder / "awkward.html").write_text(html_report(record), encoding="utf-8")
+    page = opened(browser, name="awkward.html")
+    assert "</script><b>x</b>" in page.find_element("id", "surface_x").text
+    assert page.find_elements("css selector", "main b") == []
+    assert driver.get_log("browser") == []
+
+
+def test_a_record_without_what_was_asked_still_plays(browser):
+    driver, folder = browser
+    record = summary()
+    del record["asked"]
+    (folder / "bare.html").write_text(html_report(record, motion()), encoding="utf-8")
+    page = opened(browser, name="bare.html")
+    assert page.find_elements("id", "surface") == []
+    assert "0.0225" in text_of(page, "front_point")
+    assert driver.get_log("browser") == []
+
+
+def test_surface_turns_by_drag_and_by_keys(browser):
+    from selenium.webdriver import ActionChains, Keys
+
+    page = opened(browser)
+    canvas = page.find_element("id", "surface_3d")
+    pictures = [page.execute_script(PICTURE, "surface_3d")]
+    for pressed in (Keys.ARROW_LEFT, Keys.ARROW_UP):
+        canvas.send_keys(pressed)
+        pictures.append(page.execute_script(PICTURE, "surface_3d"))
+    ActionChains(page).move_to_element(canvas).click_and_hold().move_by_offset(60, 20).release().perform()
+    pictures.append(page.execute_script(PICTURE, "surface_3d"))
+    assert len(set(pictures)) == 4
+    # Back by the same keys, back to the same picture.
+    for pressed in (Keys.ARROW_RIGHT, Keys.ARROW_LEFT):
+        canvas.send_keys(pressed)
+    assert page.execute_script(PICTURE, "surface_3d") == pictures[3]
+
+
+def test_surface_reads_out_the_fitted_values(browser):
+    from selenium.webdriver import Keys
+
+    page = opened(browser)
+    chosen = summary()["front"]["pick"]["factors"]
+    coded = [(chosen[name] - c) / s for name, c, s in zip(FACTORS, CENTRE, STEP, strict=True)]
+    page.find_element("id", "surface_pick").click()
+    assert f"impact force {predicted(RESPONSES[0], coded):.2f} ± " in text_of(page, "surface_read")
+    keys(page, "surface_response", "power")
+    assert f"power loss {predicted(RESPONSES[2], coded):.2f} ± " in text_of(page, "surface_read")
+    before = page.execute_script(PICTURE, "surface_map")
+    keys(page, "surface_map", Keys.ARROW_RIGHT)
+    assert page.execute_script(PICTURE, "surface_map") != before
+    # The slider of the factor that is no axis.
+    page.execute_script("""
+        const slider = document.querySelector("#surface_others input");
+        slider.value = slider.max;
+        slider.dispatchEvent(new Event("input"));""")
+    assert "pocket clearance 0.38409 mm" in text_of(page, "surface_read")
+
+
+def test_scripts_evaluate_terms_transforms_and_contours(browser):
+    page = opened(browser)
+    surface = {"terms": ["1", "A", "BC", "A^2B"], "coefficients": [1.0, 2.0, -1.0, 0.5]}
+    value = "return model.value(arguments[0], [2, 3, -1])"
+    # 1 + 4 + 3 + 6
+    assert page.execute_script(value, surface | {"power": None}) == pytest.approx(14.0)
+    # The way back from Box and Cox: (lambda t + 1)^(1/lambda), e^t for lambda = 0.
+    assert page.execute_script(value, surface | {"power": 0.5}) == pytest.approx(8.0**2)
+    assert page.execute_script(value, surface | {"power": 0.0}) == pytest.approx(math.exp(14.0))
+    line = {"terms": ["1", "A"], "coefficients": [1.0, 2.0], "power": None}
+    line |= {"covariance": [[4.0, 1.0], [1.0, 8.0]], "student": 2.0}
+    # 2 sqrt(4 + 2 0.5 + 8 0.25)
+    half = page.execute_script("return model.half_width(arguments[0], [0.5])", line)
+    assert half == pytest.approx(2.0 * math.sqrt(7.0))
+    cut = page.execute_script("return contours.segments([[0, 0, 0], [1, 1, 1], [2, 2, 2]], 1.25)")
+    assert sorted(place for segment in cut for place in segment) == [
+        [1.25, 0],
+        [1.25, 1],
+        [1.25, 1],
+        [1.25, 2],
+    ]
+
+
+def test_axes_of_a_surface_never_coincide(browser):
+    page = opened(browser)
+    keys(page, "surface_y", "radial")
+    script = "return ['surface_x', 'surface_y'].map(name => document.getElementById(name).value)"
+    x, y = page.execute_script(script)
+    assert y == "0" and x != y
+    assert page.get_log("browser") == []
+
+
+def test_front_slider_shows_the_points_of_the_front(browser):
+    from selenium.webdriver import Keys
+
+    page = opened(browser)
+    points = sorted(summary()["front"]["front"], key=lambda each: each["responses"][RESPONSES[0]])
+    keys(page, "front_slider", Keys.HOME)
+    for number in (0, 1, 2):
+        rows = page.execute_script(
+            "return [...document.querySelectorAll('#front_point tbody tr')].map(row => row.cells[1].textContent)"
+        )
+        for place, name in enumerate(FACTORS):
+            assert float(rows[place].split()[0]) == pytest.approx(points[number]["factors"][name], abs=5e-5)
+        for place, name in enumerate(RESPONSES, len(FACTORS)):
+            value, error = (float(each) for each in rows[place].split(" ± "))
+            assert value == pytest.approx(points[number]["responses"][name], abs=error)
+            assert error == pytest.approx(points[number]["errors"][name], rel=0.06)
+        # The same point is ringed in each picture.
+        rings = page.execute_script("""
+            return [...document.querySelectorAll("svg[data-front]")].map(svg => {
+              const ring = svg.querySelector(".chosen"), names = ring.matches("circle") ? ["cx", "cy"] : ["points"];
+              const same = each => names.every(name => each.getAttribute(name) === ring.getAttribute(name));
+              return [...svg.querySelectorAll("[data-point]")].filter(same).map(each => Number(each.dataset.point));
+            });""")
+        assert len(rings) == 4 and all(number in ring for ring in rings)
+        keys(page, "front_slider", Keys.ARROW_RIGHT)
+    assert text_of(page, "front_number") == "4 of 12"
+
+
+def test_click_on_a_point_chooses_it(browser):
+    page = opened(browser)
+    page.execute_script("document.getElementById('pairs').scrollIntoView()")
+    page.find_element("css selector", "#pairs [data-point='9']").click()
+    assert text_of(page, "front_number") == "10 of 12"
+    keys(page, "front_set", "with")
+    assert text_of(page, "front_number") == "1 of 6"
+    assert "with tolerances" in text_of(page, "front_point")
+
+
+def test_bearing_moves_while_it_plays(browser):
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    page = opened(browser)
+    button = page.find_element("id", "bearing_play")
+    picture = "return document.querySelector('#bearing canvas').toDataURL()"
+    still = page.execute_script(picture)
+    assert button.text == "Play"
+    button.click()
+    assert button.text == "Pause"
+    WebDriverWait(page, 5).until(lambda _: page.execute_script(picture) != still)
+    button.click()
+    stopped = page.execute_script(picture)
+    moment = page.find_element("id", "bearing_moment").get_property("value")
+    assert stopped != still
+    # Two more frames of the screen change nothing.
+    page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
+    assert page.find_element("id", "bearing_moment").get_property("value") == moment
+    assert page.execute_script(picture) == stopped
+
+
+@pytest.mark.parametrize(("wish", "begins"), [("reduce", False), ("no-preference", True)])
+def test_motion_begins_by_itself_only_where_it_is_welcome(browser, wish, begins):
+    page = opened(browser, motion=wish)
+    page.execute_script("document.getElementById('bearing').scrollIntoView({behavior: 'instant'})")
+    page.execute_async_script("""
+        const done = arguments[0];
+        new IntersectionObserver(() => setTimeout(done, 50)).observe(document.getElementById("bearing_play"));""")
+    pressed = page.find_element("id", "bearing_play").get_attribute("aria-pressed")
+    assert pressed == ("true" if begins else "false")
+
+
+def test_tab_reaches_every_control_and_shows_it(browser):
+    from selenium.webdriver import Keys
+
+    page = opened(browser)
+    page.execute_script("""
+        window.reached = {};
+        document.addEventListener("focusin", event => {
+          window.reached[event.target.id || event.target.outerHTML] = getComputedStyle(event.target).outlineStyle;
+        });""")
+    page.find_element("tag name", "body").send_keys(Keys.TAB * 60)
+    reached = page.execute_script("return window.reached")
+    assert "none" not in reached.values()
+    assert {
+        *("surface_response", "surface_x", "surface_y", "surface_baseline", "surface_pick", "surface_3d", "surface_map"),
+        *("front_set", "front_slider", "bearing_play", "bearing_moment", "bearing_speed", "bearing_magnify"),
+    } <= set(reached)  # fmt: skip
+
+
+def test_prints_in_light_on_several_pages(browser):
+    page = opened(browser, scheme="dark")
+    # What stands on paper is drawn anew in light colours before printing, and in dark ones again after.
+    paper = "return [page.colour('paper'), document.querySelectorAll('details[open]').length]"
+    dark = page.execute_script(paper)
+    printed = page.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})
+    pages = len(re.findall(rb"/Type\s*/Page\b", base64.b64decode(printed["data"])))
+    assert 4 <= pages <= 40
+    assert page.execute_script(paper) == dark == ["rgb(21, 25, 29)", 0]
+    page.execute_script("dispatchEvent(new Event('beforeprint'))")
+    assert page.execute_script(paper) == ["rgb(255, 255, 255)", 1]
+
+
+def test_narrow_screen_needs_no_sideways_scrolling(browser):
+    page = opened(browser)
+    size = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": False}
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        wide, room = page.execute_script(
+            "const root = document.documentElement; return [root.scrollWidth, root.clientWidth]"
+        )
+        assert wide == room <= 400
+        assert page.find_element("css selector", ".tile").rect["y"] < 250
+    finally:
+        page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_tables_sort_by_a_column(browser):
+    page = opened(browser)
+    column = "return [...document.querySelectorAll('#design table')[0].tBodies[0].rows].map(row => parseFloat(row.cells[5].textContent))"
+    before = page.execute_script(column)
+    (head,) = (
+        each
+        for each in page.find_elements("css selector", "#design .sort")
+        if each.text == "impact force [N]"
+    )
+    head.click()
+    assert page.execute_script(column) == sorted(before) != before
+    head.click()
+    assert page.execute_script(column) == sorted(before, reverse=True)
+
+
+def test_without_scripts_tables_and_static_pictures_are_there(browser):
+    driver, _ = browser
+    driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    try:
+        page = opened(browser)
+        assert "Scripts are off" in page.find_element("tag name", "noscript").text
+        assert "0.0225" in page.find_element("id", "answer").text
+        assert page.find_element("css selector", "#pairs svg").is_displayed()
+        assert not page.find_element("id", "surface").is_displayed()
+    finally:
+        driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
