@@ -37,6 +37,8 @@ Array = NDArray[np.float64]
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
 # Confirmation runs use seeds that no design run has.
 CONFIRMATION_SEEDS = 1_000_000
+# So do the evaluations of a direct front, one each.
+DIRECT_SEEDS = 2_000_000
 # Of a motion that goes into a report.
 ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
@@ -101,6 +103,20 @@ def confirmation_scene(study: Study, point: Array) -> Scene:
     ]
     seed = study.file.design.seed + CONFIRMATION_SEEDS
     return scene_at(study, read_scene(study), point, seed, overrides)
+
+
+def direct_scene(study: Study, point: Array, number: int) -> Scene:
+    """Scene of an evaluation of the direct front: few turns, a seed of its own."""
+    direct = study.file.direct
+    overrides = [
+        *study.file.scene.set,
+        f"numerics.replicates={direct.replicates}",
+        f"numerics.turns={direct.turns - direct.discard_turns!r}",
+        f"numerics.discard_turns={direct.discard_turns!r}",
+        "numerics.companion=false",
+        *direct.set,
+    ]
+    return scene_at(study, read_scene(study), point, direct.seed + DIRECT_SEEDS + number, overrides)
 
 
 def run_scenes(
@@ -227,12 +243,18 @@ def attempt_text(text: str, version: str) -> Ran:
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
-def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array]:
-    """Values and 95 % statistical half-widths (NaN where there is none), each (runs, responses)."""
+def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Values, 95 % statistical half-widths (NaN where there is none), and about how many independent values are behind
+    each, each of shape (runs, responses)."""
+    from rbdyn.dynamics.batch_means import MOST_BATCHES
+
     records: list[dict[str, Any]] = [result.as_dict() for result in results]
-    values = [[record[name]["value"] for name in study.responses] for record in records]
-    errors = [[record[name]["statistical_error"] for name in study.responses] for record in records]
-    return np.array(values), np.array(errors, dtype=float)
+    values, errors, samples = (
+        [[record[name][key] for name in study.responses] for record in records]
+        for key in ("value", "statistical_error", "effective_samples")
+    )
+    behind = np.minimum(np.array(samples), MOST_BATCHES).astype(np.int64)
+    return np.array(values), np.array(errors, dtype=float), behind
 
 
 def histories(study: Study, points: dict[str, Array], turns: float) -> dict[str, History]:

@@ -90,6 +90,7 @@ def test_answer_comes_first(page):
         "9.2400 0/-0.0050",
         "+11.16 ± 0.65 %",
         "▲ better",
+        "pocket 0.999976",
     ):
         assert text in answer
     assert "impact force [N]" in answer and "impact_force_N" not in answer
@@ -108,6 +109,21 @@ def test_missing_parts_leave_their_section_out(section):
     outline = Outline(html_report(record))
     assert section not in outline.ids and section not in outline.links
     assert set(outline.links) <= set(outline.ids)
+
+
+def test_any_one_key_may_be_missing():
+    whole = summary()
+    second = [(one, two) for one, part in whole.items() if isinstance(part, dict) for two in part]
+    third = [("fit", "responses", RESPONSES[0], key) for key in whole["fit"]["responses"][RESPONSES[0]]]
+    third += [("chains", "pocket", key) for key in whole["chains"]["pocket"]]
+    for *path, last in [*((key,) for key in whole), *second, *third]:
+        record = copy.deepcopy(whole)
+        table = record
+        for key in path:
+            table = table[key]
+        del table[last]
+        outline = Outline(html_report(record))
+        assert outline.open == [] and set(outline.links) <= set(outline.ids), (path, last)
 
 
 def test_least_record_of_all_still_answers():

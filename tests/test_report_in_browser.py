@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 import os
 import re
 import shutil
@@ -74,14 +75,30 @@ def test_opens_offline_with_the_answer_and_no_complaint(browser):
     assert page.get_log("browser") == []
 
 
-def test_awkward_names_draw_as_they_are(browser):
-    _, folder = browser
+def test_two_factors_of_awkward_names_draw_as_they_are(browser):
+    driver, folder = browser
     record = summary()
     record["asked"]["factors"][0] |= {"name": "</script><b>x</b>"}
+    del record["asked"]["factors"][2]
+    for fitted in record["fit"]["responses"].values():
+        fitted["coefficients"] = {"1": 1.0, "A": 2.0, "B": 0.5}
+        del fitted["covariance"]
     (folder / "awkward.html").write_text(html_report(record), encoding="utf-8")
     page = opened(browser, name="awkward.html")
     assert "</script><b>x</b>" in page.find_element("id", "surface_x").text
     assert page.find_elements("css selector", "main b") == []
+    assert driver.get_log("browser") == []
+
+
+def test_a_record_without_what_was_asked_still_plays(browser):
+    driver, folder = browser
+    record = summary()
+    del record["asked"]
+    (folder / "bare.html").write_text(html_report(record, motion()), encoding="utf-8")
+    page = opened(browser, name="bare.html")
+    assert page.find_elements("id", "surface") == []
+    assert "0.0225" in text_of(page, "front_point")
+    assert driver.get_log("browser") == []
 
 
 def test_surface_turns_by_drag_and_by_keys(browser):
@@ -121,6 +138,29 @@ def test_surface_reads_out_the_fitted_values(browser):
         slider.value = slider.max;
         slider.dispatchEvent(new Event("input"));""")
     assert "pocket clearance 0.38409 mm" in text_of(page, "surface_read")
+
+
+def test_scripts_evaluate_terms_transforms_and_contours(browser):
+    page = opened(browser)
+    surface = {"terms": ["1", "A", "BC", "A^2B"], "coefficients": [1.0, 2.0, -1.0, 0.5]}
+    value = "return model.value(arguments[0], [2, 3, -1])"
+    # 1 + 4 + 3 + 6
+    assert page.execute_script(value, surface | {"power": None}) == pytest.approx(14.0)
+    # The way back from Box and Cox: (lambda t + 1)^(1/lambda), e^t for lambda = 0.
+    assert page.execute_script(value, surface | {"power": 0.5}) == pytest.approx(8.0**2)
+    assert page.execute_script(value, surface | {"power": 0.0}) == pytest.approx(math.exp(14.0))
+    line = {"terms": ["1", "A"], "coefficients": [1.0, 2.0], "power": None}
+    line |= {"covariance": [[4.0, 1.0], [1.0, 8.0]], "student": 2.0}
+    # 2 sqrt(4 + 2 0.5 + 8 0.25)
+    half = page.execute_script("return model.half_width(arguments[0], [0.5])", line)
+    assert half == pytest.approx(2.0 * math.sqrt(7.0))
+    cut = page.execute_script("return contours.segments([[0, 0, 0], [1, 1, 1], [2, 2, 2]], 1.25)")
+    assert sorted(place for segment in cut for place in segment) == [
+        [1.25, 0],
+        [1.25, 1],
+        [1.25, 1],
+        [1.25, 2],
+    ]
 
 
 def test_axes_of_a_surface_never_coincide(browser):

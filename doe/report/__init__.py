@@ -4,4 +4,5 @@
 - ``answer``: the end of a study on the terminal
 - ``summary``: summary.json, everything found
 - ``files``: all files of a study; ``plots`` draws the pictures
+- ``html``, ``markdown``: the report, both made of the blocks of ``content``; ``words``: names and numbers for people
 """

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from doe.report.content import sections
 from doe.report.content.blocks import Block, Bullets, Heading, Table, Tiles, Words
-from doe.report.content.record import Record, finite
+from doe.report.content.record import Record, known
 from doe.report.content.sections import title
 
 # Marks that Markdown would take for its own; "<" and "&" for the HTML that it lets through.
@@ -15,7 +15,7 @@ SPECIAL = {mark: f"\\{mark}" for mark in "\\`*_[]|#"} | {"<": "&lt;", "&": "&amp
 
 def markdown_report(summary: Record, pictures: Sequence[str] = ()) -> str:
     """Markdown of the record of ``doe study --json``; ``pictures`` are files beside it."""
-    clean = finite(dict(summary))
+    clean = known(dict(summary))
     parts = [f"# {_plain(title(clean))}"]
     for section in sections(clean):
         written = [text for block in section.blocks if (text := _render(block))]

@@ -80,11 +80,11 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Co
     """The study's responses of a simulation at a chosen point."""
     record = result.as_dict()
     quantities = [record[name] for name in study.responses]
-    columns = [
+    values, statistical, numerical = (
         np.array([np.nan if quantity[key] is None else quantity[key] for quantity in quantities])
         for key in ("value", "statistical_error", "numerical_error")
-    ]
-    return Confirmed(choice.point, *columns, result.power_terms, choice.reason)
+    )
+    return Confirmed(choice.point, values, statistical, numerical, result.power_terms, choice.reason)
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:

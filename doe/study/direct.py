@@ -66,17 +66,18 @@ class Evaluator:
             clearance.direct_scene(self._study, point, number)
             for point, number in zip(points, numbers, strict=True)
         ]
-        results = self._simulations.run(scenes, [f"direct run {number + 1}" for number in numbers], self._watch)
+        results = self._simulations.run(
+            scenes, [f"direct run {number + 1}" for number in numbers], self._watch
+        )
         self.done += len(points)
         values = np.full((len(points), len(self._study.responses)), np.nan)
-        errors = values.copy()
+        errors, samples = values.copy(), np.zeros(values.shape, dtype=np.int64)
         for row, result in enumerate(results):
             if isinstance(result, Failure):
                 self.failures.append(result)
             else:
-                (values[row],), (errors[row],) = clearance.responses(self._study, [result])
-        replicates = np.full(len(points), self._study.file.direct.replicates)
-        return values, standard_errors(errors, replicates)
+                (values[row],), (errors[row],), (samples[row],) = clearance.responses(self._study, [result])
+        return values, standard_errors(errors, samples)
 
     def _watch(self, done: int, total: int) -> None:
         self._progress(self.done + done, max(self._total, self.done + total))

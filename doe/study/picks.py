@@ -38,14 +38,12 @@ def choices(study: Study, front: ParetoFront, direct: Direct | None) -> dict[str
         twin = next((known for known, each in found.items() if np.array_equal(each.point, rounded)), None)
         if twin is None:
             found[name] = Choice(rounded, reason)
-        elif front.picks.get(study.file.front.pick) != front.picks.get(name):
+        elif name != study.file.front.pick:
             found[twin] = Choice(rounded, f"{found[twin].reason}; also {reason}")
     return found
 
 
-def _candidates(
-    study: Study, front: ParetoFront, direct: Direct | None
-) -> Iterator[tuple[str, Array, str]]:
+def _candidates(study: Study, front: ParetoFront, direct: Direct | None) -> Iterator[tuple[str, Array, str]]:
     aware = front.tolerance_aware
     if aware is None:
         yield "pick", front.points[front.pick], front.pick_reason

@@ -26,9 +26,9 @@ STORE = "study.sqlite"
 class Runs:
     """Design runs: coded and actual factors (n, k), responses (n, m) and their 95 % half-widths.
 
-    ``notes``: what the simulations warn of, once each; none for a table that was read. ``replicates``, (n,)
-    or (n, m), count the independent values behind the half-widths (0: unknown), ``block`` (n,) labels each run; None:
-    all unknown, one block. ``failures``: design runs that failed; they are not in the arrays.
+    ``notes``: what the simulations warn of, once each; none for a table that was read. ``replicates``, (n,) or (n, m),
+    count the independent values behind the half-widths (0: unknown), ``block`` (n,) labels each run; None: all unknown,
+    one block. ``failures``: design runs that failed; they are not in the arrays.
     """
 
     coded: Array
@@ -48,11 +48,12 @@ class Runs:
 
     def only(self, places: list[int]) -> Runs:
         """The rows at these places."""
-        coded, actual, values, errors, replicates, block = (
-            None if column is None else column[places]
-            for column in (self.coded, self.actual, self.values, self.errors, self.replicates, self.block)
+        coded, actual, values, errors = (
+            array[places] for array in (self.coded, self.actual, self.values, self.errors)
         )
-        assert coded is not None and actual is not None and values is not None and errors is not None
+        replicates, block = (
+            None if array is None else array[places] for array in (self.replicates, self.block)
+        )
         return Runs(coded, actual, values, errors, self.notes, replicates, block)
 
 
@@ -99,10 +100,9 @@ def run_design(
     notes = dict.fromkeys(note for result in found for note in result.notes)
     if failures:
         notes[f"{len(failures)} design runs failed and are left out: {sentence(failures)}"] = None
-    values, errors = clearance.responses(study, found)
-    replicates = np.array([result.replicates for result in found])
+    values, errors, independent = clearance.responses(study, found)
     block = design.block[left] if design.blocks > 1 else None
-    return Runs(coded[left], actual[left], values, errors, tuple(notes), replicates, block, failures)
+    return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)
 
 
 def fewest_runs(study: Study, design: Design) -> int:

@@ -136,9 +136,7 @@ def _checked(study: Study) -> Runs | None:
     clearance.check_responses(study)
     design = design_of(study)
     check_runs(study, design)
-    clearance.design_scenes(
-        study, to_actual(design.coded, study.centre, study.step), design.order.tolist()
-    )
+    clearance.design_scenes(study, to_actual(design.coded, study.centre, study.step), design.order.tolist())
     clearance.confirmation_scene(study, study.baseline)
     clearance.direct_scene(study, study.baseline, 0)
     check_chains(study)

@@ -83,19 +83,32 @@ def part_dimensions(summary: Record) -> Table | None:
     rows = []
     chains = part(summary, "chains") or {}
     for name, chain in chains.items():
-        for each, dimensions in (part(chain, "allocation") or {}).items():
+        for each, dimensions in allocation(chain).items():
             rows.append((label(each), dimension(dimensions), dimensions.get("grade") or "", label(name)))
     if not rows:
         return None
+    header = ("part", "dimension [mm]", "grade", "chain")
+    return Table("Part dimensions", header, rows, _yields(chains), text_columns=(2, 3))
+
+
+def allocation(chain: Record) -> dict[str, Any]:
+    """Parts of a chain whose dimensions are known."""
+    wanted = {"nominal_mm", "upper_mm", "lower_mm"}
+    return {name: each for name, each in (chain.get("allocation") or {}).items() if wanted <= set(each)}
+
+
+def _yields(chains: Record) -> str:
+    """Yield of each chain that is not refused, and which are."""
     refused = [name for name, chain in chains.items() if str(chain.get("status")).startswith("refused")]
-    note = (
-        f"Refused: {', '.join(map(label, refused))}; the parts shown are the nearest that fit."
-        if refused
-        else ""
-    )
-    return Table(
-        "Part dimensions", ("part", "dimension [mm]", "grade", "chain"), rows, note, text_columns=(2, 3)
-    )
+    known = [
+        f"{label(name)} {share:.6f}"
+        for name, chain in chains.items()
+        if name not in refused and (share := part(chain, "yield", "as_given")) is not None
+    ]
+    said = [f"Yield: {', '.join(known)}."] if known else []
+    if refused:
+        said.append(f"Refused: {', '.join(map(label, refused))}; the parts shown are the nearest that fit.")
+    return " ".join(said)
 
 
 def asked(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -162,13 +175,17 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     points = part(summary, "confirmation")
     if not points:
         return None
-    given = [each for each in factors(summary) if each.name in next(iter(points.values()))["factors"]]
+    given = [
+        each
+        for each in factors(summary)
+        if any(part(point, "factors", each.name) is not None for point in points.values())
+    ]
     names = [each["name"] for each in responses(summary)]
     header = ["point", *(label(each.name) for each in given), *map(label, names)]
     rows = [
         [
             name.replace("_", " "),
-            *(each.text(point["factors"][each.name]) for each in given),
+            *(each.text(part(point, "factors", each.name)) for each in given),
             *(_value(part(point, "responses", response)) for response in names),
         ]
         for name, point in points.items()

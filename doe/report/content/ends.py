@@ -29,7 +29,13 @@ def reference(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         for factor, effect in (each.get("linear_effects") or {}).items():
             sign = "same" if effect.get("same_sign") else "opposite"
             effects.append(
-                (label(name), label(factor), shown(effect["ours"], 3), shown(effect["theirs"], 3), sign)
+                (
+                    label(name),
+                    label(factor),
+                    shown(effect.get("ours"), 3),
+                    shown(effect.get("theirs"), 3),
+                    sign,
+                )
             )
         words.append(" ".join(filter(None, (each.get("verdict"), each.get("why")))))
     blocks: list[Block] = [Bullets([text for text in words if text])]

@@ -8,7 +8,7 @@ from typing import Any
 from doe.report.content.answer import record_table
 from doe.report.content.blocks import Block, Bullets, Figures, Heading, Section, Table, Widget
 from doe.report.content.plots_of_fits import diagnostic_plots
-from doe.report.content.record import Record, factors, part
+from doe.report.content.record import Record, factors, fits, part
 from doe.report.words import label, probability, shown
 
 STATISTICS = (
@@ -23,7 +23,7 @@ FURTHER = ("box_cox", "blocks", "canonical", "known_variance", "rival")
 
 def surfaces(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """The interactive surfaces, and their coefficients."""
-    fitted = part(summary, "fit", "responses")
+    fitted = fits(summary)
     if not fitted:
         return None
     terms = list(dict.fromkeys(term for each in fitted.values() for term in each["coefficients"]))
@@ -56,9 +56,10 @@ def _stationary(summary: Record, fitted: Record) -> Table | None:
     given = factors(summary)
     rows = []
     for name, each in fitted.items():
-        if point := each.get("stationary_point"):
-            places = [factor.text(x) for factor, x in zip(given, point["actual"], strict=True)]
-            rows.append([label(name), *places, str(point["nature"])])
+        actual = part(each, "stationary_point", "actual") or []
+        if len(actual) == len(given):
+            places = [factor.text(x) for factor, x in zip(given, actual, strict=True)]
+            rows.append([label(name), *places, str(part(each, "stationary_point", "nature") or "")])
     if not rows:
         return None
     header = ["response", *(label(each.name) for each in given), "nature"]
@@ -67,7 +68,7 @@ def _stationary(summary: Record, fitted: Record) -> Table | None:
 
 def diagnostics(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Analysis of variance, what it says, and pictures of the residuals, a response at a time."""
-    fitted = part(summary, "fit", "responses")
+    fitted = fits(summary)
     if not fitted:
         return None
     rows = [
@@ -98,6 +99,7 @@ def _one(name: str, fitted: Record) -> list[Block]:
         (row["source"].replace("_", " "), shown(row.get("ss"), 5), shown(row.get("df")), shown(row.get("ms"), 5),
          shown(row.get("f")), probability(row.get("p")))
         for row in fitted.get("anova") or []
+        if "source" in row
     ]  # fmt: skip
     if rows:
         header = ("source", "sum of squares", "df", "mean square", "F", "p")

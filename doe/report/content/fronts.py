@@ -123,6 +123,7 @@ def _limits(record: Record) -> Table | None:
             shown(limit.get("kept")),
         )
         for limit in record.get("constraints") or []
+        if {"response", "sense", "limit", "value"} <= set(limit)
     ]
     return Table("Limits at the pick", ("limit", "value", "kept"), rows) if rows else None
 

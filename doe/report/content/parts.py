@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
-from doe.report.content.answer import record_table
+from doe.report.content.answer import allocation, record_table
 from doe.report.content.blocks import Block, Figures, Heading, Section, Table, Words
 from doe.report.content.record import Record, part
 from doe.report.words import dimension, label, shown
@@ -32,7 +32,7 @@ def _chain(name: str, chain: Record) -> list[Block]:
     rows = [
         (label(each), dimension(dimensions), dimensions.get("grade") or "",
          *(_percent(part(shares, each, kind)) for kind, _ in KINDS))
-        for each, dimensions in (chain.get("allocation") or {}).items()
+        for each, dimensions in allocation(chain).items()
     ]  # fmt: skip
     if rows:
         header = ("part", "dimension [mm]", "grade", "share of variance", "share of worst case")

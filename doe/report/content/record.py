@@ -88,10 +88,16 @@ def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
             yield EFFICIENCY.sub(lambda found: f"{found[1].upper()}-efficiency [%]", name), shown(value)
 
 
-def finite(value: Any) -> Any:
-    """The same record with None for every number that is none."""
+def fits(summary: Record) -> dict[str, Any]:
+    """Fitted surfaces by response."""
+    fitted = part(summary, "fit", "responses") or {}
+    return {name: each for name, each in fitted.items() if each.get("coefficients")}
+
+
+def known(value: Any) -> Any:
+    """The same record without what is undefined: null and NaN; in lists, where places count, they are None."""
     if isinstance(value, Mapping):
-        return {key: finite(each) for key, each in value.items()}
+        return {key: found for key, each in value.items() if (found := known(each)) is not None}
     if isinstance(value, list | tuple):
-        return [finite(each) for each in value]
+        return [known(each) for each in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

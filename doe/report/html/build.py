@@ -12,7 +12,7 @@ from typing import Any
 
 from doe.report.content import sections
 from doe.report.content.blocks import Section, Table, Widget
-from doe.report.content.record import Record, finite
+from doe.report.content.record import Record, known
 from doe.report.content.sections import title
 from doe.report.html.data import page_data
 from doe.report.html.render import render
@@ -33,8 +33,8 @@ def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str
     summary : record of ``doe study --json``; parts that are missing or null are left out.
     motion : record of ``doe.clearance.motion_record``; without it nothing moves.
     """
-    clean = finite(dict(summary))
-    moving = finite(dict(motion or {}))
+    clean = known(dict(summary))
+    moving = known(dict(motion or {}))
     found = sections(clean, moving)
     widgets = {block.name for section in found for block in section.blocks if isinstance(block, Widget)}
     marks = {

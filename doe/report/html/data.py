@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from doe.report.content.fronts import complete, fronts, picks
-from doe.report.content.record import Factor, Record, factors, part, responses
+from doe.report.content.record import Factor, Record, factors, fits, part, responses
 from doe.report.words import quantity
 
 
@@ -67,10 +67,12 @@ def _rounded(value: float | None, digits: int = 6) -> float | None:
 def _surfaces(summary: Record) -> list[dict[str, Any]]:
     """Terms and coefficients; with the covariance also what a 95 % confidence interval needs."""
     found = []
-    for name, fitted in (part(summary, "fit", "responses") or {}).items():
+    for name, fitted in fits(summary).items():
         coefficients = fitted["coefficients"]
         covariance = fitted.get("covariance")
-        residual = next((row["df"] for row in fitted.get("anova") or [] if row["source"] == "residual"), None)
+        residual = next(
+            (row["df"] for row in fitted.get("anova") or [] if row.get("source") == "residual"), None
+        )
         found.append(
             {
                 "name": name,
