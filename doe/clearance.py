@@ -243,9 +243,7 @@ def attempt_text(text: str, version: str) -> Ran:
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
-def responses(
-    study: Study, results: Sequence[SimulationResult]
-) -> tuple[Array, Array, NDArray[np.int64]]:
+def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array, NDArray[np.int64]]:
     """Values, 95 % statistical half-widths (NaN where there is none), and about how many independent values are behind
     each, each of shape (runs, responses)."""
     from rbdyn.dynamics.batch_means import MOST_BATCHES
