@@ -1,13 +1,14 @@
 """Studies whose simulations take no time: results made of the scene alone, for tests of what surrounds them.
 
-As a program: ``python instant_runs.py SECONDS_A_RUN FAULTY_SEEDS COMMAND...`` runs ``doe COMMAND...`` like that.
+As a program: ``python instant_runs.py SECONDS_A_RUN STUDY.toml DIR WORKERS`` runs the design like that, and tells the
+responses or leaves as a command does.
 """
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Collection
+from pathlib import Path
 from typing import Any
 
 from rbdyn.faults import RunError
@@ -61,8 +62,19 @@ def instantly(patch: Any, seconds: float = 0.0, faulty: Collection[int] = ()) ->
     return ran
 
 
-if __name__ == "__main__":
-    from doe.cli import app
+def main(seconds: float, study: Path, out: Path, workers: int) -> None:
+    """The program."""
+    from doe.study.runs import run_design
+    from doe.study_file import Study
+    from rbdyn.terminal import guarded, output_folder, print_json
 
-    instantly(setattr, float(sys.argv[1]), [int(seed) for seed in sys.argv[2].split(",") if seed])
-    app(sys.argv[3:])
+    instantly(setattr, seconds)
+    with guarded(as_json=True):
+        runs = run_design(Study.load(study), output_folder(out), workers, lambda done, total: None)
+        print_json({"values": runs.values.tolist()})
+
+
+if __name__ == "__main__":
+    import typer
+
+    typer.run(main)

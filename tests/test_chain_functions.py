@@ -136,7 +136,10 @@ def test_a_function_may_use_a_function():
     links = [{"name": "gap", "coefficient": 0, "expression": "a - b"}]
     links.append({"name": "slant", "coefficient": 1, "expression": "sqrt(gap**2 + 4**2)"})
     result = solve(
-        with_functions(chain([(0, 9.0, 0.1, -0.1), (1, 6.0, 0.0, 0.0)], (9, 13)), *links), samples=10
+        with_functions(
+            chain([(0, 9.0, 0.1, -0.1, {"fixed": True}), (1, 6.0, 0.0, 0.0)], (10.8, 11.2)), *links
+        ),
+        samples=10,
     )
     assert result.nominal_mm == pytest.approx(11.0)
     assert result.worst_case_mm == pytest.approx((6 + np.hypot(2.9, 4), 6 + np.hypot(3.1, 4)))
@@ -209,6 +212,17 @@ def test_threads_change_no_bit_of_a_bent_chain():
         ),
         ({"expression": "a +"}, 'expression = "a +": is no arithmetic expression'),
         ({"expression": "open(a)"}, "only + - * / **"),
+        (
+            {
+                "thermal_growth": {
+                    "of": "a",
+                    "expansion_per_K": 1e-5,
+                    "temperature_rise_K": 9.0,
+                    "lower_K": 5.0,
+                }
+            },
+            "lower_K = 5: exceeds upper_K = 0; swap them",
+        ),
         ({"expression": "later + a"}, 'uses "later"'),
         ({"expression": "a", "nominal_mm": 3.0}, "nominal_mm = 3.0: a link of kind expression has none"),
         (

@@ -139,6 +139,7 @@ def test_quantiles_and_moments_of_the_closing_link():
     deviation = 0.1 / 6
     assert result.mean_mm == pytest.approx(2.99, abs=5 * deviation / SAMPLES**0.5)
     assert result.standard_deviation_mm == pytest.approx(deviation, rel=0.01)
+    assert (result.cp, result.cpk) == pytest.approx((2 / (6 * deviation), 0.99 / (3 * deviation)), rel=0.01)
     assert result.quantiles_mm[0.5] == pytest.approx(2.99, abs=3e-4)
     assert result.quantiles_mm[0.975] - result.quantiles_mm[0.025] == pytest.approx(
         3.92 * deviation, rel=0.02

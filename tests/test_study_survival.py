@@ -14,18 +14,20 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from instant_runs import instantly
-from test_study import short_study, silent, stored
+from test_study import SHORT, short_study, silent, stored
 
 from doe import clearance
+from doe.study.confirmation import confirm
+from doe.study.picks import Choice
+from doe.study.reference import reference_runs
 from doe.study.runs import STORE, run_design
+from doe.study.simulations import Simulations
 from doe.study.status import study_status
 from doe.study.store import Store
-from doe.study.whole import run_study
 from doe.study_file import Study
 from rbdyn.faults import RunError
 
@@ -39,20 +41,10 @@ def seeds_run(store: Path) -> list[int]:
         return sorted(opened.get(key)["seed"] for key in keys)
 
 
-def start(study: Path, out: Path, seconds: float, *options: str, **how) -> subprocess.Popen:
-    """``doe fit`` in a process of its own, on simulations that take so long."""
+def start(study: Path, out: Path, seconds: float, workers: int, **how) -> subprocess.Popen:
+    """The design in a process of its own, on simulations that take so long."""
     program = Path(__file__).with_name("instant_runs.py")
-    command = [
-        sys.executable,
-        str(program),
-        str(seconds),
-        "",
-        "fit",
-        str(study),
-        "--out",
-        str(out),
-        *options,
-    ]
+    command = [sys.executable, str(program), str(seconds), str(study), str(out), str(workers)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how)
 
 
@@ -89,20 +81,24 @@ def test_failed_points_are_left_out_told_and_not_tried_again_unless_asked(tmp_pa
     assert sorted(thawed) == [3, 18, 19] and not mended.failures and len(mended.coded) == 20
 
 
-def test_study_ends_well_with_failed_points_but_not_without_its_confirmation(tmp_path, monkeypatch):
+def test_published_table_loses_the_rows_of_failed_runs(tmp_path, monkeypatch):
     study = Study.load(short_study(tmp_path))
-    pick = SimpleNamespace(points=np.array([study.centre * 1.1]), pick=0)
-    monkeypatch.setattr("doe.study.whole.find_front", lambda study, surfaces: pick)
     instantly(monkeypatch.setattr, faulty=(2, 5))
-    outcome = run_study(study, tmp_path, 2, lambda title: silent)
-    assert len(outcome.runs.coded) == 18
-    assert outcome.reference_values is not None and len(outcome.reference_values) == 18
-    # Of run 3, the second row that is left, in the published table as in ours.
-    assert outcome.runs.places[1] == 2
+    runs, table = run_design(study, tmp_path, 2, silent), reference_runs(study)
+    assert table is not None
+    assert np.allclose(table.only(runs.places).actual, runs.actual, atol=2e-3)
+    assert np.array_equal(table.only(runs.places).values[:3], table.values[[0, 2, 3]])
+
+
+def test_confirmation_that_fails_ends_the_study_in_a_sentence(tmp_path, monkeypatch):
+    study = Study.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, faulty=(1 + clearance.CONFIRMATION_SEEDS,))
-    (tmp_path / "other").mkdir()
-    with pytest.raises(RunError, match=r"baseline, pick: .*the oil froze"):
-        run_study(study, tmp_path / "other", 2, lambda title: silent)
+    with Store(tmp_path / STORE) as store:
+        simulations = Simulations(store, 2, None, False, lambda title: silent)
+        with pytest.raises(RunError, match=r"^confirmation of the baseline: .*the oil froze$"):
+            confirm(study, {"pick": Choice(study.baseline * 1.1, "why not")}, simulations)
+    with Store(tmp_path / STORE, read_only=True) as store:
+        assert [run.status for run in store.ended()] == ["failed", "failed"]
 
 
 def test_unexpected_fault_of_a_run_is_a_failure_too(tmp_path, monkeypatch):
@@ -159,11 +155,11 @@ def test_other_code_runs_everything_again_also_what_failed(tmp_path, monkeypatch
 
 def test_two_processes_share_a_study_and_nothing_runs_twice(tmp_path):
     study, out = short_study(tmp_path), tmp_path / "out"
-    both = [start(study, out, 0.05, "--workers", "1", "--json") for _ in range(2)]
+    both = [start(study, out, 0.05, 1) for _ in range(2)]
     answers = [process.communicate(timeout=120) for process in both]
     assert [process.returncode for process in both] == [0, 0], answers
     one, two = (json.loads(shown) for shown, _ in answers)
-    assert one == two and set(one["responses"]) == set(Study.load(study).responses)
+    assert one == two and len(one["values"]) == 20
     with Store(out / STORE, read_only=True) as store:
         owners = [run.owner for run in store.ended()]
     assert len(owners) == 20 and len(set(owners)) == 2
@@ -171,7 +167,7 @@ def test_two_processes_share_a_study_and_nothing_runs_twice(tmp_path):
 
 def test_killed_process_is_taken_over_at_once_by_one_that_waits_for_it(tmp_path, monkeypatch):
     study, out = short_study(tmp_path), tmp_path / "out"
-    slow = start(study, out, 30.0, "--workers", "19")
+    slow = start(study, out, 30.0, 19)
     wait_for(
         lambda: (out / STORE).exists() and study_status(Study.load(study), out)["points"]["running"] == 20
     )
@@ -193,7 +189,7 @@ def test_killed_process_is_taken_over_at_once_by_one_that_waits_for_it(tmp_path,
 
 def test_ctrl_c_keeps_what_was_finished_and_gives_back_the_rest(tmp_path):
     study, out = short_study(tmp_path), tmp_path / "out"
-    process = start(study, out, 0.1, "--workers", "2", "--json")
+    process = start(study, out, 0.1, 2)
     wait_for(lambda: stored(out / STORE) >= 3)
     process.send_signal(signal.SIGINT)
     shown, said = process.communicate(timeout=60)
@@ -212,7 +208,7 @@ def test_full_disk_is_one_sentence_and_the_study_goes_on_later(tmp_path):
         study,
         out,
         0.0,
-        "--json",
+        2,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
     )
     shown, said = full.communicate(timeout=60)
@@ -223,10 +219,28 @@ def test_full_disk_is_one_sentence_and_the_study_goes_on_later(tmp_path):
     assert json.loads(shown)["status"].startswith("failed: ")
     kept = seeds_run(out / STORE)
     assert 3 <= len(kept) < 20
-    resumed = start(study, out, 0.0, "--json")
+    resumed = start(study, out, 0.0, 2)
     shown, said = resumed.communicate(timeout=120)
     assert resumed.returncode == 0, said
     assert len(seeds_run(out / STORE)) == 20
     with Store(out / STORE, read_only=True) as store:
         # The finished ones were not run again: they ended first.
         assert sorted(store.get(run.key)["seed"] for run in store.ended()[: len(kept)]) == kept
+
+
+def test_scenes_of_the_same_laws_are_prepared_once(tmp_path, monkeypatch):
+    from rbdyn.dynamics import simulate as module
+
+    study = Study.load(short_study(tmp_path, SHORT + ',method="rk45"'))
+    prepared = []
+
+    def prepare(scene, bearing):
+        prepared.append(scene)
+        return 1.0
+
+    monkeypatch.setattr(module, "prepare", prepare)
+    monkeypatch.setattr(module, "_prepared", set())
+    scenes = clearance.design_scenes(study, np.array([study.centre, 1.1 * study.centre]))
+    one, two = (module.simulate(scene, 1) for scene in scenes)
+    assert prepared == scenes[:1]
+    assert [result.cost["compile_s"] for result in (one, two)] == [1.0, 0.0]

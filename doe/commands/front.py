@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doe.commands.options import Data, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
-from doe.commands.steps import fitted, save
+from doe.commands.options import Data, Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
+from doe.commands.steps import fitted, save, searched
 from rbdyn.faults import InputError
 from rbdyn.terminal import guarded, print_json
 
@@ -31,6 +31,7 @@ def front(
     scheduler: Scheduler = None,
     retry: Retry = False,
     point: Point = None,
+    direct: Direct = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also every point of the front.")] = False,
@@ -49,6 +50,12 @@ def front(
             import numpy as np
 
             record["point"] = asked_point_record(loaded, surfaces, found, np.array(values))
+        if direct:
+            from doe.report.confirmation import direct_record
+
+            record["direct"] = direct_record(
+                loaded, searched(loaded, found, out, workers, quiet or as_json, scheduler, retry)
+            )
         save(out, "front.json", record)
         if as_json:
             print_json(record)

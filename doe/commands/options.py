@@ -17,6 +17,12 @@ Scheduler = Annotated[
     typer.Option(metavar="ADDRESS", help="Run on the dask cluster of this scheduler instead of threads."),
 ]
 Retry = Annotated[bool, typer.Option("--retry", help="Run points again that failed before.")]
+Direct = Annotated[
+    bool,
+    typer.Option(
+        "--direct", help="Also search the front on the simulator itself and tell what surfaces lose."
+    ),
+]
 Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder of results and of the store of finished runs.")
 ]

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 from rbdyn.terminal import output_folder, progress_bar
 
 if TYPE_CHECKING:
+    from doe.pareto import ParetoFront
     from doe.response_surface import Surface
+    from doe.study.direct import Direct
     from doe.study_file import Study
 
 
@@ -42,6 +44,31 @@ def fitted(
         return loaded, fit_surfaces(loaded, read_runs(loaded, data))
     with _store_folder(out) as folder, progress_bar("design runs", quiet) as progress:
         return loaded, fit_surfaces(loaded, run_design(loaded, folder, workers, progress, scheduler, retry))
+
+
+def searched(
+    study: Study,
+    found: ParetoFront,
+    out: Path | None,
+    workers: int | None,
+    quiet: bool,
+    scheduler: str | None,
+    retry: bool,
+) -> Direct:
+    """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
+    from doe.study.direct import find_direct
+    from doe.study.runs import STORE
+    from doe.study.simulations import Simulations
+    from doe.study.store import Store
+
+    with (
+        _store_folder(out) as folder,
+        Store(folder / STORE, study.path.stem) as store,
+        progress_bar("direct front", quiet) as progress,
+    ):
+        return find_direct(
+            study, found, Simulations(store, workers, scheduler, retry, lambda title: progress)
+        )
 
 
 @contextmanager

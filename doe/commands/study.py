@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from pathlib import Path
 
-from doe.commands.options import Json, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
+from doe.commands.options import Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
 from rbdyn.terminal import guarded, output_folder, print_json, progress_bar
 
 
@@ -15,6 +15,7 @@ def study(
     workers: Workers = None,
     scheduler: Scheduler = None,
     retry: Retry = False,
+    direct: Direct = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -38,6 +39,7 @@ def study(
             lambda title: bars.enter_context(progress_bar(title, quiet or as_json)),
             scheduler,
             retry,
+            direct,
         )
         bars.close()
         written = write(outcome, folder)
@@ -45,7 +47,7 @@ def study(
             print_json(summary(outcome))
             return
         if verbose:
-            print_fit(outcome.surfaces)
+            print_fit(outcome.surfaces, factors=loaded.factors)
         print_outcome(outcome, quiet)
         print(f"{outcome.cost['total_s']:.1f} s, of which design runs {outcome.cost['design_s']:.1f} s")
         print(f"written to {folder}: {', '.join(written)}")

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, isfinite, sqrt
+from math import inf, sqrt
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from doe.dimension_chain.yields import closing_moments, exact_shares, sampled_yi
 SAMPLES = 100_000  # assemblies that judge a yield where no convolution can
 HALVINGS = 26
 NEWTON_STEPS = 30
+WANDER = 0.5  # of the nominal: farther off, the steps of Newton have lost the solution
 WIDEST = 64.0  # times the tolerances of the linear rule
 
 Tolerances = Mapping[str, float]
@@ -69,7 +70,7 @@ class Allocation:
             for link in self.chain.link
             if link.is_dimension or link.thermal_growth
         ]
-        moved = self.adjusted.name
+        moved, gone = self.adjusted.name, 0.0
         # One step is exact unless a function uses the part that is moved; then these are steps of Newton.
         for _ in range(NEWTON_STEPS):
             slope = self.function.sensitivities(middle(parts))[moved]
@@ -82,7 +83,8 @@ class Allocation:
             ]
             if moved not in self.function.arguments or abs(step) < SLACK:
                 return parts
-            if not isfinite(step):
+            gone += abs(step)
+            if not gone <= WANDER * abs(self.adjusted.nominal):
                 break
         raise ValueError("no nominal of it brings the closing link to its limits; name another part")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import operator
 from collections.abc import Callable, Mapping
-from functools import reduce
+from functools import cache, reduce
 from math import pi
 from typing import Any
 
@@ -49,6 +49,7 @@ def evaluate(text: str, sizes: Mapping[str, Any]) -> Any:
     return _value(_parsed(text), sizes)
 
 
+@cache
 def _parsed(text: str) -> ast.expr:
     try:
         tree = ast.parse(text, mode="eval").body

@@ -103,6 +103,9 @@ def _function_faults(link: Link) -> list[str]:
         key for key in ("nominal_mm", "upper_mm", "lower_mm", "fit", "mean_mm", "cost") if getattr(link, key)
     ]
     found += [f"{key} = {getattr(link, key)}: a link of kind {kinds[0]} has none; remove it" for key in alien]
+    rise = link.thermal_growth
+    if rise and rise.lower_K > rise.upper_K:
+        found.append(f"lower_K = {rise.lower_K:g}: exceeds upper_K = {rise.upper_K:g}; swap them")
     if unread := _sentence(lambda: used_links(link)):
         found.append(f'expression = "{link.expression}": {unread}')
     return [f'link "{link.name}": {sentence}' for sentence in found]

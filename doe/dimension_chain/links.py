@@ -21,6 +21,8 @@ Distribution = Literal["normal", "truncated_normal", "uniform", "triangular"]
 Mode = Literal["worst_case", "rss", "yield"]
 Interval = tuple[float, float]
 Positive = Annotated[float, Field(gt=0.0)]
+# A kilometre, or a coefficient of a million, is a slip of the pen.
+Bounded = Annotated[float, Field(ge=-1e6, le=1e6)]
 Poisson = Annotated[float, Field(ge=0.0, lt=0.5)]
 Position = Literal[
     "unilateral", "symmetric",
@@ -35,8 +37,8 @@ DIGITS = 12  # decimals in mm kept of an allocated size
 class ClosingLink(Strict):
     """Limits of the closing link, mm."""
 
-    lower_mm: float
-    upper_mm: float
+    lower_mm: Bounded
+    upper_mm: Bounded
 
 
 class Cost(Strict):
@@ -44,7 +46,7 @@ class Cost(Strict):
 
     a: Annotated[float, Field(ge=0.0)] = 0.0
     b: Positive
-    k: Positive = 1.0
+    k: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
     narrowest_mm: Annotated[float, Field(ge=0.0)] = 0.0
     widest_mm: Positive | None = None
 
@@ -69,17 +71,17 @@ class PressFit(Strict):
     bore_modulus_GPa: Positive = 206.0  # noqa: N815
     shaft_poisson: Poisson = 0.3
     bore_poisson: Poisson = 0.3
-    interference_change_mm: float = 0.0
+    interference_change_mm: Bounded = 0.0
 
 
 class ThermalGrowth(Strict):
     """Growth of the link ``of`` by a temperature rise, with the deviations of that rise."""
 
     of: str
-    expansion_per_K: float  # noqa: N815
-    temperature_rise_K: float  # noqa: N815
-    upper_K: float = 0.0  # noqa: N815
-    lower_K: float = 0.0  # noqa: N815
+    expansion_per_K: Annotated[float, Field(ge=-1.0, le=1.0)]  # noqa: N815
+    temperature_rise_K: Bounded  # noqa: N815
+    upper_K: Bounded = 0.0  # noqa: N815
+    lower_K: Bounded = 0.0  # noqa: N815
 
 
 class Link(Strict):
@@ -91,13 +93,13 @@ class Link(Strict):
     """
 
     name: Annotated[str, Field(min_length=1)]
-    coefficient: float
-    nominal_mm: float | None = None
-    upper_mm: float | None = None
-    lower_mm: float | None = None
+    coefficient: Bounded
+    nominal_mm: Bounded | None = None
+    upper_mm: Bounded | None = None
+    lower_mm: Bounded | None = None
     fit: str | None = None
     distribution: Distribution = "normal"
-    mean_mm: float | None = None
+    mean_mm: Bounded | None = None
     capability: Positive = 1.0
     fixed: bool = False
     position: Position = "unilateral"

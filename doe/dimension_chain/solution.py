@@ -14,7 +14,7 @@ from doe.dimension_chain.contributions import contributions
 from doe.dimension_chain.cost import total_cost
 from doe.dimension_chain.faults import faults
 from doe.dimension_chain.intervals import interval, linear_interval
-from doe.dimension_chain.links import DIGITS, Array, Chain, Distribution, Interval, Part
+from doe.dimension_chain.links import DIGITS, SLACK, Array, Chain, Distribution, Interval, Part
 from doe.dimension_chain.monte_carlo import ALIKE, Assemblies, draw
 from doe.dimension_chain.parts import given_parts, has_deviations
 from doe.dimension_chain.selective_assembly import SelectiveAssembly, selective_assembly
@@ -57,7 +57,8 @@ class ChainResult:
     ``rejected`` are the assemblies per million below and above the limits; ``exact_yields`` the yields without
     sampling, None unless the chain is linear; ``normal_yield`` that of a normal closing link. ``contributions`` are
     in percent, the variance by each part's own distribution. ``mean_mm``, ``standard_deviation_mm`` and
-    ``quantiles_mm`` belong to the Monte Carlo as given. ``cost`` is that of the allocation, where all have curves.
+    ``quantiles_mm`` belong to the Monte Carlo as given, and so do the capabilities ``cp`` and ``cpk``: the limits, and the
+    nearer of them from the mean, over six and three standard deviations, None where nothing varies. ``cost`` is that of the allocation, where all have curves.
     """
 
     nominal_mm: float
@@ -74,6 +75,8 @@ class ChainResult:
     rejected: dict[str, dict[str, float]]
     exact_yields: dict[str, float] | None
     normal_yield: float
+    cp: float | None
+    cpk: float | None
     linearisation: Linearisation | None
     cost: float | None
     selective: SelectiveAssembly | None
@@ -106,6 +109,8 @@ class ChainResult:
             "distribution": {
                 "mean_mm": self.mean_mm,
                 "standard_deviation_mm": self.standard_deviation_mm,
+                "cp": self.cp,
+                "cpk": self.cpk,
                 "quantiles_mm": {f"{share:g}": size for share, size in self.quantiles_mm.items()},
             },
             "yield_standard_errors": self.standard_errors,
@@ -150,6 +155,9 @@ def _solved(search: Allocation, samples: int, seed: int, threads: int | None) ->
     parts = given_parts(chain.link) if given else allocation
     drawn = draw(function, parts, limits, samples=samples, seed=seed, threads=threads)
     yields = sampled_yields(drawn)
+    mean, deviation = float(drawn.values.mean()), float(drawn.values.std())
+    nearer = min(limits.upper_mm - mean, mean - limits.lower_mm)
+    varies = deviation > SLACK
     return ChainResult(
         nominal_mm=round(float(function.value({part.name: part.nominal_mm for part in parts})), DIGITS),
         worst_case_mm=interval(function, parts, "worst_case"),
@@ -159,12 +167,14 @@ def _solved(search: Allocation, samples: int, seed: int, threads: int | None) ->
         contributions=contributions(function, parts),
         allocation=tuple(allocation),
         status=_status(search, parts, allocation, yields["as_given"], given),
-        mean_mm=float(drawn.values.mean()),
-        standard_deviation_mm=float(drawn.values.std()),
+        mean_mm=mean,
+        standard_deviation_mm=deviation,
         quantiles_mm=_quantiles(drawn.values),
         rejected=sampled_ppm(drawn),
         exact_yields=_exact(search, parts),
         normal_yield=normal_yield(function, parts, limits),
+        cp=chain.width_mm / (6 * deviation) if varies else None,
+        cpk=nearer / (3 * deviation) if varies else None,
         linearisation=None if function.linear else _linearisation(function, parts, drawn),
         cost=_cost(chain, allocation),
         selective=None
@@ -206,7 +216,8 @@ def _linearisation(function: ClosingFunction, parts: Sequence[Part], drawn: Asse
 def _cost(chain: Chain, allocation: Sequence[Part]) -> float | None:
     widths = {part.name: part.tolerance_mm for part in allocation}
     curves = {link.name: link.cost for link in chain.free if link.cost is not None}
-    if len(curves) < len(chain.free):
+    # What is not left any tolerance has no price.
+    if len(curves) < len(chain.free) or not all(widths[name] for name in curves):
         return None
     return total_cost(list(curves.values()), [widths[name] for name in curves])
 

@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 
 from doe.pareto.archive import dominates
 from doe.pareto.goals import Goals
+from doe.pareto.picks import Rule, pick_all
 
 Array = NDArray[np.float64]
+
+SELECTIONS = 300  # draws on which the rule picks anew; its own error then hides in that of the gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +30,8 @@ class FrontUncertainty:
 
     ``half_widths`` (f, m): 95 % half widths of the mean responses of each front point. ``non_dominated`` (f,):
     probability that a front point is dominated by none of the others. ``pick_dominates``: probability that the
-    pick dominates the baseline. Probabilities carry their Monte Carlo standard errors.
+    pick dominates the baseline. Probabilities carry their Monte Carlo standard errors. ``optimism`` (q,): by how much
+    the rule promises too large a gain of each cost, because it picks what the errors flatter; None without a baseline.
     """
 
     half_widths: Array
@@ -35,6 +39,7 @@ class FrontUncertainty:
     non_dominated_error: Array
     pick_dominates: float | None
     pick_dominates_error: float | None
+    optimism: Array | None
     draws: int
 
 
@@ -78,7 +83,14 @@ def non_dominated_share(costs: Array) -> tuple[Array, Array]:
 
 
 def front_uncertainty(
-    drawn: Array, half_widths: Array, goals: Goals, pick: int, baseline: Array | None
+    drawn: Array,
+    half_widths: Array,
+    goals: Goals,
+    values: Array,
+    pick: int,
+    rule: Rule,
+    baseline: Array | None,
+    baseline_values: Array | None,
 ) -> FrontUncertainty:
     """How sure a front is, from drawn responses.
 
@@ -87,22 +99,43 @@ def front_uncertainty(
     drawn : responses (d, f, m) of the front's points on each drawn set of surfaces.
     half_widths : 95 % half widths (f, m) of the mean responses.
     goals : what is wanted of the responses.
-    pick : row of the pick.
-    baseline : responses (d, m) of the baseline on the same surfaces, or None.
+    values : responses (f, m) on the fitted surfaces.
+    pick, rule : row of the pick and the rule that made it.
+    baseline, baseline_values : responses (d, m) of the baseline on the drawn surfaces and (m,) on the fitted ones, or
+        None.
     """
     costs = goals.costs(drawn)
     kept, kept_error = non_dominated_share(costs)
     wins: tuple[Array, Array] | tuple[None, None] = (None, None)
-    if baseline is not None:
-        wins = share(dominates(costs[:, pick], goals.costs(baseline)))
+    optimism = None
+    if baseline is not None and baseline_values is not None:
+        base = goals.costs(baseline)
+        wins = share(dominates(costs[:, pick], base))
+        real = goals.costs(baseline_values) - goals.costs(values)
+        optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
     return FrontUncertainty(
         half_widths=half_widths,
         non_dominated=kept,
         non_dominated_error=kept_error,
         pick_dominates=None if wins[0] is None else float(wins[0]),
         pick_dominates_error=None if wins[1] is None else float(wins[1]),
+        optimism=optimism,
         draws=len(drawn),
     )
+
+
+def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals, rule: Rule) -> Array:
+    """Mean excess (q,) of the gain that a rule promises at its pick over the gain that is there.
+
+    With the fitted surfaces in the place of the truth and drawn ones in that of the fit (parametric bootstrap):
+    ``costs`` (d, f, q) and ``baseline`` (d, q) are drawn, ``real`` (f, q) are the gains on the fitted surfaces.
+    """
+    excess = []
+    for drawn, base in zip(costs, baseline, strict=True):
+        row = pick_all(drawn, goals, base)[0][rule]
+        excess.append(base - drawn[row] - real[row])
+    mean: Array = np.mean(excess, axis=0)
+    return mean
 
 
 def contrast_error(jacobian: Array, covariance: Array) -> float:

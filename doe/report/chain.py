@@ -71,6 +71,7 @@ def _print_answer(chain: ChainResult) -> None:
         f"{least:.4f} to {most:.4f} mm by root sum square, yield "
         f"{chain.yields['as_given']:.6f} ± {chain.standard_errors['as_given']:.1g} "
         f"({out['low_ppm']:.0f} ppm below, {out['high_ppm']:.0f} ppm above)"
+        + (f", Cp {chain.cp:.2f}, Cpk {chain.cpk:.2f}" if chain.cp is not None else "")
     )
     if chain.linearisation is not None:
         bent = chain.linearisation

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from doe.report.fit import fit_tables
 from doe.report.front import front_record
 from doe.report.html import html_report
 from doe.report.markdown import markdown_report
@@ -16,8 +17,6 @@ from rbdyn.result import write_json
 if TYPE_CHECKING:
     from doe.dimension_chain import Part
     from doe.study import Outcome
-    from doe.study.runs import Runs
-    from doe.study_file import Study
 
 # Shaft turns of the motion that is drawn.
 DRAWN_TURNS = 10.0
@@ -32,15 +31,8 @@ def write(outcome: Outcome, folder: Path) -> list[str]:
 
     study, front = outcome.study, outcome.front
     tables = {
-        "design_runs.csv": _runs_table(study, outcome.runs),
-        "anova.csv": [
-            {"response": surface.name, **row} for surface in outcome.surfaces for row in surface.anova
-        ],
-        "coefficients.csv": [
-            {"response": s.name, "term": term, "coefficient": c, "standard_error": e}
-            for s in outcome.surfaces
-            for term, c, e in zip(s.terms, s.coefficients, np.sqrt(np.diag(s.covariance)), strict=True)
-        ],
+        "design_runs.csv": _runs_table(outcome),
+        **fit_tables(outcome.surfaces),
         "front.csv": [
             {**point["factors"], **point["responses"]}
             for point in front_record(study, outcome.surfaces, front)["front"]
@@ -73,18 +65,19 @@ def write(outcome: Outcome, folder: Path) -> list[str]:
     return ["report.html", "report.md", "summary.json", *tables, *pictures]
 
 
-def _runs_table(study: Study, runs: Runs) -> list[dict[str, Any]]:
+def _runs_table(outcome: Outcome) -> list[dict[str, Any]]:
+    study, runs, design = outcome.study, outcome.runs, outcome.design
     return [
         {
-            "run": run + 1,
-            **{f"coded_{name}": x for name, x in zip(study.factors, coded, strict=True)},
-            **dict(zip(study.factors, actual, strict=True)),
-            **dict(zip(study.responses, values, strict=True)),
-            **{f"{name}_error": e for name, e in zip(study.responses, errors, strict=True)},
+            "run": place + 1,
+            "kind": design.kind[place],
+            "block": design.block[place],
+            **{f"coded_{name}": x for name, x in zip(study.factors, runs.coded[row], strict=True)},
+            **dict(zip(study.factors, runs.actual[row], strict=True)),
+            **dict(zip(study.responses, runs.values[row], strict=True)),
+            **{f"{name}_error": e for name, e in zip(study.responses, runs.errors[row], strict=True)},
         }
-        for run, (coded, actual, values, errors) in enumerate(
-            zip(runs.coded, runs.actual, runs.values, runs.errors, strict=True)
-        )
+        for row, place in enumerate(runs.places)
     ]
 
 

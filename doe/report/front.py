@@ -56,7 +56,7 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
             "standard_error": sure.pick_dominates_error,
             "draws": sure.draws,
         },
-        "predicted_gains": gains_record(gains),
+        "predicted_gains": _with_optimism(gains, sure.optimism),
         "statement": statement(gains),
         "constraints": _limits(study, front.values[front.pick]),
         "archive": front.archive_size,
@@ -121,6 +121,13 @@ def gains_record(gains: list[PredictedGain]) -> dict[str, Any]:
     }
 
 
+def _with_optimism(gains: list[PredictedGain], optimism: Array | None) -> dict[str, Any]:
+    record = gains_record(gains)
+    for gain, excess in zip(gains, [] if optimism is None else optimism.tolist(), strict=False):
+        record[gain.response]["selection_optimism_percent"] = 100.0 * excess / abs(gain.baseline)
+    return record
+
+
 def print_front(record: dict[str, Any], verbose: bool = False) -> None:
     """Baseline, picks, gains and convergence of a front; verbosely, every point of it."""
     names = [*record["baseline"]["factors"], *record["baseline"]["responses"]]
@@ -135,6 +142,11 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
     _print_gains("the pick", record["predicted_gains"])
     sure = record["pick_dominates_baseline"]
     print(record["statement"])
+    flattered = ", ".join(
+        f"{name} {gain['selection_optimism_percent']:+.2f} %"
+        for name, gain in record["predicted_gains"].items()
+    )
+    print(f"the rule picks what errors flatter; luck expected in these gains: {flattered}")
     print(
         f"pick: {record['pick']['reason']}; on {sure['draws']} surfaces drawn from their errors it dominates the "
         f"baseline with probability {sure['probability']:.3f} ± {1.96 * sure['standard_error']:.3f}"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from doe.study.goals import region_of
 from doe.study_file import Study
 from doe.study_file.chain_section import chain_table
 from rbdyn.faults import InputError
@@ -19,8 +20,12 @@ Array = NDArray[np.float64]
 
 
 def check_chains(study: Study) -> None:
-    """Raises InputError for a chain that has no solution at the centre, or whose half width nothing gives."""
-    half_widths = study.step / 10.0 if study.file.tolerances is not None else np.full(study.step.size, np.nan)
+    """Raises InputError for a chain that has no solution at the centre, or whose half width nothing gives.
+
+    One whose half width is still to be found is tried with the widest that the region allows.
+    """
+    found_later = study.file.tolerances is not None
+    half_widths = region_of(study) * study.step if found_later else np.full(study.step.size, np.nan)
     faults = []
     for number in range(len(study.file.chain)):
         try:
@@ -40,6 +45,12 @@ def solve_chains(
     half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
     solved, notes = {}, []
     for number, chain in enumerate(study.file.chain):
+        widest, given = half_widths[study.factors.index(chain.factor)], chain.half_width_mm
+        if given is not None and given > widest:
+            notes.append(
+                f"{study.path}: chain {chain.name}: half_width_mm = {given:g}: wider than the {widest:.3g} within which "
+                "the gains are kept as [tolerances] asks; narrow it, or keep less"
+            )
         try:
             solved[chain.name] = solve(_chain(study, number, pick, half_widths))
         except InputError as error:
@@ -55,7 +66,7 @@ def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain
     half_width = float(half_widths[factor]) if half_widths[factor] > 0.0 else None
     source = f"{study.path}: chain {chain.name}"
     try:
-        table = chain_table(chain, float(point[factor]), half_width)
+        table = chain_table(chain, study.path.parent, float(point[factor]), half_width)
     except InputError as error:
         raise InputError([f"{study.path}: {fault}" for fault in error.faults]) from None
     return chain_from(table, source)

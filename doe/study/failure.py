@@ -35,7 +35,7 @@ def grouped(failures: Iterable[Failure]) -> list[dict[str, Any]]:
     """
     groups: dict[str, list[Failure]] = {}
     for failure in failures:
-        groups.setdefault(_NUMBER.sub("#", failure.cause), []).append(failure)
+        groups.setdefault(without_numbers(failure.cause), []).append(failure)
     return [
         {
             "cause": group[0].cause,
@@ -44,6 +44,11 @@ def grouped(failures: Iterable[Failure]) -> list[dict[str, Any]]:
         }
         for group in sorted(groups.values(), key=len, reverse=True)
     ]
+
+
+def without_numbers(text: str) -> str:
+    """What two sentences that differ in their numbers only have in common."""
+    return _NUMBER.sub("#", text)
 
 
 def sentence(failures: Sequence[Failure]) -> str:

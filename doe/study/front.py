@@ -86,8 +86,11 @@ def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) 
         values[:, :-1],
         half_widths(surfaces, found.standard_errors),
         found.goals,
+        found.values,
         found.pick,
+        study.file.front.pick,
         values[:, -1],
+        found.baseline_values,
     )
 
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.designs import to_actual, to_coded
+from doe.designs import Design, to_actual, to_coded
 from doe.designs.model import model_terms
 from doe.study.design import check_runs, design_of
-from doe.study.failure import Failure, sentence, successes
+from doe.study.failure import Failure, sentence, successes, without_numbers
 from doe.study_file import Study
 from rbdyn.faults import RunError
 
@@ -91,25 +91,35 @@ def run_design(
         )
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
-    if failures and len(left) < (needed := fewest_runs(study)):
+    if failures and len(left) < (needed := fewest_runs(study, design)):
         raise RunError(
             f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}: "
             f"{sentence(failures)}"
         )
     found = successes(results[row] for row in left)
-    notes = dict.fromkeys(note for result in found for note in result.notes)
+    notes = _told_once(note for result in found for note in result.notes)
     if failures:
-        notes[f"{len(failures)} design runs failed and are left out: {sentence(failures)}"] = None
+        notes.append(f"{len(failures)} design runs failed and are left out: {sentence(failures)}")
     values, errors, independent = clearance.responses(study, found)
-    return Runs(
-        coded[left], actual[left], values, errors, tuple(notes), independent, design.block[left], failures
-    )
+    block = design.block[left] if design.blocks > 1 else None
+    return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)
 
 
-def fewest_runs(study: Study) -> int:
-    """Runs that the largest response model needs: one a term, and one to judge the fit."""
+def _told_once(notes: Iterable[str]) -> list[str]:
+    """Notes of all runs; of those that differ in their numbers only the first, and how many there are."""
+    alike: dict[str, list[str]] = {}
+    for note in notes:
+        alike.setdefault(without_numbers(note), []).append(note)
+    return [
+        group[0] if len(set(group)) == 1 else f"{group[0]} (so or similarly {len(group)} runs)"
+        for group in alike.values()
+    ]
+
+
+def fewest_runs(study: Study, design: Design) -> int:
+    """Runs that the largest response model needs: one a term, one a block beyond the first, one to judge the fit."""
     factors = len(study.factors)
-    return 1 + max(len(model_terms(factors, response.model)) for response in study.file.response)
+    return design.blocks + max(len(model_terms(factors, response.model)) for response in study.file.response)
 
 
 def read_runs(study: Study, path: Path) -> Runs:

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from doe.designs import to_actual
+from doe.study.design import design_of
 from doe.study.failure import Failure, grouped
-from doe.study.runs import STORE, design_points
+from doe.study.runs import STORE
 from doe.study.store import Claim, EndedRun, Point, Store
 from doe.study_file import Study
 
@@ -22,9 +23,10 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
     from doe import clearance
 
     clearance.check_responses(study)
-    actual = to_actual(design_points(study), study.centre, study.step)
+    design = design_of(study)
+    actual = to_actual(design.coded, study.centre, study.step)
     factors = [dict(zip(study.factors, point.tolist(), strict=True)) for point in actual]
-    scenes = clearance.design_scenes(study, actual)
+    scenes = clearance.design_scenes(study, actual, design.order.tolist())
     points = clearance.points_of(scenes, [f"design run {run + 1}" for run in range(len(scenes))], factors)
     if not (folder / STORE).exists():
         return _record(study, folder, points, {}, [], [])

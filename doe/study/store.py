@@ -91,6 +91,7 @@ class Store:
         self.path, self._study = path, study
         self._lock, self._closed = threading.RLock(), threading.Event()
         self._me = this_process()
+        self._opened = time.time()
         self._beating: threading.Thread | None = None
         with self._faults():
             self._connection = sqlite3.connect(
@@ -255,10 +256,11 @@ class Store:
             )
 
     def forget_failures(self, points: Sequence[Point]) -> None:
-        """Let failed points be run again."""
+        """Let points be run again that failed before this store was opened."""
         with self._transaction(durable=True) as connection:
             connection.executemany(
-                "DELETE FROM runs WHERE status = 'failed' AND key = ?", [(p.key,) for p in points]
+                "DELETE FROM runs WHERE status = 'failed' AND key = ? AND ended < ?",
+                [(point.key, self._opened) for point in points],
             )
 
     def release(self) -> None:

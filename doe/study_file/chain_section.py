@@ -3,33 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from rbdyn.faults import InputError, Strict
+from rbdyn.faults import InputError, Strict, read_toml
 
 
 class StudyChain(Strict):
     """Dimension chain whose closing link is the picked value of ``factor``, within +- ``half_width_mm``.
 
     Without ``half_width_mm`` the tolerance that the study finds for the factor is taken. ``link``, ``allocate``,
-    ``monte_carlo`` and ``selective`` are those of a CHAIN.toml (see `doe.dimension_chain.links`).
+    ``monte_carlo`` and ``selective`` are those of a CHAIN.toml (see `doe.dimension_chain.links`), or stand in ``file``,
+    which lies beside the study, under the chain's name.
     """
 
     name: Annotated[str, Field(min_length=1)]
     factor: str
     half_width_mm: Annotated[float, Field(gt=0.0)] | None = None
-    link: Annotated[list[dict[str, Any]], Field(min_length=1)]
+    file: str | None = None
+    link: list[dict[str, Any]] = []
     allocate: dict[str, Any] = {}
     monte_carlo: dict[str, Any] = {}
     selective: dict[str, Any] | None = None
 
+    @model_validator(mode="after")
+    def _links_are_somewhere(self) -> StudyChain:
+        if self.file is None and not self.link:
+            raise ValueError("link: missing; give the links, or the file that has them")
+        if self.file is not None and (self.link or self.allocate or self.monte_carlo or self.selective):
+            raise ValueError(
+                f"file = {self.file!r}: has the links and all about them; leave out one or the other"
+            )
+        return self
 
-def chain_table(chain: StudyChain, value: float, half_width: float | None = None) -> Mapping[str, Any]:
-    """CHAIN.toml contents of a study's chain at a picked value [mm].
 
-    ``half_width`` [mm] stands in where the chain gives none. Raises InputError where neither is there.
+def chain_table(
+    chain: StudyChain, folder: Path, value: float, half_width: float | None = None
+) -> Mapping[str, Any]:
+    """CHAIN.toml contents of a study's chain at a picked value [mm]; ``folder`` is where the study lies.
+
+    ``half_width`` [mm] stands in where the chain gives none. Raises InputError where neither is there, or the chain is
+    not in its file.
     """
     half = chain.half_width_mm if chain.half_width_mm is not None else half_width
     if half is None:
@@ -38,10 +54,23 @@ def chain_table(chain: StudyChain, value: float, half_width: float | None = None
                 f"chain {chain.name}: half_width_mm: missing, and no tolerance of {chain.factor} is known; add it"
             ]
         )
+    limits = {"lower_mm": value - half, "upper_mm": value + half}
+    if chain.file is not None:
+        named = _of_file(chain.name, folder / chain.file)
+        return {**{key: each for key, each in named.items() if key != "name"}, "closing_link": limits}
     table = {
-        "closing_link": {"lower_mm": value - half, "upper_mm": value + half},
+        "closing_link": limits,
         "link": chain.link,
         "allocate": chain.allocate,
         "monte_carlo": chain.monte_carlo,
     }
     return table if chain.selective is None else table | {"selective": chain.selective}
+
+
+def _of_file(name: str, path: Path) -> Mapping[str, Any]:
+    """Table of the chain of that name in a file of chains."""
+    chains = read_toml(path).get("chain", [])
+    for chain in chains if isinstance(chains, list) else []:
+        if isinstance(chain, dict) and chain.get("name") == name:
+            return chain
+    raise InputError([f"{path}: no chain is named {name}; name it [[chain]] name = {name!r}"])

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,9 @@ SMALLEST_STEP_TURNS = 1e-12
 PI_START_ERROR = 1e-4
 # Beyond this relative gap of the power balance a result warns of its tolerance.
 LARGEST_POWER_GAP = 0.005
+
+# What was prepared in this process: method and types of the laws. Scenes of the same need not wait for it again.
+_prepared: set[Any] = set()
 
 
 class Run:
@@ -154,6 +158,13 @@ def prepare(scene: Scene, bearing: RollerBearing) -> float:
     return time.perf_counter() - started
 
 
+def _types(parameters: Any) -> Any:
+    """Types of parameters and of those inside, which decide what is compiled."""
+    if isinstance(parameters, tuple):
+        return type(parameters), *map(_types, parameters)
+    return type(parameters)
+
+
 def simulate(
     scene: Scene,
     workers: int | None = None,
@@ -174,7 +185,10 @@ def simulate(
         return reach(scene, target, workers, progress, stop)
     stop = Stop(outer=stop)
     bearing = roller_bearing(scene)
-    compile_s = prepare(scene, bearing)
+    compile_s = 0.0
+    if (laws := (scene.numerics.method, _types(bearing))) not in _prepared:
+        compile_s = prepare(scene, bearing)
+        _prepared.add(laws)
     started = time.perf_counter()
     runs, companions, fault = with_companions(scene, bearing, workers, progress, stop)
     wall_s = time.perf_counter() - started
