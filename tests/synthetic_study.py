@@ -138,7 +138,7 @@ def summary() -> dict[str, Any]:
         "pick": chosen,
         "tolerances": {FACTORS[0]: {"half_width": 0.004, "probability": 0.95, "limited_by": RESPONSES[0]}},
         "confirmation": {
-            "baseline": {"factors": baseline["factors"], "responses": confirmed, "power_terms_W": {"land": 70.0, "drag": 36.0}},
+            "baseline": {"factors": baseline["factors"], "responses": confirmed, "power_terms_W": {"land": 70.0, "drag": 36.0, "nil": 0.0}},
             "pick": {"factors": chosen, "responses": confirmed, "power_terms_W": {"land": 66.0, "drag": 36.0}},
             "knee": {"factors": chosen, "responses": confirmed, "gains": {RESPONSES[0]: VERDICT}, "reason": "the knee"},
         },

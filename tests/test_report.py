@@ -132,6 +132,13 @@ def test_least_record_of_all_still_answers():
     assert "0.2350" in words and "Of 3 responses" in words and "3 better" in words
 
 
+def test_power_terms_that_are_nil_everywhere_are_left_out(page):
+    words = " ".join(Outline(page).words)
+    power = words[words.index("Power loss by term") :]
+    assert "land" in power and "nil everywhere are left out" in power
+    assert ">nil<" not in page
+
+
 def test_without_motion_nothing_moves():
     outline = Outline(html_report(summary()))
     assert "bearing" not in outline.ids and "motion" not in outline.links
@@ -217,6 +224,21 @@ def test_markdown_says_the_same_and_links_the_pictures():
     assert len(tables) > 20
     for table in tables:
         assert len({len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("clearance_study.toml", "clearance_study.toml"),
+        ("_a_ *b* `c`", "\\_a\\_ \\*b\\* \\`c\\`"),
+        ("force [N]", "force [N]"),
+        ("[a](b)", "[a]\\(b)"),
+        ("# x & <b>", "\\# x &amp; &lt;b>"),
+    ],
+)
+def test_markdown_keeps_names_as_they_are(name, text):
+    record = {"pick": {"x": 1.0}, "statement": name}
+    assert f"**{text}**" in markdown_report(record)
 
 
 def test_scripts_and_styles_are_in_the_package():
