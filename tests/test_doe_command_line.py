@@ -155,6 +155,6 @@ def test_all_faults_of_a_study_at_once(tmp_path):
     shown = doe("study", str(path), "--json")
     assert shown.returncode == 2
     assert json.loads(shown.stdout)["faults"] == shown.stderr.strip().splitlines()
-    for words in (("factor[1].step = -0.005", "greater than 0"), ("response[1].goal", "'min' or 'max'")):
+    for words in (("factor[1].step = -0.005", "greater than 0"), ("response[1].goal", "'target' or 'none'")):
         assert any(all(word in line for word in words) for line in shown.stderr.splitlines())
     assert "front.poplation: unknown key; did you mean population?" in shown.stderr

@@ -33,7 +33,7 @@ SHORT = "turns=3,discard_turns=1,replicates=2,companion=false,impact_window_turn
 
 def short_study(folder: Path, settings: str = SHORT, replace: tuple[str, str] = ("", "")) -> Path:
     """The example study with a short simulation, in a folder of its own."""
-    for name in ("cylindrical_roller.toml", "ccd_table4.csv"):
+    for name in ("cylindrical_roller.toml", "ccd_table4.csv", "bearing_chains.toml"):
         shutil.copy(EXAMPLES / name, folder)
     text = (EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8")
     lines = [f'"numerics.{each}"' for each in settings.split(",")]
