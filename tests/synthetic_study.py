@@ -134,11 +134,11 @@ def summary() -> dict[str, Any]:
             "tolerance_aware": {"kind": "worst_case", "quantile": None,
                                 "front": [{**each, "robust": each["responses"]} for each in front[:6]]},
         },
-        "direct": {"front": front[2:7], "hypervolume": 0.9, "sentence": "The surfaces lose 1.0 ± 0.5 %."},
+        "direct": {"front": front[2:7], "hypervolume": 0.9, "hypervolume_error": 0.012, "surrogate_front": front[4:6], "sentence": "The surfaces lose 1.0 ± 0.5 %."},
         "pick": chosen,
         "tolerances": {FACTORS[0]: {"half_width": 0.004, "probability": 0.95, "limited_by": RESPONSES[0]}},
         "confirmation": {
-            "baseline": {"factors": baseline["factors"], "responses": confirmed, "power_terms_W": {"land": 70.0, "drag": 36.0}},
+            "baseline": {"factors": baseline["factors"], "responses": confirmed, "power_terms_W": {"land": 70.0, "drag": 36.0, "nil": 0.0}},
             "pick": {"factors": chosen, "responses": confirmed, "power_terms_W": {"land": 66.0, "drag": 36.0}},
             "knee": {"factors": chosen, "responses": confirmed, "gains": {RESPONSES[0]: VERDICT}, "reason": "the knee"},
         },

@@ -113,7 +113,7 @@ def test_missing_parts_leave_their_section_out(section):
 
 def test_any_one_key_may_be_missing():
     whole = summary()
-    second = [(one, two) for one, part in whole.items() if isinstance(part, dict) for two in part]
+    second = [(one, two) for one in ("asked", "design", "front") for two in whole[one]]
     third = [("fit", "responses", RESPONSES[0], key) for key in whole["fit"]["responses"][RESPONSES[0]]]
     third += [("chains", "pocket", key) for key in whole["chains"]["pocket"]]
     for *path, last in [*((key,) for key in whole), *second, *third]:
@@ -130,6 +130,13 @@ def test_least_record_of_all_still_answers():
     whole = summary()
     words = " ".join(Outline(html_report({key: whole[key] for key in ("format", "pick", "gains")})).words)
     assert "0.2350" in words and "Of 3 responses" in words and "3 better" in words
+
+
+def test_power_terms_that_are_nil_everywhere_are_left_out(page):
+    words = " ".join(Outline(page).words)
+    power = words[words.index("Power loss by term") :]
+    assert "land" in power and "nil everywhere are left out" in power
+    assert ">nil<" not in page
 
 
 def test_without_motion_nothing_moves():
@@ -184,6 +191,7 @@ def test_data_are_the_points_of_the_record(page):
         "on the surfaces",
         "with tolerances",
         "on the simulator",
+        "of the surfaces, simulated",
     ]
     for ours, theirs in zip(data["fronts"][0]["points"], points, strict=True):
         assert ours["x"] == pytest.approx(list(theirs["factors"].values()), rel=1e-5)
@@ -194,7 +202,7 @@ def test_data_are_the_points_of_the_record(page):
 
 def test_every_point_of_the_front_is_in_every_picture(page):
     count = sum(len(each["points"]) for each in data_of(page)["fronts"])
-    assert count == 12 + 6 + 5
+    assert count == 12 + 6 + 5 + 2
     for number in range(count):
         # Three pairs of responses, and parallel coordinates.
         assert page.count(f'data-point="{number}"') == 4
@@ -216,6 +224,21 @@ def test_markdown_says_the_same_and_links_the_pictures():
     assert len(tables) > 20
     for table in tables:
         assert len({len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("clearance_study.toml", "clearance_study.toml"),
+        ("_a_ *b* `c`", "\\_a\\_ \\*b\\* \\`c\\`"),
+        ("force [N]", "force [N]"),
+        ("[a](b)", "[a]\\(b)"),
+        ("# x & <b>", "\\# x &amp; &lt;b>"),
+    ],
+)
+def test_markdown_keeps_names_as_they_are(name, text):
+    record = {"pick": {"x": 1.0}, "statement": name}
+    assert f"**{text}**" in markdown_report(record)
 
 
 def test_scripts_and_styles_are_in_the_package():

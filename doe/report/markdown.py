@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from doe.report.content import sections
@@ -9,8 +10,9 @@ from doe.report.content.blocks import Block, Bullets, Heading, Table, Tiles, Wor
 from doe.report.content.record import Record, known
 from doe.report.content.sections import title
 
-# Marks that Markdown would take for its own; "<" and "&" for the HTML that it lets through.
-SPECIAL = {mark: f"\\{mark}" for mark in "\\`*_[]|#"} | {"<": "&lt;", "&": "&amp;"}
+# What Markdown or the HTML in it would take for its own: marks anywhere, underscores at the rim of a word, links.
+SPECIAL = re.compile(r"[\\`*|]|(?<![^\W_])_|_(?![^\W_])|(?<=\])[(\[:]|^(?:[#>+-]|\d+\.)(?=\s)")
+HTML = {"&": "&amp;", "<": "&lt;"}
 
 
 def markdown_report(summary: Record, pictures: Sequence[str] = ()) -> str:
@@ -62,4 +64,5 @@ def _row(cells: Sequence[str]) -> str:
 
 def _plain(text: str) -> str:
     """Text as it stands: no mark of it is Markdown or HTML."""
-    return "".join(SPECIAL.get(mark, mark) for mark in text).replace("\n", " ")
+    text = SPECIAL.sub(lambda mark: f"\\{mark[0]}", text.replace("\n", " "))
+    return re.sub("[&<]", lambda mark: HTML[mark[0]], text)

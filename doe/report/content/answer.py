@@ -7,7 +7,7 @@ from typing import Any
 
 from doe.report.content.blocks import Block, Section, Table, Tile, Tiles, Words
 from doe.report.content.record import Factor, Record, factors, part, responses, scalars
-from doe.report.words import dimension, half_width, label, percentage, shown, with_error
+from doe.report.words import dimension, half_width, label, percentage, quantity, shown, with_error
 
 # Characters above which a value is a sentence, to be broken.
 LONG = 40
@@ -201,16 +201,12 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(
             Table("What the surfaces promised and the simulation kept", columns, rows, text_columns=(3,))
         )
-    rows = [
-        [name.replace("_", " "), label(response), percentage(gain), verdict(gain)]
-        for name, point in points.items()
-        for response, gain in (point.get("gains") or {}).items()
-    ]
-    if rows:
-        columns = ("point", "response", "gain", "verdict")
-        blocks.append(
-            Table("Gains over the baseline at every confirmed point", columns, rows, text_columns=(1, 3))
-        )
+    gained = {name.replace("_", " "): point["gains"] for name, point in points.items() if point.get("gains")}
+    if gained:
+        rows = [[name, *(_signed(gains.get(each)) for each in names)] for name, gains in gained.items()]
+        caption = "Gains over the baseline at every confirmed point"
+        note = "▲ better, ▼ worse, ● within its 95 % error."
+        blocks.append(Table(caption, ["point", *(quantity(each)[0] for each in names)], rows, note))
     reasons = [
         (name.replace("_", " "), point["reason"]) for name, point in points.items() if point.get("reason")
     ]
@@ -219,8 +215,13 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     return Section("confirmation", "Confirmation", blocks)
 
 
-def _value(quantity: Record | None) -> str:
-    return with_error(quantity.get("value"), half_width(quantity)) if quantity else ""
+def _signed(gain: Record | None) -> str:
+    """A gain with the sign of its verdict."""
+    return f"{verdict(gain)[:1]} {percentage(gain)}" if gain else ""
+
+
+def _value(found: Record | None) -> str:
+    return with_error(found.get("value"), half_width(found)) if found else ""
 
 
 def tolerances(summary: Record) -> Table | None:

@@ -19,18 +19,21 @@ def power(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     }
     if not found:
         return None
-    terms = list(dict.fromkeys(term for terms in found.values() for term in terms))
+    every = list(dict.fromkeys(term for terms in found.values() for term in terms))
+    # What is nil everywhere belongs to laws that the scene leaves out.
+    terms = [term for term in every if any(each.get(term) for each in found.values())]
     first = next(iter(found.values()))
     terms.sort(key=lambda term: -abs(first.get(term) or 0.0))
     rows = [
         [term.replace("_", " "), *(_watts(terms_of.get(term)) for terms_of in found.values())]
         for term in terms
     ]
+    note = "Terms that are nil everywhere are left out." if len(terms) < len(every) else ""
     blocks: list[Block] = []
     compared = {name: found[name] for name in ("baseline", "pick") if name in found}
     if compared:
         blocks.append(Figures([plots.power_bars(terms, compared)], "Power loss by where it arises."))
-    blocks.append(Table("Power loss by term", ["term", *(f"{name} [W]" for name in found)], rows))
+    blocks.append(Table("Power loss by term", ["term", *(f"{name} [W]" for name in found)], rows, note))
     return Section("power", "Power by term", blocks)
 
 

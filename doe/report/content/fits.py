@@ -91,7 +91,9 @@ def _one(name: str, fitted: Record) -> list[Block]:
     # What judges itself may have been quoted among the sentences of the fit already.
     sentences = list(dict.fromkeys([*(fitted.get("sentences") or []), *_sentences(fitted)]))
     if sentences:
-        blocks.append(Bullets(sentences))
+        # The heading says already of which response they speak.
+        said = [sentence.removeprefix(f"{name}: ") for sentence in sentences]
+        blocks.append(Bullets([text[:1].upper() + text[1:] for text in said]))
     if runs := part(fitted, "diagnostics", "runs"):
         caption = "Predicted on observed, residuals on predicted, normal plot, Cook's distance on leverage."
         blocks.append(Figures(diagnostic_plots(name, runs), caption))

@@ -14,13 +14,13 @@ from doe.report.words import label, percentage, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400
-DIRECT = {
-    "hypervolume": "hypervolume on the simulator",
-    "surrogate_hypervolume": "hypervolume through the surfaces",
-    "loss_percent": "loss of the surfaces [%]",
-    "evaluations": "evaluations",
-    "seconds": "time [s]",
-}
+DIRECT = (
+    ("hypervolume", "hypervolume on the simulator", "hypervolume_error"),
+    ("surrogate_hypervolume", "hypervolume through the surfaces", "surrogate_hypervolume_error"),
+    ("loss_percent", "loss of the surfaces [%]", "loss_error_percent"),
+    ("evaluations", "evaluations", ""),
+    ("seconds", "time [s]", ""),
+)
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,7 @@ def fronts(summary: Record) -> list[Front]:
         ("front", "on the surfaces", part(summary, "front", "front")),
         ("robust", "with tolerances", part(summary, "front", "tolerance_aware", "front")),
         ("direct", "on the simulator", part(summary, "direct", "front")),
+        ("surrogate", "of the surfaces, simulated", part(summary, "direct", "surrogate_front")),
     ):
         whole = [point for point in points or [] if complete(point, summary)]
         if not whole or not names:
@@ -92,7 +93,11 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         ]
         header = ("response", "gain", "verdict")
         blocks.append(Table("Gains of the pick on the surfaces", header, rows, text_columns=(2,)))
+    if record.get("statement"):
+        blocks.append(Words(str(record["statement"])))
     blocks += [table for table in (_limits(record), tolerances(summary)) if table]
+    if text := part(summary, "tolerances_sentence"):
+        blocks.append(Words(str(text)))
     blocks += _search(record)
     blocks += _beside(summary)
     return Section("front", "Pareto front", blocks)
@@ -184,7 +189,11 @@ def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
 
 def _on_the_simulator(direct: Record) -> list[Block]:
     blocks: list[Block] = [Words(str(direct["sentence"]))] if direct.get("sentence") else []
-    rows = [(words, shown(direct[key])) for key, words in DIRECT.items() if direct.get(key) is not None]
+    rows = [
+        (words, with_error(direct[key], direct.get(error)))
+        for key, words, error in DIRECT
+        if direct.get(key) is not None
+    ]
     if rows:
         blocks.append(Table("Front searched on the simulator itself", ("", "value"), rows))
     return blocks

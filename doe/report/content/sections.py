@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import PurePath
 from typing import Any
 
 from doe.report.content import answer, bearing, ends, experiments, fits, fronts, parts
@@ -59,6 +60,7 @@ def _readable(block: Block, words: Mapping[str, str]) -> Block:
 
 
 def title(summary: Record) -> str:
-    """What the study was called, or the name of its file."""
+    """What the study was called, or the name of its file in words."""
     asked = summary.get("asked") or {}
-    return asked.get("title") or (asked.get("study_file") or "Clearance study").rsplit("/", 1)[-1]
+    stem = PurePath(asked.get("study_file") or "clearance study").stem.replace("_", " ")
+    return asked.get("title") or stem[:1].upper() + stem[1:]

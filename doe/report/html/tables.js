@@ -32,8 +32,8 @@
 
   document.addEventListener("toggle", page.redraw, true);
 
-  // Paper shows what is folded on the screen.
-  const folded = () => document.querySelectorAll("details:not([open])");
+  // Paper shows what belongs to the question; further figures stay folded.
+  const folded = () => document.querySelectorAll("#asked details:not([open]), #design details:not([open])");
   let opened = [];
   window.addEventListener("beforeprint", () => {
     opened = [...folded()];
