@@ -64,6 +64,14 @@ def with_error(value: float | None, error: float | None) -> str:
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
+def rounded_down(width: float) -> str:
+    """A half width in two digits and no wider: 0.001875 as '0.0018'."""
+    if width <= 0.0:
+        return "0"
+    digit = math.floor(math.log10(width)) - 1
+    return f"{math.floor(width / 10.0**digit * (1.0 + 1e-12)) * 10.0**digit:.{max(-digit, 0)}f}"
+
+
 def half_width(record: Mapping[str, Any]) -> float | None:
     """95 % half-width of a quantity: its error, or its statistical and numerical error together."""
     parts = [record.get(key) for key in ("error", "statistical_error", "numerical_error")]

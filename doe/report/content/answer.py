@@ -7,7 +7,16 @@ from typing import Any
 
 from doe.report.content.blocks import Block, Section, Table, Tile, Tiles, Words
 from doe.report.content.record import Factor, Record, factors, part, responses, scalars
-from doe.report.words import dimension, half_width, label, percentage, quantity, shown, with_error
+from doe.report.words import (
+    dimension,
+    half_width,
+    label,
+    percentage,
+    rounded_down,
+    quantity,
+    shown,
+    with_error,
+)
 
 # Characters above which a value is a sentence, to be broken.
 LONG = 40
@@ -25,7 +34,8 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(table)
     if table := part_dimensions(summary):
         blocks.append(table)
-    if reason := part(summary, "front", "pick", "reason"):
+    reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
+    if reason:
         blocks.append(Words(f"Why this point: {reason}.", "note"))
     return Section("answer", "The answer", blocks) if blocks else None
 
@@ -33,7 +43,7 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
     beneath = []
     if tolerance := tolerance_of(summary, factor):
-        beneath.append(f"± {shown(tolerance)} {factor.unit}".strip())
+        beneath.append(f"± {rounded_down(tolerance)} {factor.unit}".strip())
     baseline = part(summary, "confirmation", "baseline", "factors") or part(
         summary, "front", "baseline", "factors"
     )
@@ -120,7 +130,11 @@ def asked(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     blocks: list[Block] = []
     effort = [
         f"{shown(record[key])} {words}"
-        for key, words in (("replicates", "replicates a run"), ("turns", "counted shaft turns each"))
+        for key, words in (
+            ("replicates", "replicates a design run"),
+            ("turns", "counted shaft turns each"),
+            ("confirmation_replicates", "replicates to confirm a point"),
+        )
         if record.get(key) is not None
     ]
     files = [f"study {record['study_file']}"] if record.get("study_file") else []

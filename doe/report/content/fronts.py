@@ -64,7 +64,7 @@ def picks(summary: Record) -> dict[str, Record]:
     """Baseline and picks that the front names, by name."""
     named = {"baseline": part(summary, "front", "baseline"), "knee": part(summary, "front", "knee")}
     named |= part(summary, "front", "picks") or {}
-    named["pick"] = part(summary, "front", "pick")
+    named["pick"] = summary.get("pick_on_surfaces") or part(summary, "front", "pick")
     return {name.replace("_", " "): point for name, point in named.items() if point}
 
 
