@@ -12,8 +12,8 @@ from doe.report.words import (
     half_width,
     label,
     percentage,
-    rounded_down,
     quantity,
+    rounded_down,
     shown,
     with_error,
 )
