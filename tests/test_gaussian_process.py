@@ -137,3 +137,16 @@ def test_a_design_without_a_point_to_spare_is_refused():
     values = bent(points)
     with pytest.raises(ValueError, match="only 0 points can be left out"):
         compare(points, values, refit_of(points, values), name="y")
+
+
+def test_many_points_are_left_out_in_groups_and_many_runs_searched_in_part():
+    points = np.random.default_rng(2).uniform(-1.5, 1.5, (160, 2))
+    values = bent(points)
+    groups = compare(points, values, refit_of(points, values), name="y")
+    assert (groups["points"], groups["folds"]) == (160, 20)
+    assert groups["recommended"] == "gaussian_process"
+    part = np.sort(np.random.default_rng(1).permutation(160)[:150])
+    searched = fit_gaussian(points[part], values[part], name="y")
+    whole = fit_gaussian(points, values, name="y")
+    assert whole.length_scales == pytest.approx(searched.length_scales, rel=1e-12)
+    assert len(whole.regressor.X_train_) == 160

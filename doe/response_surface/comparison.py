@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 SAME_POINT = 1e-9  # coded units within which two runs are replicates
+# More points than these are left out in groups.
+MOST_SINGLY, FOLDS = 60, 20
 # Leverage of a point, all its replicates together, from which on the polynomial is a guess without it.
 INDISPENSABLE = 0.95
 
@@ -42,7 +44,8 @@ def compare(
 
     Both rivals see the same runs and are wholly refitted without the point (the process with its
     hyperparameters, the polynomial with its choice of terms), and foretell the mean of the runs left out;
-    each point counts once. A point without which the polynomial cannot be fitted, or is a guess, such as the
+    each point counts once. Of more than `MOST_SINGLY` points a twentieth is left out at a time, and the process keeps
+    the hyperparameters of all runs: a fit costs the cube of their number. A point without which the polynomial cannot be fitted, or is a guess, such as the
     centre of a spherical design, is not compared: no one would leave it out.
 
     Parameters
@@ -60,7 +63,7 @@ def compare(
     ``polynomial`` and ``gaussian_process``, each with ``loo_rmse`` and ``loo_r2`` (None where the points all
     have one mean); ``difference`` of the squared misses, polynomial less process: ``mean``, ``standard_error``
     and 95 % ``interval`` by Student's t over the points, which takes them as independent; ``points`` compared;
-    ``recommended``: "gaussian_process" only where the interval lies above zero, else "polynomial"; ``sentence``.
+    ``folds``: how often some were left out; ``recommended``: "gaussian_process" only where the interval lies above zero, else "polynomial"; ``sentence``.
 
     Raises
     ------
@@ -75,9 +78,12 @@ def compare(
     group = point_groups(points)
     leverage = np.zeros(len(points)) if matrix is None else _leverage(np.asarray(matrix, float))
     means, misses = [], []
-    for first in np.unique(group):
-        out, kept = np.flatnonzero(group == first), np.flatnonzero(group != first)
-        if leverage[out].sum() > INDISPENSABLE:
+    firsts = np.unique(group)
+    folds = _folds(firsts, seed)
+    for fold in folds:
+        spared = np.array([first for first in fold if leverage[group == first].sum() <= INDISPENSABLE], int)
+        kept = np.flatnonzero(~np.isin(group, spared))
+        if not spared.size:
             continue
         with THREADS.limit(limits=1):
             try:
@@ -91,17 +97,20 @@ def compare(
                 standard_errors=None if errors is None else errors[kept],
                 seed=seed,
                 start=whole,
+                search=len(folds) == len(firsts),
             )
-            foretold = [float(rival.predict(points[first])) for rival in (polynomial, process)]
-        means.append(float(response[out].mean()))
-        misses.append([means[-1] - each for each in foretold])
+            foretold = np.column_stack([rival.predict(points[spared]) for rival in (polynomial, process)])
+        truth = np.array([response[group == first].mean() for first in spared])
+        means += truth.tolist()
+        misses += (truth[:, None] - foretold).tolist()
     if len(misses) < 3:
         raise ValueError(
             f"{name}: only {len(misses)} points can be left out of the polynomial, too few to compare; "
             "add design points or choose a simpler model"
         )
     squares = np.array(misses) ** 2
-    compared = f"{len(misses)} of {len(np.unique(group))} points"
+    at_a_time = "" if len(folds) == len(firsts) else f" (in {len(folds)} groups)"
+    compared = f"{len(misses)} of {len(firsts)} points{at_a_time}"
     difference = _difference(squares[:, 0] - squares[:, 1])
     scores = [_score(each, np.array(means)) for each in squares.T]
     low, high = difference["interval"]
@@ -110,6 +119,7 @@ def compare(
         "gaussian_process": {**scores[1], **whole.as_dict()},
         "difference": difference,
         "points": len(misses),
+        "folds": len(folds),
         "recommended": "gaussian_process" if low > 0.0 else "polynomial",
         "sentence": _sentence(name, compared, scores[0]["loo_rmse"], scores[1]["loo_rmse"], low, high),
     }
@@ -120,6 +130,13 @@ def point_groups(points: Array) -> Rows:
     apart = np.abs(points[:, None, :] - points[None, :, :]).max(axis=2)
     groups: Rows = (apart <= SAME_POINT).argmax(axis=1)
     return groups
+
+
+def _folds(firsts: Rows, seed: int) -> list[Rows]:
+    """Points to be left out together: each alone, or of many a twentieth at a time."""
+    if len(firsts) <= MOST_SINGLY:
+        return np.array_split(firsts, len(firsts))
+    return np.array_split(np.random.default_rng(seed).permutation(firsts), FOLDS)
 
 
 def _leverage(matrix: Array) -> Array:

@@ -35,6 +35,8 @@ RESTARTS = 4
 STEPS, STEPS_FROM_START = 200, 10
 # The matrices are small: one thread is up to ten times as fast as several, and has the same bits everywhere.
 THREADS = ThreadpoolController()
+# Hyperparameters of more runs are searched on so many of them: each step costs the cube of their number.
+MOST_SEARCHED = 150
 JITTER = 1e-10  # variance, relative to that of the values, that keeps the matrix of runs invertible
 
 
@@ -93,6 +95,7 @@ def fit_gaussian(
     standard_errors: ArrayLike | None = None,
     seed: int = 1,
     start: GaussianSurface | None = None,
+    search: bool = True,
 ) -> GaussianSurface:
     """Fit a Gaussian process to one response.
 
@@ -105,6 +108,10 @@ def fit_gaussian(
         is estimated with the other hyperparameters.
     seed : of the restarts of the search for the hyperparameters.
     start : a fit of nearly the same runs from whose hyperparameters to search, a few steps without restarts.
+    search : False keeps the hyperparameters of ``start``.
+
+    Of more than `MOST_SEARCHED` runs the hyperparameters are those of so many, drawn by ``seed``; all runs count in
+    the surface itself.
 
     Raises
     ------
@@ -116,6 +123,11 @@ def fit_gaussian(
         raise ValueError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
     if not (np.isfinite(points).all() and np.isfinite(response).all()):
         raise ValueError(f"{name}: a factor or value is not a finite number; mend or leave out that run")
+    if start is None and len(points) > MOST_SEARCHED:
+        some = np.sort(np.random.default_rng(seed).permutation(len(points))[:MOST_SEARCHED])
+        given = None if standard_errors is None else np.broadcast_to(standard_errors, response.shape)[some]
+        start = fit_gaussian(points[some], response[some], name=name, standard_errors=given, seed=seed)
+        search = False
     mean, scale = float(response.mean()), float(response.std()) or 1.0
     nugget = np.full(len(response), JITTER)
     if standard_errors is not None:
@@ -126,7 +138,7 @@ def fit_gaussian(
     regressor = GaussianProcessRegressor(
         _kernel(points.shape[1], standard_errors is None) if start is None else start.regressor.kernel_,
         alpha=nugget,
-        optimizer=partial(_search, steps=STEPS if start is None else STEPS_FROM_START),
+        optimizer=partial(_search, steps=STEPS if start is None else STEPS_FROM_START) if search else None,
         n_restarts_optimizer=RESTARTS if start is None else 0,
         random_state=seed,
     )
