@@ -64,6 +64,14 @@ def with_error(value: float | None, error: float | None) -> str:
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
+def rounded_down(value: float | None) -> str:
+    """A tolerance to two significant digits, never wider than it is."""
+    if not value:
+        return ""
+    unit = 10.0 ** (math.floor(math.log10(value) + 1e-9) - 1)
+    return shown(math.floor(value / unit + 1e-6) * unit)
+
+
 def half_width(record: Mapping[str, Any]) -> float | None:
     """95 % half-width of a quantity: its error, or its statistical and numerical error together."""
     parts = [record.get(key) for key in ("error", "statistical_error", "numerical_error")]

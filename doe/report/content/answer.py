@@ -6,8 +6,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from doe.report.content.blocks import Block, Section, Table, Tile, Tiles, Words
-from doe.report.content.record import Factor, Record, factors, part, responses, scalars
-from doe.report.words import dimension, half_width, label, percentage, quantity, shown, with_error
+from doe.report.content.record import Factor, Record, factors, nearest, part, responses, scalars
+from doe.report.words import (
+    dimension,
+    half_width,
+    label,
+    percentage,
+    quantity,
+    rounded_down,
+    shown,
+    with_error,
+)
 
 # Characters above which a value is a sentence, to be broken.
 LONG = 40
@@ -25,7 +34,7 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(table)
     if table := part_dimensions(summary):
         blocks.append(table)
-    if reason := part(summary, "front", "pick", "reason"):
+    if reason := part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason"):
         blocks.append(Words(f"Why this point: {reason}.", "note"))
     return Section("answer", "The answer", blocks) if blocks else None
 
@@ -33,7 +42,7 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
     beneath = []
     if tolerance := tolerance_of(summary, factor):
-        beneath.append(f"± {shown(tolerance)} {factor.unit}".strip())
+        beneath.append(f"± {rounded_down(tolerance)} {factor.unit}".strip())
     baseline = part(summary, "confirmation", "baseline", "factors") or part(
         summary, "front", "baseline", "factors"
     )
@@ -192,15 +201,16 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     ]
     blocks: list[Block] = [Table("Simulated with fresh seeds (95 % intervals)", header, rows)]
     if predicted := part(summary, "front", "predicted_gains"):
-        found = part(summary, "gains") or {}
+        # The surfaces foretell the gains of their own pick, which another may have overtaken.
+        name = nearest(summary, part(summary, "front", "pick", "factors"), points) or "pick"
+        found = part(points, name, "gains") or (part(summary, "gains") if name == "pick" else None) or {}
         rows = [
-            [label(name), percentage(gain), percentage(found.get(name) or {}), verdict(found.get(name) or {})]
-            for name, gain in predicted.items()
+            [label(each), percentage(gain), percentage(found.get(each) or {}), verdict(found.get(each) or {})]
+            for each, gain in predicted.items()
         ]
         columns = ("response", "gain on the surfaces", "gain simulated", "verdict")
-        blocks.append(
-            Table("What the surfaces promised and the simulation kept", columns, rows, text_columns=(3,))
-        )
+        caption = f"What the surfaces promised and the simulation kept, {name.replace('_', ' ')}"
+        blocks.append(Table(caption, columns, rows, text_columns=(3,)))
     gained = {name.replace("_", " "): point["gains"] for name, point in points.items() if point.get("gains")}
     if gained:
         rows = [[name, *(_signed(gains.get(each)) for each in names)] for name, gains in gained.items()]
@@ -233,7 +243,7 @@ def tolerances(summary: Record) -> Table | None:
     rows = [
         (
             label(name),
-            f"± {shown(each.get('half_width'))}",
+            f"± {rounded_down(each.get('half_width'))}",
             shown(each.get("probability")),
             _limit(each.get("limited_by")),
         )
