@@ -55,10 +55,13 @@ def test_threads_change_no_bit(threads):
         ("uniform", uniform(-0.04, 0.06)),
         ("triangular", triang(0.5, -0.04, 0.06)),
         ("truncated_normal", truncnorm(-4, 2, loc=0.0, scale=0.01)),
+        ("wide", truncnorm(-0.2, 0.1, loc=0.0, scale=0.2)),
     ],
 )
 def test_the_draws_follow_their_law(law, reference):
-    mean = {"mean_mm": 0.0} if law == "truncated_normal" else {}
+    mean = {"mean_mm": 0.0} if law in ("truncated_normal", "wide") else {}
+    if law == "wide":
+        law, mean = "truncated_normal", mean | {"capability": 0.05}
     values = drawn(chain([(1, 5.0, 0.02, -0.04, {"distribution": law} | mean)]), 20_000).values
     assert kstest(values - 5.0, reference.cdf).pvalue > 1e-3
     assert values.min() >= 4.96 and values.max() <= 5.02

@@ -39,7 +39,10 @@ def short_study(folder: Path, settings: str = SHORT, replace: tuple[str, str] = 
     lines = [f'"numerics.{each}"' for each in settings.split(",")]
     first = next(line for line in text.splitlines() if line.startswith("set = "))
     text = text.replace(first, f"set = [{', '.join(lines)}]").replace("replicates = 16", "replicates = 2")
-    text = text.replace("generations = 200", "generations = 20").replace(*replace) if replace[0] else text
+    pocket = 'factor = "pocket_clearance_mm"\n'
+    text = text.replace(pocket, pocket + "half_width_mm = 0.005\n")
+    text = text.replace("generations = 200", "generations = 20")
+    text = text.replace(*replace) if replace[0] else text
     path = folder / "study.toml"
     path.write_text(text, encoding="utf-8")
     return path

@@ -20,7 +20,7 @@ from doe.dimension_chain.closing import ClosingFunction, closing_function, middl
 from doe.dimension_chain.cost import cheapest
 from doe.dimension_chain.intervals import interval, total
 from doe.dimension_chain.iso286 import grade_tolerances, tolerance_unit
-from doe.dimension_chain.links import DIGITS, SLACK, Chain, Link, Mode, Part
+from doe.dimension_chain.links import DIGITS, SLACK, Chain, Interval, Link, Mode, Part
 from doe.dimension_chain.monte_carlo import Assemblies, draw
 from doe.dimension_chain.parts import allocated_part, given_part
 from doe.dimension_chain.yields import closing_moments, exact_shares, sampled_yields, standard_error
@@ -102,6 +102,12 @@ class Allocation:
             return 1 - sum(exact_shares(self.function, parts, limits))
         share = sampled_yields(self._drawn(parts))["as_given"]
         return share - 2 * standard_error(share, SAMPLES)
+
+    def tails(self, parts: list[Part]) -> Interval:
+        """Closing links, mm, between which the wanted yield lies, as many below as above, by Monte Carlo."""
+        tail = (1 - self.chain.allocate.target_yield) / 2
+        low, high = np.quantile(self._drawn(parts).values, (tail, 1 - tail))
+        return float(low), float(high)
 
     def allocated(self) -> list[Part]:
         """Parts whose tolerances together fill the limits, snapped to grades where that is asked for."""
@@ -197,8 +203,7 @@ class Allocation:
         target = (limits.lower_mm + limits.upper_mm) / 2
         if self.function.linear:
             return target - closing_moments(self.function, parts, None)[0]
-        tail = (1 - self.chain.allocate.target_yield) / 2
-        return target - float(np.quantile(self._drawn(parts).values, (tail, 1 - tail)).mean())
+        return target - sum(self.tails(parts)) / 2
 
     def _drawn(self, parts: list[Part]) -> Assemblies:
         seed, limits = self.chain.monte_carlo.seed, self.chain.closing_link

@@ -10,7 +10,7 @@ from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import fit_factor, is_part, used_links
 from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.iso286 import LARGEST, positioned
-from doe.dimension_chain.links import SLACK, Allocate, Chain, Link
+from doe.dimension_chain.links import SLACK, Allocate, Chain, ClosingLink, Link
 from doe.dimension_chain.parts import coded_limits, has_deviations
 
 
@@ -176,22 +176,28 @@ def _room_faults(chain: Chain) -> list[str]:
     if chain.allocate.mode == "yield":
         share, target = search.sure_yield(bare), chain.allocate.target_yield
         if share < target:
+            low, high = search.tails(bare)
             return [
                 f"allocate.target_yield = {target:g}: the fixed links alone give {share:.4g}; narrow or unfix one, or "
-                "widen the limits"
+                f"widen the limits: {_nearest(limits, high - low)}"
             ]
     else:
         low, high = interval(search.function, bare, chain.allocate.mode)
         consumed = high - low
         if consumed > SLACK and width <= consumed + SLACK:
-            middle = (limits.lower_mm + limits.upper_mm) / 2
             return [
                 f"link.fixed = true: the fixed links consume {consumed:.4f} mm of the closing link's {width:.4f} "
-                "mm; narrow or unfix one, or widen the limits: the nearest that can be met are wider than "
-                f"{middle - consumed / 2:.4f} to {middle + consumed / 2:.4f} mm"
+                f"mm; narrow or unfix one, or widen the limits: {_nearest(limits, consumed)}"
             ]
     tight = _sentence(search.linear_rule)
     return [f'allocate.method = "{chain.allocate.method}": {tight}'] if tight else []
+
+
+def _nearest(limits: ClosingLink, width: float) -> str:
+    middle = (limits.lower_mm + limits.upper_mm) / 2
+    return (
+        f"the nearest that can be met are wider than {middle - width / 2:.4f} to {middle + width / 2:.4f} mm"
+    )
 
 
 def _sentence(attempt: Callable[[], object]) -> str | None:

@@ -13,12 +13,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from doe.dimension_chain.closing import ClosingFunction
 from doe.dimension_chain.distributions import standard_limits
 from doe.dimension_chain.links import SLACK, Array, ClosingLink, Distribution, Part
 
 CHUNK = 1 << 14  # assemblies: a handful of columns of them stays in the second-level cache
+RARE = 0.3  # share within the limits below which drawing again would last too long
 ALIKE: tuple[Distribution, ...] = ("normal", "truncated_normal", "uniform")  # laws for all parts alike
 
 
@@ -141,7 +143,13 @@ def _drawn(
 
 
 def _redrawn(normal: Array, low: float, high: float, generator: np.random.Generator) -> Array:
-    """Normal numbers with those outside the limits drawn again until none is left."""
+    """Normal numbers with those outside the limits drawn again until none is left.
+
+    Where few lie within, numbers by the inverse of the normal law instead.
+    """
+    below, above = float(ndtr(low)), float(ndtr(high))
+    if above - below < RARE:
+        return np.clip(ndtri(below + (above - below) * generator.random(len(normal))), low, high)
     numbers = normal.copy()
     outside = np.flatnonzero((numbers < low) | (numbers > high))
     while len(outside):

@@ -229,8 +229,8 @@ def _status(search: Allocation, parts: list[Part], allocation: list[Part], share
         return "ok"
     limits, mode, width = search.chain.closing_link, search.mode, search.chain.width_mm
     low, high = interval(search.function, parts, mode)
-    by_name = {link.name: link for link in search.chain.link}
-    nearest = ", ".join(f"{part.name} {part.text}" for part in allocation if not by_name[part.name].fixed)
+    free = {link.name for link in search.chain.free}
+    nearest = ", ".join(f"{part.name} {part.text}" for part in allocation if part.name in free)
     if mode == "yield":
         wanted = f"a yield of {search.chain.allocate.target_yield:g} is wanted"
         why = f"worst-case tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g} where {wanted}"

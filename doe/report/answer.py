@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from doe.report.chain import print_chain
+from doe.report.words import rounded_down
 from doe.study.confirmation import statement
 from doe.study.failure import grouped
 from rbdyn.terminal import print_table
@@ -53,7 +54,7 @@ def _print_clearances(outcome: Outcome) -> None:
     found = outcome.tolerances
     half_widths = [None] * len(outcome.study.factors) if found is None else found.half_widths.tolist()
     rows = [
-        (name, f"{base:.4g}", f"{pick:.4g}", *([] if half is None else [f"± {half:.3g}"]))
+        (name, f"{base:.4g}", f"{pick:.4g}", *([] if half is None else [f"± {rounded_down(half)}"]))
         for name, base, pick, half in zip(
             outcome.study.factors, outcome.baseline.point, outcome.pick.point, half_widths, strict=True
         )

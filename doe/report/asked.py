@@ -20,7 +20,7 @@ def asked_record(study: Study) -> dict[str, Any]:
 
     reach, known = region_of(study), known_tolerances(study)
     low, high = (to_actual(side * reach, study.centre, study.step) for side in (-1.0, 1.0))
-    scene = clearance.confirmation_scene(study, study.baseline)
+    scene = clearance.design_scenes(study, study.baseline[None])[0]
     return {
         "study_file": study.path.name,
         "scene_file": study.file.scene.file,
@@ -38,6 +38,7 @@ def asked_record(study: Study) -> dict[str, Any]:
         "responses": [response.model_dump() for response in study.file.response],
         "replicates": scene.numerics.replicates,
         "turns": scene.numerics.turns,
+        "confirmation_replicates": study.file.confirmation.replicates,
     }
 
 

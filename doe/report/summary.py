@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from doe.report.asked import asked_record, design_record
 from doe.report.confirmation import confirmation_record, direct_record, gains_record
 from doe.report.fit import fit_record
-from doe.report.front import front_record
+from doe.report.front import front_record, point_record
 from doe.study.confirmation import statement
 from doe.study.failure import grouped
 from rbdyn.result import versions
@@ -28,6 +28,7 @@ def summary(outcome: Outcome) -> dict[str, Any]:
         "design": design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),
+        "pick_on_surfaces": point_record(study, outcome.surfaces, outcome.pick.point),
         "pick": dict(zip(study.factors, outcome.pick.point.tolist(), strict=True)),
         "confirmation": confirmation_record(outcome),
         "gains": gains_record(gains),

@@ -64,12 +64,12 @@ def with_error(value: float | None, error: float | None) -> str:
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
-def rounded_down(value: float | None) -> str:
-    """A tolerance to two significant digits, never wider than it is."""
-    if not value:
-        return ""
-    unit = 10.0 ** (math.floor(math.log10(value) + 1e-9) - 1)
-    return shown(math.floor(value / unit + 1e-6) * unit)
+def rounded_down(width: float) -> str:
+    """A half width in two digits and no wider: 0.001875 as '0.0018'."""
+    if width <= 0.0:
+        return "0"
+    digit = math.floor(math.log10(width)) - 1
+    return f"{math.floor(width / 10.0**digit * (1.0 + 1e-12)) * 10.0**digit:.{max(-digit, 0)}f}"
 
 
 def half_width(record: Mapping[str, Any]) -> float | None:

@@ -34,7 +34,8 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(table)
     if table := part_dimensions(summary):
         blocks.append(table)
-    if reason := part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason"):
+    reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
+    if reason:
         blocks.append(Words(f"Why this point: {reason}.", "note"))
     return Section("answer", "The answer", blocks) if blocks else None
 
@@ -129,7 +130,11 @@ def asked(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     blocks: list[Block] = []
     effort = [
         f"{shown(record[key])} {words}"
-        for key, words in (("replicates", "replicates a run"), ("turns", "counted shaft turns each"))
+        for key, words in (
+            ("replicates", "replicates a design run"),
+            ("turns", "counted shaft turns each"),
+            ("confirmation_replicates", "replicates to confirm a point"),
+        )
         if record.get(key) is not None
     ]
     files = [f"study {record['study_file']}"] if record.get("study_file") else []
@@ -243,7 +248,7 @@ def tolerances(summary: Record) -> Table | None:
     rows = [
         (
             label(name),
-            f"± {rounded_down(each.get('half_width'))}",
+            f"± {rounded_down(each.get('half_width') or 0.0)}",
             shown(each.get("probability")),
             _limit(each.get("limited_by")),
         )

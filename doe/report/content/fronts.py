@@ -70,12 +70,13 @@ def picks(summary: Record) -> dict[str, Record]:
     named = {name.replace("_", " "): point for name, point in named.items() if point}
     chosen = nearest(summary, part(summary, "pick"), ({"": plain} if plain else {}) | named)
     if chosen and plain:
-        named = {name: point for name, point in named.items() if name != chosen} | {
-            "without tolerances": plain,
-            "pick": named[chosen],
-        }
+        overtaken = {name: point for name, point in named.items() if name != chosen}
+        named = overtaken | {"without tolerances": plain, "pick": named[chosen]}
     elif plain:
         named["pick"] = plain
+    # The surfaces at the pick itself, which stands on the resolution of the drawing.
+    if rounded := part(summary, "pick_on_surfaces"):
+        named["pick"] = rounded
     baseline = part(summary, "front", "baseline")
     return ({"baseline": baseline} if baseline else {}) | named
 

@@ -18,7 +18,7 @@ def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "factors": [
             {key: getattr(each, key) for key in ("name", "words", "unit", "letter", "centre", "step", "low", "high", "decimals")}
-            | {"tolerance": rounded_down(tolerance_of(summary, each))}
+            | {"tolerance": rounded_down(tolerance) if (tolerance := tolerance_of(summary, each)) else None}
             for each in given
         ],
         "responses": [{"name": name, **_named(name)} for name in names],
