@@ -9,12 +9,12 @@ from html.parser import HTMLParser
 from importlib.resources import files
 
 import pytest
-from synthetic_study import FACTORS, RESPONSES, motion, summary
+from synthetic_study import FACTORS, RESPONSES, VERDICT, motion, summary
 
 from doe.report.html import html_report
 from doe.report.html.build import SCRIPTS
 from doe.report.markdown import markdown_report
-from doe.report.words import label, percentage, quantity, shown, with_error
+from doe.report.words import label, percentage, quantity, rounded_down, shown, with_error
 
 VOID = {"meta", "input"}
 OPTIONAL = {
@@ -85,7 +85,7 @@ def test_answer_comes_first(page):
     for text in (
         "0.0225",
         "0.1850",
-        "± 0.004 mm",
+        "± 0.0040 mm",
         "The gain is real",
         "9.2400 0/-0.0050",
         "+11.16 ± 0.65 %",
@@ -137,6 +137,38 @@ def test_power_terms_that_are_nil_everywhere_are_left_out(page):
     power = words[words.index("Power loss by term") :]
     assert "land" in power and "nil everywhere are left out" in power
     assert ">nil<" not in page
+
+
+def test_pick_is_the_one_that_the_study_stands_by():
+    record = summary()
+    plain = record["front"]["pick"]
+    # The study has picked with tolerances, at the resolution of the drawing; the surfaces picked another point.
+    aware = record["front"]["front"][9]
+    record["front"]["picks"]["tolerance_aware"] = aware
+    record["pick"] = {name: round(x, 3) for name, x in aware["factors"].items()}
+    record["confirmation"]["pick"] |= {
+        "factors": record["pick"],
+        "gains": {RESPONSES[0]: VERDICT | {"percent": 5.5}},
+    }
+    record["confirmation"]["pick"]["reason"] = "by what manufacture leaves of it"
+    record["confirmation"]["without_tolerances"] = record["confirmation"].pop("knee") | {
+        "factors": plain["factors"]
+    }
+    text = html_report(record)
+    beside = data_of(text)["beside"]
+    assert beside["pick"]["x"] == pytest.approx(list(aware["factors"].values()), rel=1e-5)
+    assert beside["without tolerances"]["x"] == pytest.approx(list(plain["factors"].values()), rel=1e-5)
+    words = " ".join(Outline(text).words)
+    assert "Why this point: by what manufacture leaves of it." in words
+    kept = words[words.index("the simulation kept, without tolerances") :]
+    # Its own simulated gain, not that of the pick.
+    assert "+11.16 ± 0.65 %" in kept[:400] and "5.5" not in kept[:200]
+
+
+def test_tolerances_are_never_rounded_up():
+    assert [rounded_down(x) for x in (0.001875, 0.0125, 0.005, 0.1, 12.9, 0.0)] == [
+        *("0.0018", "0.012", "0.0050", "0.10", "12", "0"),
+    ]
 
 
 def test_without_motion_nothing_moves():

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from doe.report.content.blocks import Block, Section, Table, Tile, Tiles, Words
-from doe.report.content.record import Factor, Record, factors, part, responses, scalars
+from doe.report.content.record import Factor, Record, factors, nearest, part, responses, scalars
 from doe.report.words import (
     dimension,
     half_width,
@@ -206,15 +206,16 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     ]
     blocks: list[Block] = [Table("Simulated with fresh seeds (95 % intervals)", header, rows)]
     if predicted := part(summary, "front", "predicted_gains"):
-        found = part(summary, "gains") or {}
+        # The surfaces foretell the gains of their own pick, which another may have overtaken.
+        name = nearest(summary, part(summary, "front", "pick", "factors"), points) or "pick"
+        found = part(points, name, "gains") or (part(summary, "gains") if name == "pick" else None) or {}
         rows = [
-            [label(name), percentage(gain), percentage(found.get(name) or {}), verdict(found.get(name) or {})]
-            for name, gain in predicted.items()
+            [label(each), percentage(gain), percentage(found.get(each) or {}), verdict(found.get(each) or {})]
+            for each, gain in predicted.items()
         ]
         columns = ("response", "gain on the surfaces", "gain simulated", "verdict")
-        blocks.append(
-            Table("What the surfaces promised and the simulation kept", columns, rows, text_columns=(3,))
-        )
+        caption = f"What the surfaces promised and the simulation kept, {name.replace('_', ' ')}"
+        blocks.append(Table(caption, columns, rows, text_columns=(3,)))
     gained = {name.replace("_", " "): point["gains"] for name, point in points.items() if point.get("gains")}
     if gained:
         rows = [[name, *(_signed(gains.get(each)) for each in names)] for name, gains in gained.items()]
@@ -247,7 +248,7 @@ def tolerances(summary: Record) -> Table | None:
     rows = [
         (
             label(name),
-            f"± {shown(each.get('half_width'))}",
+            f"± {rounded_down(each.get('half_width') or 0.0)}",
             shown(each.get("probability")),
             _limit(each.get("limited_by")),
         )

@@ -9,7 +9,7 @@ from typing import Any
 from doe.report.content import plots_of_fronts as plots
 from doe.report.content.answer import record_table, tolerances
 from doe.report.content.blocks import Block, Figures, Section, Table, Widget, Words
-from doe.report.content.record import Record, factors, part, responses
+from doe.report.content.record import Record, factors, nearest, part, responses
 from doe.report.words import label, percentage, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.
@@ -61,11 +61,24 @@ def complete(point: Record, summary: Record) -> bool:
 
 
 def picks(summary: Record) -> dict[str, Record]:
-    """Baseline and picks that the front names, by name."""
-    named = {"baseline": part(summary, "front", "baseline"), "knee": part(summary, "front", "knee")}
-    named |= part(summary, "front", "picks") or {}
-    named["pick"] = summary.get("pick_on_surfaces") or part(summary, "front", "pick")
-    return {name.replace("_", " "): point for name, point in named.items() if point}
+    """Baseline and picks that the front names, by name; "pick" is the one that the study stands by.
+
+    That is the pick of the front, or the one that reckons with tolerances; then the other goes "without tolerances".
+    """
+    plain = part(summary, "front", "pick")
+    named = {"knee": part(summary, "front", "knee")} | (part(summary, "front", "picks") or {})
+    named = {name.replace("_", " "): point for name, point in named.items() if point}
+    chosen = nearest(summary, part(summary, "pick"), ({"": plain} if plain else {}) | named)
+    if chosen and plain:
+        overtaken = {name: point for name, point in named.items() if name != chosen}
+        named = overtaken | {"without tolerances": plain, "pick": named[chosen]}
+    elif plain:
+        named["pick"] = plain
+    # The surfaces at the pick itself, which stands on the resolution of the drawing.
+    if rounded := part(summary, "pick_on_surfaces"):
+        named["pick"] = rounded
+    baseline = part(summary, "front", "baseline")
+    return ({"baseline": baseline} if baseline else {}) | named
 
 
 def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
@@ -87,12 +100,13 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(Figures([plots.parallel(factors(summary), names, sets, drawn)], caption, "parallel"))
     if marks:
         blocks.append(_picks(summary, names, marks))
+    where = "of the pick without tolerances" if "without tolerances" in marks else "of the pick"
     if gains := record.get("predicted_gains"):
         rows = [
             (label(name), percentage(gain), str(gain.get("verdict") or "")) for name, gain in gains.items()
         ]
         header = ("response", "gain", "verdict")
-        blocks.append(Table("Gains of the pick on the surfaces", header, rows, text_columns=(2,)))
+        blocks.append(Table(f"Gains on the surfaces {where}", header, rows, text_columns=(2,)))
     if record.get("statement"):
         blocks.append(Words(str(record["statement"])))
     blocks += [table for table in (_limits(record), tolerances(summary)) if table]

@@ -14,8 +14,16 @@ from doe.report.words import half_width, label, quantity, shown
 if TYPE_CHECKING:
     from doe.report.content.fronts import Front
 
-SHAPES = {"baseline": "square", "pick": "star", "knee": "diamond", "desirability": "triangle"}
-OTHER_SHAPE = "down"
+# Shape and role in the style sheet.
+MARKS = {
+    "baseline": ("square", "baseline"),
+    "pick": ("star", "pick"),
+    "knee": ("diamond", "knee"),
+    "desirability": ("triangle", "desirability"),
+    "weights": ("down", "weights"),
+    "without tolerances": ("plus", "plain"),
+}
+OTHER = ("hexagon", "other")
 WIDE, HIGH, LEFT, TOP, BOTTOM = 760.0, 260.0, 46.0, 40.0, 30.0
 
 
@@ -56,11 +64,11 @@ def _simulated(point: Record, one: str, two: str) -> tuple[Point, tuple[float | 
 
 
 def _shape(name: str) -> str:
-    return SHAPES.get(name, OTHER_SHAPE)
+    return MARKS.get(name.replace("_", " "), OTHER)[0]
 
 
 def _role(name: str) -> str:
-    return name if name in SHAPES else "other"
+    return MARKS.get(name.replace("_", " "), OTHER)[1]
 
 
 def legend_of(sets: Sequence[Front], marks: Mapping[str, Record], confirmed: Mapping[str, Record]) -> str:

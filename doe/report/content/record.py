@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from doe.report.words import quantity, shown
+from doe.report.words import label, quantity, shown
 
 Record = Mapping[str, Any]
 # The efficiencies of a design go by a capital letter.
-EFFICIENCY = re.compile(r"^efficiency percent, ([adgi])$")
+EFFICIENCY = re.compile(r"^efficiency \[%\], ([adgi])$")
 
 
 def part(record: Record, *keys: str) -> Any:
@@ -79,13 +79,31 @@ def responses(summary: Record) -> list[dict[str, Any]]:
 def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
     """Names and values of everything in nested tables; lists as one value."""
     for key, value in record.items():
-        name = prefix + key.replace("_", " ")
+        name = prefix + label(key)
         if isinstance(value, Mapping):
             yield from scalars(value, f"{name}, ")
         elif value is not None and not (
             isinstance(value, list) and value and isinstance(value[0], dict | list)
         ):
             yield EFFICIENCY.sub(lambda found: f"{found[1].upper()}-efficiency [%]", name), shown(value)
+
+
+def nearest(summary: Record, place: Record | None, candidates: Mapping[str, Record]) -> str | None:
+    """Name of the candidate whose factors lie nearest to a place in coded units; None without any.
+
+    A pick is simulated at the resolution of the drawing, so its factors are not those of the front to the digit.
+    """
+
+    def apart(name: str) -> float:
+        far = [
+            abs(candidates[name]["factors"][each.name] - (place or {})[each.name]) / (each.step or 1.0)
+            for each in factors(summary)
+        ]
+        return math.hypot(*far)
+
+    names = {each.name for each in factors(summary)}
+    whole = [name for name, each in candidates.items() if names <= set(each.get("factors") or {})]
+    return min(whole, key=apart) if place and names <= set(place) and whole else None
 
 
 def fits(summary: Record) -> dict[str, Any]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from doe.report.content.answer import tolerance_of
 from doe.report.content.fronts import complete, fronts, picks
 from doe.report.content.record import Factor, Record, factors, fits, part, responses
-from doe.report.words import quantity
+from doe.report.words import quantity, rounded_down
 
 
 def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
@@ -17,7 +18,7 @@ def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "factors": [
             {key: getattr(each, key) for key in ("name", "words", "unit", "letter", "centre", "step", "low", "high", "decimals")}
-            | {"tolerance": part(summary, "tolerances", each.name, "half_width") or each.tolerance}
+            | {"tolerance": rounded_down(tolerance) if (tolerance := tolerance_of(summary, each)) else None}
             for each in given
         ],
         "responses": [{"name": name, **_named(name)} for name in names],

@@ -10,7 +10,7 @@
   let chosen = 0;
 
   const set_of = number => first.findLastIndex(each => number >= each);
-  const tolerance = each => each.tolerance ? ` ± ${page.shown(each.tolerance)}` : "";
+  const tolerance = each => each.tolerance ? ` ± ${each.tolerance}` : "";
 
   function rows(number) {
     const point = all[number], columns = [point, ...beside.map(name => data.beside[name])];
@@ -99,6 +99,6 @@
   // Start at the pick.
   const pick = data.beside.pick;
   const away = point => point.x.reduce((sum, x, k) => sum + ((x - pick.x[k]) / (data.factors[k].step || 1)) ** 2, 0);
-  const start = pick ? data.fronts[0].points.reduce((best, point, k, points) => away(point) < away(points[best]) ? k : best, 0) : 0;
+  const start = pick ? all.reduce((best, point, k) => away(point) < away(all[best]) ? k : best, 0) : 0;
   choose(start);
 })();
