@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from doe.designs import (
@@ -14,32 +15,39 @@ from doe.designs import (
 )
 from doe.designs.model import model_terms
 from doe.study_file import Study
+from doe.study_file.design_section import Design as DesignSettings
 from rbdyn.faults import InputError
 
 
 def design_of(study: Study) -> Design:
     """The design in the order of its runs. Raises InputError when its settings are impossible."""
-    settings, factors = study.file.design, len(study.factors)
-    centres = settings.centres
     try:
-        if settings.kind == "central_composite":
-            design = central_composite_design(
-                factors,
-                alpha=settings.alpha,
-                centre_replicates=centres,
-                cube=settings.cube,
-                blocks=settings.blocks,
-                cube_blocks=settings.cube_blocks,
-            )
-        elif settings.kind == "box_behnken":
-            design = box_behnken(factors, centre_replicates=centres, blocks=settings.blocks)
-        elif settings.kind == "full_factorial":
-            design = full_factorial(factors, levels=settings.levels, centre_replicates=centres)
-        else:
-            sampled = latin_hypercube if settings.kind == "latin_hypercube" else sobol
-            design = sampled(factors, runs=settings.runs, seed=settings.seed, centre_replicates=centres)
+        return _design(study.file.design.model_dump_json(exclude_unset=True), len(study.factors))
     except ValueError as error:
         raise InputError([f"{study.path}: design.{error}"]) from None
+
+
+@cache
+def _design(text: str, factors: int) -> Design:
+    """The design of settings in JSON; several steps of a study ask for it, and some designs take a while."""
+    settings = DesignSettings.model_validate_json(text)
+    centres = settings.centres
+    if settings.kind == "central_composite":
+        design = central_composite_design(
+            factors,
+            alpha=settings.alpha,
+            centre_replicates=centres,
+            cube=settings.cube,
+            blocks=settings.blocks,
+            cube_blocks=settings.cube_blocks,
+        )
+    elif settings.kind == "box_behnken":
+        design = box_behnken(factors, centre_replicates=centres, blocks=settings.blocks)
+    elif settings.kind == "full_factorial":
+        design = full_factorial(factors, levels=settings.levels, centre_replicates=centres)
+    else:
+        sampled = latin_hypercube if settings.kind == "latin_hypercube" else sobol
+        design = sampled(factors, runs=settings.runs, seed=settings.seed, centre_replicates=centres)
     return design.by_blocks(settings.seed if settings.order == "random" else None)
 
 
