@@ -1,4 +1,4 @@
-"""The source code of this package as one hash: code that was edited gives results and compiled code of its own."""
+"""The source code of a package as one hash: code that was edited gives results and compiled code of its own."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 
 @functools.cache
-def source_digest() -> str:
-    """SHA-256 of every source file of the package, as it lies on disk at the first call."""
+def source_digest(package: Path = Path(__file__).parent) -> str:
+    """SHA-256 of every source file of a package, this one by default, as it lies on disk at the first call."""
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
+    for source in sorted(package.rglob("*.py")):
         digest.update(source.read_bytes())
     return digest.hexdigest()

@@ -20,6 +20,8 @@ from doe.report.files import write
 from doe.report.front import front_record
 from doe.study import run_study
 from doe.study.confirmation import Confirmed, Gain, gains
+from doe.study.finished import finished as is_finished
+from doe.study.finished import inputs_digest
 from doe.study.front import find_front
 from doe.study.runs import read_runs, run_design
 from doe.study.store import run_key
@@ -58,7 +60,7 @@ def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     study = Study.load(short_study(folder))
     outcome = run_study(study, folder, None, lambda title: silent)
-    return outcome, folder, write(outcome, folder)
+    return outcome, folder, write(outcome, folder)["files"]
 
 
 def test_every_file_is_written(finished):
@@ -69,6 +71,22 @@ def test_every_file_is_written(finished):
     assert sum(name.startswith("surface_") for name in files) == 3
     for name in files:
         assert (folder / name).stat().st_size > 100, name
+
+
+def test_a_finished_study_is_not_done_again(finished):
+    outcome, folder, _ = finished
+    command = [sys.executable, "-m", "doe", "study", str(outcome.study.path), "--out", str(folder)]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "finished before, nothing has changed since" in shown
+    assert f"pick: {outcome.pick.reason}" in shown
+    asked = inputs_digest(outcome.study, direct=False)
+    assert is_finished(folder, asked)["pick"] == dict(
+        zip(outcome.study.factors, outcome.pick.point.tolist(), strict=True)
+    )
+    assert is_finished(folder, inputs_digest(outcome.study, direct=True)) is None
+    (folder / "front.csv").rename(folder / "aside.csv")
+    assert is_finished(folder, asked) is None
+    (folder / "aside.csv").rename(folder / "front.csv")
 
 
 def test_summary_answers_the_question(finished):

@@ -26,10 +26,18 @@ def study(
 
         loaded = Study.load(path)
         folder = output_folder(out or Path(f"{path.stem}_results"))
+        from doe.study.finished import finished, inputs_digest
+
+        if not (verbose or retry) and (record := finished(folder, inputs_digest(loaded, direct))):
+            if as_json:
+                print_json(record)
+                return
+            print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
+            print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
+            return
         from doe.report.answer import print_outcome
         from doe.report.files import write
         from doe.report.fit import print_fit
-        from doe.report.summary import summary
         from doe.study import run_study
 
         outcome = run_study(
@@ -42,12 +50,12 @@ def study(
             direct,
         )
         bars.close()
-        written = write(outcome, folder)
+        record = write(outcome, folder)
         if as_json:
-            print_json(summary(outcome))
+            print_json(record)
             return
         if verbose:
             print_fit(outcome.surfaces, factors=loaded.factors)
         print_outcome(outcome, quiet)
         print(f"{outcome.cost['total_s']:.1f} s, of which design runs {outcome.cost['design_s']:.1f} s")
-        print(f"written to {folder}: {', '.join(written)}")
+        print(f"written to {folder}: {', '.join(record['files'])}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+from contextlib import redirect_stdout
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +25,21 @@ def print_outcome(outcome: Outcome, quiet: bool) -> None:
         _print_beside(study.file.reference.label, outcome)
     if not quiet:
         _print_other_points(outcome)
+    _print_answer(outcome)
+    if not quiet:
+        for note in outcome.notes:
+            print(f"note: {note}")
+
+
+def answer_text(outcome: Outcome) -> str:
+    """The answer as it is printed."""
+    with redirect_stdout(io.StringIO()) as text:
+        _print_answer(outcome)
+    return text.getvalue()
+
+
+def _print_answer(outcome: Outcome) -> None:
+    study = outcome.study
     if outcome.direct is not None:
         direct = outcome.direct
         print(
@@ -45,9 +62,6 @@ def print_outcome(outcome: Outcome, quiet: bool) -> None:
         print(chain.status)
     for group in grouped(outcome.failures):
         print(f"failed ({len(group['labels'])}): {', '.join(group['labels'])}: {group['cause']}")
-    if not quiet:
-        for note in outcome.notes:
-            print(f"note: {note}")
 
 
 def _print_clearances(outcome: Outcome) -> None:

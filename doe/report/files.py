@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from doe.report.answer import answer_text
 from doe.report.fit import fit_tables
 from doe.report.front import front_record
 from doe.report.html import html_report
@@ -22,14 +23,18 @@ if TYPE_CHECKING:
 DRAWN_TURNS = 10.0
 
 
-def write(outcome: Outcome, folder: Path) -> list[str]:
-    """Write everything into ``folder``; returns the file names."""
+def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
+    """Write everything into ``folder``; returns the record of the study, whose ``files`` names them.
+
+    summary.json is written last: where it is, all else is whole.
+    """
     import pandas as pd
 
     from doe import clearance
     from doe.report import plots
 
     study, front = outcome.study, outcome.front
+    (folder / "summary.json").unlink(missing_ok=True)
     tables = {
         "design_runs.csv": _runs_table(outcome),
         **fit_tables(outcome.surfaces),
@@ -58,11 +63,16 @@ def write(outcome: Outcome, folder: Path) -> list[str]:
     motions = clearance.histories(study, points, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
     record = summary(outcome)
+    texts = {
+        "report.html": html_report(record, clearance.motion_record(motions)),
+        "report.md": markdown_report(record, pictures),
+        "answer.txt": answer_text(outcome),
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    record["files"] = [*texts, "summary.json", *tables, *pictures]
     write_json(folder / "summary.json", record)
-    page = html_report(record, clearance.motion_record(motions))
-    (folder / "report.html").write_text(page, encoding="utf-8")
-    (folder / "report.md").write_text(markdown_report(record, pictures), encoding="utf-8")
-    return ["report.html", "report.md", "summary.json", *tables, *pictures]
+    return record
 
 
 def _runs_table(outcome: Outcome) -> list[dict[str, Any]]:

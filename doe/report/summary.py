@@ -39,6 +39,7 @@ def summary(outcome: Outcome) -> dict[str, Any]:
         "failures": grouped(outcome.failures),
         "cost": dict(outcome.cost),
         "versions": versions(),
+        "inputs": outcome.inputs,
         "seeds": {
             "design": study.file.design.seed,
             "front": study.file.front.seed,

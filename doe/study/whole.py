@@ -17,6 +17,7 @@ from doe.study.confirmation import Confirmed, Gain, confirm, gains
 from doe.study.design import check_runs, design_of
 from doe.study.direct import Direct, find_direct
 from doe.study.failure import Failure
+from doe.study.finished import inputs_digest
 from doe.study.front import find_front
 from doe.study.picks import choices
 from doe.study.reference import Beside, beside, reference_runs
@@ -39,11 +40,12 @@ Array = NDArray[np.float64]
 class Outcome:
     """Everything a report needs.
 
-    ``confirmed`` and ``gains`` by name of the point, "baseline" (without gains) and "pick" first. ``tolerances`` is
+    ``inputs`` is the hash of all it follows from. ``confirmed`` and ``gains`` by name of the point, "baseline" (without gains) and "pick" first. ``tolerances`` is
     None where the study asks for none, ``direct`` unless it was run.
     """
 
     study: Study
+    inputs: str
     design: Design
     runs: Runs
     surfaces: list[Surface]
@@ -87,6 +89,7 @@ def run_study(
     from doe.study.store import Store
 
     clock = _Clock()
+    inputs = inputs_digest(study, direct)
     reference = _checked(study)
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry)
     clock.lap("design_s")
@@ -108,6 +111,7 @@ def run_study(
     lost = () if searched is None else searched.failures
     return Outcome(
         study=study,
+        inputs=inputs,
         design=design_of(study),
         runs=runs,
         surfaces=surfaces,

@@ -1,0 +1,49 @@
+"""Whether a study lies finished in its folder, so that nothing needs to be done again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from doe.study_file import Study
+from rbdyn.result import versions
+from rbdyn.sources import source_digest
+
+
+def inputs_digest(study: Study, direct: bool) -> str:
+    """Hash of all that the files of a study depend on: the study, the files it names, the code, what was asked."""
+    named = [study.file.scene.file, *(chain.file for chain in study.file.chain)]
+    named += [] if study.file.reference is None else [study.file.reference.file]
+    digest = hashlib.sha256()
+    for text in (
+        study.path.name,
+        study.file.model_dump_json(),
+        json.dumps([direct, versions()], sort_keys=True),
+        source_digest(),
+        source_digest(Path(__file__).parent.parent),
+    ):
+        digest.update(text.encode())
+    for name in named:
+        if name is not None:
+            digest.update(_content(study.beside(name)))
+    return digest.hexdigest()
+
+
+def finished(folder: Path, digest: str) -> dict[str, Any] | None:
+    """The record of a finished study of these inputs whose files are all there, else None."""
+    try:
+        record = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        whole = record["inputs"] == digest and all((folder / name).is_file() for name in record["files"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return record if whole else None
+
+
+def _content(path: Path) -> bytes:
+    """Bytes of a file; of one that cannot be read, which the study refuses later, none."""
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
