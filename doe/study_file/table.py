@@ -38,9 +38,11 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     """Read a CSV table with a column for each factor and response.
 
     A column "<response>_error" holds 95 % half widths (empty where unknown), "replicates" and "block" whole
-    numbers; all three kinds may be missing. ``named_in`` is the file that names the columns.
+    numbers; all three kinds may be missing. ``named_in`` is the file that names the columns. Rows of one number in a
+    column "run" are replicates: their mean is one run, with the half width that their scatter tells.
 
-    Raises InputError, with all faults, when the file, a column or a number is missing or a column comes twice.
+    Raises InputError, with all faults, when the file, a column or a number is missing, a column comes twice, or
+    replicates have different factors.
     """
     import pandas as pd
 
@@ -58,7 +60,7 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
         for name in wanted
         if name not in table.columns
     ]
-    used = [name for name in (*wanted, *errors, "replicates", "block") if name in table.columns]
+    used = [name for name in (*wanted, *errors, "replicates", "block", "run") if name in table.columns]
     faults += [
         f"{path}: column {name!r} comes {header[name]} times; keep one" for name in used if header[name] > 1
     ]
@@ -68,6 +70,8 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
         )
     if faults:
         raise InputError(faults)
+    if "run" in table.columns and table["run"].duplicated().any():
+        table = _means_of_replicates(path, table, factors, responses)
     nothing = pd.Series(np.nan, index=table.index)
     return Table(
         actual=table[factors].to_numpy(float),
@@ -76,6 +80,33 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
         replicates=np.asarray(table.get("replicates", nothing).fillna(0), np.int64),
         block=np.asarray(table.get("block", nothing).fillna(0), np.int64),
     )
+
+
+def _means_of_replicates(
+    path: Path, table: pd.DataFrame, factors: list[str], responses: list[str]
+) -> pd.DataFrame:
+    """One row a run: mean, half width and number of its replicates."""
+    from scipy import special
+
+    groups = table.groupby("run", sort=False)
+    lowest, highest = groups[factors].min(), groups[factors].max()
+    faults = [
+        f"{path}: {name} of run {run} is {lowest.loc[run, name]:g} in one replicate and {highest.loc[run, name]:g} in "
+        "another; replicates have the same factors: mend them, or number the runs apart"
+        for run in lowest.index
+        for name in factors
+        if lowest.loc[run, name] != highest.loc[run, name]
+    ]
+    if faults:
+        raise InputError(faults)
+    joined, count = groups.first(), groups.size().to_numpy()
+    joined["replicates"] = count
+    # Student's quantile; a run without replicates has no scatter, and its half width stays unknown.
+    reach = special.stdtrit(np.maximum(count - 1, 1), 0.975) / np.sqrt(count)
+    for name in responses:
+        joined[name] = groups[name].mean()
+        joined[f"{name}_error"] = groups[name].std() * reach
+    return joined
 
 
 def _faults_of(path: Path, name: str, column: pd.Series, optional: bool, whole: bool) -> list[str]:
