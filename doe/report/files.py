@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from doe.report.answer import answer_text
 from doe.report.fit import fit_tables
 from doe.report.front import front_record
@@ -57,8 +55,7 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     for surface in outcome.surfaces:
         pictures.append(f"surface_{surface.name}.png")
         plots.response_surface(study, surface, folder / pictures[-1])
-    confirmed = np.array([outcome.baseline.values, outcome.pick.values])
-    plots.pareto_front(study, front, outcome.surfaces, confirmed, folder / "pareto_front.png")
+    plots.pareto_front(outcome, folder / "pareto_front.png")
     points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
     motions = clearance.histories(study, points, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]

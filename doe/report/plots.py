@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,13 +12,13 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-from doe.designs import to_actual
+from doe.designs import to_actual, to_coded
 from doe.report.words import label
 from doe.study.design import design_of
 
 if TYPE_CHECKING:
-    from doe.pareto import ParetoFront
     from doe.response_surface import Surface
+    from doe.study import Outcome
     from doe.study_file import Study
 
 
@@ -51,31 +50,37 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
     plt.close(figure)
 
 
-def pareto_front(
-    study: Study, front: ParetoFront, surfaces: Sequence[Surface], confirmed: np.ndarray | None, path: Path
-) -> None:
-    """Every pair of responses: front on the surfaces, baseline and pick on them, confirmed points beside.
-
-    ``confirmed``: simulated responses of baseline and pick, shape (2, m), or None.
-    """
-    values = front.values
-    baseline = np.array(
-        [surface.predict((study.baseline - study.centre) / study.step) for surface in surfaces]
-    )
+def pareto_front(outcome: Outcome, path: Path) -> None:
+    """Every pair of responses: the fronts, baseline and pick on the surfaces, and both as they were simulated."""
+    study, surfaces = outcome.study, outcome.surfaces
+    clouds = [("front on the surfaces", outcome.front.values, "tab:blue")]
+    if outcome.front.tolerance_aware is not None:
+        clouds.append(("front with tolerances", outcome.front.tolerance_aware.values, "tab:purple"))
+    if outcome.direct is not None:
+        clouds.append(("front on the simulator", outcome.direct.front.values, "tab:green"))
     pairs = list(combinations(range(len(surfaces)), 2))
     figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
     for axis, (i, j) in zip(axes[0], pairs, strict=True):
-        axis.plot(
-            values[:, i], values[:, j], ".", color="tab:blue", markersize=4, label="front on the surfaces"
-        )
-        axis.plot(baseline[i], baseline[j], "s", color="black", label="baseline on the surfaces")
-        axis.plot(
-            *values[front.pick, [i, j]], "*", color="tab:red", markersize=13, label="pick on the surfaces"
-        )
-        if confirmed is not None:
-            axis.plot(*confirmed[0, [i, j]], "s", mfc="none", color="black", label="baseline simulated")
+        for words, values, color in clouds:
+            axis.plot(values[:, i], values[:, j], ".", color=color, markersize=4, label=words)
+        for words, each, marker, color in (
+            ("baseline", outcome.baseline, "s", "black"),
+            ("pick", outcome.pick, "*", "tab:red"),
+        ):
+            coded = to_coded(each.point, study.centre, study.step)
+            told = [float(surface.predict(coded)) for surface in surfaces]
+            size = 13 if marker == "*" else 6
             axis.plot(
-                *confirmed[1, [i, j]], "*", mfc="none", color="tab:red", markersize=13, label="pick simulated"
+                told[i], told[j], marker, color=color, markersize=size, label=f"{words} on the surfaces"
+            )
+            axis.plot(
+                each.values[i],
+                each.values[j],
+                marker,
+                mfc="none",
+                color=color,
+                markersize=size,
+                label=f"{words} simulated",
             )
         axis.set_xlabel(label(surfaces[i].name))
         axis.set_ylabel(label(surfaces[j].name))
