@@ -189,7 +189,7 @@ def test_killed_process_is_taken_over_at_once_by_one_that_waits_for_it(tmp_path,
 
 def test_ctrl_c_keeps_what_was_finished_and_gives_back_the_rest(tmp_path):
     study, out = short_study(tmp_path), tmp_path / "out"
-    process = start(study, out, 0.1, 2)
+    process = start(study, out, 0.4, 2)
     wait_for(lambda: stored(out / STORE) >= 3)
     process.send_signal(signal.SIGINT)
     shown, said = process.communicate(timeout=60)
