@@ -63,11 +63,11 @@ def instructions(bearing: RollerBearing) -> int:
     """
     import numba
 
-    from rbdyn.dynamics.runge_kutta import advance
+    from rbdyn.dynamics.runge_kutta import DORMAND_PRINCE, advance
 
-    kind = numba.typeof(bearing)
+    kind, pair = numba.typeof(bearing), numba.typeof(DORMAND_PRINCE)
     for signature, compiled in advance.overloads.items():
-        if signature[0] == kind:
+        if signature[0] == kind and signature[2].types[-1] == pair:
             module = compiled.library._get_module_for_linking()
             return sum(1 for body in module.functions for block in body.blocks for _ in block.instructions)
     raise KeyError(kind)

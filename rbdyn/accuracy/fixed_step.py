@@ -18,8 +18,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.dynamics.booking import book_whirl
 from rbdyn.dynamics.equations import LOADS, POWERS, derivative, derivative_once
-from rbdyn.dynamics.runge_kutta import book_whirl
 from rbdyn.dynamics.state import (
     CAGE_ANGLE,
     CAGE_SPEED,

@@ -12,11 +12,12 @@ Compiled:
 - ``drive``, ``clock``, ``schedule``: speeds and loads, steady or by the clock
 - ``equations``: forces gathered into accelerations, and the power that each loss takes; ``energy``: what balances it
 - ``orbit_frame``: the frame in which the rollers are integrated
-- ``runge_kutta``: Dormand-Prince 5(4) with step control, which also sees when stability holds the steps
+- ``runge_kutta``: Dormand-Prince 5(4) with step control, which also sees when stability holds the steps; ``kutta_pair``:
+  Kutta's 3/8 rule in its place; ``embedded_pair``: what it asks of either; ``booking``: what is kept of a step
 - ``rosenbrock``: RODAS4 for scenes where it does, on ``jacobian`` and ``arrow_matrix``; ``implicit`` makes its storage
 
 Results:
-- ``method``: which of the two integrates a run; ``ensemble``: runs side by side
+- ``method``: which of them integrates a run; ``ensemble``: runs side by side
 - ``simulate``: replicates, workers, error bars; ``metrics``: impact force, whirl deviation ratio, power loss
 - ``race_report``: pressure, half-width and film of each race
 - ``history``, ``observe``: every motion and contact over time, on request

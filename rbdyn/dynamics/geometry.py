@@ -18,7 +18,7 @@ from rbdyn.scene import Scene
 # Largest contact speed by which errors are measured, as a share of that of the faster race. Held at its limit of
 # stability, the explicit method leaves the whole tolerance in every contact in every step, and contacts lose it: in a
 # slow bearing that must stay small beside what rolling loses. The implicit method damps it.
-SPEED_SHARES = {"rk45": 0.05, "rosenbrock": 1.0}
+SPEED_SHARES = {"rk45": 0.05, "rk43": 0.05, "rosenbrock": 1.0}
 
 
 @dataclass(frozen=True)

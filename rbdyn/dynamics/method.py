@@ -1,4 +1,4 @@
-"""Which method integrates a run: explicit Dormand-Prince, or the linearly implicit one where stability holds its steps.
+"""Which method integrates a run: an explicit pair, or the linearly implicit one where stability holds its steps.
 
 A step of the second costs about nine of the first, so it pays only where it can be much longer. "auto" tries both on a
 copy of the run, over the same stretch, and counts right-hand sides; no clock is read, so that equal scenes choose alike.
@@ -7,17 +7,19 @@ copy of the run, over the same stretch, and counts right-hand sides; no clock is
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from rbdyn.dynamics.equations import RollerBearing
 from rbdyn.dynamics.metrics import Replicate
-from rbdyn.dynamics.runge_kutta import FINISHED, STEP_BUDGET, Carry, Control, Tally, advance
+from rbdyn.dynamics.runge_kutta import DORMAND_PRINCE, FINISHED, STEP_BUDGET, Carry, Control, Tally, advance
 from rbdyn.scene import Scene
 
 # Arguments: bearing, control, carry, tally, end [s], time between samples [s]. Returns a status of ``runge_kutta``.
 Advance = Callable[[RollerBearing, Control, Carry, Tally, float, float], int]
 
+EXPLICIT = ("rk45", "rk43")
 # The trial: this long, this many steps at most, after as long a start.
 TRIAL_TURNS, TRIAL_STEPS = 0.05, 20_000
 # Share of steps held by stability from which a run counts as stiff.
@@ -30,8 +32,17 @@ FEWEST_STEPS_PER_TURN = 2000
 IMPLICIT_OVERHEAD = 3.0
 
 
+def pair_of(method: str) -> Any:
+    """Explicit pair that ``method`` starts with."""
+    if method == "rk43":
+        from rbdyn.dynamics.kutta_pair import Kutta
+
+        return Kutta()
+    return DORMAND_PRINCE
+
+
 def advance_by(method: str, scene: Scene, bearing: RollerBearing) -> Advance:
-    """``advance`` of "rk45" or "rosenbrock" for this bearing."""
+    """``advance`` of "rk45", "rk43" or "rosenbrock" for this bearing."""
     if method == "rosenbrock":
         from rbdyn.dynamics.implicit import workspace
         from rbdyn.dynamics.rosenbrock import advance_implicit
@@ -93,6 +104,7 @@ def _copy(carry: Carry) -> Carry:
         carry.clock.copy(),
         carry.counts.copy(),
         carry.stiffness.copy(),
+        carry.pair,
     )
 
 
@@ -129,7 +141,7 @@ def stiffness_notes(scene: Scene, runs: Sequence[Replicate]) -> tuple[str, ...]:
     if cost["held_by_stability"] < STIFF_SHARE or steps < FEWEST_STEPS_PER_TURN * turns:
         return ()
     time_s = 1.0 / cost["eigenvalue_1_s"]
-    mend = "numerics.method = 'auto' tries the implicit one; " if scene.numerics.method == "rk45" else ""
+    mend = "numerics.method = 'auto' tries the implicit one; " if scene.numerics.method in EXPLICIT else ""
     return (
         f"steps are held by stability, not accuracy, in {100.0 * cost['held_by_stability']:.0f} % of the run: the fastest "
         f"motion takes {time_s:.2g} s, a shaft turn {scene.turn_s:.2g} s; {mend}looser tolerances save nothing, "

@@ -18,19 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.arrow_matrix import PARTS, ArrowMatrix, factor, shifted, solve
+from rbdyn.dynamics.booking import PEAK_POINTS, book_peak, book_whirl
 from rbdyn.dynamics.equations import LOADS, POCKET_LOAD, POWERS, derivative_once
 from rbdyn.dynamics.jacobian import Differences, jacobian
 from rbdyn.dynamics.runge_kutta import (
     FINISHED,
     GROW,
     NOT_FINITE,
-    PEAK_POINTS,
     SAFETY,
     SHRINK,
     STEP_BUDGET,
     STEP_UNDERFLOW,
-    book_peak,
-    book_whirl,
 )
 from rbdyn.dynamics.state import CAGE_VX, CAGE_VY
 from rbdyn.kernel import entry, kernel, routine

@@ -1,21 +1,30 @@
-"""Dormand-Prince 5(4): explicit, adaptive with a PI controller, first-same-as-last, dense output.
+"""Explicit Runge-Kutta pairs: adaptive with a PI controller, first-same-as-last, dense output. Here: Dormand-Prince 5(4).
 
 Dormand and Prince 1980; controller and continuous extension after Hairer, Norsett and Wanner, Solving ODEs I, II.4-6.
 
 The error of a step is the Euclidean norm of all components, each over its own absolute tolerance, and not averaged
 over them: it is never smaller than that of the worst component, however many rollers there are. Loss powers are
-integrated with the fifth-order weights from the same stages, so that the power balance tests the integrator too.
+integrated with the main weights from the same stages, so that the power balance tests the integrator too.
 The rollers are integrated in a frame that turns with them (``orbit_frame``).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.dynamics.booking import PEAK_POINTS, book_peak, book_whirl
+from rbdyn.dynamics.embedded_pair import (
+    mean_rate,
+    quartic_rate,
+    rate_error,
+    stage_state,
+    stage_time,
+    stage_weight,
+)
 from rbdyn.dynamics.equations import LOADS, POCKET_LOAD, POWERS, derivative, derivative_once, roller_count
 from rbdyn.dynamics.orbit_frame import (
     mean_orbit_rate,
@@ -49,15 +58,25 @@ E1, E3, E4, E5, E6, E7 = 71 / 57600, -71 / 16695, 71 / 1920, -17253 / 339200, 22
 D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
 D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
 
-SAFETY, BETA = 0.9, 0.04
-EXPONENT = 0.2 - 0.75 * BETA
-SHRINK, GROW = 0.2, 10.0
-# Stiffness is looked at in every eighth step. The method is stable up to h |eigenvalue| = 3.3 for decay and about 2.4 for
-# a loaded contact that vibrates.
-LOOK_EVERY, STABILITY_LIMIT = 8, 2.0
-# As integers of numpy: for each plain one a right-hand side would be compiled anew. b_2 = e_2 = d_2 = 0 leave row 1 free.
-FIRST_ROW, FREE_ROW = np.int64(0), np.int64(1)
-PEAK_POINTS = 8  # interior points at which a step that holds a new largest pocket load is looked at
+SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
+LOOK_EVERY = 8  # Stiffness is looked at in every eighth step.
+# As an integer of numpy: for each plain one a right-hand side would be compiled anew.
+FIRST_ROW = np.int64(0)
+
+
+class DormandPrince(NamedTuple):
+    """The pair of order 5(4), six right-hand sides a step; fields as in ``embedded_pair``."""
+
+    last: int = 6
+    free: int = 1  # b_2 = e_2 = d_2 = 0
+    exponent: float = 0.2 - 0.75 * 0.04
+    beta: float = 0.04
+    rejected: float = 0.2
+    # Stable up to 3.3 for decay and about 2.4 for a loaded contact that vibrates.
+    limit: float = 2.0
+
+
+DORMAND_PRINCE = DormandPrince()
 
 
 class Control(NamedTuple):
@@ -83,6 +102,7 @@ class Carry(NamedTuple):
     stiffness: NDArray[
         np.float64
     ]  # steps looked at, those held by stability, sum of their |eigenvalue| [1/s]
+    pair: Any = DORMAND_PRINCE
 
 
 class Tally(NamedTuple):
@@ -94,26 +114,52 @@ class Tally(NamedTuple):
     whirl: NDArray[np.float64]  # samples, sum and sum of squares of the cage centre's speed
 
 
+@stage_weight.body(DormandPrince)
+def _(pair, s, j):
+    return A[s, j]
+
+
+@stage_time.body(DormandPrince)
+def _(pair, s):
+    return C[s]
+
+
+@mean_rate.body(DormandPrince)
+def _(pair, rows, i):
+    return B1 * rows[0, i] + B3 * rows[2, i] + B4 * rows[3, i] + B5 * rows[4, i] + B6 * rows[5, i]
+
+
+@rate_error.body(DormandPrince)
+def _(pair, k, i):
+    return E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
+
+
+@quartic_rate.body(DormandPrince)
+def _(pair, k, i):
+    return D1 * k[0, i] + D3 * k[2, i] + D4 * k[3, i] + D5 * k[4, i] + D6 * k[5, i] + D7 * k[6, i]
+
+
 @kernel
-def interpolate(y, k, h, theta, i):
-    """Component ``i`` at the fraction ``theta`` of the step, fourth-order accurate; rollers' in the frame of the step."""
-    difference = h * (B1 * k[0, i] + B3 * k[2, i] + B4 * k[3, i] + B5 * k[4, i] + B6 * k[5, i])
+def interpolate(y, k, h, theta, i, pair=DORMAND_PRINCE):
+    """Component ``i`` at the fraction ``theta`` of the step, to the order of ``pair`` less one; rollers' in the frame of
+    the step.
+    """
+    difference = h * mean_rate(pair, k, i)
     slope = h * k[0, i] - difference
-    curve = difference - h * k[6, i] - slope
-    quartic = h * (D1 * k[0, i] + D3 * k[2, i] + D4 * k[3, i] + D5 * k[4, i] + D6 * k[5, i] + D7 * k[6, i])
+    curve = difference - h * k[pair.last, i] - slope
+    quartic = h * quartic_rate(pair, k, i)
     rest = 1.0 - theta
     return y[i] + theta * (difference + rest * (slope + theta * (curve + rest * quartic)))
 
 
 @kernel
-def scaled_error(k, i, inverse_tolerance):
+def scaled_error(pair, k, i, inverse_tolerance):
     """Embedded error of component ``i`` per step size, over its tolerance."""
-    e = E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
-    return e * inverse_tolerance[i]
+    return rate_error(pair, k, i) * inverse_tolerance[i]
 
 
 @kernel
-def error_norm(k, h, inverse_tolerance):
+def error_norm(pair, k, h, inverse_tolerance):
     """Norm of the embedded error: a sum of squares, so that any NaN comes through.
 
     Four sums side by side, in an order that does not depend on how the compiler vectorises.
@@ -122,21 +168,26 @@ def error_norm(k, h, inverse_tolerance):
     whole = n // 4 * 4
     sum_0 = sum_1 = sum_2 = sum_3 = 0.0
     for i in range(0, whole, 4):
-        e_0, e_1 = scaled_error(k, i, inverse_tolerance), scaled_error(k, i + 1, inverse_tolerance)
-        e_2, e_3 = scaled_error(k, i + 2, inverse_tolerance), scaled_error(k, i + 3, inverse_tolerance)
+        e_0, e_1 = (
+            scaled_error(pair, k, i, inverse_tolerance),
+            scaled_error(pair, k, i + 1, inverse_tolerance),
+        )
+        e_2, e_3 = (
+            scaled_error(pair, k, i + 2, inverse_tolerance),
+            scaled_error(pair, k, i + 3, inverse_tolerance),
+        )
         sum_0 += e_0 * e_0
         sum_1 += e_1 * e_1
         sum_2 += e_2 * e_2
         sum_3 += e_3 * e_3
     for i in range(whole, n):
-        e = scaled_error(k, i, inverse_tolerance)
+        e = scaled_error(pair, k, i, inverse_tolerance)
         sum_0 += e * e
     return h * math.sqrt((sum_0 + sum_1) + (sum_2 + sum_3))
 
 
-@kernel
-def stage_state(s, y, k, h, state):
-    """State at which stage ``s`` + 1 is evaluated. One pass a stage: rows of weight zero may hold anything."""
+@stage_state.body(DormandPrince)
+def _(pair, s, y, k, h, state):
     n = y.size
     w0, w1, w2, w3, w4, w5 = h * A[s, 0], h * A[s, 1], h * A[s, 2], h * A[s, 3], h * A[s, 4], h * A[s, 5]
     if s == 1:
@@ -162,13 +213,13 @@ def stage_state(s, y, k, h, state):
 
 
 @kernel
-def trial_step(bearing, y, k, stage, power, loads, scratch, rate, h):
-    """Stages 2 to 7 of a step of size ``h`` from ``y``, in a frame of ``rate``; the end state is left in ``stage``."""
-    # One loop of a length the compiler does not know: unrolled, six derivatives overflow the instruction cache.
+def trial_step(bearing, pair, y, k, stage, power, loads, scratch, rate, h):
+    """All stages but the first of a step of size ``h`` from ``y``, in a frame of ``rate``; the end state is left in ``stage``."""
+    # One loop of a length the compiler does not know: unrolled, the derivatives overflow the instruction cache.
     z = roller_count(bearing)
-    for s in range(1, k.shape[0]):
-        turn = turn_of(rate, C[s] * h)
-        stage_state(s, y, k, h, stage)
+    for s in range(1, pair.last + 1):
+        turn = turn_of(rate, stage_time(pair, s) * h)
+        stage_state(pair, s, y, k, h, stage)
         to_fixed_axes(turn, z, stage)
         derivative(bearing, stage, s, k, power, loads, scratch)
         rates_to_frame(turn, z, stage, s, k)
@@ -183,11 +234,11 @@ def begin_step(z, y, k):
 
 
 @routine
-def worst_component(k, h, inverse_tolerance):
+def worst_component(pair, k, h, inverse_tolerance):
     """Component that limits the step: the first that is not finite, else the one of the largest error."""
     worst, largest = 0, -1.0
     for i in range(inverse_tolerance.size):
-        e = abs(h * scaled_error(k, i, inverse_tolerance))
+        e = abs(h * scaled_error(pair, k, i, inverse_tolerance))
         if not math.isfinite(e):
             return i
         if e > largest:
@@ -195,98 +246,68 @@ def worst_component(k, h, inverse_tolerance):
     return worst
 
 
-@kernel
-def book_whirl(whirl, vx, vy):
-    """Take a sample of the velocity of the cage's centre [m/s]."""
-    square = vx * vx + vy * vy
-    whirl[0] += 1.0
-    whirl[1] += math.sqrt(square)
-    whirl[2] += square
-
-
-@routine
-def book_peak(values, start, h, tally):
-    """Keep the largest of pocket loads at even points of a step of ``h`` [s] from ``start`` on, or the vertex of the
-    parabola through it and its neighbours, where it is larger than any before.
-    """
-    best, place, spacing = 0.0, 0, 1.0 / (values.size - 1)
-    for p in range(values.size):
-        if values[p] > best:
-            best, place = values[p], p
-    theta = place * spacing
-    if 0 < place < values.size - 1:
-        left, right = values[place - 1], values[place + 1]
-        bend = left - 2.0 * best + right
-        if bend < 0.0:
-            shift = 0.5 * (left - right) / bend
-            best -= 0.25 * (left - right) * shift
-            theta += shift * spacing
-    if best > tally.largest[POCKET_LOAD]:
-        tally.largest[POCKET_LOAD] = best
-        tally.largest_time[POCKET_LOAD] = start + theta * h
-
-
 @routine
 def refine_peak(bearing, carry, h, tally):
     """Look inside a step for its largest pocket load: eight points, then the vertex of a parabola."""
+    pair = carry.pair
     values = np.empty(PEAK_POINTS + 2)
     inside = np.empty_like(carry.y)
     values[0] = carry.loads[0, POCKET_LOAD]
-    values[PEAK_POINTS + 1] = carry.loads[6, POCKET_LOAD]
+    values[PEAK_POINTS + 1] = carry.loads[pair.last, POCKET_LOAD]
     spacing = 1.0 / (PEAK_POINTS + 1)
     for p in range(1, PEAK_POINTS + 1):
         for i in range(carry.y.size):
-            inside[i] = interpolate(carry.y, carry.k, h, p * spacing, i)
+            inside[i] = interpolate(carry.y, carry.k, h, p * spacing, i, pair)
         to_fixed_axes(turn_of(carry.clock[4], p * spacing * h), bearing.rollers, inside)
-        derivative_once(bearing, inside, FREE_ROW, carry.k, carry.power, carry.loads, carry.scratch)
-        values[p] = carry.loads[1, POCKET_LOAD]
+        derivative_once(bearing, inside, pair.free, carry.k, carry.power, carry.loads, carry.scratch)
+        values[p] = carry.loads[pair.free, POCKET_LOAD]
     book_peak(values, carry.clock[0], h, tally)
 
 
 @kernel
-def keep(body, y, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step):
+def keep(pair, body, y, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step):
     """Book an accepted step: work, largest loads, samples; the cage's coordinates stand from ``body`` on.
 
     Returns whether a stage saw a new largest pocket load.
     """
     for p in range(POWERS):
-        work[p] += h * (
-            B1 * power[0, p] + B3 * power[2, p] + B4 * power[3, p] + B5 * power[4, p] + B6 * power[5, p]
-        )
+        work[p] += h * mean_rate(pair, power, p)
     time = clock[0]
     suspected = 0.0
-    for s in range(1, 7):
+    for s in range(1, pair.last + 1):
         suspected = max(suspected, loads[s, POCKET_LOAD])
     for force in range(LOADS):
-        if loads[6, force] > largest[force]:
-            largest[force] = loads[6, force]
+        if loads[pair.last, force] > largest[force]:
+            largest[force] = loads[pair.last, force]
             largest_time[force] = time + h
     while clock[3] <= time + h:
         theta = (clock[3] - time) / h
-        vx = interpolate(y, k, h, theta, body + CAGE_VX)
-        vy = interpolate(y, k, h, theta, body + CAGE_VY)
+        vx = interpolate(y, k, h, theta, body + CAGE_VX, pair)
+        vy = interpolate(y, k, h, theta, body + CAGE_VY, pair)
         book_whirl(whirl, vx, vy)
         clock[3] += sample_step
     return suspected > largest[POCKET_LOAD]
 
 
 @routine
-def look_at_stiffness(k, stiffness, h, inverse_tolerance):
-    """Book whether stability holds the step: |eigenvalue| = |k_7 - k_6|/|y_7 - y_6| over the tolerances, both at the end
-    of the step (Hairer and Wanner, Solving ODEs II, IV.2).
+def look_at_stiffness(pair, k, stiffness, h, inverse_tolerance):
+    """Book whether stability holds the step: |eigenvalue| = |difference of rates|/|difference of states| over the
+    tolerances, of the last two stages, both at the end of the step (Hairer and Wanner, Solving ODEs II, IV.2).
     """
+    last = pair.last
     rates = places = 0.0
     for i in range(inverse_tolerance.size):
-        rate = (k[6, i] - k[5, i]) * inverse_tolerance[i]
+        rate = (k[last, i] - k[last - 1, i]) * inverse_tolerance[i]
         place = 0.0
-        for s in range(6):
-            if A[6, s] != A[5, s]:
-                place += (A[6, s] - A[5, s]) * k[s, i]
+        for s in range(last):
+            weight = stage_weight(pair, last, s) - stage_weight(pair, last - 1, s)
+            if weight != 0.0:
+                place += weight * k[s, i]
         place *= h * inverse_tolerance[i]
         rates += rate * rate
         places += place * place
     stiffness[0] += 1.0
-    if h * h * rates > STABILITY_LIMIT * STABILITY_LIMIT * places > 0.0:
+    if h * h * rates > pair.limit * pair.limit * places > 0.0:
         stiffness[1] += 1.0
         stiffness[2] += math.sqrt(rates / places)
 
@@ -302,7 +323,7 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
     y, k, stage, clock, counts = carry.y, carry.k, carry.stage, carry.clock, carry.counts
     power, loads, scratch = carry.power, carry.loads, carry.scratch
     work, largest, largest_time, whirl = tally.work, tally.largest, tally.largest_time, tally.whirl
-    inverse_tolerance = control.inverse_tolerance
+    inverse_tolerance, pair = control.inverse_tolerance, carry.pair
     z = roller_count(bearing)
     if counts[2] == 0:
         derivative_once(bearing, y, FIRST_ROW, k, power, loads, scratch)
@@ -319,28 +340,30 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
         remaining = t_end - clock[0]
         last = clock[1] >= remaining
         h = remaining if last else clock[1]
-        trial_step(bearing, y, k, stage, power, loads, scratch, clock[4], h)
-        counts[2] += 6
-        error = error_norm(k, h, inverse_tolerance)
+        trial_step(bearing, pair, y, k, stage, power, loads, scratch, clock[4], h)
+        counts[2] += pair.last
+        error = error_norm(pair, k, h, inverse_tolerance)
         if error <= 1.0:
             if counts[0] % LOOK_EVERY == 0:
-                look_at_stiffness(k, carry.stiffness, h, inverse_tolerance)
-            if keep(5 * z, y, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step):
+                look_at_stiffness(pair, k, carry.stiffness, h, inverse_tolerance)
+            if keep(
+                pair, 5 * z, y, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step
+            ):
                 refine_peak(bearing, carry, h, tally)
                 counts[2] += PEAK_POINTS
             counts[0] += 1
-            rates_to_fixed_axes(turn_of(clock[4], h), z, stage, 6, k)
+            rates_to_fixed_axes(turn_of(clock[4], h), z, stage, pair.last, k)
             clock[0] = t_end if last else clock[0] + h
             for i in range(y.size):
                 y[i] = stage[i]
-                k[0, i] = k[6, i]
+                k[0, i] = k[pair.last, i]
             for p in range(POWERS):
-                power[0, p] = power[6, p]
+                power[0, p] = power[pair.last, p]
             for force in range(LOADS):
-                loads[0, force] = loads[6, force]
+                loads[0, force] = loads[pair.last, force]
             clock[4] = begin_step(z, y, k)
             error = max(error, 1e-4)
-            factor = SAFETY * error**-EXPONENT * clock[2] ** BETA
+            factor = SAFETY * error**-pair.exponent * clock[2] ** pair.beta
             # A step cut short by t_end says nothing against the step it was cut from.
             proposal = min(h * min(max(factor, SHRINK), grow), control.largest_step)
             clock[1] = max(proposal, clock[1]) if last else proposal
@@ -349,9 +372,9 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
         else:
             counts[1] += 1
             finite = math.isfinite(error)
-            shrink = max(SAFETY * error**-0.2, SHRINK) if finite else SHRINK
+            shrink = max(SAFETY * error**-pair.rejected, SHRINK) if finite else SHRINK
             if h * shrink < control.smallest_step:
-                counts[3] = worst_component(k, h, inverse_tolerance)
+                counts[3] = worst_component(pair, k, h, inverse_tolerance)
                 return STEP_UNDERFLOW if finite else NOT_FINITE
             clock[1] = h * shrink
             grow = 1.0

@@ -17,7 +17,14 @@ from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing
 from rbdyn.dynamics.error_bars import error_notes, quantities, settled
 from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
-from rbdyn.dynamics.method import advance_by, cheaper_method, stiffness_cost, stiffness_notes
+from rbdyn.dynamics.method import (
+    EXPLICIT,
+    advance_by,
+    cheaper_method,
+    pair_of,
+    stiffness_cost,
+    stiffness_notes,
+)
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_lanes import scratch
@@ -72,6 +79,7 @@ class Run:
             clock=np.array([0.0, first_step, PI_START_ERROR, 0.0, 0.0]),
             counts=np.zeros(4, dtype=np.int64),
             stiffness=np.zeros(3),
+            pair=pair_of(numerics.method),
         )
         self.tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
         self.sample_step = scene.turn_s / numerics.samples_per_turn
@@ -139,7 +147,7 @@ class Run:
             return f"{where}: {component} is not finite at any step size; check the laws that act on it"
         return (
             f"{where}: step budget of {self.control.step_budget} used up (last step {self.carry.clock[1]:.2g} s); "
-            f"{'take numerics.method = auto, ' if self.scene.numerics.method == 'rk45' else ''}raise "
+            f"{'take numerics.method = auto, ' if self.scene.numerics.method in EXPLICIT else ''}raise "
             "numerics.step_budget_per_turn, loosen numerics.rtol, or soften the stiffest law"
         )
 
