@@ -1,8 +1,13 @@
 """The study that joins the steps.
 
 - ``design``: the points of the study and what they can tell
-- ``runs``, ``store``: design runs, kept as they end
-- ``surfaces``, ``front``, ``confirmation``: from runs to a confirmed pick
+- ``runs``, ``surfaces``: design runs, simulated or of a table, and the surfaces through them
+- ``goals``, ``front``, ``drawn``, ``predicted``: the front on the surfaces, how sure it is, what it promises
+- ``direct``: the front of the simulator itself
+- ``picks``, ``confirmation``: points worth a simulation, and whether what they gain is real
+- ``widest``, ``chains``: tolerances that keep the gains, and the parts
+- ``simulations``, ``runner``, ``store``, ``owner``, ``cluster``, ``failure``: where points run and how they are kept
+- ``status``, ``finished``: where a study stands
 - ``reference``: a published table beside
 - ``whole``: all of it in one go
 """
