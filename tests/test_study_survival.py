@@ -45,6 +45,8 @@ def start(study: Path, out: Path, seconds: float, workers: int, **how) -> subpro
     """The design in a process of its own, on simulations that take so long."""
     program = Path(__file__).with_name("instant_runs.py")
     command = [sys.executable, str(program), str(seconds), str(study), str(out), str(workers)]
+    # Where the tests run in the background of a shell, Ctrl-C is switched off and that is inherited.
+    how = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler), **how}
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how)
 
 
