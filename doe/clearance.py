@@ -105,9 +105,9 @@ def confirmation_scene(study: Study, point: Array) -> Scene:
     return scene_at(study, read_scene(study), point, seed, overrides)
 
 
-def direct_scene(study: Study, point: Array, number: int) -> Scene:
-    """Scene of an evaluation of the direct front: few turns, a seed of its own."""
-    direct = study.file.direct
+def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
+    """A scene an evaluation of the direct front (n, k), numbered from ``first``: few turns, a seed of its own."""
+    data, direct = read_scene(study), study.file.direct
     overrides = [
         *study.file.scene.set,
         f"numerics.replicates={direct.replicates}",
@@ -116,7 +116,10 @@ def direct_scene(study: Study, point: Array, number: int) -> Scene:
         "numerics.companion=false",
         *direct.set,
     ]
-    return scene_at(study, read_scene(study), point, direct.seed + DIRECT_SEEDS + number, overrides)
+    return [
+        scene_at(study, data, point, direct.seed + DIRECT_SEEDS + number, overrides)
+        for number, point in enumerate(points, first)
+    ]
 
 
 def run_scenes(

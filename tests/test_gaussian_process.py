@@ -9,8 +9,9 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from doe.designs import central_composite
+from doe.designs.replicates import replicate_groups
 from doe.response_surface import fit
-from doe.response_surface.comparison import compare, point_groups
+from doe.response_surface.comparison import compare
 from doe.response_surface.gaussian_process import fit_gaussian
 from doe.response_surface.surface import model_matrix
 
@@ -99,7 +100,7 @@ def test_replicates_leave_together():
     values = bent(POINTS)
 
     def watched(rows):
-        seen.append(point_groups(POINTS)[rows])
+        seen.append(replicate_groups(POINTS)[rows])
         return refit_of(POINTS, values, "linear")(rows)
 
     compare(POINTS, values, watched, name="y")

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from test_runge_kutta import fixed_step, run_of, slope_of, vibrating
+from test_runge_kutta import one_step, orders_of, run_of, slope_of, vibrating
 
 from rbdyn.dynamics import kutta_pair as pair
 from rbdyn.dynamics import runge_kutta as rk
@@ -80,21 +80,8 @@ def test_oracle_stability():
 def test_rate_order_four(make_scene, conservative):
     """Rate: the error over a smooth stretch falls with the fourth power of the step; a fit between 3.6 and 5.2."""
     scene = conservative.model_copy(update={"numerics": make_scene(RK43).numerics})
-    duration, steps = 3.2e-5, np.array([3.2e-5 / n for n in (32, 48, 64, 96)])
-    reference = fixed_step(scene, duration / 1024, duration)
-    errors = np.array([np.abs(fixed_step(scene, h, duration) - reference) for h in steps])
-    for kind in (slice(0, 20), slice(20, 40)):  # positions, velocities
-        assert 3.6 < slope_of(steps, errors[:, kind].max(axis=1)) < 5.2
-
-
-def one_step(bearing, y, h, evaluate):
-    """One step in Python from the module's table, in fixed axes: stages and end state."""
-    k = np.empty((5, y.size))
-    k[0] = evaluate(bearing, y).dy
-    for s in range(1, 5):
-        end = y + h * pair.A[s, :s] @ k[:s]
-        k[s] = evaluate(bearing, end).dy
-    return k, end
+    for order in orders_of(scene):
+        assert 3.6 < order < 5.2
 
 
 def test_rate_dense_output(conservative, evaluate):
@@ -103,7 +90,7 @@ def test_rate_dense_output(conservative, evaluate):
     y, steps = run.carry.y.copy(), np.array([4e-6, 2.8e-6, 2e-6, 1.4e-6])
 
     def inside(h, theta):
-        k, end = one_step(run.bearing, y, h, evaluate)
+        k, end = one_step(run.bearing, y, h, evaluate, pair.A)
         return np.array([rk.interpolate.py_func(y, k, h, theta, i, KUTTA) for i in range(y.size)]), end
 
     assert inside(4e-6, 0.0)[0] == pytest.approx(y, abs=1e-14)

@@ -382,10 +382,7 @@ values = st.one_of(
 )  # fmt: skip
 
 
-@given(
-    section=st.sampled_from([*SECTIONS]),
-    draw=st.data(),
-)
+@given(section=st.sampled_from([*SECTIONS]), draw=st.data())
 @settings(max_examples=300, deadline=None)
 def test_invariant_anything_is_taken_or_refused_in_sentences(section, draw):
     """Invariant: any value of any key gives a scene or an InputError that names a key, never another exception."""

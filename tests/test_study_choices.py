@@ -100,17 +100,18 @@ def test_direct_front_asks_for_the_same_runs_again_and_survives_failures(tmp_pat
     assert list(record["pick"]["factors"]) == study.factors
     assert list(record["front"][0]["errors"]) == study.responses
 
-    usual = clearance.direct_scene
+    usual = clearance.direct_scenes
 
-    def some_break(study, point, number):
-        scene = usual(study, point, number)
-        if number % 5:
-            return scene
-        return scene.model_copy(
-            update={"numerics": scene.numerics.model_copy(update={"step_budget_per_turn": 2})}
-        )
+    def some_break(study, points, first):
+        scenes = usual(study, points, first)
+        for row in range(0, len(scenes), 5):
+            scene = scenes[row]
+            scenes[row] = scene.model_copy(
+                update={"numerics": scene.numerics.model_copy(update={"step_budget_per_turn": 2})}
+            )
+        return scenes
 
-    monkeypatch.setattr(clearance, "direct_scene", some_break)
+    monkeypatch.setattr(clearance, "direct_scenes", some_break)
     with Store(tmp_path / "other.sqlite") as store:
         evaluate = Evaluator(study, simulations(store), silent, 10)
         values, errors = evaluate(np.tile(study.baseline, (10, 1)))

@@ -16,10 +16,10 @@ from scipy import stats
 from doe.designs.design import Region
 from doe.designs.model import term_columns
 from doe.designs.region import directions, lattice, moment_matrix, sample
+from doe.designs.replicates import replicate_groups
 
 Array = NDArray[np.float64]
 
-SAME_POINT = 1e-9  # coded units within which two runs are replicates
 SIGNIFICANCE = 0.05  # of the tests whose power is given
 RADII = 11  # of the variance dispersion graph
 
@@ -165,9 +165,8 @@ def _inflation(matrix: Array, covariance: Array, terms: Sequence[str]) -> dict[s
 
 
 def _degrees_of_freedom(points: Array, groups: NDArray[np.intp], terms: int, blocks: int) -> dict[str, int]:
-    labelled = np.round(np.column_stack([points, groups]) / SAME_POINT)
     residual = len(points) - terms - blocks
-    pure = len(points) - len(np.unique(labelled, axis=0))
+    pure = len(points) - len(np.unique(replicate_groups(points, groups)))
     return {
         "model": terms - 1,
         "blocks": blocks,

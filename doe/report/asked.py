@@ -6,6 +6,7 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any
 
 from doe.designs import to_actual
+from doe.report.confirmation import or_none
 from doe.study.design import evaluation
 from doe.study.goals import known_tolerances, region_of
 
@@ -77,7 +78,7 @@ def _responses(outcome: Outcome, row: int | None) -> dict[str, Any]:
         return {}
     runs = outcome.runs
     return {
-        name: {"value": float(value), "error": None if error != error else float(error)}
+        name: {"value": float(value), "error": or_none(error)}
         for name, value, error in zip(
             outcome.study.responses, runs.values[row], runs.errors[row], strict=True
         )

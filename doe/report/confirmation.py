@@ -85,8 +85,8 @@ def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:
     return {
         response: {
             "value": value,
-            "statistical_error": _or_none(statistical),
-            "numerical_error": _or_none(numerical),
+            "statistical_error": or_none(statistical),
+            "numerical_error": or_none(numerical),
         }
         for response, value, statistical, numerical in zip(study.responses, *columns, strict=True)
     }
@@ -100,5 +100,6 @@ def _point(study: Study, point: Array, values: Array, errors: Array) -> dict[str
     }
 
 
-def _or_none(value: float) -> float | None:
+def or_none(value: float) -> float | None:
+    """A number for JSON; None for what is not known."""
     return None if np.isnan(value) else float(value)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from doe.report.answer import answer_text
 from doe.report.fit import fit_tables
-from doe.report.front import front_record
 from doe.report.html import html_report
 from doe.report.markdown import markdown_report
 from doe.report.summary import summary
@@ -31,15 +30,12 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     from doe import clearance
     from doe.report import plots
 
-    study, front = outcome.study, outcome.front
+    study, record = outcome.study, summary(outcome)
     (folder / "summary.json").unlink(missing_ok=True)
     tables = {
         "design_runs.csv": _runs_table(outcome),
         **fit_tables(outcome.surfaces),
-        "front.csv": [
-            {**point["factors"], **point["responses"]}
-            for point in front_record(study, outcome.surfaces, front)["front"]
-        ],
+        "front.csv": [{**point["factors"], **point["responses"]} for point in record["front"]["front"]],
         "confirmation.csv": _confirmation_table(outcome),
         "part_dimensions.csv": [
             {"chain": name, "part": part.name, **_dimension(part)}
@@ -59,7 +55,6 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
     motions = clearance.histories(study, points, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
-    record = summary(outcome)
     texts = {
         "report.html": html_report(record, clearance.motion_record(motions)),
         "report.md": markdown_report(record, pictures),

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from doe.designs.replicates import replicate_groups
 from doe.response_surface.least_squares import LeastSquares
 
 Array = NDArray[np.float64]
-
-SAME_POINT = 1e-9  # coded units within which two runs are replicates
 
 
 class AnovaRow(TypedDict):
@@ -83,13 +82,6 @@ def anova(
             p=None,
         ),
     ]
-
-
-def replicate_groups(points: Array, block: NDArray[np.int64]) -> NDArray[np.int64]:
-    """For each run the first run at the same point of the same block, shape (n,)."""
-    apart = np.abs(points[:, None, :] - points[None, :, :]).max(axis=2)
-    first: NDArray[np.int64] = ((apart <= SAME_POINT) & (block[:, None] == block[None, :])).argmax(axis=1)
-    return first
 
 
 def sum_within(values: Array, weights: Array, group: NDArray[np.int64]) -> float:

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
+from doe.designs.replicates import replicate_groups
 from doe.response_surface.gaussian_process import THREADS, fit_gaussian
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-SAME_POINT = 1e-9  # coded units within which two runs are replicates
 # More points than these are left out in groups.
 MOST_SINGLY, FOLDS = 60, 20
 # Leverage of a point, all its replicates together, from which on the polynomial is a guess without it.
@@ -75,7 +75,7 @@ def compare(
     points, response = np.asarray(coded, float), np.asarray(values, float)
     errors = None if standard_errors is None else np.asarray(standard_errors, float)
     whole = fit_gaussian(points, response, name=name, standard_errors=errors, seed=seed)
-    group = point_groups(points)
+    group = replicate_groups(points)
     leverage = np.zeros(len(points)) if matrix is None else _leverage(np.asarray(matrix, float))
     means, misses = [], []
     firsts = np.unique(group)
@@ -123,13 +123,6 @@ def compare(
         "recommended": "gaussian_process" if low > 0.0 else "polynomial",
         "sentence": _sentence(name, compared, scores[0]["loo_rmse"], scores[1]["loo_rmse"], low, high),
     }
-
-
-def point_groups(points: Array) -> Rows:
-    """For each run (n, k) the first run at the same point, shape (n,)."""
-    apart = np.abs(points[:, None, :] - points[None, :, :]).max(axis=2)
-    groups: Rows = (apart <= SAME_POINT).argmax(axis=1)
-    return groups
 
 
 def _folds(firsts: Rows, seed: int) -> list[Rows]:

@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from doe.designs.model import model_terms
-from doe.response_surface.anova import AnovaRow, anova, complement, find, ratio, replicate_groups, sum_within
+from doe.designs.replicates import replicate_groups
+from doe.response_surface.anova import AnovaRow, anova, complement, find, ratio, sum_within
 from doe.response_surface.canonical import Canonical, StationaryPoint, canonical, stationary_point
 from doe.response_surface.data import Data, check_errors, check_matrix, checked
 from doe.response_surface.diagnostics import Diagnostics, diagnose, press

@@ -61,14 +61,9 @@ class Evaluator:
         """Responses (n, m) and their standard errors (n, m) at points (n, k) in factor units; NaN where a run failed."""
         from doe import clearance
 
-        numbers = range(self.done, self.done + len(points))
-        scenes = [
-            clearance.direct_scene(self._study, point, number)
-            for point, number in zip(points, numbers, strict=True)
-        ]
-        results = self._simulations.run(
-            scenes, [f"direct run {number + 1}" for number in numbers], self._watch
-        )
+        scenes = clearance.direct_scenes(self._study, points, self.done)
+        labels = [f"direct run {self.done + row}" for row in range(1, len(points) + 1)]
+        results = self._simulations.run(scenes, labels, self._watch)
         self.done += len(points)
         values = np.full((len(points), len(self._study.responses)), np.nan)
         errors, samples = values.copy(), np.zeros(values.shape, dtype=np.int64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -33,22 +33,22 @@ def grouped(failures: Iterable[Failure]) -> list[dict[str, Any]]:
 
     Causes that differ in their numbers only are one; the first of them stands for all.
     """
-    groups: dict[str, list[Failure]] = {}
-    for failure in failures:
-        groups.setdefault(without_numbers(failure.cause), []).append(failure)
     return [
         {
             "cause": group[0].cause,
             "runs": [failure.run for failure in group if failure.run is not None],
             "labels": [failure.label for failure in group],
         }
-        for group in sorted(groups.values(), key=len, reverse=True)
+        for group in sorted(alike(failures, lambda failure: failure.cause), key=len, reverse=True)
     ]
 
 
-def without_numbers(text: str) -> str:
-    """What two sentences that differ in their numbers only have in common."""
-    return _NUMBER.sub("#", text)
+def alike(items: Iterable[T], text: Callable[[T], str]) -> list[list[T]]:
+    """Items whose texts differ in their numbers only, together."""
+    groups: dict[str, list[T]] = {}
+    for item in items:
+        groups.setdefault(_NUMBER.sub("#", text(item)), []).append(item)
+    return list(groups.values())
 
 
 def sentence(failures: Sequence[Failure]) -> str:

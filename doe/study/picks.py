@@ -30,7 +30,8 @@ class Choice:
 def choices(study: Study, front: ParetoFront, direct: Direct | None) -> dict[str, Choice]:
     """The pick, then the picks by the other rules and of the direct front, by name.
 
-    Where the study asks for a tolerance-aware front, its pick is the pick. Of those that the drawing cannot tell apart the first stands for all, and its reason says so.
+    Where the study asks for a tolerance-aware front, its pick is the pick. Of those that the drawing cannot tell apart
+    the first stands for all, and its reason says so.
     """
     found: dict[str, Choice] = {}
     for name, point, reason in _candidates(study, front, direct):

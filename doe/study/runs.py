@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from doe.designs import Design, to_actual, to_coded
 from doe.designs.model import model_terms
 from doe.study.design import check_runs, design_of
-from doe.study.failure import Failure, sentence, successes, without_numbers
+from doe.study.failure import Failure, alike, sentence, successes
 from doe.study_file import Study
 from rbdyn.faults import RunError
 
@@ -107,12 +107,9 @@ def run_design(
 
 def _told_once(notes: Iterable[str]) -> list[str]:
     """Notes of all runs; of those that differ in their numbers only the first, and how many there are."""
-    alike: dict[str, list[str]] = {}
-    for note in notes:
-        alike.setdefault(without_numbers(note), []).append(note)
     return [
         group[0] if len(set(group)) == 1 else f"{group[0]} (so or similarly {len(group)} runs)"
-        for group in alike.values()
+        for group in alike(notes, str)
     ]
 
 

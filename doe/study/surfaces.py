@@ -56,11 +56,7 @@ def with_rivals(surfaces: Sequence[Surface], seed: int = 1) -> list[Surface]:
 
     It takes of the order of a second a response. ``rival`` stays None where too few points can be left out.
     """
-    from threadpoolctl import threadpool_limits
-
-    # Threads of their own cost more than they give on matrices of a few dozen runs.
-    with threadpool_limits(1):
-        return [_with_rival(surface, seed) for surface in surfaces]
+    return [_with_rival(surface, seed) for surface in surfaces]
 
 
 def _with_rival(surface: Surface, seed: int) -> Surface:

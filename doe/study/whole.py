@@ -142,7 +142,7 @@ def _checked(study: Study) -> Runs | None:
     check_runs(study, design)
     clearance.design_scenes(study, to_actual(design.coded, study.centre, study.step), design.order.tolist())
     clearance.confirmation_scene(study, study.baseline)
-    clearance.direct_scene(study, study.baseline, 0)
+    clearance.direct_scenes(study, study.baseline[None], 0)
     check_chains(study)
     return reference_runs(study)
 
