@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from doe.study.design import check_runs, design_of
 from doe.study.failure import Failure, alike, sentence, successes
 from doe.study_file import Study
 from rbdyn.faults import RunError
+
+if TYPE_CHECKING:
+    from rbdyn.scene import Scene
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -62,6 +66,34 @@ def design_points(study: Study) -> Array:
     return design_of(study).coded
 
 
+@dataclass(frozen=True)
+class Ordered:
+    """The design runs as they are to be simulated: coded and actual factors (n, k), and of each run its scene, its label
+    and its factors by name."""
+
+    design: Design
+    actual: Array
+    scenes: list[Scene]
+    labels: list[str]
+    factors: list[dict[str, float]]
+
+
+def ordered_runs(study: Study) -> Ordered:
+    """Every run of the study's design. Raises InputError when the design, a scene or a response is impossible."""
+    from doe import clearance
+
+    clearance.check_responses(study)
+    design = design_of(study)
+    actual = to_actual(design.coded, study.centre, study.step)
+    return Ordered(
+        design,
+        actual,
+        clearance.design_scenes(study, actual, design.order.tolist()),
+        [f"design run {run}" for run in range(1, len(actual) + 1)],
+        [dict(zip(study.factors, point.tolist(), strict=True)) for point in actual],
+    )
+
+
 def run_design(
     study: Study,
     folder: Path,
@@ -77,17 +109,19 @@ def run_design(
     from doe import clearance
     from doe.study.store import Store
 
-    clearance.check_responses(study)
-    design = design_of(study)
+    asked = ordered_runs(study)
+    design, coded, actual = asked.design, asked.design.coded, asked.actual
     check_runs(study, design)
-    coded = design.coded
-    actual = to_actual(coded, study.centre, study.step)
-    scenes = clearance.design_scenes(study, actual, design.order.tolist())
-    labels = [f"design run {run + 1}" for run in range(len(scenes))]
-    factors = [dict(zip(study.factors, point.tolist(), strict=True)) for point in actual]
     with Store(folder / STORE, study.path.stem) as store:
         results = clearance.run_scenes(
-            scenes, labels, store, workers, progress, scheduler, retry=retry, factors=factors
+            asked.scenes,
+            asked.labels,
+            store,
+            workers,
+            progress,
+            scheduler,
+            retry=retry,
+            factors=asked.factors,
         )
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]

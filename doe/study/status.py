@@ -8,10 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from doe.designs import to_actual
-from doe.study.design import design_of
 from doe.study.failure import Failure, grouped
-from doe.study.runs import STORE
+from doe.study.runs import STORE, ordered_runs
 from doe.study.store import Claim, EndedRun, Point, Store
 from doe.study_file import Study
 
@@ -22,12 +20,8 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
     """Record of ``doe status``. Changes nothing, not even while the study runs. Raises InputError."""
     from doe import clearance
 
-    clearance.check_responses(study)
-    design = design_of(study)
-    actual = to_actual(design.coded, study.centre, study.step)
-    factors = [dict(zip(study.factors, point.tolist(), strict=True)) for point in actual]
-    scenes = clearance.design_scenes(study, actual, design.order.tolist())
-    points = clearance.points_of(scenes, [f"design run {run + 1}" for run in range(len(scenes))], factors)
+    asked = ordered_runs(study)
+    points = clearance.points_of(asked.scenes, asked.labels, asked.factors)
     if not (folder / STORE).exists():
         return _record(study, folder, points, {}, [], [])
     with Store(folder / STORE, read_only=True) as store:

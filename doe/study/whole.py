@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.designs import to_actual
 from doe.study.chains import check_chains, solve_chains
 from doe.study.confirmation import Confirmed, Gain, confirm, gains
 from doe.study.design import check_runs, design_of
@@ -21,7 +20,7 @@ from doe.study.finished import inputs_digest
 from doe.study.front import find_front
 from doe.study.picks import choices
 from doe.study.reference import Beside, beside, reference_runs
-from doe.study.runs import STORE, Progress, Runs, run_design
+from doe.study.runs import STORE, Progress, Runs, ordered_runs, run_design
 from doe.study.simulations import Simulations
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study_file import Study
@@ -137,10 +136,7 @@ def _checked(study: Study) -> Runs | None:
     """The published runs, if any. Whatever can be refused is refused here, before anything runs. Raises InputError."""
     from doe import clearance
 
-    clearance.check_responses(study)
-    design = design_of(study)
-    check_runs(study, design)
-    clearance.design_scenes(study, to_actual(design.coded, study.centre, study.step), design.order.tolist())
+    check_runs(study, ordered_runs(study).design)
     clearance.confirmation_scene(study, study.baseline)
     clearance.direct_scenes(study, study.baseline[None], 0)
     check_chains(study)
