@@ -95,8 +95,9 @@ def student_half_width(values: Array) -> float | None:
     return float(student_factor(count - 1) * values.std(ddof=1) / math.sqrt(count))
 
 
-def student_factor(freedom: int) -> float:
-    """The t that holds 95 % of Student's distribution with ``freedom`` > 0 degrees of freedom between -t and t.
+def student_factor(freedom: int, level: float = 0.95) -> float:
+    """The t that holds the share ``level`` of Student's distribution with ``freedom`` > 0 degrees of freedom between
+    -t and t.
 
     Bisection of the finite sums of Abramowitz and Stegun, eq 26.7.3 and 26.7.4, in theta = atan(t/sqrt(freedom)).
     """
@@ -113,7 +114,7 @@ def student_factor(freedom: int) -> float:
     low, high = 0.0, 0.5 * math.pi
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if held(middle) < 0.95 else (low, middle)
+        low, high = (middle, high) if held(middle) < level else (low, middle)
     return math.sqrt(freedom) * math.tan(0.5 * (low + high))
 
 

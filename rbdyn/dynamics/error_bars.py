@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from rbdyn.dynamics.bias import compare
+from rbdyn.dynamics.drift import drifts
 from rbdyn.dynamics.metrics import (
     CAGE_SLIP,
     CAGE_SPEED,
@@ -55,8 +56,11 @@ def quantities(
 ) -> dict[str, Quantity]:
     """Every figure with its errors, by the name it has in a record."""
     comparison = compare(runs, companions, scene.numerics.rtol) if companions else None
+    steady = scene.operation.schedule is None
+    found = drifts(runs) if steady else {}
     return {
-        name: quantity(figure, runs, companions, comparison, unit) for name, (figure, unit) in FIGURES.items()
+        name: quantity(figure, runs, companions, comparison, found[name].bias if name in found else 0.0, unit)
+        for name, (figure, unit) in FIGURES.items()
     }
 
 

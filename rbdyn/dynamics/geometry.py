@@ -19,6 +19,10 @@ from rbdyn.scene import Scene
 # stability, the explicit method leaves the whole tolerance in every contact in every step, and contacts lose it: in a
 # slow bearing that must stay small beside what rolling loses. The implicit method damps it.
 SPEED_SHARES = {"rk45": 0.05, "rk43": 0.05, "rosenbrock": 1.0}
+# Tolerance of the cage's speeds over that of a contact's. Only impacts change them, in two or three explicit steps each,
+# which damp an impact where the races alone rule the steps: with it impact and whirl of the bearing of Chen et al. 2022
+# are off by -0.14 +- 0.12 and -0.1 +- 0.4 % in 1970 right-hand sides of rk43 a turn, without it by -0.3 and -0.9 % in 1550.
+CAGE_SHARES = {"rk45": 0.01, "rk43": 0.01, "rosenbrock": 1.0}
 
 
 @dataclass(frozen=True)
@@ -159,7 +163,8 @@ def absolute_tolerance(
 
     In a slow bearing the contact speed is at most the method's share of the speed of the faster race, and the approach
     shrinks with it. The spin of a roller counts by the slip it makes, at most the scale of the traction curve at the load
-    of the most loaded roller (Stribeck). Infinite for the clock, which the method integrates exactly.
+    of the most loaded roller (Stribeck). Speeds of the cage count by the method's share of a contact's. Infinite for the
+    clock, which the method integrates exactly.
     """
     scale, state = scales(scene), layout_of(scene)
     speed = min(scale.speed, SPEED_SHARES[method] * fastest_surface(scene))
@@ -167,8 +172,8 @@ def absolute_tolerance(
     slip = min(speed, slip_scale(bearing, 5.0 * scale.load))
     roller, cage = 0.5e-3 * scene.bearing.roller_diameter_mm, 0.5e-3 * scene.bearing.pitch_diameter_mm
     rollers = np.repeat([length, length, speed, speed, slip / roller], state.rollers)
-    positions, speeds = [length, length], [speed, speed]
-    bodies = [*positions, length / cage, *speeds, speed / cage, *positions, *speeds]
+    positions, speeds, own = [length, length], [speed, speed], CAGE_SHARES[method] * speed
+    bodies = [*positions, length / cage, own, own, own / cage, *positions, *speeds]
     bodies += [*positions, *speeds] if state.support is not None else []
     clock = [math.inf] * 3 if state.clock is not None else []
     return rtol * np.concatenate((rollers, np.array(bodies + clock)))

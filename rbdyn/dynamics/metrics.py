@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -183,11 +184,13 @@ def quantity(
     runs: Sequence[Replicate],
     companions: Sequence[Replicate],
     comparison: Comparison | None,
+    drift_bias: float,
     unit: float = 1.0,
 ) -> Quantity:
     """A figure with its 95 % errors, times ``unit``.
 
-    Statistical: batch means over all replicates (``rbdyn.dynamics.batch_means``). Numerical: of the power loss what
+    Statistical: batch means over all replicates (``rbdyn.dynamics.batch_means``) and, as root sum of squares, the
+    ``drift_bias`` that the counted turns show (``rbdyn.dynamics.drift``). Numerical: of the power loss what
     the power balance misses, of all else from companions and how they ``compare`` (``rbdyn.dynamics.bias``). None where
     it was not estimated.
     """
@@ -198,5 +201,6 @@ def quantity(
     elif comparison is not None:
         theirs = estimate([figure.moments(run) for run in companions], figure.of_sums)
         numerical = companion_error(ours, theirs, comparison)
-    statistical, numerical = (None if x is None else unit * x for x in (ours.half_width, numerical))
+    statistical = None if ours.half_width is None else math.hypot(ours.half_width, drift_bias)
+    statistical, numerical = (None if x is None else unit * x for x in (statistical, numerical))
     return Quantity(unit * ours.value, statistical, numerical, ours.effective_samples)

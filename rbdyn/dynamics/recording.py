@@ -1,16 +1,16 @@
-"""One replicate recorded in equal batches of about a shaft turn, from its start to its end."""
+"""One replicate recorded in equal batches of about a shaft turn, from its start as far as it goes."""
 
 from __future__ import annotations
 
 import math
 import time
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.energy import mechanical_energy
-from rbdyn.dynamics.equations import LOADS, POWERS
 from rbdyn.dynamics.geometry import raceway_radii, scales
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.state import CAGE_ANGLE
@@ -25,69 +25,112 @@ BATCH_TURNS = 1.0
 MOST_BATCHES = 20_000
 
 
-def batch_ends(scene: Scene) -> tuple[NDArray[np.float64], int, int]:
-    """Ends of the batches [shaft turns], how many of them end the warm-up, and how many make an impact window.
+@dataclass(frozen=True)
+class Batches:
+    """How a run is cut: ends of the warm-up's batches [shaft turns], length of all others, how many make an impact window.
 
-    A whole number of batches fits an impact window; the last may be shorter.
+    A whole number of batches fits an impact window.
     """
+
+    warm_up: NDArray[np.float64]
+    length: float
+    per_window: int
+
+    @property
+    def first(self) -> int:
+        """Batches of the warm-up."""
+        return len(self.warm_up)
+
+    @property
+    def window(self) -> float:
+        """Length of an impact window [shaft turns]."""
+        return self.length * self.per_window
+
+    def ends(self, counted: float) -> NDArray[np.float64]:
+        """Ends of all batches [shaft turns] of a run of so many turns after the warm-up; the last may be shorter."""
+        begin = float(self.warm_up[-1]) if self.first else 0.0
+        count = math.ceil(counted / self.length - 1e-9)
+        after = np.minimum(np.arange(1, count + 1) * self.length, counted)
+        return np.concatenate((self.warm_up, begin + after))
+
+
+def batches_of(scene: Scene) -> Batches:
+    """How the scene's runs are cut."""
     numerics, window = scene.numerics, scene.impact_window_turns
     shortest = max(BATCH_TURNS, numerics.turns / MOST_BATCHES)
     per_window = max(round(window / shortest), 1)
     length = window / per_window
     warm_up = numerics.warm_up_turns
     first = math.ceil(warm_up / max(length, warm_up / MOST_BATCHES) - 1e-9) if warm_up else 0
-    counted = math.ceil(numerics.turns / length - 1e-9)
-    before = warm_up * np.arange(1, first + 1) / max(first, 1)
-    after = np.minimum(np.arange(1, counted + 1) * length, numerics.turns)
-    return np.concatenate((before, warm_up + after)), first, per_window
+    return Batches(warm_up * np.arange(1, first + 1) / max(first, 1), length, per_window)
+
+
+class Recording:
+    """A run under way and what is kept of it, batch by batch; it can always go on."""
+
+    def __init__(self, run: Run) -> None:
+        self.run, self.batches = run, batches_of(run.scene)
+        self._begin = run.clock_angles()
+        self._ends, self._booked = [0.0], list[tuple[NDArray[np.float64], ...]]()
+        self._looks = [self._look()]
+        self._cpu_s = 0.0
+
+    def to(self, counted: float) -> Replicate:
+        """Go on until so many turns after the warm-up [shaft turns]. Raises RunError or CancelledError."""
+        started = time.thread_time()
+        run, tally = self.run, self.run.tally
+        ends = self.batches.ends(counted)
+        run.allow(float(ends[-1]))
+        for end in ends[len(self._booked) :]:
+            if len(self._booked) == self.batches.first:
+                run.forget()
+            run.to(float(end))
+            self._booked.append((tally.whirl.copy(), tally.work.copy(), tally.largest.copy()))
+            for kept in (tally.whirl, tally.work, tally.largest):
+                kept[:] = 0.0
+            self._ends.append(float(end))
+            self._looks.append(self._look())
+        self._cpu_s += time.thread_time() - started
+        return self.replicate
+
+    @property
+    def replicate(self) -> Replicate:
+        """What is kept so far, counted from the end of the warm-up."""
+        run, scale = self.run, scales(self.run.scene)
+        whirl, work, largest = (np.array(kept) for kept in zip(*self._booked, strict=True))
+        cage, rolling, energy = np.array(self._looks).T
+        return Replicate(
+            first=self.batches.first,
+            per_window=self.batches.per_window,
+            durations=np.diff(self._ends) * run.scene.turn_s,
+            whirl=whirl,
+            work=work,
+            largest=largest,
+            cage_angle=np.diff(cage),
+            kinematic_angle=np.diff(rolling),
+            energy=energy,
+            energy_scale=scale.load * scale.length,
+            accepted_steps=int(run.carry.counts[0]),
+            rejected_steps=int(run.carry.counts[1]),
+            derivatives=int(run.carry.counts[2]),
+            cpu_s=self._cpu_s,
+            method=run.method,
+            stiffness=run.carry.stiffness.copy(),
+        )
+
+    def _look(self) -> tuple[float, float, float]:
+        """Cage angle, kinematic cage angle [rad] and mechanical energy [J] as they stand."""
+        run = self.run
+        return (
+            float(run.carry.y[5 * run.bearing.rollers + CAGE_ANGLE]),
+            kinematic_cage_angle(run.scene, self._begin, run.clock_angles()),
+            sum(mechanical_energy(run.bearing, run.carry.y)),
+        )
 
 
 def record(run: Run) -> Replicate:
-    """Run to the end, batch by batch. Raises RunError or CancelledError."""
-    started = time.thread_time()
-    scene, tally = run.scene, run.tally
-    ends, first, per_window = batch_ends(scene)
-    count, angle = len(ends), 5 * run.bearing.rollers + CAGE_ANGLE
-    whirl, work, largest = np.empty((count, 3)), np.empty((count, POWERS)), np.empty((count, LOADS))
-    cage, rolling = np.empty(count + 1), np.empty(count + 1)
-    # Looked at only where the count may begin or ends.
-    energy = np.full(count + 1, np.nan)
-    begin = run.clock_angles()
-
-    def look(place: int) -> None:
-        cage[place] = run.carry.y[angle]
-        rolling[place] = kinematic_cage_angle(scene, begin, run.clock_angles())
-        if place in (first, count) or scene.numerics.discard_turns == "auto":
-            energy[place] = sum(mechanical_energy(run.bearing, run.carry.y))
-
-    look(0)
-    for batch, end in enumerate(ends):
-        if batch == first:
-            run.forget()
-        run.to(end)
-        for kept, series in ((tally.whirl, whirl), (tally.work, work), (tally.largest, largest)):
-            series[batch] = kept
-            kept[:] = 0.0
-        look(batch + 1)
-    scale = scales(scene)
-    return Replicate(
-        first=first,
-        per_window=per_window,
-        durations=np.diff(ends, prepend=0.0) * scene.turn_s,
-        whirl=whirl,
-        work=work,
-        largest=largest,
-        cage_angle=np.diff(cage),
-        kinematic_angle=np.diff(rolling),
-        energy=energy,
-        energy_scale=scale.load * scale.length,
-        accepted_steps=int(run.carry.counts[0]),
-        rejected_steps=int(run.carry.counts[1]),
-        derivatives=int(run.carry.counts[2]),
-        cpu_s=time.thread_time() - started,
-        method=run.method,
-        stiffness=run.carry.stiffness.copy(),
-    )
+    """Run for the turns of its scene. Raises RunError or CancelledError."""
+    return Recording(run).to(run.scene.numerics.turns)
 
 
 def kinematic_cage_angle(scene: Scene, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.bias import companion_tolerance
 from rbdyn.dynamics.energy import mechanical_energy
 from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing
-from rbdyn.dynamics.error_bars import error_notes, quantities, settled
+from rbdyn.dynamics.error_bars import error_notes, quantities
 from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
 from rbdyn.dynamics.method import (
     EXPLICIT,
@@ -29,7 +28,7 @@ from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_lanes import scratch
 from rbdyn.dynamics.race_report import race_report
-from rbdyn.dynamics.recording import record
+from rbdyn.dynamics.recording import Recording, record
 from rbdyn.dynamics.runge_kutta import (
     FINISHED,
     NOT_FINITE,
@@ -39,6 +38,7 @@ from rbdyn.dynamics.runge_kutta import (
     Control,
     Tally,
 )
+from rbdyn.dynamics.settling import Ensemble, run_until_settled
 from rbdyn.dynamics.start import start_state
 from rbdyn.dynamics.state import INNER_ANGLE, OUTER_ANGLE, name
 from rbdyn.faults import RunError
@@ -103,6 +103,11 @@ class Run:
             LARGEST_STEP_TURNS * self.scene.turn_s,
             int(min(numerics.step_budget_per_turn * math.ceil(turns), 2**62)),
         )
+
+    def allow(self, turns: float) -> None:
+        """Let the budget of steps last for so many shaft turns since the start, at least."""
+        budget = int(min(self.scene.numerics.step_budget_per_turn * math.ceil(turns), 2**62))
+        self.control = self.control._replace(step_budget=max(self.control.step_budget, budget))
 
     def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""
@@ -198,42 +203,13 @@ def simulate(
         compile_s = prepare(scene, bearing)
         _prepared.add(laws)
     started = time.perf_counter()
-    runs, companions, fault = with_companions(scene, bearing, workers, progress, stop)
+
+    def recording(replicate: int, rtol: float, stop: Stop) -> Recording:
+        return Recording(Run(scene, bearing, replicate, rtol, stop))
+
+    ensemble = run_until_settled(scene, recording, workers, progress, stop)
     wall_s = time.perf_counter() - started
-    return _gather(scene, runs, companions, fault, wall_s, compile_s)
-
-
-def with_companions(
-    scene: Scene,
-    bearing: RollerBearing,
-    workers: int | None,
-    progress: Callable[[int, int], None] | None,
-    stop: Stop,
-) -> tuple[list[Replicate], list[Replicate], str | None]:
-    """Replicates, their companions, and why there are none of these although asked for.
-
-    Raises RunError when a replicate cannot go on, KeyboardInterrupt.
-    """
-    numerics = scene.numerics
-    total = numerics.replicates + numerics.companions
-
-    def after(before: int) -> Callable[[int, int], None] | None:
-        return None if progress is None else lambda done, _: progress(before + done, total)
-
-    (runs,) = run_series(scene, bearing, [numerics.rtol], workers, after(0), stop)
-    if not numerics.companions:
-        return runs, [], None
-    fewer = scene.model_copy(
-        update={"numerics": numerics.model_copy(update={"replicates": numerics.companions})}
-    )
-    rtol = companion_tolerance(numerics.rtol)
-    try:
-        (companions,) = run_series(
-            fewer, bearing, [rtol], workers, after(numerics.replicates), Stop(outer=stop)
-        )
-    except RunError as error:
-        return runs, [], f"a companion at numerics.rtol = {rtol:g} could not go on ({error})"
-    return runs, companions, None
+    return _gather(scene, ensemble, wall_s, compile_s)
 
 
 def run_series(
@@ -266,15 +242,12 @@ def run_series(
 
 def _gather(
     scene: Scene,
-    runs: list[Replicate],
-    companions: list[Replicate],
-    fault: str | None,
+    ensemble: Ensemble,
     wall_s: float,
     compile_s: float,
 ) -> SimulationResult:
+    runs, companions = ensemble.runs, ensemble.companions
     everything = [*runs, *companions]
-    per_run = scene.numerics.turns + scene.numerics.warm_up_turns
-    runs, companions, start = settled(scene, runs, companions)
     figures = quantities(scene, runs, companions)
     power_gap = max(run.power_gap for run in runs)
     inner_load, outer_load = (
@@ -298,7 +271,8 @@ def _gather(
         races=race_report(scene, inner_load, outer_load),
         clearance=clearance_report(scene),
         impact_window_turns=scene.impact_window_turns,
-        transient_turns=start.turns,
+        transient_turns=ensemble.transient_turns,
+        counted_turns=runs[0].duration / scene.turn_s,
         cost={
             "wall_s": wall_s,
             "compile_s": compile_s,
@@ -306,15 +280,15 @@ def _gather(
             "steps": sum(run.accepted_steps for run in everything),
             "rejected_steps": sum(run.rejected_steps for run in everything),
             "rhs_evaluations": sum(run.derivatives for run in everything),
-            "turns": per_run * len(everything),
+            "turns": sum(float(run.durations.sum()) for run in everything) / scene.turn_s,
             **stiffness_cost(runs),
         },
         replicates=scene.numerics.replicates,
         seed=scene.numerics.seed,
         notes=(
             *_notes(scene, power_gap),
-            *start.notes,
-            *error_notes(scene, figures, fault),
+            *ensemble.notes,
+            *error_notes(scene, figures, ensemble.fault),
             *stiffness_notes(scene, runs),
         ),
         versions=versions(),

@@ -13,7 +13,7 @@ from rbdyn.dynamics.equations import RollerBearing
 from rbdyn.dynamics.geometry import kinematics, layout_of
 from rbdyn.dynamics.race_form import form_at
 from rbdyn.dynamics.races import roller_radius
-from rbdyn.dynamics.state import CAGE_SPEED, CAGE_X, CAGE_Y, RING_X
+from rbdyn.dynamics.state import CAGE_ANGLE, CAGE_SPEED, CAGE_X, CAGE_Y, RING_X
 from rbdyn.kernel import entry, kernel, routine
 from rbdyn.scene import Scene
 
@@ -97,8 +97,10 @@ def static_share(bearing, angles, orbit_speed, load, radii):
 def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Generator) -> NDArray[np.float64]:
     """State at time zero.
 
-    Rollers stand within +-20 % of the pocket clearance of their pockets' middles and the cage a tenth of the guide
-    (or pocket) clearance off centre, both at random; all move as if they rolled without slip.
+    The cage stands at any angle, rollers within +-20 % of the pocket clearance of their pockets' middles and the cage a
+    tenth of the guide (or pocket) clearance off centre, all at random; all move as if they rolled without slip. With one
+    angle for all, replicates would share the passage of the rollers through the load zone, which no mean over them
+    takes away.
     """
     z = bearing.rollers
     state = layout_of(scene)
@@ -107,8 +109,9 @@ def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Gener
     motion = kinematics(scene, acting.inner_speed, acting.outer_speed)
     pitch_radius = 0.5e-3 * scene.bearing.pitch_diameter_mm
     pocket = 1e-3 * scene.cage.pocket_clearance_mm
-    angles = 2.0 * np.pi * np.arange(z) / z + generator.uniform(-0.2, 0.2, z) * pocket / pitch_radius
-    direction = generator.uniform(0.0, 2.0 * np.pi)
+    offsets = generator.uniform(-0.2, 0.2, z) * pocket / pitch_radius
+    direction, cage_angle = generator.uniform(0.0, 2.0 * np.pi, 2)
+    angles = cage_angle + 2.0 * np.pi * np.arange(z) / z + offsets
     offset = 0.1 * min(0.5e-3 * scene.cage.guide_clearance_mm, 0.5 * pocket)
     radii = np.empty(z)
     ring_x = static_share(bearing, angles, motion.cage_speed, acting.load_x, radii)
@@ -124,7 +127,7 @@ def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Gener
     )
     body = y[5 * z :]  # cage, ring and what the scene adds, which starts at rest at time zero
     body[CAGE_X], body[CAGE_Y] = offset * math.cos(direction), offset * math.sin(direction)
-    body[CAGE_SPEED] = motion.cage_speed
+    body[CAGE_ANGLE], body[CAGE_SPEED] = cage_angle, motion.cage_speed
     body[RING_X] = ring_x
     if state.support is not None:
         # All sits on the outer ring, which gives way under the load.

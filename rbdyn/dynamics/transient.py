@@ -29,10 +29,6 @@ FEWEST_GROUPS = 8
 # Standard errors by which the mean of a head must differ: the head is the worst of many, so more than the usual two or three.
 SIGNIFICANT = 4.0
 FEWEST_MEMORIES = 4.0
-UNSETTLED = (
-    "transient: figures still change in the later half of the run, so it is too short to tell a transient from slow "
-    "change; lengthen numerics.turns"
-)
 
 
 class Transient(NamedTuple):
@@ -118,15 +114,5 @@ def start_of_counting(scene: Scene, runs: Sequence[Replicate]) -> Start:
     if numerics.discard_turns == "auto":
         # An impact window at least must be left to count.
         first = min(found.batches, len(run.durations) - run.per_window)
-        return Start(first, turns, () if found.settled else (UNSETTLED,))
-    left = transient_of(runs, run.first)
-    if left is None or left == (0, True):
-        return Start(run.first, turns, ())
-    if not left.settled:
-        return Start(run.first, turns, (UNSETTLED,))
-    until = float(run.durations[: run.first + left.batches].sum()) / scene.turn_s
-    note = (
-        f"transient: figures still settle up to shaft turn {until:.0f}, and numerics.discard_turns = "
-        f"{numerics.discard_turns:g}; raise it, or set it to 'auto'"
-    )
-    return Start(run.first, turns, (note,))
+        return Start(first, turns, ())
+    return Start(run.first, turns, ())

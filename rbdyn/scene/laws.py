@@ -94,6 +94,10 @@ class Numerics(Strict):
     turns: Annotated[float, Field(gt=0.0, le=1e6)] = 100
     # "auto": what the series of the run show to be its transient, at least a batch; else so many turns.
     discard_turns: Annotated[float, Field(ge=0.0, le=1e6)] | Literal["auto"] = 20.0
+    # Where the figures of the counted turns drift, drop them and run on for as long as the run took so far, at most so
+    # many times the turns asked for in all (rbdyn.dynamics.settling); counted turns are filled up to whole windows.
+    extend: bool = True
+    extend_limit: Annotated[float, Field(ge=1.0, le=1000.0)] = 8.0
     replicates: Annotated[int, Field(ge=1, le=10000)] = 8
     seed: Annotated[int, Field(ge=0)] = 1
     # The largest force grows with the time one waits for it, so it is taken over windows of a fixed length.

@@ -1,0 +1,180 @@
+"""Replicates that run until their figures no longer drift.
+
+Where a figure drifts over the counted turns (``drift``), everything up to here is dropped and every replicate goes on for
+as long as it took so far, at most ``numerics.extend_limit`` times the turns asked for: the window doubles, so a slow
+regime is seen at last, and of a run that stops the turns dropped are no more than those counted. Companions run just as
+far. Nothing depends on the clock or on the number of threads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+from rbdyn.dynamics.bias import companion_tolerance
+from rbdyn.dynamics.drift import drifting
+from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+from rbdyn.dynamics.metrics import Replicate
+from rbdyn.dynamics.recording import Recording
+from rbdyn.dynamics.transient import start_of_counting
+from rbdyn.faults import RunError
+from rbdyn.scene import Scene
+
+
+class Stage(NamedTuple):
+    """Where replicates stand: from which batch they count, and the turns after the warm-up that they ran."""
+
+    first: int
+    turns: float
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Replicates and companions as they are counted, why there are no companions although asked for, shaft turns of the
+    transient (None where it cannot be told), and what a result has to say of its length."""
+
+    runs: list[Replicate]
+    companions: list[Replicate]
+    fault: str | None
+    transient_turns: float | None
+    notes: tuple[str, ...]
+
+
+# Makes the recording of a replicate at a tolerance.
+Start = Callable[[int, float, Stop], Recording]
+
+
+def run_until_settled(
+    scene: Scene,
+    start: Start,
+    workers: int | None,
+    progress: Callable[[int, int], None] | None,
+    stop: Stop,
+) -> Ensemble:
+    """Run the replicates of a scene, as far as it takes, then their companions just as far.
+
+    Raises RunError when a replicate cannot go on, KeyboardInterrupt.
+    """
+    numerics = scene.numerics
+    team = Team(
+        start, range(numerics.replicates), numerics.rtol, workers, stop, progress, numerics.companions
+    )
+    extends = numerics.extend and scene.operation.schedule is None
+    stage = Stage(-1, whole_windows(scene) if extends else numerics.turns)
+    begin = None
+    while True:
+        runs = team.to(stage.turns)
+        if begin is None:
+            begin = start_of_counting(scene, runs)
+            stage = stage._replace(first=begin.first)
+        runs = [run.counted_from(stage.first) for run in runs]
+        longer = next_stage(scene, runs, stage) if extends else None
+        if longer is None:
+            break
+        stage = longer
+    notes = (*begin.notes, *length_notes(scene, runs, stage, begin.first, extends))
+    if not numerics.companions:
+        return Ensemble(runs, [], None, begin.turns, notes)
+    rtol = companion_tolerance(numerics.rtol)
+    others = Team(start, range(numerics.companions), rtol, workers, Stop(outer=stop), progress, 0, team.done)
+    try:
+        companions = [run.counted_from(stage.first) for run in others.to(stage.turns)]
+    except RunError as error:
+        fault = f"a companion at numerics.rtol = {rtol:g} could not go on ({error})"
+        return Ensemble(runs, [], fault, begin.turns, notes)
+    return Ensemble(runs, companions, None, begin.turns, notes)
+
+
+class Team:
+    """Recordings that go on together, in threads. ``to_come``: runs of others that the progress counts too."""
+
+    def __init__(
+        self,
+        start: Start,
+        replicates: range,
+        rtol: float,
+        workers: int | None,
+        stop: Stop,
+        progress: Callable[[int, int], None] | None,
+        to_come: int,
+        done: int = 0,
+    ) -> None:
+        self._start, self._replicates, self._rtol = start, replicates, rtol
+        self._workers, self._stop, self._progress = workers, stop, progress
+        self._to_come, self.done = to_come, done
+        self._recordings: dict[int, Recording] = {}
+
+    def to(self, turns: float) -> list[Replicate]:
+        """All of them after so many turns past the warm-up. Raises RunError, KeyboardInterrupt."""
+        total = self.done + len(self._replicates) + self._to_come
+        runs: dict[int, Replicate] = {}
+
+        def go_on(replicate: int) -> Replicate:
+            if replicate not in self._recordings:
+                self._recordings[replicate] = self._start(replicate, self._rtol, self._stop)
+            return self._recordings[replicate].to(turns)
+
+        def ended(one: Ended[Replicate]) -> None:
+            runs[one.place] = one.result()
+            self.done += 1
+            if self._progress is not None:
+                self._progress(self.done, total)
+
+        run_all(
+            [partial(go_on, replicate) for replicate in self._replicates], self._workers, self._stop, ended
+        )
+        return [runs[place] for place in range(len(self._replicates))]
+
+
+def whole_windows(scene: Scene) -> float:
+    """The turns that a scene counts, filled up to whole impact windows."""
+    window = scene.impact_window_turns
+    return math.ceil(scene.numerics.turns / window - 1e-9) * window
+
+
+def next_stage(scene: Scene, runs: Sequence[Replicate], stage: Stage) -> Stage | None:
+    """How to go on from counted ``runs``: None where nothing drifts, or where that would pass the scene's limit.
+
+    Where ``discard_turns = "auto"`` left fewer turns than asked for, they are made up first.
+    """
+    numerics, turn_s, window = scene.numerics, scene.turn_s, scene.impact_window_turns
+    ran = numerics.warm_up_turns + stage.turns
+    limit = numerics.extend_limit * (numerics.warm_up_turns + numerics.turns)
+    missing = numerics.turns - runs[0].duration / turn_s
+    if missing > 1e-6 * numerics.turns:
+        longer = Stage(stage.first, stage.turns + math.ceil(missing / window - 1e-9) * window)
+    elif drifting(runs):
+        longer = Stage(len(runs[0].durations), stage.turns + math.ceil(ran / window - 1e-9) * window)
+    else:
+        return None
+    return longer if numerics.warm_up_turns + longer.turns <= limit * (1.0 + 1e-9) else None
+
+
+def length_notes(
+    scene: Scene, runs: Sequence[Replicate], stage: Stage, first: int, extends: bool
+) -> tuple[str, ...]:
+    """What a reader should know of how long the runs took and what is counted of them."""
+    numerics, turn_s = scene.numerics, scene.turn_s
+    notes = []
+    counted = runs[0].duration / turn_s
+    if stage.first != first:
+        dropped = float(runs[0].durations[: stage.first].sum()) / turn_s
+        notes.append(
+            f"length: figures drifted, so each replicate ran {dropped + counted:.4g} shaft turns in place of "
+            f"{numerics.warm_up_turns + numerics.turns:.4g}, of which the last {counted:.4g} count "
+            "(numerics.extend = false forbids it)"
+        )
+    if scene.operation.schedule is None and drifting(runs):
+        mend = (
+            "raise numerics.extend_limit"
+            if extends
+            else "lengthen numerics.turns or set numerics.extend = true"
+        )
+        notes.append(
+            f"transient: figures still drift over the {counted:.4g} turns counted; their errors hold what the drift shows, "
+            f"yet it may go farther; {mend}"
+        )
+    return tuple(notes)
