@@ -28,28 +28,25 @@ def book_point(values, point, loads, row):
 
 @routine
 def book_peaks(values, start, h, tally):
-    """Keep the peaks of both pocket loads, given at even points of a step of ``h`` [s] from ``start`` on."""
-    book_peak(values[0], start, h, tally, POCKET_LOAD)
-    book_peak(values[1], start, h, tally, POCKET_CONTACT_LOAD)
-
-
-@routine
-def book_peak(values, start, h, tally, force):
-    """Keep the largest of these loads, or the vertex of the parabola through it and its neighbours, where it is larger
-    than any before.
+    """Keep the peaks of both pocket loads, given at even points of a step of ``h`` [s] from ``start`` on: of each the
+    largest, or the vertex of the parabola through it and its neighbours, where it is larger than any before.
     """
-    best, place, spacing = 0.0, 0, 1.0 / (values.size - 1)
-    for p in range(values.size):
-        if values[p] > best:
-            best, place = values[p], p
-    theta = place * spacing
-    if 0 < place < values.size - 1:
-        left, right = values[place - 1], values[place + 1]
-        bend = left - 2.0 * best + right
-        if bend < 0.0:
-            shift = 0.5 * (left - right) / bend
-            best -= 0.25 * (left - right) * shift
-            theta += shift * spacing
-    if best > tally.largest[force]:
-        tally.largest[force] = best
-        tally.largest_time[force] = start + theta * h
+    last = values.shape[1] - 1
+    # Of a length that the compiler does not know: unrolled, this would be compiled twice.
+    for row in range(values.shape[0]):
+        force = POCKET_CONTACT_LOAD if row else POCKET_LOAD
+        best, place, spacing = 0.0, 0, 1.0 / last
+        for p in range(last + 1):
+            if values[row, p] > best:
+                best, place = values[row, p], p
+        theta = place * spacing
+        if 0 < place < last:
+            left, right = values[row, place - 1], values[row, place + 1]
+            bend = left - 2.0 * best + right
+            if bend < 0.0:
+                shift = 0.5 * (left - right) / bend
+                best -= 0.25 * (left - right) * shift
+                theta += shift * spacing
+        if best > tally.largest[force]:
+            tally.largest[force] = best
+            tally.largest_time[force] = start + theta * h
