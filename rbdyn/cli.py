@@ -228,8 +228,10 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
     def shown(error: float | None) -> str:
         return "not estimated" if error is None else f"± {error:.2g}"
 
+    contact = {"largest of it by contact alone, without the film [N]": result.impact_contact_force}
     figures = {
         f"largest roller/cage force in {result.impact_window_turns:g} shaft turns [N]": result.impact_force,
+        **({} if result.impact_contact_force == result.impact_force else contact),
         "whirl deviation ratio": result.whirl_deviation_ratio,
         "power loss [W]": result.power_loss,
         "cage speed [rpm]": result.cage_speed_rpm,

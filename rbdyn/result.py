@@ -16,7 +16,7 @@ from rbdyn.faults import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMAT = "rbdyn.simulation/2"
+FORMAT = "rbdyn.simulation/3"
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,8 @@ class Quantity:
 class SimulationResult:
     """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input.
 
-    ``races``: pressure, half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and
+    ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of
+    the contact alone; ``races``: pressure, half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and
     operating diametral clearance [um], with what fits, temperature and rotation take of it where a mounting is given;
     ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not tell;
     ``counted_turns``: those that each replicate counts, more than asked for where it was lengthened;
@@ -61,6 +62,7 @@ class SimulationResult:
 
     status: str
     impact_force: Quantity
+    impact_contact_force: Quantity
     whirl_deviation_ratio: Quantity
     power_loss: Quantity
     cage_speed_rpm: Quantity
@@ -89,6 +91,7 @@ class SimulationResult:
             "format": FORMAT,
             "status": self.status,
             "impact_force_N": self.impact_force.as_dict(),
+            "impact_contact_force_N": self.impact_contact_force.as_dict(),
             "whirl_deviation_ratio": self.whirl_deviation_ratio.as_dict(),
             "power_loss_W": self.power_loss.as_dict(),
             "cage_speed_rpm": self.cage_speed_rpm.as_dict(),
@@ -120,6 +123,7 @@ class SimulationResult:
         return cls(
             status=data["status"],
             impact_force=Quantity(**data["impact_force_N"]),
+            impact_contact_force=Quantity(**data["impact_contact_force_N"]),
             whirl_deviation_ratio=Quantity(**data["whirl_deviation_ratio"]),
             power_loss=Quantity(**data["power_loss_W"]),
             cage_speed_rpm=Quantity(**data["cage_speed_rpm"]),
@@ -149,6 +153,7 @@ class SimulationResult:
 
         figures = {
             "impact_force_N": self.impact_force,
+            "impact_contact_force_N": self.impact_contact_force,
             "whirl_deviation_ratio": self.whirl_deviation_ratio,
             "power_loss_W": self.power_loss,
             "cage_speed_rpm": self.cage_speed_rpm,

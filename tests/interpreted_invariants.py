@@ -15,7 +15,6 @@ from numpy_twin import cross
 
 from rbdyn.contact.hertz_line import SlicedLineContact, TiltedLineContact
 from rbdyn.contact.traction import MixedTraction
-from rbdyn.dynamics import equations
 from rbdyn.dynamics.cage_body import BalancedCage, UnbalancedCage, mass_centre
 from rbdyn.dynamics.clock import ClockedDrive
 from rbdyn.dynamics.drive import SteadyDrive, TwoSpeedDrive, action
@@ -179,13 +178,10 @@ def test_invariant_power_between_tilted_rings(made):
 @given(scenes())
 @settings(max_examples=100, deadline=None, derandomize=True)
 def test_invariant_no_loss_is_negative(made):
-    """Invariant: each law takes power from the motion, whatever the state; the film of a parting pocket may give some
-    of the work back that its pressure does.
-    """
+    """Invariant: each law takes power from the motion, whatever the state."""
     scene, seed = made
     found = right_hand_side(roller_bearing(scene), state_near_contact(scene, seed))
-    film = equations.LOSSES.index("pocket_film")
-    assert (np.delete(found.power[:SHAFT], film) >= 0.0).all()
+    assert (found.power[:SHAFT] >= 0.0).all()
     assert (found.loads >= 0.0).all()
 
 

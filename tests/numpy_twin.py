@@ -12,6 +12,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from film_oracle import quadrature_shape
 from numpy_twin_laws import (
     alpha_of,
     hunt_crossley,
@@ -152,11 +153,12 @@ def touch(scene, roller, cage, point, to_wall, along, approach):
 
 
 def film_on_wall(scene, roller, cage, point, to_wall, along, gap):
-    """Rigid cylinder on a plane in isoviscous oil, seen from axes that turn with the plane. Returns the power lost."""
+    """Rigid cylinder on a plane in isoviscous oil, seen from axes that turn with the plane. Returns (push, power lost)."""
     laws = scene.model
     radius = 0.5e-3 * scene.bearing.roller_diameter_mm
     h = max(gap, laws.pocket_film_floor_um * 1e-6)
-    weight = laws.pocket_fill * oil_of(scene).viscosity * scene.bearing.roller_length_mm * 1e-3
+    length = scene.cage.pocket_contact_length_mm or scene.bearing.roller_length_mm
+    weight = laws.pocket_fill * oil_of(scene).viscosity * length * 1e-3
 
     def seen(body, place):
         """Velocity of a body at a place, less that of the roller's centre, in axes that turn with the cage."""
@@ -167,10 +169,11 @@ def film_on_wall(scene, roller, cage, point, to_wall, along, gap):
     round_speed, plane_speed = seen(roller, point), seen(cage, point)
     entrainment = 0.5 * (round_speed + plane_speed)
     closing = float((roller.velocity - cage.velocity_at(roller.centre)) @ to_wall)
-    push = 4.895 * weight * abs(entrainment) * radius / h
-    push += 3.0 * math.sqrt(2.0) * math.pi * weight * (radius / h) ** 1.5 * max(closing, 0.0)
-    couette = math.pi * weight * math.sqrt(2.0 * radius / h) * (plane_speed - round_speed)
-    held = 4.60 * weight * entrainment * math.sqrt(radius / h)
+    slender = math.sqrt(2.0 * radius / h)
+    pressed, rolled, sheared = quadrature_shape(entrainment, slender * closing)
+    push = 24.0 * weight * radius / h * pressed
+    couette = weight * slender * sheared * (plane_speed - round_speed)
+    held = 6.0 * weight * slender * rolled
 
     film = Body(cage.centre, (0.0, 0.0), 0.0)
     before = roller.force, roller.moment
@@ -183,27 +186,27 @@ def film_on_wall(scene, roller, cage, point, to_wall, along, gap):
         film.push(-force, place)
     cage.force, cage.moment = cage.force + film.force, cage.moment + film.moment
     force, moment = roller.force - before[0], roller.moment - before[1]
-    return (
-        -float(force @ roller.velocity - force @ cage.velocity)
-        - moment * roller.spin
-        - film.moment * cage.spin
-    )
+    lost = -float(force @ roller.velocity - force @ cage.velocity)
+    return push, lost - moment * roller.spin - film.moment * cage.spin
 
 
 def pocket(scene, roller, cage, radius, mid_line):
-    """One pocket: walls, films, lips. Returns (load, powers in friction, damping, film)."""
+    """One pocket: walls, films, lips. Returns (force on a wall, contact load, powers in friction, damping, film)."""
     if scene.model.pocket == "off":
-        return np.zeros(4)
+        return np.zeros(5)
     # Pocket and lips are cut for the nominal roller.
     larger = radius - 0.5e-3 * scene.bearing.roller_diameter_mm
-    half, laws, result = 0.5e-3 * scene.cage.pocket_clearance_mm - larger, scene.model, np.zeros(4)
+    half, laws, result = 0.5e-3 * scene.cage.pocket_clearance_mm - larger, scene.model, np.zeros(5)
     floor = laws.pocket_film_floor_um * 1e-6 if laws.pocket_film else 0.0
     for to_wall in (turned(mid_line), -turned(mid_line)):
         gap = half - float((roller.centre - cage.centre) @ to_wall)
         point = roller.centre + radius * to_wall
         load, friction, damping = touch(scene, roller, cage, point, to_wall, mid_line, floor - gap)
-        film = film_on_wall(scene, roller, cage, point, to_wall, mid_line, gap) if laws.pocket_film else 0.0
-        result = np.array((max(result[0], load), *np.add(result[1:], (friction, damping, film))))
+        push, film = 0.0, 0.0
+        if laws.pocket_film:
+            push, film = film_on_wall(scene, roller, cage, point, to_wall, mid_line, gap)
+        on_wall, contact = max(result[0], load + push), max(result[1], load)
+        result = np.array((on_wall, contact, *np.add(result[2:], (friction, damping, film))))
     if scene.cage.lip_clearance_mm is not None:
         play, orbit = 0.5e-3 * scene.cage.lip_clearance_mm - larger, 0.5 * sum(raceways(scene))
         for side in (1.0, -1.0):
@@ -212,7 +215,7 @@ def pocket(scene, roller, cage, radius, mid_line):
             load, friction, damping = touch(
                 scene, roller, cage, point, side * mid_line, turned(mid_line), height - play
             )
-            result = np.array((max(result[0], load), *np.add(result[1:], (friction, damping, 0.0))))
+            result = np.array((*np.maximum(result[:2], load), *np.add(result[2:], (friction, damping, 0.0))))
     return result
 
 
@@ -306,13 +309,13 @@ def twin(scene: Scene, y: Any) -> Twin:
     inner = Body(inner_state[:2], inner_state[2:], shaft, inner_angle)
     outer = Body(ring[:2], ring[2:], operation.outer_speed_rpm * math.pi / 30.0, outer_angle)
 
-    power, loads, dy = np.zeros(len(POWERS)), np.zeros(4), np.zeros(y.size)
+    power, loads, dy = np.zeros(len(POWERS)), np.zeros(5), np.zeros(y.size)
     for j in range(z):
         roller = Body(y[[j, z + j]], y[[2 * z + j, 3 * z + j]], y[4 * z + j])
         angle = cage.angle + 2.0 * math.pi * j / z
         wall = pocket(scene, roller, cage, radii[j], np.array([math.cos(angle), math.sin(angle)]))
-        loads[0] = max(loads[0], wall[0])
-        power[4:7] += wall[1:]
+        loads[[0, 4]] = np.maximum(loads[[0, 4]], wall[:2])
+        power[4:7] += wall[2:]
         for term, body, encloses in ((0, outer, True), (1, inner, False)):
             load, slipping, rolling, damping = race(scene, mass, body, roller, radii[j], encloses)
             loads[1 + term] = max(loads[1 + term], load)

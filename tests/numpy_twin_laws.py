@@ -125,7 +125,8 @@ def race_load(scene, encloses, approach, azimuth):
 
 def wall_load(scene, approach):
     """Elastic load on a pocket wall or lip: indentation plus bending of the bar make up the approach."""
-    k = palmgren_stiffness(scene, "roller", "cage", scene.bearing.effective_length_mm * 1e-3)
+    length = scene.cage.pocket_contact_length_mm or scene.bearing.effective_length_mm
+    k = palmgren_stiffness(scene, "roller", "cage", length * 1e-3)
     bar = scene.model.pocket_bar_stiffness_N_m
     if bar == "rigid":
         return k * approach ** (10.0 / 9.0)

@@ -259,6 +259,14 @@ ADDED_FAULTS = {
             "cage.pocket_clearance_mm",
         ),
     ),
+    "pocket contact longer than the roller": (
+        {"cage.pocket_contact_length_mm": 5.5},
+        ("cage.pocket_contact_length_mm = 5.5", "no more than the roller of 5 mm", "shorten it"),
+    ),
+    "pocket contact of no length": (
+        {"cage.pocket_contact_length_mm": 0.0},
+        ("cage.pocket_contact_length_mm = 0.0", "greater than 0"),
+    ),
     "times that do not rise": (
         {"operation.schedule": {**SCHEDULE, "time_s": [1.0, 0.5]}},
         ("operation.schedule.time_s", "0.5 s (point 2) follows 1 s", "sort them"),

@@ -18,6 +18,7 @@ from rbdyn.dynamics.equations import (
     LOADS,
     LOSSES,
     OUTER_LOAD,
+    POCKET_CONTACT_LOAD,
     POCKET_LOAD,
     POWERS,
     SHAFT,
@@ -32,10 +33,12 @@ from rbdyn.result import Quantity, SimulationResult
 
 # The contract of `rbdyn simulate --json`; more keys may be added.
 KEYS = {
-    "format", "status", "impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip",
+    "format", "status", "impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip",
     "power_balance", "power_terms_W", "loads", "cost", "replicates", "seed", "versions", "transient_turns", "target",
 }  # fmt: skip
-QUANTITIES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
+QUANTITIES = (
+    "impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip",
+)  # fmt: skip
 COST_KEYS = {"wall_s", "compile_s", "steps", "rejected_steps", "rhs_evaluations", "turns"}
 
 
@@ -113,7 +116,7 @@ def test_unit_json_keys_and_values(outer_result):
     """Unit: keys, their form, and plain JSON without NaN."""
     record = json.loads(json.dumps(outer_result.as_dict(), allow_nan=False))
     assert record.keys() >= KEYS
-    assert (record["format"], record["status"]) == ("rbdyn.simulation/2", "ok")
+    assert (record["format"], record["status"]) == ("rbdyn.simulation/3", "ok")
     for name in QUANTITIES:
         assert record[name].keys() == {"value", "statistical_error", "numerical_error", "effective_samples"}
     assert record["power_balance"].keys() >= {"relative_gap"}
@@ -129,6 +132,8 @@ def test_literature_plausible_figures(outer_result):
     """Literature: the size of the paper's responses: 150 to 260 N, 380 to 484 W, kinematic cage speed; loads 674 N and up."""
     # Four turns are no statistic, and the traction law is not theirs: orders of magnitude.
     assert 20.0 < outer_result.impact_force.value < 500.0
+    # Without a film the contact is all there is on a wall.
+    assert outer_result.impact_contact_force == outer_result.impact_force
     assert 150.0 < outer_result.power_loss.value < 600.0
     assert abs(outer_result.cage_slip.value) < 0.02
     assert outer_result.power_gap < 0.005
@@ -322,6 +327,7 @@ def test_unit_replicate_figures(outer):
     work[:, 0], work[:, 2], work[:, SHAFT] = 1.5, 0.5, 2.5
     loads = np.zeros((2, LOADS))
     loads[:, POCKET_LOAD] = 10.0, 20.0
+    loads[:, POCKET_CONTACT_LOAD] = 8.0, 3.0
     run = record_of(
         [1.0],
         outer,
@@ -333,6 +339,7 @@ def test_unit_replicate_figures(outer):
         kinematic_angle=np.full(2, kinematics(outer).cage_speed),
     )
     assert (run.impact_force, run.power_loss) == (15.0, 2.0)
+    assert list(run.contact_windows) == [8.0, 3.0] and list(run.impact_windows) == [10.0, 20.0]
     assert run.power("outer_race_traction") == 1.5
     assert run.power_gap == pytest.approx(0.02)
     assert run.cage_slip == pytest.approx(0.5)

@@ -9,7 +9,7 @@
 - ``film_thickness``: thickness of that film, its lambda ratio, the share that asperities bear
 - ``point_film``: the same for the ellipse of a ball, and the film's stiffness
 - ``film``: rolling resistance of the lubricated line contact; the short-journal film
-- ``pocket_film``: wedge, squeeze and shear between a roller and a pocket wall
+- ``pocket_film``: wedge and squeeze in one film, and shear, between a roller and a pocket wall
 
 Conventions: approach is positive when surfaces overlap, its rate positive when they close, loads are
 non-negative. A slip is the surface speed of the ring (or cage) minus that of the roller; the traction on the

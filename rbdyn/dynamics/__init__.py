@@ -19,7 +19,7 @@ Compiled:
 Results:
 - ``method``: which of them integrates a run; ``ensemble``: runs side by side
 - ``simulate``: replicates, workers, error bars; ``metrics``: impact force, whirl deviation ratio, power loss
-- ``race_report``: pressure, half-width and film of each race
+- ``race_report``: pressure, half-width and film of each race; ``left_out``: what the model leaves out, with estimates
 - ``history``, ``observe``: every motion and contact over time, on request
 - ``orbit``, ``lyapunov``: what the cage does; ``life``, ``rating``, ``slice_loads``: ISO/TS 16281
 

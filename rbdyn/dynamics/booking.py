@@ -1,10 +1,10 @@
-"""What every method keeps of a step: samples of the cage's speed, and the largest pocket load within it."""
+"""What every method keeps of a step: samples of the cage's speed, and the largest pocket loads within it."""
 
 from __future__ import annotations
 
 import math
 
-from rbdyn.dynamics.equations import POCKET_LOAD
+from rbdyn.dynamics.equations import POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.kernel import kernel, routine
 
 PEAK_POINTS = 8  # interior points at which a step that holds a new largest pocket load is looked at
@@ -19,23 +19,34 @@ def book_whirl(whirl, vx, vy):
     whirl[2] += square
 
 
+@kernel
+def book_point(values, point, loads, row):
+    """Take the pocket loads in row ``row`` as those at a point of a step."""
+    values[0, point] = loads[row, POCKET_LOAD]
+    values[1, point] = loads[row, POCKET_CONTACT_LOAD]
+
+
 @routine
-def book_peak(values, start, h, tally):
-    """Keep the largest of pocket loads at even points of a step of ``h`` [s] from ``start`` on, or the vertex of the
-    parabola through it and its neighbours, where it is larger than any before.
+def book_peaks(values, start, h, tally):
+    """Keep the peaks of both pocket loads, given at even points of a step of ``h`` [s] from ``start`` on: of each the
+    largest, or the vertex of the parabola through it and its neighbours, where it is larger than any before.
     """
-    best, place, spacing = 0.0, 0, 1.0 / (values.size - 1)
-    for p in range(values.size):
-        if values[p] > best:
-            best, place = values[p], p
-    theta = place * spacing
-    if 0 < place < values.size - 1:
-        left, right = values[place - 1], values[place + 1]
-        bend = left - 2.0 * best + right
-        if bend < 0.0:
-            shift = 0.5 * (left - right) / bend
-            best -= 0.25 * (left - right) * shift
-            theta += shift * spacing
-    if best > tally.largest[POCKET_LOAD]:
-        tally.largest[POCKET_LOAD] = best
-        tally.largest_time[POCKET_LOAD] = start + theta * h
+    last = values.shape[1] - 1
+    # Of a length that the compiler does not know: unrolled, this would be compiled twice.
+    for row in range(values.shape[0]):
+        force = POCKET_CONTACT_LOAD if row else POCKET_LOAD
+        best, place, spacing = 0.0, 0, 1.0 / last
+        for p in range(last + 1):
+            if values[row, p] > best:
+                best, place = values[row, p], p
+        theta = place * spacing
+        if 0 < place < last:
+            left, right = values[row, place - 1], values[row, place + 1]
+            bend = left - 2.0 * best + right
+            if bend < 0.0:
+                shift = 0.5 * (left - right) / bend
+                best -= 0.25 * (left - right) * shift
+                theta += shift * spacing
+        if best > tally.largest[force]:
+            tally.largest[force] = best
+            tally.largest_time[force] = start + theta * h

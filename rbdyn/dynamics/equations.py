@@ -54,9 +54,9 @@ LOSSES = (
 SHAFT = len(LOSSES)
 LOAD = SHAFT + 1
 POWERS = SHAFT + 2
-# Extremes, in the order of the load vector.
-POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD = range(4)
-LOADS = 4
+# Extremes, in the order of the load vector. On a pocket wall: contact and film together, and contact alone.
+POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD = range(5)
+LOADS = 5
 
 
 class RollerBearing(NamedTuple):
@@ -161,7 +161,8 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     # A long chain of roots and quotients: begun first, it runs beside what follows.
     land = guide_forces(bearing.guide, cage, inner, outer)
     tick(bearing.drive, acting, row, dy)
-    cage_fx = cage_fy = cage_moment = pocket_load = pocket_friction = pocket_damping = pocket_film = 0.0
+    cage_fx = cage_fy = cage_moment = pocket_friction = pocket_damping = pocket_film = 0.0
+    pocket_load = contact_load = 0.0
     drag_loss = drag_forces(bearing.drag, z, y, row, dy)
     for i in range(2 * z):
         dy[row, i] = y[2 * z + i]
@@ -179,7 +180,8 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
         cage_fx -= wall[0]
         cage_fy -= wall[1]
         cage_moment += wall[3]
-        pocket_load = max(pocket_load, wall[4])
+        pocket_load = max(pocket_load, abs(wall[8]))
+        contact_load = max(contact_load, wall[4])
         pocket_friction += wall[5]
         pocket_damping += wall[6]
         pocket_film += wall[7]
@@ -241,6 +243,7 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     loads[row, OUTER_LOAD] = on_outer[3]
     loads[row, INNER_LOAD] = on_inner[3]
     loads[row, LAND_LOAD] = land.load
+    loads[row, POCKET_CONTACT_LOAD] = contact_load
 
 
 @routine

@@ -10,6 +10,7 @@ from rbdyn.dynamics.drift import drifts
 from rbdyn.dynamics.metrics import (
     CAGE_SLIP,
     CAGE_SPEED,
+    IMPACT_CONTACT_FORCE,
     IMPACT_FORCE,
     POWER_LOSS,
     WHIRL_DEVIATION_RATIO,
@@ -22,6 +23,7 @@ from rbdyn.scene import Scene
 
 FIGURES = {
     "impact_force_N": (IMPACT_FORCE, 1.0),
+    "impact_contact_force_N": (IMPACT_CONTACT_FORCE, 1.0),
     "whirl_deviation_ratio": (WHIRL_DEVIATION_RATIO, 1.0),
     "power_loss_W": (POWER_LOSS, 1.0),
     "cage_speed_rpm": (CAGE_SPEED, 30.0 / math.pi),

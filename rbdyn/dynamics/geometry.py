@@ -97,12 +97,17 @@ def roller_radii(scene: Scene) -> NDArray[np.float64] | None:
     return 0.5e-3 * bearing.roller_diameter_mm + 0.5e-6 * np.array(errors_um)
 
 
+def cage_rim_diameter(scene: Scene) -> float:
+    """Diameter of the estimated cage body on the side away from the land [mm]."""
+    side = {"outer": -1.0, "inner": 1.0, "roller": 1.0}[scene.cage.guidance]
+    return scene.bearing.pitch_diameter_mm + side * scene.bearing.roller_diameter_mm / 3.0
+
+
 def cage_inertia(scene: Scene) -> float:
     """Given, or that of a plain ring between the land and the far rim of the estimated cage body [kg m^2]."""
     if scene.cage.inertia_kg_mm2 is not None:
         return scene.cage.inertia_kg_mm2 * 1e-6
-    side = {"outer": -1.0, "inner": 1.0, "roller": 1.0}[scene.cage.guidance]
-    rim = scene.bearing.pitch_diameter_mm + side * scene.bearing.roller_diameter_mm / 3.0
+    rim = cage_rim_diameter(scene)
     return scene.cage.mass_g * 1e-3 * (scene.land_diameter_mm**2 + rim**2) * 1e-6 / 8.0
 
 

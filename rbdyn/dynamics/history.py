@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 class History:
     """Samples at equal intervals after the discarded turns. Arrays over (samples,) or (samples, rollers); SI.
 
-    ``azimuth``: of the rollers from the load direction [rad], growing without bound; ``pocket_load``: positive on the
-    front wall, where the roller drives the cage; slips: ring surface less roller surface; heats: traction and rolling.
+    ``azimuth``: of the rollers from the load direction [rad], growing without bound; ``pocket_load``: contact and
+    film on the more loaded wall, positive on the front one, where the roller drives the cage; slips: ring surface less roller surface; heats: traction and rolling.
     """
 
     scene: Scene

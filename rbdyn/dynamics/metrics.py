@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 
 from rbdyn.dynamics.batch_means import estimate
 from rbdyn.dynamics.bias import Comparison, companion_error, missing_power
-from rbdyn.dynamics.equations import INNER_LOAD, LAND_LOAD, LOAD, LOSSES, OUTER_LOAD, POCKET_LOAD, SHAFT
+from rbdyn.dynamics.equations import (
+    INNER_LOAD,
+    LAND_LOAD,
+    LOAD,
+    LOSSES,
+    OUTER_LOAD,
+    POCKET_CONTACT_LOAD,
+    POCKET_LOAD,
+    SHAFT,
+)
 from rbdyn.result import Quantity
 
 Array = NDArray[np.float64]
@@ -59,14 +68,22 @@ class Replicate:
 
     @property
     def impact_windows(self) -> Array:
-        """Largest roller/cage force of each whole window [N]."""
-        forces = self.largest[self.first :, POCKET_LOAD]
+        """Largest force of a roller on a pocket wall, by contact and film, of each whole window [N]."""
+        return self._windows(POCKET_LOAD)
+
+    @property
+    def contact_windows(self) -> Array:
+        """Largest roller/cage contact load of each whole window [N]."""
+        return self._windows(POCKET_CONTACT_LOAD)
+
+    def _windows(self, force: int) -> Array:
+        forces = self.largest[self.first :, force]
         whole = len(forces) // self.per_window
         return forces[: whole * self.per_window].reshape(whole, self.per_window).max(axis=1)
 
     @property
     def impact_force(self) -> float:
-        """Mean over the windows of the largest roller/cage force [N]."""
+        """Mean over the windows of the largest force on a pocket wall [N]."""
         return float(self.impact_windows.mean())
 
     @property
@@ -164,15 +181,16 @@ def _slip(sums: Array) -> Array:
     return np.where(known, 1.0 - turned / np.where(known, rolling, 1.0), 0.0)
 
 
-def _windows(run: Replicate) -> Array:
-    return np.column_stack((np.ones(len(run.impact_windows)), run.impact_windows))
+def _counted(windows: Array) -> Array:
+    return np.column_stack((np.ones(len(windows)), windows))
 
 
 def _timed(values: Callable[[Replicate], Array]) -> Callable[[Replicate], Array]:
     return lambda run: np.column_stack((run.durations, values(run)))[run.first :]
 
 
-IMPACT_FORCE = Figure(_windows, _mean)
+IMPACT_FORCE = Figure(lambda run: _counted(run.impact_windows), _mean)
+IMPACT_CONTACT_FORCE = Figure(lambda run: _counted(run.contact_windows), _mean)
 WHIRL_DEVIATION_RATIO = Figure(lambda run: run.whirl[run.first :], _deviation_ratio)
 POWER_LOSS = Figure(_timed(lambda run: run.work[:, :SHAFT].sum(axis=1)), _mean)
 CAGE_SPEED = Figure(_timed(lambda run: run.cage_angle), _mean)

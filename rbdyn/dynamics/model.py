@@ -212,7 +212,8 @@ def _pocket(scene: Scene, oil: Oil) -> Any:
     laws, cage = scene.model, scene.cage
     if laws.pocket == "off":
         return NoPocket()
-    plain = palmgren(_modulus(scene, "roller", "cage"), scene.bearing.effective_length_mm * 1e-3)
+    touching = cage.pocket_contact_length_mm or scene.bearing.effective_length_mm
+    plain = palmgren(_modulus(scene, "roller", "cage"), touching * 1e-3)
     bar = laws.pocket_bar_stiffness_N_m
     contact = plain if bar == "rigid" else LineContactOnBar(plain.stiffness, float(bar))
     damping, friction = _hunt_crossley(laws.alpha("pocket")), _friction(scene, laws.pocket_friction)
@@ -223,8 +224,8 @@ def _pocket(scene: Scene, oil: Oil) -> Any:
         from rbdyn.contact.pocket_film import pocket_film
 
         floor = laws.pocket_film_floor_um * 1e-6
-        length = scene.bearing.roller_length_mm * 1e-3
-        film = pocket_film(oil.viscosity, radius, length, floor, laws.pocket_fill)
+        covered = cage.pocket_contact_length_mm or scene.bearing.roller_length_mm
+        film = pocket_film(oil.viscosity, radius, covered * 1e-3, floor, laws.pocket_fill)
         walls = Pocket(clearance - floor, radius, contact, damping, friction)
         pocket = LubricatedPocket(walls, film, clearance, radius)
     if cage.lip_clearance_mm is None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from rbdyn.dynamics.equations import motions, pocket_direction, roller_pocket
+from rbdyn.dynamics.equations import motions, roller_pocket
 from rbdyn.dynamics.guide_land import guide_forces
 from rbdyn.dynamics.races import race_contact, roller_radius
 from rbdyn.kernel import entry, kernel
 
-# Rows of what is observed of each roller: loads [N] (that on the pocket is positive on the front wall, where the roller
-# drives the cage), slips [m/s] and heat [W] by traction and rolling.
+# Rows of what is observed of each roller: loads [N] (that on the pocket wall, by contact and film, is positive on the
+# front wall, where the roller drives the cage), slips [m/s] and heat [W] by traction and rolling.
 OUTER_LOAD, INNER_LOAD, POCKET_LOAD, OUTER_SLIP, INNER_SLIP, OUTER_HEAT, INNER_HEAT = range(7)
 OBSERVED = 7
 
@@ -44,11 +44,9 @@ def observe(bearing, states, rollers, land):
             on_outer = race_observed(bearing.outer, 1.0, bearing, y, j, outer)
             on_inner = race_observed(bearing.inner, -1.0, bearing, y, j, inner)
             wall = roller_pocket(bearing, y, cage, j)
-            ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)
-            front = (y[z + j] - cage.y) * ex - (y[j] - cage.x) * ey >= 0.0
             rollers[OUTER_LOAD, i, j] = on_outer[4]
             rollers[INNER_LOAD, i, j] = on_inner[4]
-            rollers[POCKET_LOAD, i, j] = wall[4] if front else -wall[4]
+            rollers[POCKET_LOAD, i, j] = wall[8]
             rollers[OUTER_SLIP, i, j] = on_outer[8]
             rollers[INNER_SLIP, i, j] = on_inner[8]
             rollers[OUTER_HEAT, i, j] = on_outer[5] + on_outer[6]

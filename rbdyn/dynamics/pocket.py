@@ -91,14 +91,15 @@ def pocket_contact(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_s
 
     ``ex, ey``: unit vector of the pocket's mid-line, outward; ``dx ... dvy``: centre of the roller less that of the
     cage, position [m] and velocity [m/s]; spins [rad/s]. Returns (force x, force y, moment on the roller, moment on
-    the cage about its centre, contact load, powers lost in friction, in damping and in the film). The force on the
-    cage is the opposite. Chen et al. 2022, eq 16, for the front and the rear wall alike.
+    the cage about its centre, contact load, powers lost in friction, in damping and in the film, force on the more
+    loaded wall by contact and film together, negative on the rear one). The force on the cage is the opposite. Chen et
+    al. 2022, eq 16, for the front and the rear wall alike.
     """
 
 
 @pocket_contact.body(NoPocket)
 def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
-    return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @pocket_contact.body(Pocket)
@@ -112,7 +113,7 @@ def dry_walls(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed)
     offset = dy * ex - dx * ey
     approach = abs(offset) - clearance_of(pocket, radius)
     if approach <= 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     wall = math.copysign(1.0, offset)
     height = dx * ex + dy * ey
     approach_rate = wall * (dvy * ex - dvx * ey - cage_speed * height)
@@ -134,6 +135,7 @@ def dry_walls(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed)
         friction * slip,
         (load - elastic) * approach_rate,
         0.0,
+        wall * load,
     )
 
 
@@ -172,6 +174,7 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
     tangential, normal = front[0] + rear[0], front[1] + rear[1]
     fx, fy = tangential * ex - normal * ey, tangential * ey + normal * ex
     moment, cage_moment = front[2] + rear[2], front[3] + rear[3]
+    on_front, on_rear = max(dry[8], 0.0) - front[1], max(-dry[8], 0.0) + rear[1]
     return (
         dry[0] + fx,
         dry[1] + fy,
@@ -181,6 +184,7 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
         dry[5],
         dry[6],
         front[4] + rear[4],
+        on_front if on_front >= on_rear else -on_rear,
     )
 
 
@@ -210,6 +214,7 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
         walls[5] + friction * slip,
         walls[6] + (load - elastic) * approach_rate,
         walls[7],
+        walls[8] if abs(walls[8]) >= load else math.copysign(load, offset),
     )
 
 

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.arrow_matrix import PARTS, ArrowMatrix, factor, shifted, solve
-from rbdyn.dynamics.booking import PEAK_POINTS, book_peak, book_whirl
-from rbdyn.dynamics.equations import LOADS, POCKET_LOAD, POWERS, derivative_once
+from rbdyn.dynamics.booking import PEAK_POINTS, book_peaks, book_point, book_whirl
+from rbdyn.dynamics.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS, derivative_once
 from rbdyn.dynamics.jacobian import Differences, jacobian
 from rbdyn.dynamics.runge_kutta import (
     FINISHED,
@@ -161,16 +161,17 @@ def interpolate(carry, work, theta, i):
 
 @routine
 def refine_peak(bearing, carry, work, h, tally):
-    """Look inside a step for its largest pocket load: eight points, then the vertex of a parabola."""
-    values = np.empty(PEAK_POINTS + 2)
-    values[0], values[PEAK_POINTS + 1] = carry.loads[0, POCKET_LOAD], carry.loads[STAGES, POCKET_LOAD]
+    """Look inside a step for its largest pocket loads: eight points, then the vertex of a parabola."""
+    values = np.empty((2, PEAK_POINTS + 2))
+    book_point(values, 0, carry.loads, 0)
+    book_point(values, PEAK_POINTS + 1, carry.loads, STAGES)
     spacing = 1.0 / (PEAK_POINTS + 1)
     for p in range(1, PEAK_POINTS + 1):
         for i in range(carry.y.size):
             carry.stage[i] = interpolate(carry, work, p * spacing, i)
         derivative_once(bearing, carry.stage, NEXT_ROW, carry.k, carry.power, carry.loads, carry.scratch)
-        values[p] = carry.loads[1, POCKET_LOAD]
-    book_peak(values, carry.clock[0], h, tally)
+        book_point(values, p, carry.loads, 1)
+    book_peaks(values, carry.clock[0], h, tally)
 
 
 @routine
@@ -186,9 +187,10 @@ def keep(bearing, carry, work, h, tally, sample_step):
         for s in range(STAGES - 1):
             done += A[STAGES - 1, s] * work.work[s, p]
         tally.work[p] += done
-    suspected = 0.0
+    on_wall = contact = 0.0
     for s in range(1, STAGES + 1):
-        suspected = max(suspected, loads[s, POCKET_LOAD])
+        on_wall = max(on_wall, loads[s, POCKET_LOAD])
+        contact = max(contact, loads[s, POCKET_CONTACT_LOAD])
     for force in range(LOADS):
         if loads[STAGES, force] > tally.largest[force]:
             tally.largest[force] = loads[STAGES, force]
@@ -202,7 +204,7 @@ def keep(bearing, carry, work, h, tally, sample_step):
         )
         book_whirl(tally.whirl, vx, vy)
         carry.clock[3] += sample_step
-    return suspected > tally.largest[POCKET_LOAD]
+    return on_wall > tally.largest[POCKET_LOAD] or contact > tally.largest[POCKET_CONTACT_LOAD]
 
 
 @entry

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.booking import PEAK_POINTS, book_peak, book_whirl
+from rbdyn.dynamics.booking import PEAK_POINTS, book_peaks, book_point, book_whirl
 from rbdyn.dynamics.embedded_pair import (
     mean_rate,
     quartic_rate,
@@ -25,7 +25,15 @@ from rbdyn.dynamics.embedded_pair import (
     stage_time,
     stage_weight,
 )
-from rbdyn.dynamics.equations import LOADS, POCKET_LOAD, POWERS, derivative, derivative_once, roller_count
+from rbdyn.dynamics.equations import (
+    LOADS,
+    POCKET_CONTACT_LOAD,
+    POCKET_LOAD,
+    POWERS,
+    derivative,
+    derivative_once,
+    roller_count,
+)
 from rbdyn.dynamics.orbit_frame import (
     mean_orbit_rate,
     rates_to_fixed_axes,
@@ -248,20 +256,20 @@ def worst_component(pair, k, h, inverse_tolerance):
 
 @routine
 def refine_peak(bearing, carry, h, tally):
-    """Look inside a step for its largest pocket load: eight points, then the vertex of a parabola."""
+    """Look inside a step for its largest pocket loads: eight points, then the vertex of a parabola."""
     pair = carry.pair
-    values = np.empty(PEAK_POINTS + 2)
+    values = np.empty((2, PEAK_POINTS + 2))
     inside = np.empty_like(carry.y)
-    values[0] = carry.loads[0, POCKET_LOAD]
-    values[PEAK_POINTS + 1] = carry.loads[pair.last, POCKET_LOAD]
+    book_point(values, 0, carry.loads, 0)
+    book_point(values, PEAK_POINTS + 1, carry.loads, pair.last)
     spacing = 1.0 / (PEAK_POINTS + 1)
     for p in range(1, PEAK_POINTS + 1):
         for i in range(carry.y.size):
             inside[i] = interpolate(carry.y, carry.k, h, p * spacing, i, pair)
         to_fixed_axes(turn_of(carry.clock[4], p * spacing * h), bearing.rollers, inside)
         derivative_once(bearing, inside, pair.free, carry.k, carry.power, carry.loads, carry.scratch)
-        values[p] = carry.loads[pair.free, POCKET_LOAD]
-    book_peak(values, carry.clock[0], h, tally)
+        book_point(values, p, carry.loads, pair.free)
+    book_peaks(values, carry.clock[0], h, tally)
 
 
 @kernel
@@ -273,9 +281,10 @@ def keep(pair, body, y, k, power, loads, clock, work, largest, largest_time, whi
     for p in range(POWERS):
         work[p] += h * mean_rate(pair, power, p)
     time = clock[0]
-    suspected = 0.0
+    on_wall = contact = 0.0
     for s in range(1, pair.last + 1):
-        suspected = max(suspected, loads[s, POCKET_LOAD])
+        on_wall = max(on_wall, loads[s, POCKET_LOAD])
+        contact = max(contact, loads[s, POCKET_CONTACT_LOAD])
     for force in range(LOADS):
         if loads[pair.last, force] > largest[force]:
             largest[force] = loads[pair.last, force]
@@ -286,7 +295,7 @@ def keep(pair, body, y, k, power, loads, clock, work, largest, largest_time, whi
         vy = interpolate(y, k, h, theta, body + CAGE_VY, pair)
         book_whirl(whirl, vx, vy)
         clock[3] += sample_step
-    return suspected > largest[POCKET_LOAD]
+    return on_wall > largest[POCKET_LOAD] or contact > largest[POCKET_CONTACT_LOAD]
 
 
 @routine

@@ -16,6 +16,7 @@ from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing
 from rbdyn.dynamics.error_bars import error_notes, quantities
 from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
+from rbdyn.dynamics.left_out import left_out_notes
 from rbdyn.dynamics.method import (
     EXPLICIT,
     advance_by,
@@ -256,6 +257,7 @@ def _gather(
     return SimulationResult(
         status="ok",
         impact_force=figures["impact_force_N"],
+        impact_contact_force=figures["impact_contact_force_N"],
         whirl_deviation_ratio=figures["whirl_deviation_ratio"],
         power_loss=figures["power_loss_W"],
         cage_speed_rpm=figures["cage_speed_rpm"],
@@ -287,6 +289,7 @@ def _gather(
         seed=scene.numerics.seed,
         notes=(
             *_notes(scene, power_gap),
+            *left_out_notes(scene, figures["power_loss_W"].value),
             *ensemble.notes,
             *error_notes(scene, figures, ensemble.fault),
             *stiffness_notes(scene, runs),

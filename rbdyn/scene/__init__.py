@@ -69,6 +69,12 @@ class Scene(SceneFile):
                     f"model.land_film_floor_um = {laws.land_film_floor_um:g}: not below the radial guide clearance of "
                     f"{radial_um:g} um; lower it, widen cage.guide_clearance_mm or set model.guide_land = 'dry'"
                 )
+        touching = cage.pocket_contact_length_mm
+        if touching is not None and touching > bearing.roller_length_mm:
+            found.append(
+                f"cage.pocket_contact_length_mm = {touching:g}: a wall touches no more than the roller of "
+                f"{bearing.roller_length_mm:g} mm; shorten it or lengthen bearing.roller_length_mm"
+            )
         floor, half_pocket_um = laws.pocket_film_floor_um, 500.0 * cage.pocket_clearance_mm
         if laws.pocket_film and floor >= half_pocket_um:
             found.append(
