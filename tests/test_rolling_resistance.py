@@ -167,6 +167,6 @@ def test_invariant_power_balance_of_a_starved_run():
         scene = make(*more)
         run = run_replicate(scene, roller_bearing(scene), 0, scene.numerics.rtol, Stop())
         gaps.append(run.power_gap)
-        powers.append(run.power_terms["rolling_resistance"])
+        powers.append(run.power("rolling_resistance"))
     assert max(abs(gap) for gap in gaps) < 1e-3
     assert 0.5 * powers[0] < powers[1] < 0.9 * powers[0]

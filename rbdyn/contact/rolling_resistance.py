@@ -40,11 +40,11 @@ class StarvedRollingResistance(NamedTuple):
     force_scale: float  # of the starved rigid branch [N/sqrt(N m/s)]
     regime_scale: float  # of the flooded contact [(N/sqrt(m/s))^-5]
     rigid_share: float  # what the meniscus leaves of the rigid branch [-]
-    beyond_scale: float  # beyond = beyond_scale u^0.25/sqrt(Q): flooded shear beyond the meniscus [...]
-    short_scale: float  # short = short_scale u^0.75/Q: flooded force over that of a very short inlet [...]
-    rigid_load: (
-        float  # Q^2/u of the load whose Hertz contact is as wide as the pressure of rigid cylinders [N^2 s/m]
+    beyond_scale: float  # beyond = beyond_scale u^0.25/sqrt(Q), shear beyond the meniscus [N^0.5 (m/s)^-0.25]
+    short_scale: (
+        float  # short = short_scale u^0.75/Q, flooded force over that of a short inlet [N (m/s)^-0.75]
     )
+    rigid_load: float  # Q^2/u where Hertz's width is that of rigid cylinders [N^2 s/m]
 
 
 def biboulet_houpert(
@@ -55,7 +55,7 @@ def biboulet_houpert(
     F_R/(E' R l) = 1.42 sqrt(U W)/(1 + r^10)^0.1 with U = 2 eta u/(E' R), W = Q/(l E' R),
     r = (1.4/1.45) sqrt(W/sqrt(U)), times ``reduction`` (heating, a factor of one's own). F_R is a force per surface, so
     the power lost is 2 F_R u: the rigid-cylinder Reynolds solution gives 1.47 for the same coefficient, an isothermal
-    elastohydrodynamic one 1.55 to 1.7 U^0.75 with compressible oil (both in the tests).
+    elastohydrodynamic one 1.42 to 1.60 U^0.75 with compressible oil (both in the tests).
     """
     speed_part = 2.0 * viscosity / (equivalent_modulus * radius)
     load_part = 1.0 / (length * equivalent_modulus * radius)
@@ -99,16 +99,17 @@ def starved(
     length: float,
     inlet_distance: float,
 ) -> StarvedRollingResistance:
-    """The law where the oil begins ``inlet_distance`` half-widths ahead of the edge of the contact; units as above, [1/Pa].
+    """The law where the oil begins ``inlet_distance`` half-widths ahead of the edge of the contact; SI units as above.
 
     The flooded force is the smooth lesser of a rigid and an elastic branch; each keeps its own share, with the distance
     in the half-width of its own pressure: Hertz's b or the sqrt(2 R h_0) of rigid cylinders, so that a light contact,
     whose b vanishes, does not lose its oil. Elastic share: 1/(1 + F_beyond/F + F/F_short), where
     F_beyond = 12 eta u R l/(b sqrt(g)) is the shear of the oil beyond the meniscus in a gap g b^2/(2 R) = ``gap_ahead``,
     and F_short = (10/(3 pi)) g Q/(alpha E') the limit of a short inlet with viscosity exp(alpha p). It is exact in both
-    limits and within 0.032 of the quadrature over the Hertz gap of Grubin and of Wolveridge, Baglin and Archard 1971 (whose
-    film is that of ``film_thickness.starvation_factor``) from a distance of 0.1 on; the closed form of Goksem and Hargreaves 1978
-    lies within 0.1 of it. A load at which b is the smaller width counts in the shares as one at which both are alike.
+    limits and, from a distance of 0.1 on, within 0.032 of the quadrature over the Hertz gap (Grubin; Wolveridge, Baglin
+    and Archard 1971, whose film is that of ``film_thickness.starvation_factor``). The fit of Goksem and Hargreaves 1978
+    lies within 0.1 of that quadrature, full elastohydrodynamic solutions within 0.045 of the law at 5 half-widths and more.
+    A load at which b is the smaller width counts in the shares as one at which both are alike.
     """
     gap = gap_ahead(inlet_distance)
     stiffness = equivalent_modulus * radius * length  # [N]
