@@ -91,14 +91,14 @@ def test_oracle_elastic_inlet_share(dynamic_load):
 
 @pytest.mark.parametrize(
     ("m", "viscous", "hertz_pressure"),
-    [(1.4, 9.0, 1e9), (5.0, 9.0, 1e9), (20.0, 13.0, 1e9), (20.0, 5.0, 0.0)],
+    [(1.4, 9.0, 1e9), (5.0, 9.0, 1e9), (20.0, 13.0, 1e9), (20.0, 5.0, 0.7e9), (20.0, 5.0, 0.0)],
 )
 def test_oracle_elastohydrodynamic_contact(m, viscous, hertz_pressure):
-    """Oracle: flooded, the law is within 17 % of full solutions, 10 % with compressible oil; the starved share is within
+    """Oracle: flooded, the law is within 17 % of full solutions, 14 % with compressible oil; the starved share is within
     0.045 of theirs at 5 half-widths and more; their film is that of Dowson and Toyoda within 15 %."""
     far = max(40.0, 300.0 / m)
     flooded, film = oracle.elastohydrodynamic(m, viscous, far, hertz_pressure)
-    assert at_moes(m, viscous) == pytest.approx(flooded, rel=0.10 if hertz_pressure else 0.17)
+    assert at_moes(m, viscous) == pytest.approx(flooded, rel=0.14 if hertz_pressure else 0.17)
     # Dowson and Toyoda's central film.
     u = 0.5e-10
     toyoda = 3.06 * u**0.69 * (viscous / (2.0 * u) ** 0.25) ** 0.56 * (m * math.sqrt(2.0 * u)) ** -0.10

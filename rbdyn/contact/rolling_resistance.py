@@ -55,7 +55,7 @@ def biboulet_houpert(
     F_R/(E' R l) = 1.42 sqrt(U W)/(1 + r^10)^0.1 with U = 2 eta u/(E' R), W = Q/(l E' R),
     r = (1.4/1.45) sqrt(W/sqrt(U)), times ``reduction`` (heating, a factor of one's own). F_R is a force per surface, so
     the power lost is 2 F_R u: the rigid-cylinder Reynolds solution gives 1.47 for the same coefficient, an isothermal
-    elastohydrodynamic one 1.42 to 1.60 U^0.75 with compressible oil (both in the tests).
+    elastohydrodynamic one 1.42 to 1.69 U^0.75 with compressible oil (both in the tests).
     """
     speed_part = 2.0 * viscosity / (equivalent_modulus * radius)
     load_part = 1.0 / (length * equivalent_modulus * radius)

@@ -53,7 +53,7 @@ class Laws(Strict):
     land_friction: NonNegative = 0.05
     rolling_resistance: Literal["biboulet_houpert", "off"] = "biboulet_houpert"
     # What multiplies it, in force and in power. Isothermal elastohydrodynamic solutions of one contact put 1 at 0.97 to
-    # 1.09 (2 F u is lost a contact: F is a force per surface); SKF's rolling moments of ten catalogue bearings want 0.5 to
+    # 1.15 (2 F u is lost a contact: F is a force per surface); SKF's rolling moments of ten catalogue bearings want 0.5 to
     # 1.3, the less the faster, the lighter loaded and the thicker the oil (examples/published/friction_totals.py).
     rolling_resistance_factor: Annotated[float, Field(gt=0.0, le=5.0)] = 1.0
     drag: Literal["cylinder", "off"] = "cylinder"
