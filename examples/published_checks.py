@@ -15,6 +15,7 @@ from typing import Annotated
 
 import typer
 from published.common import Check, Effort
+from published.friction_totals import friction_totals
 from published.operating import figure14, friction
 from published.sensitivity import QUICK, sensitivity
 from published.skidding import QUICK as QUICK_ASSUMPTIONS
@@ -27,12 +28,15 @@ LONG = Effort(replicates=6, turns=40, discard_turns=10)
 MEDIUM = Effort(replicates=4, turns=40, discard_turns=10)
 # The NU215 slows down from its epicyclic start over some 40 turns; its slip differs little between replicates.
 SLOW = Effort(replicates=3, turns=10, discard_turns=40)
+# Rolling resistance hardly fluctuates.
+STEADY = Effort(replicates=2, turns=10, discard_turns=10)
 
 FULL: dict[str, Callable[[], Check]] = {
     "table4": lambda: table4(LONG),
     "figure14": lambda: figure14(MEDIUM),
     "nu215": lambda: nu215(SLOW),
     "friction": lambda: friction(SHORT),
+    "totals": lambda: friction_totals(STEADY),
     "sensitivity": lambda: sensitivity(SHORT),
     "whirl": lambda: whirl(MEDIUM),
 }
@@ -43,6 +47,7 @@ BRIEF: dict[str, Callable[[], Check]] = {
         Effort(2, 10, 30), (2400, 3600, 5000), (1000, 5000), QUICK_ASSUMPTIONS
     ),
     "friction": lambda: friction(SHORT, (12000, 24000, 30000), (650, 1300, 2600)),
+    "totals": lambda: friction_totals(),
     "sensitivity": lambda: sensitivity(SHORT, QUICK, whole_design=False),
     "whirl": lambda: whirl(SHORT, (1.0, 0.1, 0.01, 0.001), ("four_constant",), 5.0),
 }  # fmt: skip

@@ -41,6 +41,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "without traction": ('traction.model="off"',),
     "without race damping": ('model.race_damping="off"',),
     "without rolling resistance": ('model.rolling_resistance="off"',),
+    "starved inlets": ("lubricant.inlet_distance=10.0",),
     "pocket film": ("model.pocket_film=true",),
     "rigid pocket bars": ('model.pocket_bar_stiffness_N_m="rigid"',),
     "without pockets": ('model.pocket="off"',),

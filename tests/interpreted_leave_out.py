@@ -14,9 +14,14 @@ from conftest import make, right_hand_side, state_near_contact
 from interpreted_invariants import REWRITTEN, on_both
 
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
-from rbdyn.contact.film import NoRollingResistance, RollingResistance, ShortJournalFilm
+from rbdyn.contact.film import ShortJournalFilm
 from rbdyn.contact.hertz_line import LineContact, LineContactOnBar, PowerLineContact
 from rbdyn.contact.pocket_film import PocketFilm
+from rbdyn.contact.rolling_resistance import (
+    NoRollingResistance,
+    RollingResistance,
+    StarvedRollingResistance,
+)
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
     CoulombTraction,
@@ -119,6 +124,12 @@ NEUTRAL = {
     "without rolling resistance": (
         races(rolling=NoRollingResistance()),
         races(rolling=RollingResistance(0.0, 1.0)),
+    ),
+    "starved inlets": (
+        itself,
+        lambda b: on_both(
+            b, rolling=lambda race: StarvedRollingResistance(*race.rolling, 1.0, 0.0, 0.0, 0.0)
+        ),
     ),
     "pocket film": (
         itself,

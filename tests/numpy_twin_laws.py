@@ -249,7 +249,8 @@ def race_traction(scene, encloses, slip, load):
 
 
 def rolling_resistance(scene, encloses, load, speed):
-    """Biboulet and Houpert 2010 with Aihara's heating of the inlet, from the dimensionless groups."""
+    """Biboulet and Houpert 2010 with Aihara's heating of the inlet, from the dimensionless groups; each branch keeps its
+    share where the oil begins at a distance."""
     if scene.model.rolling_resistance == "off" or load == 0.0:
         return 0.0
     oil, length, radius = (
@@ -259,10 +260,21 @@ def rolling_resistance(scene, encloses, load, speed):
     )
     e = modulus(scene, "roller", "rings")
     u, w = 2.0 * oil.viscosity * speed / (e * radius), load / (length * e * radius)
-    regime = 1.4 / 1.45 * math.sqrt(w / math.sqrt(u))
     heating = oil.viscosity_slope * nominal_entrainment(scene) ** 2 / oil.conductivity
-    thermal = 1.0 / (1.0 + 0.29 * heating**0.78)
-    return thermal * 1.42 * math.sqrt(u * w) / (1.0 + regime**10) ** 0.1 * e * radius * length
+    thermal = scene.model.rolling_resistance_factor / (1.0 + 0.29 * heating**0.78)
+    rigid, elastic = 1.42 * math.sqrt(u * w), 1.42 * 1.45 / 1.4 * u**0.75
+    distance = scene.lubricant.inlet_distance
+    if distance is not None:
+        rigid *= distance / (distance + 1.845 + 1.48 / (1.0 + distance / 2.2))
+        wide = math.hypot(w, math.sqrt(math.pi * 4.894 / 8.0 * u))
+        half_width = math.sqrt(8.0 * wide / math.pi) * radius
+        m = 1.0 + distance
+        gap = m * math.sqrt(m * m - 1.0) - math.acosh(m)
+        # Goksem and Hargreaves 1978: dynamic loading D, and traction in load over alpha E'.
+        dynamic = 48.0 * oil.pressure_coefficient * oil.viscosity * speed * radius**2 / half_width**3
+        tension = elastic * oil.pressure_coefficient * e / wide
+        elastic /= 1.0 + 2.0 * dynamic / (math.pi * tension * math.sqrt(gap)) + 0.3 * math.pi * tension / gap
+    return thermal * rigid / (1.0 + (rigid / elastic) ** 10) ** 0.1 * e * radius * length
 
 
 def scheduled(scene, key, time):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy.integrate import solve_ivp
 
-from rbdyn.contact import damping, film, hertz_line, traction
+from rbdyn.contact import damping, film, hertz_line, rolling_resistance, traction
 from rbdyn.elementary import (
     eighteenth_root,
     fast_atan,
@@ -42,7 +42,7 @@ def compiled_traction(model, slip, load):
 
 @njit
 def compiled_rolling(model, load, speed):
-    return film.rolling_force(model, load, speed)
+    return rolling_resistance.rolling_force(model, load, speed)
 
 
 @njit
@@ -208,7 +208,7 @@ REDUCED_INNER = 1.0 / (1.0 / 4.5e-3 + 1.0 / 17.245e-3)
 
 def resistance(load, speed, thermal=1.0, temperature=100.0):
     oil = oil_at("MIL-L-7808", temperature)
-    law = film.biboulet_houpert(oil.viscosity, STEEL, REDUCED_INNER, 3.5e-3, thermal)
+    law = rolling_resistance.biboulet_houpert(oil.viscosity, STEEL, REDUCED_INNER, 3.5e-3, thermal)
     return compiled_rolling(law, load, speed), oil.viscosity
 
 
@@ -227,20 +227,20 @@ def test_literature_rolling_resistance_at_the_papers_point():
     """Literature: 0.21 to 0.23 N per contact at 26.2 m/s and 100 C, loaded or light; thermal factor about 0.91 at L = 0.25."""
     for load in (674.0, 387.0, 54.0):
         assert 0.20 < resistance(load, 26.2)[0] < 0.24  # the range of both races, widened by its rounding
-    assert film.aihara_thermal_factor(0.25, 1.0, 1.0) == pytest.approx(0.91, abs=0.005)
+    assert rolling_resistance.aihara_thermal_factor(0.25, 1.0, 1.0) == pytest.approx(0.91, abs=0.005)
     oil = oil_at("MIL-L-7808", 100.0)
-    assert film.aihara_thermal_factor(oil.viscosity_slope, oil.conductivity, 26.2) == pytest.approx(
-        0.91, abs=0.01
-    )
+    assert rolling_resistance.aihara_thermal_factor(
+        oil.viscosity_slope, oil.conductivity, 26.2
+    ) == pytest.approx(0.91, abs=0.01)
 
 
 @given(load=st.floats(1e-10, 1e6), speed=st.floats(1e-8, 1e3))
 @settings(max_examples=100, deadline=None)
 def test_unit_rolling_force_compiled_equals_interpreted(load, speed):
     """Unit: compiled equals interpreted, to the ulps of one tenth root."""
-    law = film.biboulet_houpert(2.87e-3, STEEL, REDUCED_INNER, 3.5e-3, 0.9)
+    law = rolling_resistance.biboulet_houpert(2.87e-3, STEEL, REDUCED_INNER, 3.5e-3, 0.9)
     assert compiled_rolling(law, load, speed) == pytest.approx(
-        film.rolling_force(law, load, speed), rel=1e-13
+        rolling_resistance.rolling_force(law, load, speed), rel=1e-13
     )
 
 
@@ -288,7 +288,7 @@ def test_unit_fast_exp_and_log():
 def test_unit_law_without_a_body_is_refused():
     """Unit: a law asked for a type that it does not know says so, interpreted and compiled."""
     with pytest.raises(TypeError, match="rolling_force has no body for NoDamping"):
-        film.rolling_force(damping.NoDamping(), 1.0, 1.0)
+        rolling_resistance.rolling_force(damping.NoDamping(), 1.0, 1.0)
     with pytest.raises(numba.TypingError, match="rolling_force"):
         compiled_rolling(damping.NoDamping(), 1.0, 1.0)
 

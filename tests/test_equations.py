@@ -121,6 +121,7 @@ MEETINGS = {
         "mounting.inner_interference_um=12.0",
         "model.land_fill=0.4",
     ),
+    "starved inlets": ("lubricant.inlet_distance=3.0", "model.rolling_resistance_factor=0.8"),
     "rotating load": ("operation.rotating_load_N=700.0", "operation.radial_load_N=100.0"),
 }
 TABLES = {

@@ -59,6 +59,7 @@ LAWS = {
     "without traction": ("inner.traction", "NoTraction"),
     "without race damping": ("outer.damping", "NoDamping"),
     "without rolling resistance": ("outer.rolling", "NoRollingResistance"),
+    "starved inlets": ("outer.rolling", "StarvedRollingResistance"),
     "pocket film": ("pocket", "LubricatedPocket"),
     "rigid pocket bars": ("pocket.contact", "LineContact"),
     "without pockets": ("pocket", "NoPocket"),

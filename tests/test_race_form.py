@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numba import njit
 
 from rbdyn.contact.damping import NoDamping
-from rbdyn.contact.film import NoRollingResistance
 from rbdyn.contact.hertz_line import dowson_higginson, palmgren
+from rbdyn.contact.rolling_resistance import NoRollingResistance
 from rbdyn.contact.traction import CoulombTraction, NoTraction
 from rbdyn.dynamics.race_form import RoundRace, form_at, largest_rise, wavy_race
 from rbdyn.dynamics.races import Race, race_contact

@@ -8,7 +8,8 @@
 - ``rheology``: traction of an elastohydrodynamic film from the oil's behaviour under pressure and shear
 - ``film_thickness``: thickness of that film, its lambda ratio, the share that asperities bear
 - ``point_film``: the same for the ellipse of a ball, and the film's stiffness
-- ``film``: rolling resistance of the lubricated line contact; the short-journal film
+- ``rolling_resistance``: of the lubricated line contact, flooded or starved
+- ``film``: the short-journal film
 - ``pocket_film``: wedge and squeeze in one film, and shear, between a roller and a pocket wall
 
 Conventions: approach is positive when surfaces overlap, its rate positive when they close, loads are

@@ -1,66 +1,12 @@
-"""Lubricant films: rolling resistance of a line contact, and the short journal bearing of a guide land."""
+"""Lubricant film of a guide land: the short journal bearing."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-from rbdyn.elementary import fast_atan, tenth_root
-from rbdyn.kernel import kernel, law
-
-SMALLEST_LOAD = 1e-30  # [N], keeps the logarithm finite
-
-
-class NoRollingResistance(NamedTuple):
-    """Rolling without loss."""
-
-
-class RollingResistance(NamedTuple):
-    """Biboulet and Houpert 2010, from the isoviscous-rigid to the elastohydrodynamic regime."""
-
-    force_scale: float  # F_R = force_scale sqrt(Q u) / (1 + r^10)^0.1, [N/sqrt(N m/s)]
-    regime_scale: float  # r^10 = regime_scale (Q/sqrt(u))^5, [(N/sqrt(m/s))^-5]
-
-
-def biboulet_houpert(
-    viscosity: float, equivalent_modulus: float, radius: float, length: float, thermal_factor: float
-) -> RollingResistance:
-    """Rolling resistance of a line contact of reduced radius and length [m] in oil of viscosity [Pa s].
-
-    F_R/(E' R l) = 1.42 sqrt(U W)/(1 + r^10)^0.1 with U = 2 eta u/(E' R), W = Q/(l E' R),
-    r = (1.4/1.45) sqrt(W/sqrt(U)). F_R is a force per surface, so the power lost is 2 F_R u
-    (the rigid-cylinder Reynolds solution gives 1.47 for the same coefficient).
-    """
-    speed_part = 2.0 * viscosity / (equivalent_modulus * radius)
-    load_part = 1.0 / (length * equivalent_modulus * radius)
-    force = 1.42 * thermal_factor * equivalent_modulus * radius * length * math.sqrt(speed_part * load_part)
-    return RollingResistance(force, (1.4 / 1.45) ** 10 * (load_part / math.sqrt(speed_part)) ** 5)
-
-
-def aihara_thermal_factor(viscosity_slope: float, conductivity: float, entrainment_speed: float) -> float:
-    """Inlet shear heating: 1/(1 + 0.29 L^0.78), L = (-d eta/dT) u^2/k (Aihara 1987)."""
-    thermal_load = viscosity_slope * entrainment_speed**2 / conductivity
-    return float(1.0 / (1.0 + 0.29 * thermal_load**0.78))
-
-
-@law
-def rolling_force(film, load, entrainment_speed):
-    """Rolling resistance per surface [N] at a contact load [N] and an entrainment speed [m/s], both > 0."""
-
-
-@rolling_force.body(NoRollingResistance)
-def _(film, load, entrainment_speed):
-    return 0.0
-
-
-@rolling_force.body(RollingResistance)
-def _(film, load, entrainment_speed):
-    # sqrt(Q u)/(1 + c Q^5 u^-2.5)^0.1 as one tenth root, with one square root and one division.
-    q = max(load, SMALLEST_LOAD)
-    q5 = q * q * q * q * q
-    u25 = entrainment_speed * entrainment_speed * math.sqrt(entrainment_speed)
-    u75 = u25 * u25 * u25
-    return film.force_scale * tenth_root(q5 * u75 / (u25 + film.regime_scale * q5))
+from rbdyn.elementary import fast_atan
+from rbdyn.kernel import kernel
 
 
 class ShortJournalFilm(NamedTuple):

@@ -12,12 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
-from rbdyn.contact.film import (
-    NoRollingResistance,
-    aihara_thermal_factor,
-    biboulet_houpert,
-    short_journal_film,
-)
+from rbdyn.contact.film import short_journal_film
 from rbdyn.contact.hertz_line import (
     LineContactOnBar,
     dowson_higginson,
@@ -25,6 +20,12 @@ from rbdyn.contact.hertz_line import (
     iso_16281,
     palmgren,
     sliced,
+)
+from rbdyn.contact.rolling_resistance import (
+    NoRollingResistance,
+    aihara_thermal_factor,
+    biboulet_houpert,
+    starved,
 )
 from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.cage_body import BalancedCage, UnbalancedCage
@@ -115,7 +116,7 @@ def _race(scene: Scene, oil: Oil, which: str) -> Race:
             scene.bearing.effective_length_mm * 1e-3,
             TRACTION_RANGE * max(scene.operation.largest_load_N, 1.0),
         ),
-        rolling=_rolling(scene, oil, reduced),
+        rolling=rolling_law(scene, oil, reduced),
     )
 
 
@@ -196,15 +197,21 @@ def _hunt_crossley(alpha: float) -> NoDamping | HuntCrossleyDamping:
     return HuntCrossleyDamping(alpha) if alpha > 0.0 else NoDamping()
 
 
-def _rolling(scene: Scene, oil: Oil, reduced_radius: float) -> Any:
+def rolling_law(scene: Scene, oil: Oil, reduced_radius: float) -> Any:
+    """Rolling resistance of a race contact of this reduced radius [m]."""
     if scene.model.rolling_resistance == "off":
         return NoRollingResistance()
     # The entrainment speed varies little: the heating of the inlet is that at the kinematic speed.
     entrainment = abs(kinematics(scene).entrainment)
     heating = aihara_thermal_factor(oil.viscosity_slope, oil.conductivity, entrainment)
-    length = scene.bearing.effective_length_mm * 1e-3
-    return biboulet_houpert(
-        oil.viscosity, _modulus(scene, "roller", "rings"), reduced_radius, length, heating
+    modulus, length = _modulus(scene, "roller", "rings"), scene.bearing.effective_length_mm * 1e-3
+    reduction = heating * scene.model.rolling_resistance_factor
+    flooded = biboulet_houpert(oil.viscosity, modulus, reduced_radius, length, reduction)
+    distance = scene.lubricant.inlet_distance
+    if distance is None:
+        return flooded
+    return starved(
+        flooded, oil.viscosity, oil.pressure_coefficient, modulus, reduced_radius, length, distance
     )
 
 

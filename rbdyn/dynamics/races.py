@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.contact.damping import damped_load
-from rbdyn.contact.film import rolling_force
 from rbdyn.contact.hertz_line import around, line_load, root_stiffness
+from rbdyn.contact.rolling_resistance import rolling_force
 from rbdyn.contact.traction import traction
 from rbdyn.dynamics.race_form import form_at, sloped
 from rbdyn.kernel import VECTOR, kernel, law

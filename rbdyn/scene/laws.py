@@ -55,6 +55,10 @@ class Laws(Strict):
     land_restitution_speed_m_s: Positive = 0.5
     land_friction: NonNegative = 0.05
     rolling_resistance: Literal["biboulet_houpert", "off"] = "biboulet_houpert"
+    # What multiplies it, in force and in power. Isothermal elastohydrodynamic solutions of one contact put 1 at 0.97 to
+    # 1.15 (2 F u is lost a contact: F is a force per surface); SKF's rolling moments of ten catalogue bearings want 0.5 to
+    # 1.3, the less the faster, the lighter loaded and the thicker the oil (examples/published/friction_totals.py).
+    rolling_resistance_factor: Annotated[float, Field(gt=0.0, le=5.0)] = 1.0
     drag: Literal["cylinder", "off"] = "cylinder"
     # A free cylinder; packed rollers shield each other (0.3 to 0.5).
     drag_coefficient: NonNegative = 1.0

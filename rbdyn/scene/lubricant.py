@@ -40,7 +40,8 @@ class Lubricant(Strict):
     # in the bearing of Chen et al. 2022 at 100 C, 0.1 gives 1.2 to 1.45.
     roller_roughness_um: Annotated[float, Field(gt=0.0, le=100.0)] = 0.05
     race_roughness_um: Annotated[float, Field(gt=0.0, le=100.0)] = 0.05
-    # Where the oil begins ahead of a contact, in its half-widths; flooded where left out. ADORE-style inputs have 10.
+    # Where the oil begins ahead of the edge of a contact, in its half-widths; flooded where left out. ADORE-style inputs
+    # have 10, which leaves the film whole and takes 5 to 19 % of the rolling resistance.
     inlet_distance: Positive | None = None
 
     @property
