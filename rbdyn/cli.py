@@ -299,7 +299,7 @@ def _print_target(target: dict[str, Any]) -> None:
         f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached}) by "
         f"{chosen['replicates']} replicates of {chosen['turns']:g} turns at rtol {chosen['rtol']:g}; "
         f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides, "
-        f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots"
+        f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots; the seconds are those of pilots and all runs"
     )
 
 
