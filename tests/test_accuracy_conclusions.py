@@ -82,7 +82,7 @@ def test_unit_noisy_tolerances_conclude_nothing(outer):
     for sizes in ((0.0, 0.0, 0.0), (0.05, 0.14, 0.02)):
         told = tolerances.conclusion(tolerance_rows(sizes, 0.2), outer)
         assert told.startswith("undecided: errors of 20 % hide differences of")
-        assert "is the loosest" not in told and "keeps" not in told
+        assert "is the loosest" not in told and "measure at most" not in told
         expected = turns_needed(0.2, outer.numerics.turns)
         assert f"numerics.turns to about {about(expected)} " in told
         expected = replicates_needed(0.2, outer.numerics.replicates)
@@ -95,10 +95,12 @@ def test_unit_sharp_tolerances_conclude(outer):
     """Unit: errors of 0.2 % name the loosest tolerance within 1 %, tighter where that is sought."""
     rows = tolerance_rows((0.03, 0.004, 0.001), 0.002, gaps=(1e-4, 1e-4, 1e-5, 1e-7))
     assert tolerances.conclusion(rows, outer).startswith(
-        "rtol 0.02 is the loosest that keeps every output within 1 %"
+        "rtol 0.02 is the loosest whose biases measure at most 1 %"
     )
     told = tolerances.conclusion(rows, outer, 0.003)
-    assert told.startswith("rtol 0.01 is the loosest that keeps every output within 0.3 % (known to 0.2 %)")
+    assert told.startswith(
+        "rtol 0.01 is the loosest whose biases measure at most 0.3 % (their errors at most 0.2 %)"
+    )
     biased = tolerance_rows((0.03, 0.02, 0.02), 0.002)
     assert "no tolerance looser than the reference, rtol 0.0001," in tolerances.conclusion(biased, outer)
     assert tolerances.conclusion(rows[-1:], outer).startswith("no tolerance looser than the reference")
@@ -109,7 +111,7 @@ def test_unit_mixed_tolerances_conclude_what_they_can(outer):
     rows = tolerance_rows((0.0, 0.0, 0.0), 0.05)
     rows[2] = tolerances.Row(*bias(0.001, 0.002), 0.01, 1.0, 600.0, 340.0, 1e-5)
     told = tolerances.conclusion(rows, outer)
-    assert told.startswith("rtol 0.01 keeps every output within 1 % (known to 0.2 %)")
+    assert told.startswith("rtol 0.01 is one whose biases measure at most 1 % (their errors at most 0.2 %)")
     assert "Looser ones are undecided: errors of 5 % hide differences of 0 %" in told
 
 
@@ -128,10 +130,10 @@ def test_unit_methods_conclude_only_what_errors_allow(outer):
     noisy = method_bias.conclusion(rows(0.43), outer)
     assert noisy.startswith("Which method keeps its statistics is undecided: errors of 43 % hide")
     sharp = method_bias.conclusion(rows(0.003), outer)
-    assert "ours 1.20 ms (rtol 0.01, known to 0.3 %)" in sharp
+    assert "ours 1.20 ms (rtol 0.01, errors at most 0.3 %)" in sharp
     assert "Verlet" not in sharp and "undecided" not in sharp
     none = method_bias.conclusion(rows(0.003)[3:], outer)
-    assert none == "No method keeps its statistics within 1 % with a power balance closed to 0.5 %."
+    assert none == "No method shows biases of at most 1 % and a power balance closed to 0.5 %."
 
 
 def test_unit_slices_conclude_only_what_errors_allow(outer):
@@ -151,8 +153,8 @@ def test_unit_slices_conclude_only_what_errors_allow(outer):
     noisy, sharp = slicing.conclusion(rows(0.2), outer), slicing.conclusion(rows(0.003), outer)
     load = "31 slices are the fewest whose load is right within 0.5 %"
     assert noisy.startswith(load) and sharp.startswith(load)
-    assert "undecided: errors of 20 % hide differences" in noisy and "keep every output" not in noisy
-    assert sharp.endswith("They keep every output within 1 % (known to 0.3 %).")
+    assert "undecided: errors of 20 % hide differences" in noisy and "measure at most" not in noisy
+    assert sharp.endswith("At 31 the biases of the outputs measure at most 1 % (their errors at most 0.3 %).")
     coarse = [slicing.Row(*bias(0.0, 0.003), 9, 0.02, 900.0)]
     assert slicing.conclusion(coarse, outer) == "not even 9 slices keep the load within 0.5 %"
 

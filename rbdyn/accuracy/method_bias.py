@@ -104,19 +104,15 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
         if verdict == "undecided":
             hidden += row.found.hidden(f"{row.method}, {row.setting}", sought)
     rest = undecided(hidden, scene, sought) if hidden else ""
-    limits = f"{percent(sought)} with a power balance closed to {percent(NEGLIGIBLE)}"
+    limits = f"biases of at most {percent(sought)} and a power balance closed to {percent(NEGLIGIBLE)}"
     if not best:
-        return (
-            f"Which method keeps its statistics is {rest}."
-            if rest
-            else f"No method keeps its statistics within {limits}."
-        )
+        return f"Which method keeps its statistics is {rest}." if rest else f"No method shows {limits}."
     told = ", ".join(
-        f"{row.method} {row.turn_ms:.2f} ms ({row.setting}, known to {percent(row.found.known_to)})"
+        f"{row.method} {row.turn_ms:.2f} ms ({row.setting}, errors at most {percent(row.found.known_to)})"
         for row in best.values()
         if row.found is not None
     )
-    return f"Statistics within {limits}, a turn: {told}." + (f" Other settings are {rest}." if rest else "")
+    return f"Measured {limits}, a turn: {told}." + (f" Other settings are {rest}." if rest else "")
 
 
 def table(rows: Sequence[Row], sought: float = SOUGHT) -> Table:

@@ -175,23 +175,22 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
     )
     compared = [row for row in good if row is not rows[-1]]
     chosen = next((row for row in compared if row.verdict(sought) == "within"), None)
-    if chosen is not None and chosen is good[0]:
-        return (
-            f"{fewest} They keep every output within {percent(sought)} (known to {percent(chosen.known_to)})."
-        )
     hidden = [
         found
         for row in compared
         if row.verdict(sought) == "undecided" and (chosen is None or row.slices < chosen.slices)
         for found in row.hidden(f"{row.slices} slices", sought)
     ]
-    kept = (
-        ""
-        if chosen is None
-        else f" {chosen.slices} keep every output within {percent(sought)} (known to {percent(chosen.known_to)})."
-    )
-    rest = f" What fewer do to the outputs is {undecided(hidden, scene, sought)}." if hidden else ""
-    return fewest + kept + rest
+    sentences = [fewest]
+    if chosen is not None:
+        sentences.append(
+            f"At {chosen.slices} the biases of the outputs measure at most {percent(sought)} (their errors at most "
+            f"{percent(chosen.known_to)})."
+        )
+    if hidden:
+        below = (chosen or rows[-1]).slices
+        sentences.append(f"What fewer than {below} do to the outputs is {undecided(hidden, scene, sought)}.")
+    return " ".join(sentences)
 
 
 def _draw(rows: Sequence[Row], path: Any, sought: float) -> None:

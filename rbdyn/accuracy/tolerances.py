@@ -143,12 +143,12 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
     rest = undecided(hidden, scene, sought) if hidden else ""
     if chosen is None:
         return rest or (
-            f"no tolerance looser than the reference, rtol {reference.rtol:g}, keeps every output within "
-            f"{percent(sought)} and closes the power balance within {percent(NEGLIGIBLE)}"
+            f"no tolerance looser than the reference, rtol {reference.rtol:g}, has biases of at most {percent(sought)} and a "
+            f"power balance that closes within {percent(NEGLIGIBLE)}"
         )
     return (
-        f"rtol {chosen.rtol:g} {'keeps' if hidden else 'is the loosest that keeps'} every output within {percent(sought)} "
-        f"(known to {percent(chosen.known_to)}) and closes the power balance within {percent(NEGLIGIBLE)}: "
+        f"rtol {chosen.rtol:g} is {'one' if hidden else 'the loosest'} whose biases measure at most {percent(sought)} (their "
+        f"errors at most {percent(chosen.known_to)}) and whose power balance closes within {percent(NEGLIGIBLE)}: "
         f"{chosen.turn_ms:.2f} ms a shaft turn. The scene has {scene.numerics.rtol:g}."
         + (f" Looser ones are {rest}." if hidden else "")
     )
