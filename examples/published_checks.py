@@ -2,8 +2,9 @@
 
     python examples/published_checks.py [--quick] [--out DIR] [--only NAME]
 
-Prints plain tables and a conclusion a check; ``--out`` writes published_checks.md, a table of the numbers and a
-picture for each. ``--quick`` simulates less and says so.
+Prints plain tables and a conclusion a check, and at the end how the findings came out by kind: measured, trends, other
+models, formulas. ``--out`` writes published_checks.md, a table of the numbers and a picture for each. ``--quick``
+simulates less and says so.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from published.common import Check, Effort
+from published.common import Check, Effort, Finding, tally_table
 from published.friction_totals import friction_totals
 from published.operating import figure14, friction
 from published.sensitivity import QUICK, sensitivity
@@ -65,12 +66,14 @@ def main(
     names = [only] if only else list(checks)
     started = time.perf_counter()
     report = ["# rbdyn beside what is published\n"]
+    findings: list[Finding] = []
     if quick:
         report.append("Quick run: fewer turns, replicates and points than the full one.\n")
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
     for name in names:
         check = checks[name]()
+        findings += check.findings
         typer.echo(f"\n{check.title}\n")
         for table in check.tables:
             table.show()
@@ -85,6 +88,12 @@ def main(
             check.draw(out / f"{name}.png")
             report.append(f"![{check.title}]({name}.png)\n")
             (out / "published_checks.md").write_text("\n".join(report), encoding="utf-8")
+    if findings:
+        counts = tally_table(findings)
+        counts.show()
+        if out is not None:
+            text = "\n".join([*report, "## All findings\n", counts.markdown()])
+            (out / "published_checks.md").write_text(text, encoding="utf-8")
     typer.echo(f"\n{len(names)} checks in {time.perf_counter() - started:.0f} s, compilation included")
 
 

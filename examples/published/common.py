@@ -1,4 +1,4 @@
-"""What the checks share: how much to simulate, figures with errors, tables, and what a check returns."""
+"""What the checks share: how much to simulate, figures with errors, findings, tables, and what a check returns."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 import pandas as pd
@@ -24,6 +25,9 @@ PLAIN = {
     "power_loss_W": "power loss",
 }
 LAWS = ("four_constant", "thermal_newtonian")
+
+Kind = Literal["measured", "trend", "model against model", "cross-check"]
+Verdict = Literal["agrees", "differs", "unclear", "untested"]
 
 
 @dataclass(frozen=True)
@@ -64,14 +68,73 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Finding:
+    """One published finding with ours beside it.
+
+    ``kind``: "measured": what came out of a test, a value or which of two bearings did better; "trend": only the
+    direction in which something runs with speed, load or oil, whoever found it; "model against model": a figure of
+    another simulation, which may err as ours does; "cross-check": a formula of a maker or a handbook. ``source`` tells
+    how much of it was read. ``verdict``: "unclear" where an error hides the answer, "untested" where the source has no
+    number to set ours beside.
+    """
+
+    words: str
+    source: str
+    kind: Kind
+    ours: str
+    verdict: Verdict
+
+
+def verdict_of(beyond: float, error: float) -> Verdict:
+    """Of a difference that should be above 0: agrees or differs beyond its 95 % error, else unclear."""
+    if not abs(beyond) > error:
+        return "unclear"
+    return "agrees" if beyond > 0.0 else "differs"
+
+
+def findings_table(findings: Sequence[Finding]) -> Table:
+    """A line a finding."""
+    header = ("finding", "source", "kind", "ours", "verdict")
+    return Table(
+        "what is published", header, tuple((f.words, f.source, f.kind, f.ours, f.verdict) for f in findings)
+    )
+
+
+def tally_table(findings: Sequence[Finding]) -> Table:
+    """How the findings of each kind came out."""
+    rows = [(kind, [f.verdict for f in findings if f.kind == kind]) for kind in get_args(Kind)]
+    return Table(
+        "published findings by kind",
+        ("kind", "findings", *get_args(Verdict)),
+        tuple(
+            (kind, f"{len(own)}", *(f"{own.count(word)}" for word in get_args(Verdict)))
+            for kind, own in rows
+            if own
+        ),
+    )
+
+
+def tally(findings: Sequence[Finding]) -> str:
+    """The same in words: 'measured 2 of 3 agree (1 untested), trend 3 of 3 agree'."""
+    parts = []
+    for kind, count, agree, _, *rest in tally_table(findings).rows:
+        doubts = ", ".join(
+            f"{n} {word}" for n, word in zip(rest, ("unclear", "untested"), strict=True) if n != "0"
+        )
+        parts.append(f"{kind} {agree} of {count} agree" + (f" ({doubts})" if doubts else ""))
+    return ", ".join(parts)
+
+
+@dataclass(frozen=True)
 class Check:
-    """One check: its tables, its conclusion in a sentence or two, its numbers, and how to draw it."""
+    """One check: its tables, its conclusion in a sentence or two, its numbers, how to draw it, and what it compares."""
 
     title: str
     tables: tuple[Table, ...]
     conclusion: str
     frame: pd.DataFrame
     draw: Callable[[Path], None]
+    findings: tuple[Finding, ...] = ()
 
 
 @functools.cache

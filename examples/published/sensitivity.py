@@ -1,4 +1,7 @@
-"""Check 5: the same comparison with one documented, defensible input changed at a time. No default follows from it."""
+"""Check 5: the same comparison, model against model, with one documented, defensible input changed at a time.
+
+No default follows from it.
+"""
 
 from __future__ import annotations
 

@@ -20,13 +20,16 @@ from published.common import (
     RESPONSES,
     Check,
     Effort,
+    Finding,
     Table,
+    Verdict,
     canvas,
     error,
     plus_minus,
     quantity,
     save,
     simulated,
+    tally,
 )
 
 FACTORS = {
@@ -123,6 +126,10 @@ def rank_correlation(
     return float(spearmanr(values, their).statistic), float(low), float(high)
 
 
+SIGN_VERDICTS: dict[str, Verdict] = {"same": "agrees", "opposite": "differs", "unclear": "unclear"}
+SOURCE = "Chen et al. 2022, Table 4 (simulated)"
+
+
 def sign(own: tuple[float, float], other: tuple[float, float]) -> str:
     """Whether two effects point the same way, or one of them is lost in its error."""
     if abs(own[0]) <= own[1] or abs(other[0]) <= other[1]:
@@ -184,22 +191,46 @@ def table4(effort: Effort, laws: Sequence[str] = LAWS) -> Check:
     return Check(
         "Chen et al. 2022, Table 4: 20 designs of three clearances",
         (levels_table(frame), effects_table(frame), power_table(fits)),
-        conclusion(frame, fits),
+        f"{conclusion(frame, fits)} {tally(findings(frame))}.",
         frame,
         draw,
+        findings(frame),
     )
+
+
+def findings(frame: pd.DataFrame) -> tuple[Finding, ...]:
+    """Levels beside levels, and the signs of the linear effects."""
+    found = []
+    for row in frame.to_dict("records"):
+        name, law = PLAIN[row["response"]], row["law"]
+        found.append(
+            Finding(
+                f"level of the {name}", SOURCE, "model against model",
+                f"{plus_minus(row['level_ratio'], row['level_ratio_error'])} of theirs ({law})",
+                "agrees" if abs(row["level_ratio"] - 1.0) <= row["level_ratio_error"] else "differs",
+            )
+        )  # fmt: skip
+        for factor in FACTORS:
+            way = "rises" if row[f"theirs_{factor}"] > 0.0 else "falls"
+            verdict = SIGN_VERDICTS[row[f"sign_{factor}"]]
+            told = f"{row[f'sign_{factor}']} ({law})"
+            found.append(
+                Finding(f"{name} {way} with {SHORT[factor]} clearance", SOURCE, "trend", told, verdict)
+            )
+    return tuple(found)
 
 
 def levels_table(frame: pd.DataFrame) -> Table:
     """Level ratios and rank correlations."""
     return Table(
         "level (ours/theirs, mean of the 20 runs) and Spearman rank correlation over the 15 distinct designs; 95 %",
-        ("response", "traction law", "level ratio", "rank correlation", "interval"),
+        ("response", "traction law", "level ratio", "kind", "rank correlation", "interval"),
         tuple(
             (
                 PLAIN[row["response"]],
                 row["law"],
                 plus_minus(row["level_ratio"], row["level_ratio_error"]),
+                "model against model",
                 f"{row['spearman']:+.2f}",
                 f"{row['spearman_low']:+.2f} to {row['spearman_high']:+.2f}",
             )
@@ -216,10 +247,12 @@ def effects_table(frame: pd.DataFrame) -> Table:
             pairs = [
                 plus_minus(row[f"{who}_{name}"], row[f"{who}_error_{name}"]) for who in ("ours", "theirs")
             ]
-            rows.append((PLAIN[row["response"]], row["law"], SHORT[name], *pairs, row[f"sign_{name}"]))
+            rows.append(
+                (PLAIN[row["response"]], row["law"], SHORT[name], *pairs, row[f"sign_{name}"], "trend")
+            )
     return Table(
         "linear effects per step (A 0.005, B and C 0.05 mm); 'unclear' where one of the two is within its error",
-        ("response", "traction law", "clearance", "ours", "theirs", "sign"),
+        ("response", "traction law", "clearance", "ours", "theirs", "sign", "kind"),
         tuple(rows),
     )
 

@@ -9,7 +9,21 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from published.common import CHEN, LAWS, Check, Effort, Table, canvas, error, plus_minus, save, simulated
+from published.common import (
+    CHEN,
+    LAWS,
+    Check,
+    Effort,
+    Finding,
+    Table,
+    canvas,
+    error,
+    findings_table,
+    plus_minus,
+    save,
+    simulated,
+    tally,
+)
 from rbdyn import History, Scene, history
 
 FILLS = (1.0, 0.3, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
@@ -90,6 +104,7 @@ def whirl(
         axes[0][0].legend(fontsize=8)
         save(figure, path)
 
+    found = findings(frame)
     return Check(
         "Cage whirl against starvation of the guide land",
         (
@@ -99,14 +114,32 @@ def whirl(
                  "impact N", "slip %", "regime"),
                 rows,
             ),
+            findings_table(found),
         ),
-        conclusion(frame),
+        conclusion(frame, found),
         frame,
         draw,
+        found,
     )  # fmt: skip
 
 
-def conclusion(frame: pd.DataFrame) -> str:
+def findings(frame: pd.DataFrame) -> tuple[Finding, ...]:
+    """Their whirl ratios beside ours on the fullest land."""
+    found = []
+    for law, part in frame.groupby("law", sort=False):
+        flooded = part.loc[part["fill"].idxmax()]
+        off = max(PAPER[0] - flooded["ratio"], flooded["ratio"] - PAPER[1])
+        found.append(
+            Finding(
+                f"cage whirl deviation ratio of {PAPER[0]:g} to {PAPER[1]:g}", "Chen et al. 2022, Table 4",
+                "model against model", f"{plus_minus(flooded['ratio'], flooded['ratio_error'])} ({law}, fill {flooded['fill']:g})",
+                "agrees" if off <= 0.0 else "unclear" if off <= flooded["ratio_error"] else "differs",
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def conclusion(frame: pd.DataFrame, found: Sequence[Finding]) -> str:
     """Where the film is lost, and what that does to the ratio."""
     parts = []
     for law, part in frame.groupby("law", sort=False):
@@ -119,5 +152,5 @@ def conclusion(frame: pd.DataFrame) -> str:
     reaches = "reaches" if frame["ratio"].max() > PAPER[0] else "does not reach"
     return (
         f"The flooded land carries the cage without contact; {'; '.join(parts)}. An isotropic random velocity would give "
-        f"{ISOTROPIC:.2f}; starvation alone {reaches} the paper's {PAPER[0]:.2f} to {PAPER[1]:.2f}."
+        f"{ISOTROPIC:.2f}; starvation alone {reaches} the paper's {PAPER[0]:.2f} to {PAPER[1]:.2f}. {tally(found)}."
     )

@@ -11,12 +11,14 @@ from rbdyn.scene import BallScene, Scene
 
 # Studies that take the length of trajectories.
 TRAJECTORIES = ("tolerances", "methods")
+# Studies that judge means with errors.
+JUDGED = ("tolerances", "methods", "slices", "replicates")
 
 
 def asked_study(flags: Mapping[str, bool], limits: Mapping[str, Any], scene: Scene | BallScene) -> str:
     """Name of the study: that of the only flag set, or the default of the scene's kind of bearing.
 
-    ``limits``: options of single studies, "turns" and "scenes". Raises InputError for two flags, for a study of the other
+    ``limits``: options of single studies, "turns", "scenes" and "sought". Raises InputError for two flags, for a study of the other
     kind of bearing, and for limits that the study does not know.
     """
     chosen = [name for name, wished in flags.items() if wished]
@@ -32,6 +34,9 @@ def asked_study(flags: Mapping[str, bool], limits: Mapping[str, Any], scene: Sce
     if "turns" in limits and name not in TRAJECTORIES:
         why = f"{shown or 'the study of ' + repr(kind)} integrates no trajectories; leave it out"
         raise InputError([f"--trajectory {limits['turns']:g}: {why}"])
+    if "sought" in limits and name not in JUDGED:
+        why = f"{shown or 'the study of ' + repr(kind)} judges no means; leave it out"
+        raise InputError([f"--sought-percent {100.0 * limits['sought']:g}: {why}"])
     if "scenes" in limits and name != "battery":
         raise InputError([f"--scenes {limits['scenes']}: goes with --battery only; leave it out"])
     return name

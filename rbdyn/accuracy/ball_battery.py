@@ -113,10 +113,10 @@ def conclusion(rows: Sequence[Success | None]) -> str:
     """Who solves most, and how the others compare."""
     ranked = sorted(_some(rows), key=lambda row: -row.solved)
     best, rest = ranked[0], ranked[1:]
-    others = ", ".join(f"{row.solver} {100.0 * row.solved:.1f} %" for row in rest)
+    others = ", ".join(f"{row.solver} {row.shown_share}" for row in rest)
     return (
-        f"{best.solver} solves {100.0 * best.solved:.2f} % of {best.problems} random scenes, half of them within "
-        f"{best.median_us:.0f} us; {others}."
+        f"{best.solver} solves {best.shown_share} of {best.problems} random scenes, half of them within "
+        f"{best.median_us:.0f} us; {others}; 95 % intervals."
     )
 
 

@@ -7,6 +7,7 @@ first that compiles. Then the load and the speed of the scene are perturbed at r
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -62,6 +63,25 @@ class Success(NamedTuple):
     longest_us: float
     median_steps: float
     causes: dict[str, int]
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the share solved."""
+        return share(round(self.solved * self.problems), self.problems)
+
+    @property
+    def shown_share(self) -> str:
+        """The share solved with its interval, in words."""
+        low, high = self.interval
+        return f"{100.0 * self.solved:.2f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"
+
+
+def share(count: int, total: int) -> tuple[float, float]:
+    """95 % interval of a share of which ``count`` of ``total`` were seen (Wilson 1927, J. Am. Stat. Assoc. 22, 209)."""
+    z, seen = 1.96, count / total
+    spread = math.sqrt(seen * (1.0 - seen) / total + (0.5 * z / total) ** 2)
+    middle, scale = seen + 0.5 * z * z / total, 1.0 + z * z / total
+    return max((middle - z * spread) / scale, 0.0), min((middle + z * spread) / scale, 1.0)
 
 
 def study(
@@ -206,17 +226,20 @@ def causes(rows: Sequence[Success]) -> list[str]:
 
 
 def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
-    """Which solver to take here: the surest, and the fastest of those."""
+    """Which solver to take here: the fastest of those that are as sure as the surest, as far as so many scenes tell."""
     reached: dict[str, float] = {}
     for attempt in attempts:
         if attempt.status == "ok":
             reached[attempt.solver] = min(attempt.solve_us, reached.get(attempt.solver, float("inf")))
-    surest = max(row.solved for row in rows)
-    best = min((row for row in rows if row.solved == surest), key=lambda row: row.median_us)
+    surest = max(rows, key=lambda row: row.solved)
+    alike = [row for row in rows if row.interval[1] >= surest.interval[0]]
+    best = min(alike, key=lambda row: row.median_us)
+    rivals = ", ".join(f"{row.solver} {row.shown_share}" for row in alike if row is not best)
     times = ", ".join(f"{name} {took:.0f} us" for name, took in sorted(reached.items(), key=lambda it: it[1]))
     return (
         f"To an equilibrium of this scene: {times or 'none'}. Take {best.solver}: it solves "
-        f"{100.0 * best.solved:.1f} % of {best.problems} scenes nearby, half of them within {best.median_us:.0f} us."
+        f"{best.shown_share} of {best.problems} scenes nearby, half of them within {best.median_us:.0f} us"
+        + (f"; so many scenes do not tell it from {rivals} in sureness." if rivals else ".")
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from rbdyn.accuracy import method_bias
 from rbdyn.accuracy.equal_error import Speedup, times_faster
+from rbdyn.accuracy.judgement import SOUGHT
 from rbdyn.accuracy.methods import METHODS, OURS, Method, NotInstalledError, compiled
 from rbdyn.accuracy.report import Progress, Report, Table, record
 from rbdyn.accuracy.stretch import Stretch
@@ -61,20 +62,21 @@ def study(
     progress: Callable[[int, int], None] | None = None,
     turns: float = DEFAULT_TURNS,
     methods: Sequence[Method] = METHODS,
+    sought: float = SOUGHT,
 ) -> Report:
-    """``rbdyn accuracy --methods``: trajectories, and the statistics of the compiled methods.
+    """``rbdyn accuracy --methods``: trajectories, and the statistics of the compiled methods, judged to ``sought``.
 
     Raises InputError, RunError where the references fail, KeyboardInterrupt.
     """
     motion = trajectories(scene, progress, turns, methods)
     rows = method_bias.bias_rows(scene, progress=progress)
-    chosen = method_bias.conclusion(rows)
+    chosen = method_bias.conclusion(rows, scene, sought)
     written = [row.as_dict() for row in rows]
     return replace(
         motion,
         record=motion.record
-        | {"statistics": written, "conclusion": f"{motion.record['conclusion']} {chosen}"},
-        tables=(*motion.tables, method_bias.table(rows)),
+        | {"statistics": written, "sought": sought, "conclusion": f"{motion.record['conclusion']} {chosen}"},
+        tables=(*motion.tables, method_bias.table(rows, sought)),
         sentences=(*motion.sentences, chosen),
         sheets={**motion.sheets, "statistics": [method_bias.flat(row) for row in written]},
     )
@@ -205,9 +207,13 @@ def conclusion(
     """In words: who is faster at equal error, and what failed."""
     sentences = []
     if ratios:
-        told = ", ".join(f"{ratio.mean:.2g} times that of {name}" for name, ratio in ratios.items())
+        told = ", ".join(
+            f"{ratio.mean:.2g} ({ratio.least:.2g} to {ratio.greatest:.2g}) times that of {name}"
+            for name, ratio in ratios.items()
+        )
         sentences.append(
-            f"At equal position error after {turns:g} turns the speed of {OURS.name} is {told} (geometric means)."
+            f"At equal position error after {turns:g} turns the speed of {OURS.name} is {told}: geometric mean, least and "
+            "greatest over the errors in common."
         )
     failed = {a.method: sum(b.method == a.method and b.status != OK for b in attempts) for a in attempts}
     told = ", ".join(f"{name} at {count}" for name, count in failed.items() if count)

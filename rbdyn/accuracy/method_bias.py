@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
 from rbdyn.accuracy.methods import (
     OURS,
     RUNGE_KUTTA_4,
@@ -62,7 +63,8 @@ def bias_rows(
     settings: Sequence[tuple[Method, Sequence[float]]] = SETTINGS,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Row]:
-    """A row a setting. Raises RunError where the reference fails, KeyboardInterrupt."""
+    """A row a setting. Raises InputError for a single replicate, RunError where the reference fails, KeyboardInterrupt."""
+    check_replicates(scene)
     bearing = roller_bearing(scene)
     prepare(scene, bearing)
     counting = Progress(progress, 1 + sum(len(values) for _, values in settings))
@@ -87,24 +89,36 @@ def bias_rows(
     return rows
 
 
-def conclusion(rows: Sequence[Row]) -> str:
-    """The cheapest setting of each method without bias."""
+def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str:
+    """The cheapest setting of each method shown to be without bias, and what errors hide of the rest."""
     best: dict[str, Row] = {}
+    hidden = []
     for row in rows:
         if row.found is None or row.power_gap is None or row.turn_ms is None or row.power_gap > NEGLIGIBLE:
             continue
-        if row.found.unbiased and (row.method not in best or row.turn_ms < (best[row.method].turn_ms or 0.0)):
+        verdict = row.found.verdict(sought)
+        if verdict == "within" and (
+            row.method not in best or row.turn_ms < (best[row.method].turn_ms or 0.0)
+        ):
             best[row.method] = row
+        if verdict == "undecided":
+            hidden += row.found.hidden(f"{row.method}, {row.setting}", sought)
+    rest = undecided(hidden, scene, sought) if hidden else ""
+    limits = f"biases of at most {percent(sought)} and a power balance closed to {percent(NEGLIGIBLE)}"
     if not best:
-        return "No method keeps its statistics within error (or 0.5 %) with a power balance closed to 0.5 %."
-    told = ", ".join(f"{row.method} {row.turn_ms:.2f} ms ({row.setting})" for row in best.values())
-    return f"Statistics without bias beyond error (or 0.5 %), power balance closed to 0.5 %, a turn: {told}."
+        return f"Which method keeps its statistics is {rest}." if rest else f"No method shows {limits}."
+    told = ", ".join(
+        f"{row.method} {row.turn_ms:.2f} ms ({row.setting}, errors at most {percent(row.found.known_to)})"
+        for row in best.values()
+        if row.found is not None
+    )
+    return f"Measured {limits}, a turn: {told}." + (f" Other settings are {rest}." if rest else "")
 
 
-def table(rows: Sequence[Row]) -> Table:
+def table(rows: Sequence[Row], sought: float = SOUGHT) -> Table:
     """Table for the terminal, failures in their places."""
     cells = [
-        (row.method, row.setting, row.status, *[""] * 5)
+        (row.method, row.setting, row.status, *[""] * 6)
         if row.found is None
         else (
             row.method,
@@ -113,10 +127,11 @@ def table(rows: Sequence[Row]) -> Table:
             f"{row.turn_ms:.2f}",
             f"{100.0 * (row.power_gap or 0.0):.2g} %",
             *bias_cells(row.found),
+            row.found.verdict(sought),
         )
         for row in rows
     ]
-    header = ("method", "setting", "status", "ms a turn", "power gap", *OUTPUTS)
+    header = ("method", "setting", "status", "ms a turn", "power gap", *OUTPUTS, f"within {percent(sought)}")
     return Table(f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors", header, cells)
 
 

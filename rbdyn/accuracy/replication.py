@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.accuracy.judgement import NORMAL, SOUGHT, about, percent
 from rbdyn.accuracy.report import Progress, Report, Table, record
 from rbdyn.accuracy.tolerances import OUTPUTS
 from rbdyn.dynamics.batch_means import student_factor
@@ -27,6 +28,8 @@ FORMAT = "rbdyn.replicates/1"
 POOL = 32
 TURNS = (10.0, 20.0, 40.0, 80.0)
 COUNTS = (2, 4, 8, 16, 32)
+# A slope known no better than this does not tell independent turns, -0.5, from ones that tell nothing new, 0.
+SLOPE_ERROR = 0.25
 
 
 @dataclass(frozen=True)
@@ -52,8 +55,10 @@ class Slope:
     half_width: float
 
     @property
-    def as_expected(self) -> bool:
-        """Whether -0.5 lies within the error."""
+    def as_expected(self) -> bool | None:
+        """Whether -0.5 lies within the error; None where that is too wide to tell."""
+        if self.half_width > SLOPE_ERROR:
+            return None
         return abs(self.power + 0.5) <= self.half_width
 
 
@@ -62,12 +67,13 @@ def study(
     progress: Callable[[int, int], None] | None = None,
     turns: Sequence[float] = TURNS,
     pool: int = POOL,
+    sought: float = SOUGHT,
 ) -> Report:
     """``rbdyn accuracy --replicates``. Raises RunError, KeyboardInterrupt."""
     values, cpu_s = pool_of_runs(scene, turns, pool, progress)
     rows = replication_rows(values, cpu_s, [count for count in COUNTS if count <= pool])
     slopes = {name: slope(turns, [values[length][name] for length in turns]) for name in OUTPUTS}
-    sentences = conclusion(rows, slopes, scene)
+    sentences = conclusion(rows, slopes, scene, pool, sought)
     header = ("replicates", "turns each", "processor s", *(f"{name} ±" for name in OUTPUTS))
     cells = [
         (
@@ -86,6 +92,7 @@ def study(
             slopes={name: found.__dict__ for name, found in slopes.items()},
             conclusion=" ".join(sentences),
             pool=pool,
+            sought=sought,
             discard_turns=scene.numerics.warm_up_turns,
         ),
         tables=(Table("95 % half-widths, relative", header, cells),),
@@ -153,34 +160,56 @@ def slope(turns: Sequence[float], samples: Sequence[NDArray[np.float64]]) -> Slo
     x = np.log(turns)
     y = [math.log(sample.std(ddof=1) / abs(sample.mean())) for sample in samples]
     centred = x - x.mean()
-    error = 1.0 / math.sqrt(2.0 * (len(samples[0]) - 1))
     return Slope(
-        float(centred @ np.array(y) / (centred @ centred)), 1.96 * error / math.sqrt(float(centred @ centred))
+        float(centred @ np.array(y) / (centred @ centred)),
+        scatter_error(len(samples[0])) / math.sqrt(float(centred @ centred)),
     )
 
 
-def conclusion(rows: Sequence[Row], slopes: dict[str, Slope], scene: Scene) -> list[str]:
-    """Whether the error falls as it should, and what the scene's choice among the rows buys."""
+def scatter_error(pool: int) -> float:
+    """95 % half-width of the logarithm of a standard deviation over ``pool`` normal values."""
+    return NORMAL / math.sqrt(2.0 * (pool - 1))
+
+
+def conclusion(
+    rows: Sequence[Row], slopes: dict[str, Slope], scene: Scene, pool: int = POOL, sought: float = SOUGHT
+) -> list[str]:
+    """Whether the error falls as it should, and what the scene's choice among the rows buys, as far as the scatter of
+    ``pool`` replicates is known."""
     sentences = []
     for name, found in slopes.items():
-        verdict = "as independent turns do" if found.as_expected else "not as independent turns do (-0.5)"
+        verdict = {
+            True: "as independent turns do",
+            False: "not as independent turns do (-0.5)",
+            None: f"undecided: errors of {found.half_width:.2g} hide a difference of {abs(found.power + 0.5):.2g}; a pool "
+            f"of about {about(1.0 + (pool - 1) * (found.half_width / SLOPE_ERROR) ** 2)} replicates tells",
+        }[found.as_expected]
         sentences.append(
             f"{name}: scatter falls with counted turns to the power {found.power:.2f} ± {found.half_width:.2f}, {verdict}."
         )
-    for name in OUTPUTS:
-        good = [row for row in rows if row.half_width[name] <= 0.01]
-        if good:
-            best = min(good, key=lambda row: row.cpu_s)
-            sentences.append(
-                f"{name} within 1 %: {best.replicates} replicates of {best.turns:g} turns, {best.cpu_s:.2g} s."
-            )
-        else:
-            sentences.append(
-                f"{name} within 1 %: more than {rows[-1].replicates} replicates of {rows[-1].turns:g} turns."
-            )
+    sentences += [_choice(name, rows, scatter_error(pool), sought) for name in OUTPUTS]
     numerics = scene.numerics
     sentences.append(f"The scene has {numerics.replicates} of {numerics.turns:g}.")
     return sentences
+
+
+def _choice(name: str, rows: Sequence[Row], unsure: float, sought: float) -> str:
+    """The quickest choice whose half-width is at most the one sought even where the scatter is as large as it may be."""
+    good = [row for row in rows if row.half_width[name] * math.exp(unsure) <= sought]
+    if good:
+        best = min(good, key=lambda row: row.cpu_s)
+        return f"{name} within {percent(sought)}: {best.replicates} replicates of {best.turns:g} turns, {best.cpu_s:.2g} s."
+    sharpest = min(rows, key=lambda row: row.half_width[name])
+    width = sharpest.half_width[name]
+    if width * math.exp(-unsure) > sought:
+        return (
+            f"{name} within {percent(sought)}: more than {sharpest.replicates} replicates of {sharpest.turns:g} turns; by "
+            f"the square root about {about(sharpest.replicates * (width / sought) ** 2)} of them."
+        )
+    return (
+        f"{name} within {percent(sought)}: undecided; {sharpest.replicates} replicates of {sharpest.turns:g} turns reach "
+        f"{percent(width)}, known to a factor of {math.exp(unsure):.2g}."
+    )
 
 
 def _draw(rows: Sequence[Row], path: Any) -> None:

@@ -1,7 +1,7 @@
 """Slices of a roller with a profile or between tilted races: error of the load and of the statistics against cost.
 
 The load law is exact in itself: its error is measured at equal approach against a very fine slicing, over all loads
-up to twice the largest on the shaft. Statistics come from short runs, against those of the finest slicing run.
+up to twice the largest on the shaft. Statistics are compared with those of the finest slicing run.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
 from rbdyn.accuracy.report import Progress, Report, Table, record
 from rbdyn.accuracy.tolerances import NEGLIGIBLE, OUTPUTS, Bias, bias_cells, bias_of, flat
 from rbdyn.contact.hertz_line import line_load
@@ -27,7 +28,6 @@ FORMAT = "rbdyn.slices/1"
 COUNTS = (5, 9, 15, 21, 31, 61, 121, 241)
 FINE = 1001  # the most a scene may have
 LOADS = 40
-TURNS, DISCARDED, REPLICATES = 20, 5, 4
 # Loads below this share of the largest: the touching part is too short to matter to anything.
 LIGHTEST = 0.02
 
@@ -46,29 +46,46 @@ class Row(Bias):
 
 
 def study(
-    scene: Scene, progress: Callable[[int, int], None] | None = None, counts: Sequence[int] = COUNTS
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    counts: Sequence[int] = COUNTS,
+    sought: float = SOUGHT,
 ) -> Report:
-    """``rbdyn accuracy --slices``. Raises InputError for a roller without slices, RunError, KeyboardInterrupt."""
+    """``rbdyn accuracy --slices``.
+
+    Raises InputError for a roller without slices or a single replicate, RunError, KeyboardInterrupt.
+    """
     rows = slice_rows(scene, counts, progress)
-    chosen = conclusion(rows, scene)
-    header = ("slices", "load error", "ns a right-hand side", *OUTPUTS)
+    chosen = conclusion(rows, scene, sought)
+    header = ("slices", "load error", "ns a right-hand side", *OUTPUTS, f"within {percent(sought)}")
     cells = [
-        (f"{row.slices}", f"{100.0 * row.load_error:.2g} %", f"{row.rhs_ns:.0f}", *bias_cells(row))
+        (
+            f"{row.slices}",
+            f"{100.0 * row.load_error:.2g} %",
+            f"{row.rhs_ns:.0f}",
+            *bias_cells(row),
+            "reference" if row is rows[-1] else row.verdict(sought),
+        )
         for row in rows
     ]
+    numerics = scene.numerics
     return Report(
         stem="slices",
         record=record(
             FORMAT,
             rows=[row.as_dict() for row in rows],
             conclusion=chosen,
-            turns=TURNS,
-            replicates=REPLICATES,
+            turns=numerics.turns,
+            replicates=numerics.replicates,
+            sought=sought,
         ),
         tables=(Table(f"bias against {rows[-1].slices} slices, 95 % errors", header, cells),),
-        sentences=(chosen, f"{REPLICATES} replicates of {TURNS} turns; load errors against {FINE} slices"),
+        sentences=(
+            chosen,
+            f"{numerics.replicates} replicates of {numerics.turns:g} turns; load errors against {FINE} slices",
+        ),
         sheets={"slices": [flat(row) for row in rows]},
-        pictures={"slices": lambda path: _draw(rows, path)},
+        pictures={"slices": lambda path: _draw(rows, path, sought)},
     )
 
 
@@ -83,20 +100,12 @@ def slice_rows(
                 "exact; give the roller a profile or the races a tilt to study its slices"
             ]
         )
+    check_replicates(scene)
     counts = sorted(counts)
-    counted = Progress(progress, len(counts) * REPLICATES)
+    counted = Progress(progress, len(counts) * scene.numerics.replicates)
     series: dict[int, list[Replicate]] = {}
     for count in counts:
-        cut = with_options(
-            scene,
-            (
-                f"model.slices={count}",
-                f"numerics.turns={TURNS}",
-                f"numerics.discard_turns={DISCARDED}",
-                f"numerics.impact_window_turns={TURNS}",
-                f"numerics.replicates={REPLICATES}",
-            ),
-        )
+        cut = with_options(scene, (f"model.slices={count}",))
         bearing = roller_bearing(cut)
         prepare(cut, bearing)
         series[count] = run_series(
@@ -152,18 +161,39 @@ def overlap_at(law: Any, load: float) -> float:
     return high
 
 
-def conclusion(rows: Sequence[Row], scene: Scene) -> str:
-    """The fewest slices whose load and statistics are right within 0.5 % or their errors."""
-    for row in rows:
-        if row.unbiased and row.load_error <= NEGLIGIBLE:
-            return (
-                f"{row.slices} slices are the fewest whose load is right within 0.5 % and that bias no output beyond "
-                f"its error (or 0.5 %): {row.rhs_ns:.0f} ns a right-hand side. The scene has {scene.slices}."
-            )
-    return f"not even {rows[-1].slices} slices keep the load within 0.5 %"
+def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str:
+    """The fewest slices shown to keep load and statistics, or what hides them.
+
+    The last row is the reference of the statistics and no evidence for its own.
+    """
+    good = [row for row in rows if row.load_error <= NEGLIGIBLE]
+    if not good:
+        return f"not even {rows[-1].slices} slices keep the load within {percent(NEGLIGIBLE)}"
+    fewest = (
+        f"{good[0].slices} slices are the fewest whose load is right within {percent(NEGLIGIBLE)}: "
+        f"{good[0].rhs_ns:.0f} ns a right-hand side. The scene has {scene.slices}."
+    )
+    compared = [row for row in good if row is not rows[-1]]
+    chosen = next((row for row in compared if row.verdict(sought) == "within"), None)
+    hidden = [
+        found
+        for row in compared
+        if row.verdict(sought) == "undecided" and (chosen is None or row.slices < chosen.slices)
+        for found in row.hidden(f"{row.slices} slices", sought)
+    ]
+    sentences = [fewest]
+    if chosen is not None:
+        sentences.append(
+            f"At {chosen.slices} the biases of the outputs measure at most {percent(sought)} (their errors at most "
+            f"{percent(chosen.known_to)})."
+        )
+    if hidden:
+        below = (chosen or rows[-1]).slices
+        sentences.append(f"What fewer than {below} do to the outputs is {undecided(hidden, scene, sought)}.")
+    return " ".join(sentences)
 
 
-def _draw(rows: Sequence[Row], path: Any) -> None:
+def _draw(rows: Sequence[Row], path: Any, sought: float) -> None:
     from rbdyn import plots
 
-    plots.slices_at_work(rows, path)
+    plots.slices_at_work(rows, path, sought)

@@ -1,7 +1,7 @@
 """Bias of the statistics: what each tolerance costs and how far its outputs are from converged ones.
 
-Every tolerance runs the same seeded replicates. The reference is the tightest tolerance; a difference counts as bias
-only beyond the 95 % half-width of the difference of the two means. Times are those of single-threaded runs, taken
+Every tolerance runs the same seeded replicates. The reference is the tightest tolerance; what the difference of two
+means and its 95 % half-width allow to be said, ``judgement`` decides. Times are those of single-threaded runs, taken
 after everything was compiled.
 """
 
@@ -14,6 +14,16 @@ from typing import Any
 
 import numpy as np
 
+from rbdyn.accuracy.judgement import (
+    SOUGHT,
+    Difference,
+    Verdict,
+    check_replicates,
+    judged,
+    overall,
+    percent,
+    undecided,
+)
 from rbdyn.accuracy.report import Progress, Table
 from rbdyn.dynamics.batch_means import student_half_width
 from rbdyn.dynamics.ensemble import Stop
@@ -29,7 +39,7 @@ OUTPUTS: dict[str, Callable[[Replicate], float]] = {
     "whirl_deviation_ratio": lambda run: run.whirl_deviation_ratio,
     "power_loss_W": lambda run: run.power_loss,
 }
-# A bias below this, or a power gap, hurts nobody.
+# A gap of the power balance, or an error of a load, below this hurts nobody; neither of them scatters.
 NEGLIGIBLE = 0.005
 
 
@@ -41,10 +51,26 @@ class Bias:
     bias: dict[str, float]
     bias_error: dict[str, float]
 
+    def verdict_of(self, name: str, sought: float = SOUGHT) -> Verdict:
+        """Whether an output is off by more than ``sought``, as far as its error tells."""
+        return judged(self.bias[name], self.bias_error[name], sought)
+
+    def verdict(self, sought: float = SOUGHT) -> Verdict:
+        """That of all outputs together."""
+        return overall(self.verdict_of(name, sought) for name in OUTPUTS)
+
     @property
-    def unbiased(self) -> bool:
-        """Whether no output is off by more than its error, or half a per cent."""
-        return all(abs(self.bias[name]) <= max(self.bias_error[name], NEGLIGIBLE) for name in OUTPUTS)
+    def known_to(self) -> float:
+        """Largest 95 % error of any output."""
+        return max(self.bias_error[name] for name in OUTPUTS)
+
+    def hidden(self, row: str, sought: float = SOUGHT) -> list[Difference]:
+        """Differences that their errors hide; ``row`` says where."""
+        return [
+            Difference(f"{name} at {row}", self.bias[name], self.bias_error[name])
+            for name in OUTPUTS
+            if self.verdict_of(name, sought) == "undecided"
+        ]
 
 
 @dataclass(frozen=True)
@@ -75,7 +101,11 @@ class StatisticsBias:
 def statistics_bias(
     scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Callable[[int, int], None] | None = None
 ) -> StatisticsBias:
-    """A row a tolerance. Runs one replicate at a time. Raises KeyboardInterrupt, RunError where the tightest fails."""
+    """A row a tolerance. Runs one replicate at a time.
+
+    Raises InputError for a single replicate, KeyboardInterrupt, RunError where the tightest fails.
+    """
+    check_replicates(scene)
     bearing = roller_bearing(scene)
     prepare(scene, bearing)
     ordered = sorted(tolerances)
@@ -95,16 +125,33 @@ def statistics_bias(
     return StatisticsBias(rows[::-1], failures)
 
 
-def conclusion(rows: Sequence[Row], scene: Scene) -> str:
-    """Which tolerance to take: the loosest that biases no output beyond error or 0.5 %, and closes in power."""
-    for row in rows:
-        if row.unbiased and row.power_gap <= NEGLIGIBLE:
-            return (
-                f"rtol {row.rtol:g} is the loosest at which no output is off by more than its error (or 0.5 %) and the "
-                f"power balance closes within 0.5 %: {row.turn_ms:.2f} ms a shaft turn. The scene has "
-                f"{scene.numerics.rtol:g}."
-            )
-    return f"no tolerance down to {rows[-1].rtol:g} is good enough; tighten further"
+def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str:
+    """Which tolerance to take: the loosest shown to bias no output and to close in power, or what hides it.
+
+    The last row, with which the others are compared, is no evidence for itself.
+    """
+    reference = rows[-1]
+    closing = [row for row in rows[:-1] if row.power_gap <= NEGLIGIBLE]
+    verdicts = [row.verdict(sought) for row in closing]
+    chosen = closing[verdicts.index("within")] if "within" in verdicts else None
+    open_rows = [
+        row
+        for row, verdict in zip(closing, verdicts, strict=True)
+        if verdict == "undecided" and (chosen is None or row.rtol > chosen.rtol)
+    ]
+    hidden = [found for row in open_rows for found in row.hidden(f"rtol {row.rtol:g}", sought)]
+    rest = undecided(hidden, scene, sought) if hidden else ""
+    if chosen is None:
+        return rest or (
+            f"no tolerance looser than the reference, rtol {reference.rtol:g}, has biases of at most {percent(sought)} and a "
+            f"power balance that closes within {percent(NEGLIGIBLE)}"
+        )
+    return (
+        f"rtol {chosen.rtol:g} is {'one' if hidden else 'the loosest'} whose biases measure at most {percent(sought)} (their "
+        f"errors at most {percent(chosen.known_to)}) and whose power balance closes within {percent(NEGLIGIBLE)}: "
+        f"{chosen.turn_ms:.2f} ms a shaft turn. The scene has {scene.numerics.rtol:g}."
+        + (f" Looser ones are {rest}." if hidden else "")
+    )
 
 
 def bias_of(runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Bias:
@@ -119,9 +166,13 @@ def bias_of(runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Bias:
     return Bias(value, bias, bias_error)
 
 
-def table(found: StatisticsBias) -> Table:
+def table(found: StatisticsBias, sought: float = SOUGHT) -> Table:
     """Table for the terminal; failed tolerances at the end."""
-    header = ("rtol", "ms a turn", "ns a right-hand side", "steps a turn", "power gap", *OUTPUTS)
+    header = (
+        *("rtol", "ms a turn", "ns a right-hand side", "steps a turn", "power gap"),
+        *OUTPUTS,
+        f"within {percent(sought)}",
+    )
     cells = [
         (
             f"{row.rtol:g}",
@@ -130,6 +181,7 @@ def table(found: StatisticsBias) -> Table:
             f"{row.steps_per_turn:.0f}",
             f"{100.0 * row.power_gap:.2g} %",
             *bias_cells(row),
+            "reference" if row is found.rows[-1] else row.verdict(sought),
         )
         for row in found.rows
     ]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from rbdyn.accuracy import comparison, tolerances
+from rbdyn.accuracy.judgement import SOUGHT
 from rbdyn.accuracy.methods import COMPILED
 from rbdyn.accuracy.report import Report, record
 from rbdyn.accuracy.trajectory import DEFAULT_TURNS
@@ -19,14 +20,15 @@ def study(
     progress: Callable[[int, int], None] | None = None,
     turns: float = DEFAULT_TURNS,
     rtols: Sequence[float] = tolerances.TOLERANCES,
+    sought: float = SOUGHT,
 ) -> Report:
-    """``rbdyn accuracy``: bias of the statistics, then the trajectories of the compiled methods over ``turns``.
+    """``rbdyn accuracy``: bias of the statistics, judged to ``sought``, and the trajectories of the compiled methods.
 
     Raises InputError, RunError where a reference fails, KeyboardInterrupt.
     """
     motion = comparison.trajectories(scene, progress, turns, COMPILED)
     found = tolerances.statistics_bias(scene, rtols, progress)
-    chosen = tolerances.conclusion(found.rows, scene)
+    chosen = tolerances.conclusion(found.rows, scene, sought)
     numerics = scene.numerics
     agreement, trajectories, _ = motion.tables
     return Report(
@@ -34,13 +36,14 @@ def study(
         record=record(
             FORMAT,
             rows=[row.as_dict() for row in found.rows],
+            sought=sought,
             failures={f"{rtol:g}": why for rtol, why in found.failures.items()},
             conclusion=chosen,
             turns=numerics.turns,
             replicates=numerics.replicates,
             trajectory={key: motion.record[key] for key in _MOTION},
         ),
-        tables=(agreement, trajectories, tolerances.table(found)),
+        tables=(agreement, trajectories, tolerances.table(found, sought)),
         sentences=(
             *motion.sentences,
             chosen,
@@ -52,7 +55,7 @@ def study(
             "trajectory": motion.record["rows"],
         },
         pictures={
-            "accuracy": lambda path: _draw(found.rows, path),
+            "accuracy": lambda path: _draw(found.rows, path, sought),
             "trajectory": motion.pictures["methods"],
         },
     )
@@ -61,7 +64,7 @@ def study(
 _MOTION = ("rows", "conclusion", "turns", "starts", "reference", "resolved_m", "times_faster", "compile_s")
 
 
-def _draw(rows: Sequence[tolerances.Row], path: Any) -> None:
+def _draw(rows: Sequence[tolerances.Row], path: Any, sought: float) -> None:
     from rbdyn import plots
 
-    plots.work_precision(rows, path)
+    plots.work_precision(rows, path, sought)

@@ -3,14 +3,17 @@
 Pilots over a ladder of tolerances measure the scatter of a turn, the bias over the tolerance, the power gap and the
 right-hand sides a turn takes. From these follow, for each tolerance, the turns that bring numerical plus statistical
 error of each figure below the target, and what they cost; the cheapest is run and judged by its own error bars. If
-they are too wide, what it measured goes into the model and a longer or tighter run follows. Cost is counted in
-right-hand sides, not seconds: equal scenes choose equally on any machine.
+they are too wide, what it measured goes into the model and a longer or tighter run follows. What to choose is weighed
+in right-hand sides, not seconds: equal scenes choose equally on any machine. The cost of the result is that of all this
+together, pilots and earlier runs included.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -50,6 +53,8 @@ MOST_TURNS = 100_000.0
 NORMAL = 1.96
 # Mean size of a difference that is all scatter, over its 95 % half-width: sqrt(2 / pi) / 1.96.
 MEAN_SIZE = 0.407
+# What adds up over runs in the cost of a result; the rest of it tells of the run that is reported.
+ADDED = ("wall_s", "compile_s", "cpu_s", "steps", "rejected_steps", "rhs_evaluations", "turns")
 
 
 def target_of(text: str) -> float:
@@ -119,19 +124,19 @@ def reach(
     """Simulate until the total relative 95 % error of impact force, whirl ratio and power loss is at most ``target``.
 
     Tolerance, turns and replicates of the scene are replaced. What was chosen, reached and spent stands under
-    ``target`` of the result, and in its notes where the target was not met. Raises InputError, RunError,
-    KeyboardInterrupt.
+    ``target`` of the result, and in its notes where the target was not met; ``cost`` sums pilots and all runs. Raises
+    InputError, RunError, KeyboardInterrupt.
     """
     checked(target)
-    model, spent = measure(scene, workers, progress, stop)
-    pilots = spent
+    model, pilots = measure(scene, workers, progress, stop)
+    spent = Counter(pilots)
     shortest, longest = 0.0, MOST_TURNS
     runs, met = 0, False
     while runs < MOST_RUNS and not met and shortest < MOST_TURNS:
         runs += 1
         choice = choose(model, scene, MARGIN * target, shortest, longest)
         result = simulate(choice.applied(scene), workers, progress, stop)
-        spent += int(result.cost["rhs_evaluations"])
+        spent.update({key: result.cost[key] for key in ADDED})
         errors = {name: total_error(quantities_of(result)[name]) for name in AIMED}
         met = all(error is not None and error <= target for error in errors.values())
         model = learned(model, scene, choice, result)
@@ -142,10 +147,13 @@ def reach(
         "relative_error": errors,
         "chosen": {"rtol": choice.rtol, "turns": choice.turns, "replicates": choice.replicates},
         "runs": runs,
-        "cost": {"rhs_evaluations": spent, "pilot_rhs_evaluations": pilots},
+        "cost": {
+            "rhs_evaluations": int(spent["rhs_evaluations"]),
+            "pilot_rhs_evaluations": int(pilots["rhs_evaluations"]),
+        },
     }
     notes = result.notes if met else (*result.notes, _shortfall(target, errors, result, choice))
-    return replace(result, target=record, notes=notes)
+    return replace(result, cost=result.cost | dict(spent), target=record, notes=notes)
 
 
 def total_error(figure: Quantity) -> float | None:
@@ -169,16 +177,28 @@ def measure(
     workers: int | None,
     progress: Callable[[int, int], None] | None,
     stop: Stop | None,
-) -> tuple[Model, int]:
-    """Pilots over the ladder of tolerances: what they tell, and the right-hand sides they took. Raises RunError."""
+) -> tuple[Model, Mapping[str, float]]:
+    """Pilots over the ladder of tolerances: what they tell, and what they cost (``ADDED``). Raises RunError."""
     turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)
     numbers = {"turns": turns, "replicates": PILOT_REPLICATES}
     pilot = scene.model_copy(update={"numerics": scene.numerics.model_copy(update=numbers)})
     bearing = roller_bearing(pilot)
-    prepare(pilot, bearing)
+    compile_s = prepare(pilot, bearing)
+    started = time.perf_counter()
     series = run_series(pilot, bearing, LADDER, workers, progress, Stop(outer=stop))
+    wall_s = time.perf_counter() - started
     per_turn = PILOT_REPLICATES * (turns + scene.numerics.warm_up_turns)
     derivatives = [sum(run.derivatives for run in runs) for runs in series]
+    everything = [run for runs in series for run in runs]
+    spent = {
+        "wall_s": wall_s,
+        "compile_s": compile_s,
+        "cpu_s": sum(run.cpu_s for run in everything),
+        "steps": sum(run.accepted_steps for run in everything),
+        "rejected_steps": sum(run.rejected_steps for run in everything),
+        "rhs_evaluations": sum(derivatives),
+        "turns": per_turn * len(LADDER),
+    }
     series = [settled(pilot, runs, [])[0] for runs in series]
     scatter = {name: _scatter(name, series, scene) for name in AIMED}
     model = Model(
@@ -188,7 +208,7 @@ def measure(
         gaps=np.array([mean_gap(runs) for runs in series]),
         rhs_per_turn=np.array(derivatives) / per_turn,
     )
-    return model, sum(derivatives)
+    return model, spent
 
 
 def choose(

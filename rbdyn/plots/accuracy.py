@@ -44,15 +44,15 @@ def logarithmic(axis: Axes, across: str, up: str) -> None:
     plain(axis)
 
 
-def work_precision(rows: Sequence[Row], path: Path) -> None:
+def work_precision(rows: Sequence[Row], path: Path, sought: float) -> None:
     """Bias of each output and gap of the power balance against the time of a shaft turn, marked with rtol."""
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
     logarithmic(axis, "relative bias, or gap of the power balance", "processor time of a shaft turn [ms]")
     times = [row.turn_ms for row in rows]
-    ends = _outputs(axis, rows, times)
+    ends = _outputs(axis, rows, times, sought)
     marks = [f"{row.rtol:g}" for row in rows]
     ends.append(_marked(axis, "gap of the power balance", [row.power_gap for row in rows], times, marks))
-    _finish_biased(axis, "rtol", ends)
+    _finish_biased(axis, "rtol", ends, sought)
     save(figure, path)
 
 
@@ -102,15 +102,15 @@ def _failed(axis: Axes, failures: dict[str, tuple[list[float], str]]) -> None:
         lowest = height + 0.025
 
 
-def slices_at_work(rows: Sequence[SliceRow], path: Path) -> None:
+def slices_at_work(rows: Sequence[SliceRow], path: Path, sought: float) -> None:
     """Error of the load and bias of each output against the time of a right-hand side, marked with slices."""
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
     logarithmic(axis, "relative error", "processor time of a right-hand side [ns]")
     times = [row.rhs_ns for row in rows]
-    ends = _outputs(axis, rows, times)
+    ends = _outputs(axis, rows, times, sought)
     marks = [f"{row.slices}" for row in rows]
     ends.append(_marked(axis, "load at equal approach", [row.load_error for row in rows], times, marks))
-    _finish_biased(axis, "slices", ends)
+    _finish_biased(axis, "slices", ends, sought)
     save(figure, path)
 
 
@@ -139,16 +139,20 @@ def replicates_at_work(rows: Sequence[ReplicationRow], path: Path) -> None:
     save(figure, path)
 
 
-def _outputs(axis: Axes, rows: Sequence[Row] | Sequence[SliceRow], times: Sequence[float]) -> list[Named]:
-    """Bias of each output of all rows but the last, the reference; open marks where it is within its error."""
+def _outputs(
+    axis: Axes, rows: Sequence[Row] | Sequence[SliceRow], times: Sequence[float], sought: float
+) -> list[Named]:
+    """Bias of each output of all rows but the last, the reference, with a whisker as far as its error reaches; open
+    marks where that hides it."""
     ends: list[Named] = []
     for name, colour in COLOURS.items():
         points = [
             (max(abs(row.bias[name]), SMALLEST_BIAS), time) for row, time in zip(rows, times, strict=True)
         ]
-        axis.plot(*zip(*points[:-1], strict=True), color=colour, linewidth=0.8)
         for point, row in zip(points[:-1], rows, strict=False):
-            filled = point[0] > row.bias_error[name]
+            filled = row.verdict_of(name, sought) != "undecided"
+            reach = [point[0], point[0] + row.bias_error[name]]
+            axis.plot(reach, [point[1]] * 2, color=colour, linewidth=0.8, alpha=0.6)
             axis.plot(*point, "o", color=colour, markersize=5, markerfacecolor=colour if filled else "white")
         ends.append((points[:-1], NAMES[name], colour))
     return ends
@@ -166,7 +170,12 @@ def _marked(
     return list(zip(errors, times, strict=True)), name, "black"
 
 
-def _finish_biased(axis: Axes, mark: str, ends: list[Named]) -> None:
+def _finish_biased(axis: Axes, mark: str, ends: list[Named], sought: float) -> None:
     axis.margins(0.12)
-    axis.set_title(f"grey: {mark}; open marks: within the 95 % statistical error", fontsize=9, color=GREY)
+    axis.axvline(sought, color=GREY, linewidth=0.8, linestyle=":")
+    axis.set_title(
+        f"grey: {mark}; whiskers: to bias plus 95 % error; open marks: that error hides whether it is {100.0 * sought:g} %",
+        fontsize=9,
+        color=GREY,
+    )
     label_ends(axis, ends)
