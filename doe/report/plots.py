@@ -47,7 +47,6 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
                 ]
                 plane = np.full((2, 2), bound)
                 axis.plot_surface(*corners, plane, color="tab:red", alpha=0.25, linewidth=0)
-                axis.text(x[0, 0], y[0, 0], bound, f" limit {bound:g}", color="tab:red", fontsize=8)
                 top = max(top, bound)
             if values.min() < bound < values.max():
                 axis.contour(
@@ -56,7 +55,8 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
         axis.set_zlim(floor, top)
         axis.set_xlabel(label(study.factors[0]), labelpad=8)
         axis.set_ylabel(label(study.factors[panel]), labelpad=8)
-        axis.set_title(f"({'abcdefg'[panel - 1]}) {label(surface.name)}")
+        limits = "".join(f", limit {bound:g} in red" for bound in _bounds(study, surface.name))
+        axis.set_title(f"({'abcdefg'[panel - 1]}) {label(surface.name)}{limits}")
         axis.tick_params(labelsize=8)
         axis.view_init(elev=24, azim=-128)
     figure.subplots_adjust(left=0.02, right=0.94, bottom=0.06, top=0.94, wspace=0.12)

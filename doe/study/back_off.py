@@ -77,7 +77,7 @@ def surfaces_doubt(
     study: Study, surfaces: Sequence[Surface], simulated: Sequence[Confirmed]
 ) -> Callable[[float], Doubt]:
     """Range in which the limited responses lie with the study's probability, from the surfaces, what these missed at the
-    design runs and at points ``simulated``; a function of the share of the margin that is taken."""
+    design runs and at points ``simulated``; a function of the share of it that is taken."""
     from scipy import special
 
     from doe.study.goals import goals_of
@@ -104,8 +104,9 @@ def surfaces_doubt(
                 stated = surfaces[index].prediction_standard_error(coded)
                 shift[:, index], deviation = fields[index](coded, stated)
                 # The error of one more simulation counts too.
-                margin[:, index] = share * quantiles[index] * np.hypot(deviation, more.get(index, 0.0))
-            return margin - shift, margin + shift
+                margin[:, index] = quantiles[index] * np.hypot(deviation, more.get(index, 0.0))
+            # A limit is never loosened: the surface itself keeps it too.
+            return share * (margin - shift).clip(0.0), share * (margin + shift).clip(0.0)
 
         return doubt
 
