@@ -202,3 +202,30 @@ def test_direct_runs_are_as_long_as_design_runs_and_told_in_words(tmp_path):
     (scene,) = clearance.direct_scenes(study, study.baseline[None], 0)
     assert (scene.numerics.turns, scene.numerics.discard_turns, scene.numerics.replicates) == (3, 1, 3)
     assert "3 replicates of 3 counted shaft turns (3 whole windows" in clearance.direct_run(study)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "design",
+    ['kind = "central_composite"\nalpha = "face_centred"', 'kind = "latin_hypercube"\nruns = 20'],
+)
+def test_impact_limited_to_90_N_of_the_bearing_itself(tmp_path, design):
+    """Guide and pocket clearance, the limit pressed upon: what surfaces alone pick simulates beyond or at 90 N."""
+    text = limited_study(tmp_path, "upper = 90.0").read_text(encoding="utf-8")
+    text = text.replace(next(line for line in text.splitlines() if line.startswith("set = ")),
+        'set = ["numerics.turns=40", "numerics.discard_turns=20", "numerics.companion=false"]')  # fmt: skip
+    first, second = (text.index("[[factor]]", place) for place in (0, text.index("[[factor]]") + 1))
+    text = text[:first] + text[second : text.index("[[chain]]")].replace("radial_clearance_mm = 0.020\n", "")
+    start, end = text.index("[design]"), text.index("[[response]]")
+    text = f"{text[:start]}[design]\n{design}\nseed = 1\n\n{text[end:]}".replace(
+        "replicates = 2\n", "replicates = 16\n"
+    )
+    (tmp_path / "study.toml").write_text(
+        text.replace("population = 24", "population = 100"), encoding="utf-8"
+    )
+    outcome = run_study(Study.load(tmp_path / "study.toml"), tmp_path, None, lambda title: silent)
+    (found,) = outcome.limits
+    if outcome.verdict == "kept":
+        assert found.value + 0.83 * found.error < 90.0
+    else:
+        assert outcome.limits_sentence.startswith("LIMIT") and outcome.tried == 4
