@@ -209,7 +209,7 @@ def test_direct_runs_are_as_long_as_design_runs_and_told_in_words(tmp_path):
     "design",
     ['kind = "central_composite"\nalpha = "face_centred"', 'kind = "latin_hypercube"\nruns = 20'],
 )
-def test_impact_limited_to_90_N_of_the_bearing_itself(tmp_path, design):
+def test_impact_limited_to_90_newtons_of_the_bearing_itself(tmp_path, design):
     """Guide and pocket clearance, the limit pressed upon: what surfaces alone pick simulates beyond or at 90 N."""
     text = limited_study(tmp_path, "upper = 90.0").read_text(encoding="utf-8")
     text = text.replace(next(line for line in text.splitlines() if line.startswith("set = ")),
