@@ -106,20 +106,53 @@ def confirmation_scene(study: Study, point: Array) -> Scene:
 
 
 def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
-    """A scene an evaluation of the direct front (n, k), numbered from ``first``: few turns, a seed of its own."""
+    """A scene an evaluation of the direct front (n, k), numbered from ``first``: few replicates, a seed of its own.
+
+    As long as a design run unless the study says otherwise.
+    """
     data, direct = read_scene(study), study.file.direct
     overrides = [
         *study.file.scene.set,
         f"numerics.replicates={direct.replicates}",
-        f"numerics.turns={direct.turns - direct.discard_turns!r}",
-        f"numerics.discard_turns={direct.discard_turns!r}",
         "numerics.companion=false",
-        *direct.set,
     ]
+    if direct.discard_turns is not None:
+        overrides.append(f"numerics.discard_turns={direct.discard_turns!r}")
+    if direct.turns is not None:
+        usual = scene_at(study, data, study.baseline, direct.seed, overrides).numerics.warm_up_turns
+        # What is left after the transient; check_direct names a study that leaves nothing.
+        overrides.append(f"numerics.turns={max(direct.turns - usual, 1e-3)!r}")
+    overrides += direct.set
     return [
         scene_at(study, data, point, direct.seed + DIRECT_SEEDS + number, overrides)
         for number, point in enumerate(points, first)
     ]
+
+
+def check_direct(study: Study) -> None:
+    """Raises InputError where the runs of a direct search are impossible or hold no whole window of the impact."""
+    (scene,) = direct_scenes(study, study.baseline[None], 0)
+    counted, window = scene.numerics.turns, scene.numerics.impact_window_turns
+    if "impact_force_N" in study.responses and counted < window:
+        given = "without turns" if study.file.direct.turns is None else f"turns = {study.file.direct.turns:g}"
+        least = scene.numerics.warm_up_turns + window
+        raise InputError(
+            [
+                f"{study.path}: direct.{given}: after {scene.numerics.warm_up_turns:g} discarded turns too few are counted "
+                f"for one window of the impact, numerics.impact_window_turns = {window:g}; give turns = {least:g} at least"
+            ]
+        )
+
+
+def direct_run(study: Study) -> str:
+    """What one run of a direct search is, in words."""
+    (scene,) = direct_scenes(study, study.baseline[None], 0)
+    numerics = scene.numerics
+    windows = int(numerics.turns / scene.impact_window_turns + 1e-9)
+    return (
+        f"each of {numerics.replicates} replicates of {numerics.turns:g} counted shaft turns ({windows} whole windows of the "
+        f"impact, {scene.impact_window_turns:g} turns each) after {numerics.warm_up_turns:g} discarded ones"
+    )
 
 
 def run_scenes(

@@ -1,5 +1,7 @@
 """Errors of fronts and gains: against statsmodels, closed forms and plain simulation; the published table's promise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -22,6 +24,11 @@ from doe.study.predicted import predicted_gains, statement
 PAPER_PICK = np.array([0.017, 0.187, 0.285])  # Chen et al. 2022, Table 8
 
 
+def of_the_textbook(surfaces):
+    """The surfaces without what their models miss."""
+    return [replace(surface, model_error=None) for surface in surfaces]
+
+
 @pytest.fixture(scope="module")
 def table(tmp_path_factory):
     study = edited_study(tmp_path_factory.mktemp("study"))
@@ -29,7 +36,7 @@ def table(tmp_path_factory):
 
 
 def test_gain_of_the_published_pick_is_that_of_statsmodels(table):
-    study, surfaces = table
+    study, surfaces = table[0], of_the_textbook(table[1])
     data = pd.read_csv(TABLE)
     for letter, factor in zip("ABC", study.file.factor, strict=True):
         data[letter] = (data[factor.name] - factor.centre) / factor.step
@@ -47,7 +54,7 @@ def test_gain_of_the_published_pick_is_that_of_statsmodels(table):
 
 
 def test_promise_of_the_published_pick_is_less_than_claimed_and_hidden_in_single_runs(table):
-    study, surfaces = table
+    study, surfaces = table[0], of_the_textbook(table[1])
     impact, whirl, power = predicted_gains(study, surfaces, PAPER_PICK)
     # Table 8 claims 9.26, 2.87 and 1.45 %, of one run at the centre and a value that eq 22 does not give (193.2).
     assert impact.percent == pytest.approx(5.27, abs=0.01) and impact.error == pytest.approx(4.17, abs=0.01)
@@ -86,7 +93,7 @@ def test_gain_of_a_transformed_response_is_judged_in_its_own_units(tmp_path, tra
     # To first order, the quantiles of the drawn difference.
     drawn = predict_draws(surfaces, draw_all(surfaces, 20000, 1), points)[:, :, 0]
     low, high = np.quantile(drawn[:, 0] - drawn[:, 1], [0.025, 0.975]) / gain.baseline * 100.0
-    assert gain.error == pytest.approx((high - low) / 2.0, rel=0.03)
+    assert gain.error == pytest.approx((high - low) / 2.0, rel=0.05)
     shifts = 1e-6 * np.eye(4)
     up, down = (surfaces[0].draws(points[1], surfaces[0].coefficients + s * shifts) for s in (1, -1))
     assert jacobian(surfaces[0], points[1]) == pytest.approx((up - down) / 2e-6, rel=1e-5)
@@ -104,7 +111,7 @@ def test_drawn_coefficients_have_the_quantiles_of_t():
 
 
 def test_draws_in_pairs_are_the_diagonal_of_all_draws(table):
-    _, surfaces = table
+    surfaces = of_the_textbook(table[1])
     drawn = draw_all(surfaces, 5, 1)
     points = np.random.default_rng(1).uniform(-1, 1, (5, 3))
     everything = predict_draws(surfaces, drawn, points)
@@ -174,7 +181,7 @@ def test_front_of_the_published_table_knows_its_errors(table):
     assert np.array_equal(found.points, again.points)
     sure = found.uncertainty
     assert np.array_equal(sure.non_dominated, again.uncertainty.non_dominated)
-    # Student's t of the residual, 16 degrees of freedom for the linear surface and 10 for the others.
-    assert sure.half_widths == pytest.approx(found.standard_errors * [2.1199, 2.2281, 2.2281], rel=1e-4)
-    assert 0.7 < sure.pick_dominates < 0.95
+    # Student's t of the lack of fit, 11 degrees of freedom for the linear surface and 5 for the others.
+    assert sure.half_widths == pytest.approx(found.standard_errors * [2.2010, 2.5706, 2.5706], rel=1e-4)
+    assert 0.3 < sure.pick_dominates < 0.95
     assert 0.0 < sure.non_dominated.min() < sure.non_dominated.max() <= 1.0

@@ -172,8 +172,8 @@ def test_json_has_the_contract_keys_and_no_nan(printed):
         *("model", "coefficients", "anova", "lack_of_fit", "pure_error", "r2", "adjusted_r2", "predicted_r2"),
         *("press", "cv_percent", "adequate_precision", "stationary_point", "terms", "standard_errors", "vif"),
         *("tests", "covariance", "residual_dof", "observation_variance", "actual_coefficients", "weighting"),
-        *("transform", "box_cox", "blocks", "elimination", "canonical", "known_variance", "diagnostics"),
-        *("rival", "sentences"),
+        *("transform", "box_cox", "blocks", "elimination", "canonical", "known_variance", "model_error"),
+        *("diagnostics", "rival", "sentences"),
     ]
     assert list(result["stationary_point"]) == ["coded", "actual", "eigenvalues", "nature"]
     terms = ["A", "B", "C", "AB", "AC", "BC", "A^2", "B^2", "C^2"]

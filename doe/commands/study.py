@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
+
+import typer
 
 from doe.commands.options import Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
-from rbdyn.terminal import guarded, output_folder, print_json, progress_bar
+from rbdyn.terminal import FAILED, guarded, output_folder, print_json, progress_bar
 
 
 def study(
@@ -31,11 +35,13 @@ def study(
         if not (verbose or retry) and (record := finished(folder, inputs_digest(loaded, direct))):
             if as_json:
                 print_json(record)
+                _leave_by(record)
                 return
             print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
             print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
+            _leave_by(record)
             return
-        from doe.report.answer import print_outcome
+        from doe.report.answer import print_outcome, print_verdict
         from doe.report.files import write
         from doe.report.fit import print_fit
         from doe.study import run_study
@@ -53,9 +59,19 @@ def study(
         record = write(outcome, folder)
         if as_json:
             print_json(record)
+            _leave_by(record)
             return
+        print_verdict(outcome)
         if verbose:
             print_fit(outcome.surfaces, factors=loaded.factors)
         print_outcome(outcome, quiet)
         print(f"{outcome.cost['total_s']:.1f} s, of which design runs {outcome.cost['design_s']:.1f} s")
         print(f"written to {folder}: {', '.join(record['files'])}")
+        _leave_by(record)
+
+
+def _leave_by(record: dict[str, Any]) -> None:
+    """A study whose pick did not keep its limits has failed."""
+    if record["status"] != "ok":
+        print(record["limits_sentence"], file=sys.stderr)
+        raise typer.Exit(FAILED)

@@ -55,7 +55,7 @@ class DirectFront:
     ``points`` (f, k); ``values`` and ``standard_errors`` (f, m) of ``repeats`` fresh runs each, which had no part in
     the selection, and their ``costs`` (f, q) and ``cost_errors`` (f, q). ``searched_values`` (f, m) is what the
     search believed of them; ``optimism`` (q,) how much too small that was on average, in shares of the range of the
-    costs. ``pick`` is a row. ``failures`` (x, k) are the points where a run failed.
+    costs. ``searched`` are all runs of the search. ``pick`` is a row. ``failures`` (x, k) are the points where a run failed.
     """
 
     points: Array
@@ -75,6 +75,7 @@ class DirectFront:
     generations: int
     seed: int
     goals: Goals
+    searched: Samples
 
 
 def direct_front(
@@ -162,6 +163,7 @@ def direct_front(
         generations=generations,
         seed=seed,
         goals=goals,
+        searched=archive,
     )
 
 

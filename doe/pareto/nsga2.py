@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Objectives = Callable[[Array], Array]
+# How far below and above (n, m) what is foretold of points (n, k) their responses may be when limits are judged.
+Doubt = Callable[[Array], tuple[Array, Array]]
 
 
 class Judged(NamedTuple):
@@ -101,6 +103,7 @@ def front(
     keep: int = 200,
     pick: Rule = "knee",
     standard_errors: Objectives | None = None,
+    doubt: Doubt | None = None,
 ) -> ParetoFront:
     """Find the Pareto front of responses over a box; the same seed gives the same bits.
 
@@ -115,6 +118,7 @@ def front(
         the best and worst of each cost, the knee and the picks.
     pick : rule that makes the pick.
     standard_errors : maps points (n, k) to the standard errors (n, m) of their responses.
+    doubt : maps points (n, k) to how far below and above (n, m) their responses may be; limits hold all over it.
 
     Raises
     ------
@@ -131,7 +135,8 @@ def front(
 
     def judge(points: Array) -> Judged:
         values = _evaluate(objectives, points)
-        return Judged(wanted.costs(values), wanted.violations(values, values))
+        below, above = (0.0, 0.0) if doubt is None else doubt(points)
+        return Judged(wanted.costs(values), wanted.violations(values - below, values + above))
 
     found = search(judge, low, high, population, generations, seed)
     points, costs = found.archives[-1]

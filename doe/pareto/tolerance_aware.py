@@ -22,7 +22,7 @@ from doe.pareto.archive import Archive, dominates, spread
 from doe.pareto.goals import Goals
 from doe.pareto.indicators import hypervolume, normalised
 from doe.pareto.manufacture import Distribution, even_offsets
-from doe.pareto.nsga2 import Judged, check_search, search
+from doe.pareto.nsga2 import Doubt, Judged, check_search, search
 from doe.pareto.picks import NAMES, Rule, pick_all
 from doe.pareto.quadratic import Quadratic
 
@@ -46,17 +46,26 @@ class ToleranceBox:
     distribution: Distribution = "normal"
     samples: int = 256
 
-    def judge(self, surfaces: Sequence[Quadratic], goals: Goals, points: Array) -> Judged:
-        """Robust costs (n, q) and violations (n, c) of coded points (n, k)."""
+    def judge(
+        self, surfaces: Sequence[Quadratic], goals: Goals, points: Array, doubt: Doubt | None = None
+    ) -> Judged:
+        """Robust costs (n, q) and violations (n, c) of coded points (n, k); limits hold all over the ``doubt``."""
+        below, above = (0.0, 0.0) if doubt is None else doubt(points)
         if self.kind == "worst_case":
             pairs = [surface.range_over_box(points, self.half) for surface in surfaces]
             low, high = (np.column_stack(part) for part in zip(*pairs, strict=True))
-            return Judged(goals.worst(low, high), goals.violations(low, high))
-        values = self.parts(surfaces, points)
-        costs = np.quantile(goals.costs(values), self.quantile, axis=1)
-        low = np.quantile(values, 1.0 - self.quantile, axis=1)
-        high = np.quantile(values, self.quantile, axis=1)
-        return Judged(costs, goals.violations(low, high))
+            return Judged(goals.worst(low, high), goals.violations(low - below, high + above))
+        return self.judge_parts(self.parts(surfaces, points), goals, below, above)
+
+    def judge_parts(
+        self, values: Array, goals: Goals, below: Array | float = 0.0, above: Array | float = 0.0
+    ) -> Judged:
+        """Robust costs (n, q) and violations (n, c) from the responses (n, s, m) of parts: of the worst of them, or the
+        quantile that they keep."""
+        share = 1.0 if self.kind == "worst_case" else self.quantile
+        costs = np.quantile(goals.costs(values), share, axis=1)
+        low, high = (np.quantile(values, side, axis=1) for side in (1.0 - share, share))
+        return Judged(costs, goals.violations(low - below, high + above))
 
     def parts(self, surfaces: Sequence[Quadratic], points: Array, samples: int | None = None) -> Array:
         """Responses (n, s, m) of parts made at coded points (n, k)."""
@@ -109,6 +118,7 @@ def tolerance_aware_front(
     seed: int = 1,
     keep: int = 200,
     pick: Rule = "knee",
+    doubt: Doubt | None = None,
 ) -> ToleranceAware:
     """NSGA-II on robust costs, and what it costs and gains beside the plain front; the same seed, the same bits.
 
@@ -121,7 +131,7 @@ def tolerance_aware_front(
     baseline : coded point (k,) to improve on. Picks dominate its nominal costs with their robust ones where any
         point does; else they dominate what manufacture leaves of the baseline.
     plain : points (coded) and costs of the plain front, and ``plain_pick`` the row of its pick.
-    population, generations, seed, keep, pick : as for `doe.pareto.front`.
+    population, generations, seed, keep, pick, doubt : as for `doe.pareto.front`, of coded points.
 
     Raises
     ------
@@ -130,7 +140,7 @@ def tolerance_aware_front(
     low, high = lower + box.half, upper - box.half
     check_search(low, high, population, generations, keep)
     found = search(
-        lambda points: box.judge(surfaces, goals, points), low, high, population, generations, seed
+        lambda points: box.judge(surfaces, goals, points, doubt), low, high, population, generations, seed
     )
     points, costs = found.archives[-1]
     nominal_baseline = goals.costs(_nominal(surfaces, baseline[None]))[0]

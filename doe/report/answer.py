@@ -12,6 +12,7 @@ from doe.report.chain import print_chain
 from doe.report.words import rounded_down
 from doe.study.confirmation import statement
 from doe.study.failure import grouped
+from doe.study.limits import limits_of
 from rbdyn.terminal import print_table
 
 if TYPE_CHECKING:
@@ -31,14 +32,23 @@ def print_outcome(outcome: Outcome, quiet: bool) -> None:
             print(f"note: {note}")
 
 
+def print_verdict(outcome: Outcome) -> None:
+    """What became of the limits: the first that is to be read."""
+    if outcome.limits_sentence:
+        print(outcome.limits_sentence)
+
+
 def answer_text(outcome: Outcome) -> str:
     """The answer as it is printed."""
     with redirect_stdout(io.StringIO()) as text:
+        print_verdict(outcome)
         _print_answer(outcome)
     return text.getvalue()
 
 
 def _print_answer(outcome: Outcome) -> None:
+    from doe.clearance import direct_run
+
     study = outcome.study
     if outcome.direct is not None:
         direct = outcome.direct
@@ -46,6 +56,7 @@ def _print_answer(outcome: Outcome) -> None:
             f"direct front: {direct.front.evaluations} simulations in {direct.seconds['search']:.0f} s. "
             f"{direct.loss.sentence}"
         )
+        print(f"a run of the direct search: {direct_run(study)}")
     _print_clearances(outcome)
     rows = []
     for gain in outcome.gains["pick"]:
@@ -56,12 +67,28 @@ def _print_answer(outcome: Outcome) -> None:
         "confirmed by simulation (95 % intervals)", ("", "baseline", "pick", "improvement", "verdict"), rows
     )
     print(statement(outcome.gains["pick"]))
+    _print_limits(outcome)
     print(f"pick: {outcome.pick.reason}")
+    print(outcome.edge.sentence)
     for name, chain in outcome.chains.items():
         print_chain(name, chain)
         print(chain.status)
     for group in grouped(outcome.failures):
         print(f"failed ({len(group['labels'])}): {', '.join(group['labels'])}: {group['cause']}")
+
+
+def _print_limits(outcome: Outcome) -> None:
+    """Every limit at the baseline and at the pick, judged by simulation."""
+    rows = []
+    for limit in outcome.limits:
+        base = next(
+            each for each in limits_of(outcome.study, outcome.baseline) if each.response == limit.response
+        )
+        told = [(f"{each.value:.5g} ± {each.error:.2g}", each.verdict) for each in (base, limit)]
+        rows.append((f"{limit.response} {limit.sense} {limit.bound:g}", *told[0], *told[1]))
+    if rows:
+        header = ("", "baseline", "verdict", "pick", "verdict")
+        print_table("limits judged by simulation", header, rows)
 
 
 def _print_clearances(outcome: Outcome) -> None:
@@ -113,8 +140,7 @@ def _print_beside(reference: str, outcome: Outcome) -> None:
 
 
 def _value(confirmed: Any, index: int) -> str:
-    error = np.hypot(np.nan_to_num(confirmed.statistical[index]), np.nan_to_num(confirmed.numerical[index]))
-    return f"{confirmed.values[index]:.5g} ± {error:.2g}"
+    return f"{confirmed.values[index]:.5g} ± {np.nan_to_num(confirmed.error[index]):.2g}"
 
 
 def _effect(effect: tuple[float, bool]) -> str:

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doe.study.confirmation import Confirmed, Gain, statement
+from doe.study.limits import Limit, limits_of
 
 if TYPE_CHECKING:
     from doe.study import Outcome
     from doe.study.direct import Direct
+    from doe.study.edge import Edge
     from doe.study_file import Study
 
 Array = NDArray[np.float64]
@@ -26,6 +28,7 @@ def confirmation_record(outcome: Outcome) -> dict[str, Any]:
             "reason": each.reason,
             "responses": _quantities(outcome.study, each),
             "power_terms_W": dict(each.power_terms),
+            "limits": limits_record(limits_of(outcome.study, each)),
             **(
                 {"gains": gains_record(outcome.gains[name]), "statement": statement(outcome.gains[name])}
                 if name in outcome.gains
@@ -33,6 +36,42 @@ def confirmation_record(outcome: Outcome) -> dict[str, Any]:
             ),
         }
         for name, each in outcome.confirmed.items()
+    }
+
+
+def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
+    """Limits judged by simulation, by response: of a lower and an upper one that with the worse verdict, or less room."""
+    return {
+        limit.response: {
+            "bound": limit.bound,
+            "sense": limit.sense,
+            "value": limit.value,
+            "error": or_none(limit.error),
+            "verdict": limit.verdict,
+        }
+        for limit in limits
+    }
+
+
+def edge_record(edge: Edge) -> dict[str, Any]:
+    """The factors of the pick at a bound of the region, what lies beyond, and the share of the fronts at a bound."""
+    return {
+        "factors": {
+            each.factor: {
+                "side": each.side,
+                "bound": each.bound,
+                "per": each.unit,
+                "source": each.source,
+                "gains": {
+                    name: {"value": gain, "error": or_none(error)}
+                    for name, (gain, error) in each.gains.items()
+                },
+            }
+            for each in edge.outward
+        },
+        "front_share": edge.front_share,
+        "direct_front_share": edge.direct_share,
+        "sentence": edge.sentence,
     }
 
 
@@ -46,6 +85,8 @@ def gains_record(gains: Sequence[Gain]) -> dict[str, Any]:
 
 def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
     """The direct front beside that of the surfaces run on the simulator, and what these lose."""
+    from doe import clearance
+
     front, loss = direct.front, direct.loss
     rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
     surrogate = zip(
@@ -63,6 +104,7 @@ def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
         "loss_percent": loss.loss_percent,
         "loss_error_percent": loss.error_percent,
         "sentence": loss.sentence,
+        "run": clearance.direct_run(study),
         "optimism_percent": dict(
             zip(
                 [study.responses[index] for index in front.goals.objectives],

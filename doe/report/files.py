@@ -10,6 +10,7 @@ from doe.report.fit import fit_tables
 from doe.report.html import html_report
 from doe.report.markdown import markdown_report
 from doe.report.summary import summary
+from doe.study.limits import limits_of
 from rbdyn.result import write_json
 
 if TYPE_CHECKING:
@@ -102,8 +103,9 @@ def _confirmation_table(outcome: Outcome) -> list[dict[str, Any]]:
     rows = []
     for name, each in outcome.confirmed.items():
         gains = {gain.response: gain for gain in outcome.gains.get(name, [])}
+        limits = {limit.response: limit for limit in limits_of(study, each)}
         for index, response in enumerate(study.responses):
-            gain = gains.get(response)
+            gain, limit = gains.get(response), limits.get(response)
             rows.append(
                 {
                     "point": name,
@@ -115,6 +117,9 @@ def _confirmation_table(outcome: Outcome) -> list[dict[str, Any]]:
                     "improvement_percent": None if gain is None else gain.percent,
                     "improvement_error_percent": None if gain is None else gain.error,
                     "verdict": "" if gain is None else gain.verdict,
+                    "joint_error": each.error[index],
+                    "limit": "" if limit is None else f"{limit.sense} {limit.bound:g}",
+                    "limit_verdict": "" if limit is None else limit.verdict,
                 }
             )
     return rows

@@ -39,15 +39,34 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
         span = np.ptp(values) or abs(float(values.mean())) or 1.0
         floor = values.min() - 0.35 * span
         axis.contour(x, y, values, zdir="z", offset=floor, cmap="viridis", levels=10, linewidths=0.9)
-        axis.set_zlim(floor, values.max())
+        top = values.max()
+        for bound in _bounds(study, surface.name):
+            if floor < bound < top + 0.5 * span:
+                corners = [
+                    np.array([[side[0, 0], side[0, -1]], [side[-1, 0], side[-1, -1]]]) for side in (x, y)
+                ]
+                plane = np.full((2, 2), bound)
+                axis.plot_surface(*corners, plane, color="tab:red", alpha=0.25, linewidth=0)
+                top = max(top, bound)
+            if values.min() < bound < values.max():
+                axis.contour(
+                    x, y, values, zdir="z", offset=floor, colors="tab:red", levels=[bound], linewidths=2.0
+                )
+        axis.set_zlim(floor, top)
         axis.set_xlabel(label(study.factors[0]), labelpad=8)
         axis.set_ylabel(label(study.factors[panel]), labelpad=8)
-        axis.set_title(f"({'abcdefg'[panel - 1]}) {label(surface.name)}")
+        limits = "".join(f", limit {bound:g} in red" for bound in _bounds(study, surface.name))
+        axis.set_title(f"({'abcdefg'[panel - 1]}) {label(surface.name)}{limits}")
         axis.tick_params(labelsize=8)
         axis.view_init(elev=24, azim=-128)
     figure.subplots_adjust(left=0.02, right=0.94, bottom=0.06, top=0.94, wspace=0.12)
     figure.savefig(path, dpi=130)
     plt.close(figure)
+
+
+def _bounds(study: Study, name: str) -> list[float]:
+    response = next(each for each in study.file.response if each.name == name)
+    return [bound for bound in (response.lower, response.upper) if bound is not None]
 
 
 def pareto_front(outcome: Outcome, path: Path) -> None:
@@ -82,6 +101,10 @@ def pareto_front(outcome: Outcome, path: Path) -> None:
                 markersize=size,
                 label=f"{words} simulated",
             )
+        for number, (draw, response) in enumerate(((axis.axvline, i), (axis.axhline, j))):
+            for bound in _bounds(study, surfaces[response].name):
+                words = f"limit {label(surfaces[response].name)} {bound:g}" if number == 0 else ""
+                draw(bound, color="tab:red", linestyle="--", linewidth=1.2, label=words or "_")
         axis.set_xlabel(label(surfaces[i].name))
         axis.set_ylabel(label(surfaces[j].name))
         axis.grid(alpha=0.3)

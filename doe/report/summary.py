@@ -5,7 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from doe.report.asked import asked_record, design_record
-from doe.report.confirmation import confirmation_record, direct_record, gains_record
+from doe.report.confirmation import (
+    confirmation_record,
+    direct_record,
+    edge_record,
+    gains_record,
+    limits_record,
+)
 from doe.report.fit import fit_record
 from doe.report.front import front_record, point_record
 from doe.study.confirmation import statement
@@ -14,6 +20,7 @@ from rbdyn.result import versions
 
 if TYPE_CHECKING:
     from doe.study import Outcome
+    from doe.study.direct_pick import DirectPick
 
 FORMAT = "doe.study/1"
 
@@ -23,7 +30,11 @@ def summary(outcome: Outcome) -> dict[str, Any]:
     study, gains = outcome.study, outcome.gains["pick"]
     record: dict[str, Any] = {
         "format": FORMAT,
-        "status": "ok",
+        "status": "ok" if outcome.verdict == "kept" else outcome.verdict,
+        "limits": limits_record(outcome.limits),
+        "limits_sentence": outcome.limits_sentence,
+        "tried": outcome.tried,
+        "edge": edge_record(outcome.edge),
         "asked": asked_record(study),
         "design": design_record(outcome),
         "fit": fit_record(outcome.surfaces),
@@ -48,10 +59,22 @@ def summary(outcome: Outcome) -> dict[str, Any]:
     }
     if outcome.direct is not None:
         record["direct"] = direct_record(study, outcome.direct)
+    if outcome.direct_pick is not None:
+        record["direct"]["chosen"] = _chosen_record(outcome.direct_pick)
     if outcome.tolerances is not None:
         record["tolerances"] = outcome.tolerances.as_dict(study.factors)
         record["tolerances_sentence"] = outcome.tolerances.sentence
     return record
+
+
+def _chosen_record(pick: DirectPick) -> dict[str, Any]:
+    """Why the pick is this point of the direct front, and the share of its parts that still dominate the baseline."""
+    aware = pick.aware
+    return {
+        "row": pick.row,
+        "reason": pick.reason,
+        "survives": None if aware is None or aware.survives is None else float(aware.survives[pick.row]),
+    }
 
 
 def _beside_record(outcome: Outcome) -> dict[str, Any]:

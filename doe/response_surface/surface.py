@@ -9,7 +9,6 @@ Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th e
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -20,13 +19,15 @@ from scipy import special
 
 from doe.designs.model import model_terms
 from doe.designs.replicates import replicate_groups
-from doe.response_surface.anova import AnovaRow, anova, complement, find, ratio, sum_within
+from doe.response_surface.anova import AnovaRow, anova, find
 from doe.response_surface.canonical import Canonical, StationaryPoint, canonical, stationary_point
 from doe.response_surface.data import Data, check_errors, check_matrix, checked
-from doe.response_surface.diagnostics import Diagnostics, diagnose, press
+from doe.response_surface.diagnostics import Diagnostics, diagnose
 from doe.response_surface.elimination import Removal, eliminate
+from doe.response_surface.goodness import goodness, observation_variance
 from doe.response_surface.known_variance import KnownVariance, compare
-from doe.response_surface.least_squares import LeastSquares, solve
+from doe.response_surface.least_squares import solve
+from doe.response_surface.model_error import ModelError, model_error
 from doe.response_surface.terms import MODELS, Model, in_actual_units, model_matrix, second_order
 from doe.response_surface.words import describe
 
@@ -53,7 +54,8 @@ class Surface:
     ``r2``, ``adjusted_r2`` and ``predicted_r2`` leave out what the blocks differ by; ``blocks`` are their
     effects by label, about the mean over all runs for which the surface stands. ``vif`` follows ``terms`` (NaN for "1").
     ``stationary_point`` is None for a surface that has none or no single one, ``canonical`` for one without
-    curvature, ``known_variance`` where the errors of the runs are not known, ``rival`` until
+    curvature, ``known_variance`` where the errors of the runs are not known, ``model_error`` where lack of fit is not
+    significant, ``rival`` until
     `doe.study.surfaces.with_rivals` has compared it with a Gaussian process.
     """
 
@@ -78,6 +80,7 @@ class Surface:
     elimination: list[Removal]
     diagnostics: Diagnostics
     known_variance: KnownVariance | None
+    model_error: ModelError | None
     observation_variance: float
     weighting: Weighting
     transform: float | None
@@ -90,13 +93,17 @@ class Surface:
         constant, gradient, matrix = self._polynomial
         return self._back(np.einsum("...i,...i", points @ matrix + gradient, points) + constant)
 
-    def draws(self, coded: ArrayLike, coefficients: ArrayLike) -> Array:
-        """Response at coded points (..., k) for each row of ``coefficients`` (s, p), shape (s, ...)."""
+    def draws(self, coded: ArrayLike, coefficients: ArrayLike, fields: Array | None = None) -> Array:
+        """Response at coded points (..., k) for each row of ``coefficients`` (s, p), shape (s, ...).
+
+        ``fields`` (s, ...): what the model misses there, on the scale of the fit.
+        """
         columns = model_matrix(coded, self.terms)
-        return self._back(np.moveaxis(columns @ np.asarray(coefficients, float).T, -1, 0))
+        drawn = np.moveaxis(columns @ np.asarray(coefficients, float).T, -1, 0)
+        return self._back(drawn if fields is None else drawn + fields)
 
     def prediction_standard_error(self, coded: ArrayLike) -> Array:
-        """Standard error of the mean response at coded points (..., k), shape (...).
+        """Standard error of the mean response at coded points (..., k), shape (...), its model error included.
 
         A single new observation scatters by ``observation_variance`` more (as a variance). Of a transformed
         response it is that of the transform over the slope of the transform (first order).
@@ -120,6 +127,11 @@ class Surface:
         """The same kind of surface through these runs alone. Raises ValueError when they do not suffice."""
         transform: Transform = "none" if self.transform is None else self.transform
         return _fit(self.name, self.data.rows(rows), self.model, self.weighting, transform)
+
+    @property
+    def interval_dof(self) -> int:
+        """Degrees of freedom of the intervals of a mean: of the residual, or of what told the model error."""
+        return self.residual_dof if self.model_error is None else self.model_error.dof
 
     @property
     def lack_of_fit(self) -> dict[str, Any]:
@@ -185,6 +197,7 @@ class Surface:
             "elimination": self.elimination,
             "canonical": self.canonical,
             "known_variance": None if self.known_variance is None else self.known_variance.as_dict(),
+            "model_error": None if self.model_error is None else self.model_error.as_dict(),
             "diagnostics": self.diagnostics,
             "rival": self.rival,
             "sentences": describe(self),
@@ -197,11 +210,11 @@ class Surface:
     def _variance(self, coded: ArrayLike) -> Array:
         matrix = model_matrix(coded, self.terms)
         variance: Array = np.einsum("...j,jk,...k", matrix, self.covariance, matrix)
-        return variance.clip(0.0)
+        return variance.clip(0.0) + (0.0 if self.model_error is None else self.model_error.variance)
 
     def _interval(self, coded: ArrayLike, extra: float, level: float) -> tuple[Array, Array]:
         middle = model_matrix(coded, self.terms) @ self.coefficients
-        half = special.stdtrit(self.residual_dof, (1 + level) / 2) * np.sqrt(self._variance(coded) + extra)
+        half = special.stdtrit(self.interval_dof, (1 + level) / 2) * np.sqrt(self._variance(coded) + extra)
         return self._back(middle - half), self._back(middle + half)
 
     def _back(self, values: Array) -> Array:
@@ -295,7 +308,7 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
         residual_mean_square=solution.mean_square,
         residual_dof=solution.dof,
         anova=table,
-        **_summary(solution, response, matrix[:, :count] @ coefficients, data.block),
+        **goodness(solution, response, matrix[:, :count] @ coefficients, data.block),
         stationary_point=stationary_point(terms, coefficients, data.centre, data.step),
         canonical=canonical(terms, coefficients, covariance[:count, :count], solution.dof, data.points),
         vif=solution.inflation[:count],
@@ -303,7 +316,8 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
         elimination=removed,
         diagnostics=diagnose(solution, response),
         known_variance=known,
-        observation_variance=_observation_variance(solution),
+        model_error=model_error(solution, matrix, groups, table, known),
+        observation_variance=observation_variance(solution),
         weighting=weighting,
         transform=exponent,
         data=data,
@@ -335,29 +349,6 @@ def _on_scale_of_fit(data: Data, exponent: float | None) -> tuple[Array, Array |
 
     variances = None if errors is None else (errors * slope(data.values, exponent)) ** 2
     return forward(data.values, exponent), variances
-
-
-def _observation_variance(solution: LeastSquares) -> float:
-    return solution.mean_square * float((1.0 / solution.weights).mean())
-
-
-def _summary(
-    solution: LeastSquares, response: Array, predicted: Array, block: NDArray[np.int64]
-) -> dict[str, Any]:
-    """R2 and its kin on the scatter within blocks; the others by the definitions of Myers et al."""
-    within = sum_within(response, solution.weights, block)
-    free = len(response) - len(np.unique(block))
-    missed, variance = press(solution), _observation_variance(solution)
-    size = len(solution.coefficients)
-    mean = float(solution.weights @ response / solution.weights.sum())
-    return {
-        "r2": complement(solution.residual_sum, within),
-        "adjusted_r2": complement(solution.mean_square, within / free),
-        "predicted_r2": None if missed is None else complement(missed, within),
-        "press": missed,
-        "cv_percent": ratio(100 * math.sqrt(variance), abs(mean)),
-        "adequate_precision": ratio(float(np.ptp(predicted)), math.sqrt(size * variance / len(response))),
-    }
 
 
 def _block_effects(data: Data, effects: Array) -> dict[str, float]:

@@ -27,6 +27,7 @@ def describe(surface: Surface, alpha: float = 0.05) -> list[str]:
         _removed(surface),
         _blocks(surface, alpha),
         *([] if known is None else describe_known_variance(name, known, alpha)),
+        _model_error(surface),
         _summary(surface),
         *describe_diagnostics(name, surface.diagnostics, alpha),
         _transform(surface),
@@ -64,6 +65,16 @@ def _lack_of_fit(surface: Surface, alpha: float) -> str:
     if surface.lack_of_fit["df"] == 0:
         return f"{name}: lack of fit cannot be tested, for the model has as many terms as distinct points."
     return f"{name}: lack of fit cannot be tested, for the replicates agree exactly."
+
+
+def _model_error(surface: Surface) -> str:
+    error = surface.model_error
+    if error is None:
+        return ""
+    return (
+        f"{surface.name}: the 95 % intervals of its mean join the error of the coefficients with what the model misses, a "
+        f"standard deviation of {error.variance**0.5:.3g} told by {error.told_by} ({error.dof} degrees of freedom)."
+    )
 
 
 def _removed(surface: Surface) -> str:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from doe.study.failure import Failure
 from doe.study.goals import goals_of
-from doe.study.picks import Choice
 from doe.study_file import Study
 from rbdyn.faults import RunError
 
@@ -23,9 +22,19 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class Choice:
+    """A point (k,) in factor units, at the resolution of the drawing, and why it was chosen."""
+
+    point: Array
+    reason: str
+
+
+@dataclass(frozen=True)
 class Confirmed:
     """Simulated responses (m,) at a point, with 95 % statistical and numerical half-widths.
 
+    Every interval of a simulated response joins the two by `error`: the root sum square of the statistical and the
+    numerical half-width, as of independent errors; that of a gain joins those of both of its runs in the same way.
     ``power_terms``: power losses [W] by contact; ``reason``: why the point was chosen.
     """
 
@@ -35,6 +44,13 @@ class Confirmed:
     numerical: Array
     power_terms: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
+
+    @property
+    def error(self) -> Array:
+        """Joint 95 % half-widths (m,); NaN where neither part is known."""
+        known = np.isfinite(self.statistical) | np.isfinite(self.numerical)
+        joint: Array = np.hypot(np.nan_to_num(self.statistical), np.nan_to_num(self.numerical))
+        return np.where(known, joint, np.nan)
 
 
 @dataclass(frozen=True)
@@ -88,11 +104,10 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Co
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
-    """Improvements of all responses with a goal; statistical and numerical errors of both runs as independent."""
+    """Improvements of all responses with a goal, with the joint errors of both runs as independent."""
     goals = goals_of(study)
     chosen = goals.objectives
-    parts = (baseline.statistical, baseline.numerical, pick.statistical, pick.numerical)
-    error = np.sqrt(sum(np.nan_to_num(part[chosen]) ** 2 for part in parts))
+    error = np.hypot(*(np.nan_to_num(each.error[chosen]) for each in (baseline, pick)))
     scale = 100.0 / np.abs(baseline.values[chosen])
     percent = (goals.costs(baseline.values) - goals.costs(pick.values)) * scale
     return [

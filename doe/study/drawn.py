@@ -32,10 +32,16 @@ def draw_all(surfaces: Sequence[Surface], draws: int, seed: int) -> list[Array]:
     ]
 
 
-def predict_draws(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array) -> Array:
-    """Responses (d, n, m) on drawn coefficients at coded points (n, k)."""
-    pairs = zip(surfaces, drawn, strict=True)
-    return np.stack([surface.draws(coded, coefficients) for surface, coefficients in pairs], axis=-1)
+def predict_draws(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array, seed: int = 1) -> Array:
+    """Responses (d, n, m) on drawn coefficients, and with what the models may miss, at coded points (n, k)."""
+    from doe.response_surface.model_error import draw_fields
+
+    random = np.random.default_rng(seed)
+    columns = [
+        surface.draws(coded, coefficients, draw_fields(surface.model_error, coded, len(coefficients), random))
+        for surface, coefficients in zip(surfaces, drawn, strict=True)
+    ]
+    return np.stack(columns, axis=-1)
 
 
 def predict_paired(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array) -> Array:

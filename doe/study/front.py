@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from doe.designs import to_actual, to_coded
+from doe.study.back_off import Doubt, surfaces_doubt
+from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import goals_of, region_of, tolerances_of
 from doe.study_file import Study
@@ -23,11 +25,23 @@ if TYPE_CHECKING:
     from doe.response_surface import Surface
 
 Array = NDArray[np.float64]
+Found = TypeVar("Found", "ParetoFront", "ToleranceAware")
 
 
-def find_front(study: Study, surfaces: Sequence[Surface]) -> ParetoFront:
+# Shares of the back-off from limits that are tried: where no point keeps all of it, the largest that any point keeps.
+SHARES = (1.0, 0.5, 0.25, 0.0)
+
+
+def find_front(
+    study: Study, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = (), failed: int = 0
+) -> ParetoFront:
     """Pareto front on the surfaces within the region of the design, with its uncertainty, and the tolerance-aware one
     where the study asks for it.
+
+    Its points keep every limit with the probability that the study asks for, by the standard errors of the surfaces and
+    by what these missed at points ``simulated``; where no point does, with as much of that back-off as any point keeps.
+    Each of the ``failed`` points, picked so before and yet not kept, shows the errors to be larger: the back-off grows by
+    its own size.
 
     Raises InputError when fewer than two responses have a goal, no point keeps all limits, or a tolerance is missing.
     """
@@ -41,8 +55,10 @@ def find_front(study: Study, surfaces: Sequence[Surface]) -> ParetoFront:
     def coded(points: Array) -> Array:
         return to_coded(points, study.centre, study.step)
 
-    with _named(study, goals, np.zeros(1), np.ones(1), ""):
-        found = front(
+    doubt = surfaces_doubt(study, surfaces, simulated)
+
+    def plain(share: float) -> ParetoFront:
+        return front(
             lambda points: predict_all(surfaces, coded(points)),
             to_actual(-reach, study.centre, study.step),
             to_actual(reach, study.centre, study.step),
@@ -55,12 +71,41 @@ def find_front(study: Study, surfaces: Sequence[Surface]) -> ParetoFront:
             standard_errors=lambda points: np.column_stack(
                 [surface.prediction_standard_error(coded(points)) for surface in surfaces]
             ),
+            doubt=lambda points: doubt(share)(coded(points)),
         )
+
+    with _named(study, goals, np.zeros(1), np.ones(1), ""):
+        found = _backed_off(study, plain, failed)
     found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
     if half is None:
         return found
     with _named(study, goals, study.centre, study.step, " after manufacture"):
-        return replace(found, tolerance_aware=_tolerance_aware(study, surfaces, found, half))
+        aware = _backed_off(
+            study,
+            lambda share: _tolerance_aware(study, surfaces, found, half, doubt(share)),
+            failed,
+        )
+    return replace(found, tolerance_aware=aware)
+
+
+def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> Found:
+    """What a search finds with the largest share of the back-off that leaves any point. Raises InfeasibleError."""
+    from doe.pareto import InfeasibleError
+
+    if not goals_of(study).limited:
+        return search(0.0)
+    for share in (1.0 + failed, *SHARES)[failed == 0 :]:
+        try:
+            found = search(share)
+        except InfeasibleError:
+            if share == SHARES[-1]:
+                raise
+            continue
+        probability = study.file.confirmation.limit_probability
+        kept = f"with {100.0 * share:g} % of the back-off for" if share < 1.0 else "with"
+        words = f"; on the surfaces it keeps the limits {kept} a probability of {probability:g}"
+        return replace(found, pick_reason=found.pick_reason + words)
+    raise AssertionError("the last share either returns or raises")
 
 
 def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
@@ -68,7 +113,7 @@ def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
     from scipy import stats
 
     factors = [
-        float(stats.t.ppf(0.975, surface.residual_dof)) if surface.residual_dof > 0 else np.nan
+        float(stats.t.ppf(0.975, surface.interval_dof)) if surface.interval_dof > 0 else np.nan
         for surface in surfaces
     ]
     widths: Array = np.array(factors) * standard_errors
@@ -81,7 +126,7 @@ def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) 
     assert found.standard_errors is not None
     drawn = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
     points = np.vstack([found.points, study.baseline])
-    values = predict_draws(surfaces, drawn, to_coded(points, study.centre, study.step))
+    values = predict_draws(surfaces, drawn, to_coded(points, study.centre, study.step), study.file.front.seed)
     return front_uncertainty(
         values[:, :-1],
         half_widths(surfaces, found.standard_errors),
@@ -95,7 +140,7 @@ def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) 
 
 
 def _tolerance_aware(
-    study: Study, surfaces: Sequence[Surface], found: ParetoFront, half: Array
+    study: Study, surfaces: Sequence[Surface], found: ParetoFront, half: Array, doubt: Doubt
 ) -> ToleranceAware:
     from doe.pareto.archive import Archive
     from doe.pareto.tolerance_aware import ToleranceBox, tolerance_aware_front
@@ -121,6 +166,7 @@ def _tolerance_aware(
         generations=settings.generations,
         seed=settings.seed,
         pick=settings.pick,
+        doubt=doubt,
     )
 
 

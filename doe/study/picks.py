@@ -3,39 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from doe.designs import to_actual
+from doe.study.confirmation import Choice
+from doe.study.goals import rounded_within
 from doe.study_file import Study
 
 if TYPE_CHECKING:
     from doe.pareto import ParetoFront
     from doe.study.direct import Direct
+    from doe.study.direct_pick import DirectPick
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Choice:
-    """A point (k,) in factor units, at the resolution of the drawing, and why it was chosen."""
-
-    point: Array
-    reason: str
-
-
-def choices(study: Study, front: ParetoFront, direct: Direct | None) -> dict[str, Choice]:
+def choices(
+    study: Study, front: ParetoFront, direct: Direct | None, chosen: DirectPick | None = None
+) -> dict[str, Choice]:
     """The pick, then the picks by the other rules and of the direct front, by name.
 
-    Where the study asks for a tolerance-aware front, its pick is the pick. Of those that the drawing cannot tell apart
+    What was ``chosen`` of the direct front is the pick, and the pick of the surfaces stands beside it. Where the study asks
+    for a tolerance-aware front, its pick is that of the surfaces. Of those that the drawing cannot tell apart
     the first stands for all, and its reason says so.
     """
     found: dict[str, Choice] = {}
-    for name, point, reason in _candidates(study, front, direct):
-        rounded = study.rounded(point)
+    for name, point, reason in _candidates(study, front, direct, chosen):
+        rounded = rounded_within(study, point)
         twin = next((known for known, each in found.items() if np.array_equal(each.point, rounded)), None)
         if twin is None:
             found[name] = Choice(rounded, reason)
@@ -44,13 +41,18 @@ def choices(study: Study, front: ParetoFront, direct: Direct | None) -> dict[str
     return found
 
 
-def _candidates(study: Study, front: ParetoFront, direct: Direct | None) -> Iterator[tuple[str, Array, str]]:
-    aware = front.tolerance_aware
+def _candidates(
+    study: Study, front: ParetoFront, direct: Direct | None, chosen: DirectPick | None
+) -> Iterator[tuple[str, Array, str]]:
+    aware, name = front.tolerance_aware, "pick"
+    if direct is not None and chosen is not None:
+        yield "pick", direct.front.points[chosen.row], chosen.reason
+        name = "pick_of_surfaces"
     if aware is None:
-        yield "pick", front.points[front.pick], front.pick_reason
+        yield name, front.points[front.pick], front.pick_reason
     else:
         point = to_actual(aware.points[aware.pick], study.centre, study.step)
-        yield "pick", point, f"{aware.pick_reason}, by what its tolerances leave of it"
+        yield name, point, f"{aware.pick_reason}, by what its tolerances leave of it"
         yield "without_tolerances", front.points[front.pick], front.pick_reason
     for rule, row in front.picks.items():
         yield rule, front.points[row], f"the pick by {rule}"

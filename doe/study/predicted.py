@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 class PredictedGain:
     """Improvement [%] of a mean response over the baseline, with two 95 % half widths [%].
 
-    ``error`` is that of the difference of the two predictions: the errors that they share cancel (contrast c'Vc with
-    the residual's degrees of freedom). ``scatter`` is by how much two single runs at one point differ (pure error of
+    ``error`` is that of the difference of the two predictions: the errors that they share cancel (contrast c'Vc, and
+    what the model misses at either point, with the degrees of freedom of `Surface.interval_dof`). ``scatter`` is by how much two single runs at one point differ (pure error of
     the replicates). Either is None where the runs do not tell it.
     """
 
@@ -83,9 +83,10 @@ def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> 
         surface = surfaces[index]
         rows = [slopes[end, column] * jacobian(surface, coded[end]) for end in (0, 1)]
         scale = 100.0 / abs(float(values[0, index])) if values[0, index] else math.nan
-        dof, error, scatter = surface.residual_dof, None, None
+        dof, error, scatter = surface.interval_dof, None, None
         if dof > 0:
-            error = float(stats.t.ppf(0.975, dof)) * contrast_error(rows[0] - rows[1], surface.covariance)
+            shared = contrast_error(rows[0] - rows[1], surface.covariance)
+            error = float(stats.t.ppf(0.975, dof)) * math.hypot(shared, _missed(surface, coded, rows))
         pure = surface.pure_error
         if pure["ms"] is not None and surface.residual_mean_square > 0.0:
             constant = surface.terms.index("1")
@@ -104,6 +105,21 @@ def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> 
             )
         )
     return gains
+
+
+def _missed(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
+    """Standard deviation of the difference of what the model misses at two coded points (2, k).
+
+    ``rows`` are the derivatives of either cost by the coefficients; that by the constant is that by the field.
+    """
+    from doe.response_surface.model_error import correlation
+
+    if surface.model_error is None:
+        return 0.0
+    constant = surface.terms.index("1")
+    by_field = np.array([float(row[constant]) for row in rows]) * [1.0, -1.0]
+    variance = surface.model_error.variance * float(by_field @ correlation(coded, coded) @ by_field)
+    return math.sqrt(max(variance, 0.0))
 
 
 def statement(gains: Sequence[PredictedGain]) -> str:

@@ -12,13 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doe.study.chains import check_chains, solve_chains
-from doe.study.confirmation import Confirmed, Gain, confirm, gains
+from doe.study.chosen import choose
+from doe.study.confirmation import Confirmed, Gain, gains
 from doe.study.design import check_runs, design_of
 from doe.study.direct import Direct, find_direct
+from doe.study.direct_pick import DirectPick, Local, local_of
+from doe.study.edge import Edge, edge_of
 from doe.study.failure import Failure
 from doe.study.finished import inputs_digest
 from doe.study.front import find_front
-from doe.study.picks import choices
+from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
 from doe.study.reference import Beside, beside, reference_runs
 from doe.study.runs import STORE, Progress, Runs, ordered_runs, run_design
 from doe.study.simulations import Simulations
@@ -39,8 +42,9 @@ Array = NDArray[np.float64]
 class Outcome:
     """Everything a report needs.
 
-    ``inputs`` is the hash of all it follows from. ``confirmed`` and ``gains`` by name of the point, "baseline" (without gains) and "pick" first. ``tolerances`` is
-    None where the study asks for none, ``direct`` unless it was run.
+    ``inputs`` is the hash of all it follows from. ``confirmed`` and ``gains`` by name of the point, "baseline" (without
+    gains) and "pick" first; ``tried`` counts the points simulated as the pick until one kept its limits. ``tolerances`` is
+    None where the study asks for none, ``direct`` and ``direct_pick`` unless it was run.
     """
 
     study: Study
@@ -50,6 +54,9 @@ class Outcome:
     surfaces: list[Surface]
     front: ParetoFront
     direct: Direct | None
+    direct_pick: DirectPick | None
+    edge: Edge
+    tried: int
     confirmed: Mapping[str, Confirmed]
     gains: Mapping[str, list[Gain]]
     tolerances: WidestTolerances | None
@@ -69,6 +76,21 @@ class Outcome:
     def pick(self) -> Confirmed:
         """The chosen design, simulated."""
         return self.confirmed["pick"]
+
+    @property
+    def limits(self) -> list[Limit]:
+        """The limits at the pick."""
+        return limits_of(self.study, self.pick)
+
+    @property
+    def verdict(self) -> Verdict:
+        """What became of the limits at the pick; a study that did not keep them has failed."""
+        return verdict_of(self.limits)
+
+    @property
+    def limits_sentence(self) -> str:
+        """The same in words; empty without limits."""
+        return sentence(self.limits, self.study.file.confirmation.limit_probability, self.tried)
 
 
 def run_study(
@@ -100,10 +122,19 @@ def run_study(
         simulations = Simulations(store, workers, scheduler, retry, progress)
         searched = find_direct(study, found, simulations) if direct else None
         clock.lap("direct_s")
-        confirmed, failures = confirm(study, choices(study, found, searched), simulations)
+        chosen = choose(study, surfaces, found, searched, simulations)
+        confirmed, at = chosen.confirmed, None if searched is None else searched.front.points
+        edge = edge_of(
+            study, surfaces, confirmed["pick"], chosen.front.points, at, simulations if direct else None
+        )
         clock.lap("confirmation_s")
     pick = confirmed["pick"].point
-    tolerances = _tolerances(study, surfaces, pick)
+    local = (
+        None
+        if searched is None
+        else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])
+    )
+    tolerances = _tolerances(study, surfaces, pick, local)
     chains, notes = solve_chains(study, pick, tolerances)
     if reference is not None:
         reference = reference.only(runs.places)
@@ -114,8 +145,11 @@ def run_study(
         design=design_of(study),
         runs=runs,
         surfaces=surfaces,
-        front=found,
+        front=chosen.front,
         direct=searched,
+        direct_pick=chosen.direct,
+        edge=edge,
+        tried=chosen.tried,
         confirmed=confirmed,
         gains={
             name: gains(study, confirmed["baseline"], each)
@@ -126,7 +160,7 @@ def run_study(
         chains=chains,
         beside=[] if reference is None else beside(study, runs, reference),
         reference_values=None if reference is None else reference.values,
-        failures=(*runs.failures, *lost, *failures),
+        failures=(*runs.failures, *lost, *chosen.failures),
         notes=(*runs.notes, *notes),
         cost=clock.total(),
     )
@@ -138,16 +172,18 @@ def _checked(study: Study) -> Runs | None:
 
     check_runs(study, ordered_runs(study).design)
     clearance.confirmation_scene(study, study.baseline)
-    clearance.direct_scenes(study, study.baseline[None], 0)
+    clearance.check_direct(study)
     check_chains(study)
     return reference_runs(study)
 
 
-def _tolerances(study: Study, surfaces: list[Surface], point: Array) -> WidestTolerances | None:
+def _tolerances(
+    study: Study, surfaces: list[Surface], point: Array, local: Local | None
+) -> WidestTolerances | None:
     from doe.study.widest import widest_of
 
     settings = study.file.tolerances
-    return None if settings is None else widest_of(study, surfaces, point, settings)
+    return None if settings is None else widest_of(study, surfaces, point, settings, local)
 
 
 class _Clock:

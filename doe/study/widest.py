@@ -17,14 +17,22 @@ from doe.study_file.front_section import Tolerances
 if TYPE_CHECKING:
     from doe.pareto.tolerance import WidestTolerances
     from doe.response_surface import Surface
+    from doe.study.direct_pick import Local
 
 Array = NDArray[np.float64]
 
 
 def widest_of(
-    study: Study, surfaces: Sequence[Surface], point: Array, settings: Tolerances
+    study: Study,
+    surfaces: Sequence[Surface],
+    point: Array,
+    settings: Tolerances,
+    local: Local | None = None,
 ) -> WidestTolerances:
     """Widest half widths, in factor units, about a point (k,) in factor units.
+
+    ``local``, of a pick of the direct front, stands for the level of the surfaces there; then parts may lie beyond the
+    region by the factors' own tolerances, which the runs of the search bear out by their slopes.
 
     A part keeps its promise when every response with a goal has at least the share ``keep`` of the gain that the
     surfaces predict at the point (or, where they predict a loss, loses no more), and when all limits hold.
@@ -33,7 +41,10 @@ def widest_of(
 
     goals = goals_of(study)
     base, nominal = (to_coded(each, study.centre, study.step)[None] for each in (study.baseline, point))
-    gain = (goals.costs(predict_all(surfaces, base)) - goals.costs(predict_all(surfaces, nominal)))[0]
+    ends = [predict_all(surfaces, each) for each in (base, nominal)]
+    if local is not None:
+        ends = [local.baseline[None], local.values[None]]
+    gain = (goals.costs(ends[0]) - goals.costs(ends[1]))[0]
     keep = np.where(gain > 0.0, settings.keep * gain, gain)
     drawn = draw_all(surfaces, settings.samples, settings.seed) if settings.surface_uncertainty else None
 
@@ -43,21 +54,34 @@ def widest_of(
         return predict_paired(surfaces, drawn, coded)
 
     def objectives(points: Array) -> Array:
-        values = responses(to_coded(points, study.centre, study.step))
+        coded = to_coded(points, study.centre, study.step)
+        values = responses(coded)
+        if local is not None:
+            values = values - centre_values + local.values + (coded - local.coded) @ local.slopes
         return np.hstack([goals.costs(values), goals.violations(values, values)])
 
-    reference = goals.costs(responses(np.repeat(base, settings.samples, axis=0)))
+    # Of every part its own nominal point and baseline: they may have surfaces of their own.
+    centre_values, reference_values = (
+        responses(np.repeat(each, settings.samples, axis=0)) for each in (nominal, base)
+    )
+    if local is not None:
+        reference_values = np.broadcast_to(local.baseline, reference_values.shape)
+    reference = goals.costs(reference_values)
     held = np.zeros((settings.samples, len(goals.limited)))
     known = known_tolerances(study)
     ratios = [known.get(name, np.nan) for name in study.factors]
     reach = region_of(study) * study.step
+    low, high = study.centre - reach, study.centre + reach
+    if local is not None:
+        beyond = np.nan_to_num(ratios)
+        low, high = np.minimum(low, point - beyond), np.maximum(high, point + beyond)
     return widest_tolerances(
         objectives,
         point,
         np.hstack([reference - keep, held]) + 1e-9 * np.abs(gain).max(),
         study.step if np.isnan(ratios).any() else ratios,
-        lower=study.centre - reach,
-        upper=study.centre + reach,
+        lower=low,
+        upper=high,
         names=[
             *(f"the gain of {study.responses[index]}" for index in goals.objectives),
             *(f"{study.responses[index]} {sense} {limit:g}" for index, sense, limit in goals.limited),

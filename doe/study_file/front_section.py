@@ -69,15 +69,17 @@ class Direct(Strict):
     """NSGA-II on the simulator itself.
 
     ``replicates`` of each evaluation, each of ``turns`` shaft turns of which the first ``discard_turns`` are left out as
-    transient; ``confidence`` at which differences count in the search;
+    transient; without them a run is as long as a design run. What is counted must hold a whole window of the impact.
+    ``confidence`` at which differences count in the search;
     ``resample``: share of the evaluations for fresh runs of the points found; ``set`` replaces keys of the scene.
     """
 
     evaluations: Annotated[int, Field(ge=50, le=10_000_000)] = 2000
     population: Annotated[int, Field(ge=8, le=10000)] = 50
-    replicates: Annotated[int, Field(ge=2, le=10000)] = 4
-    turns: Annotated[float, Field(gt=0.0)] = 40.0
-    discard_turns: Annotated[float, Field(ge=0.0)] = 8.0
+    # Fewer than a design run has: the search makes up for it by the number of its runs.
+    replicates: Annotated[int, Field(ge=2, le=10000)] = 3
+    turns: Annotated[float, Field(gt=0.0)] | None = None
+    discard_turns: Annotated[float, Field(ge=0.0)] | None = None
     seed: Annotated[int, Field(ge=0)] = 1
     confidence: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
     resample: Annotated[float, Field(ge=0.1, le=0.9)] = 0.3
@@ -85,7 +87,7 @@ class Direct(Strict):
 
     @model_validator(mode="after")
     def _something_is_counted(self) -> Direct:
-        if self.discard_turns >= self.turns:
+        if self.turns is not None and (self.discard_turns or 0.0) >= self.turns:
             raise ValueError(
                 f"discard_turns = {self.discard_turns:g}: must be below turns = {self.turns:g}; discard fewer"
             )

@@ -35,9 +35,17 @@ class Response(Fitted, Goal):
 
 
 class Confirmation(Strict):
-    """Simulation at the baseline and at the pick; ``set`` replaces keys of the scene."""
+    """Simulation at the baseline and at the pick; ``set`` replaces keys of the scene.
+
+    ``limit_probability``: with which the simulated pick must keep each limit. Where it does not, the next best point of
+    the front is simulated, ``tries`` points at most.
+    """
 
     replicates: Annotated[int, Field(ge=2, le=10000)] = 16
+    # One chance in twenty of a broken limit, as the 95 % intervals leave everywhere else.
+    limit_probability: Annotated[float, Field(ge=0.5, le=0.9999)] = 0.95
+    # The second already knows what the surfaces missed at the first; each takes a simulation and a search.
+    tries: Annotated[int, Field(ge=1, le=20)] = 4
     set: list[str] = []
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from doe.report.content.blocks import Block, Section, Table, Tile, Tiles, Words
@@ -21,17 +21,24 @@ from doe.report.words import (
 # Characters above which a value is a sentence, to be broken.
 LONG = 40
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
+LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"}
 
 
 def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Clearances, gains, whether they are real, and the parts to make."""
     blocks: list[Block] = []
+    if text := part(summary, "limits_sentence"):
+        blocks.append(Words(str(text), "statement"))
     if pick := part(summary, "pick"):
         blocks.append(Tiles([_tile(summary, each, pick) for each in factors(summary) if each.name in pick]))
     if text := statement(summary):
         blocks.append(Words(text, "statement"))
     if table := _gains(summary):
         blocks.append(table)
+    if table := limits(summary, ("baseline", "pick")):
+        blocks.append(table)
+    if text := part(summary, "edge", "sentence"):
+        blocks.append(Words(str(text)))
     if table := part_dimensions(summary):
         blocks.append(table)
     reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
@@ -81,6 +88,26 @@ def _gains(summary: Record) -> Table | None:
     ]
     header = ("response", "baseline", "pick", "gain", "verdict")
     return Table("Gains confirmed by simulation (95 % intervals)", header, rows, text_columns=(4,))
+
+
+def limits(summary: Record, names: Sequence[str] = ()) -> Table | None:
+    """Limits judged by simulation at the points of these names, at every confirmed point without any."""
+    points = part(summary, "confirmation") or {}
+    rows = [
+        (
+            name.replace("_", " "),
+            f"{label(response)} {limit.get('sense') or ''} {shown(limit.get('bound'))}",
+            with_error(limit.get("value"), limit.get("error")),
+            LIMITS.get(str(limit.get("verdict")), ""),
+        )
+        for name in names or points
+        for response, limit in (part(points, name, "limits") or {}).items()
+    ]
+    if not rows:
+        return None
+    note = "Kept or broken by more than the error; between the two a limit is undecided."
+    header = ("point", "limit", "simulated", "verdict")
+    return Table("Limits judged by simulation", header, rows, note, text_columns=(1, 3))
 
 
 def verdict(gain: Record) -> str:
@@ -222,6 +249,8 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         caption = "Gains over the baseline at every confirmed point"
         note = "▲ better, ▼ worse, ● within its 95 % error."
         blocks.append(Table(caption, ["point", *(quantity(each)[0] for each in names)], rows, note))
+    if table := limits(summary):
+        blocks.append(table)
     reasons = [
         (name.replace("_", " "), point["reason"]) for name, point in points.items() if point.get("reason")
     ]

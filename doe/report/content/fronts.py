@@ -94,8 +94,10 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         confirmed = part(summary, "confirmation") or {}
         drawn = {name: point for name, point in marks.items() if complete(point, summary)}
         blocks.append(Widget("front"))
-        pairs = plots.pairs(names, sets, drawn, confirmed)
-        blocks.append(Figures([*pairs, plots.legend_of(sets, drawn, confirmed)], "", "pairs"))
+        pairs = plots.pairs(names, sets, drawn, confirmed, bounds(summary))
+        blocks.append(
+            Figures([*pairs, plots.legend_of(sets, drawn, confirmed, bool(bounds(summary)))], "", "pairs")
+        )
         caption = "Each line is a point of the front: its clearances to the left, its responses to the right."
         blocks.append(Figures([plots.parallel(factors(summary), names, sets, drawn)], caption, "parallel"))
     if marks:
@@ -115,6 +117,12 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     blocks += _search(record)
     blocks += _beside(summary)
     return Section("front", "Pareto front", blocks)
+
+
+def bounds(summary: Record) -> dict[str, list[float]]:
+    """Limits of every response that has any."""
+    given = {each["name"]: [each.get("lower"), each.get("upper")] for each in responses(summary)}
+    return {name: [x for x in ends if x is not None] for name, ends in given.items() if ends != [None, None]}
 
 
 def _picks(summary: Record, names: Sequence[str], marks: Mapping[str, Record]) -> Table:
@@ -144,7 +152,7 @@ def _limits(record: Record) -> Table | None:
         for limit in record.get("constraints") or []
         if {"response", "sense", "limit", "value"} <= set(limit)
     ]
-    return Table("Limits at the pick", ("limit", "value", "kept"), rows) if rows else None
+    return Table("Limits at the pick on the surfaces", ("limit", "value", "kept"), rows) if rows else None
 
 
 def _search(record: Record) -> list[Block]:
@@ -203,6 +211,8 @@ def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
 
 def _on_the_simulator(direct: Record) -> list[Block]:
     blocks: list[Block] = [Words(str(direct["sentence"]))] if direct.get("sentence") else []
+    if direct.get("run"):
+        blocks.append(Words(f"A run of the direct search: {direct['run']}."))
     rows = [
         (words, with_error(direct[key], direct.get(error)))
         for key, words, error in DIRECT

@@ -28,9 +28,13 @@ WIDE, HIGH, LEFT, TOP, BOTTOM = 760.0, 260.0, 46.0, 40.0, 30.0
 
 
 def pairs(
-    names: Sequence[str], sets: Sequence[Front], marks: Mapping[str, Record], confirmed: Mapping[str, Record]
+    names: Sequence[str],
+    sets: Sequence[Front],
+    marks: Mapping[str, Record],
+    confirmed: Mapping[str, Record],
+    bounds: Mapping[str, Sequence[float]],
 ) -> list[str]:
-    """A picture for every pair of responses; points are numbered through all sets."""
+    """A picture for every pair of responses, with the ``bounds`` of either; points are numbered through all sets."""
     drawn = []
     for one, two in combinations(names, 2):
         simulated = {
@@ -40,7 +44,16 @@ def pairs(
             _pair(point, one, two) for point in [*marks.values(), *(p for each in sets for p in each.points)]
         ]
         whole += [place for place, _ in simulated.values()]
-        plot = Plot(span(x for x, _ in whole), span(y for _, y in whole), (label(one), label(two)))
+        across, up = bounds.get(one, ()), bounds.get(two, ())
+        plot = Plot(
+            span([*(x for x, _ in whole), *across]),
+            span([*(y for _, y in whole), *up]),
+            (label(one), label(two)),
+        )
+        for bound in across:
+            plot.line([(bound, plot.y[0]), (bound, plot.y[1])], "limit")
+        for bound in up:
+            plot.line([(plot.x[0], bound), (plot.x[1], bound)], "limit")
         for each in sets:
             plot.dots([_pair(point, one, two) for point in each.points], each.role, first=each.first)
         for name, point in marks.items():
@@ -71,14 +84,16 @@ def _role(name: str) -> str:
     return MARKS.get(name.replace("_", " "), OTHER)[1]
 
 
-def legend_of(sets: Sequence[Front], marks: Mapping[str, Record], confirmed: Mapping[str, Record]) -> str:
+def legend_of(
+    sets: Sequence[Front], marks: Mapping[str, Record], confirmed: Mapping[str, Record], limited: bool
+) -> str:
     """What the symbols of the pictures mean."""
     entries = [("dot", each.role, f"front {each.words}") for each in sets]
     entries += [(_shape(name), _role(name), name) for name in marks]
     entries += [
         (_shape(name), f"hollow {_role(name)}", f"{name.replace('_', ' ')}, simulated") for name in confirmed
     ]
-    return legend(entries)
+    return legend(entries + [("line", "limit", "limit")] * limited)
 
 
 def parallel(

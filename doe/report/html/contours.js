@@ -84,6 +84,13 @@ const contours = (() => {
       for (const [a, b] of lines) { pen.moveTo(...place(...a)); pen.lineTo(...place(...b)); }
       pen.stroke();
     });
+    for (const bound of s.bounds) {
+      pen.strokeStyle = page.colour("vermilion");
+      pen.lineWidth = 2.6;
+      pen.beginPath();
+      for (const [a, b] of segments(s.z, bound)) { pen.moveTo(...place(...a)); pen.lineTo(...place(...b)); }
+      pen.stroke();
+    }
     levels.forEach((level, k) => label(pen, segments(s.z, level), levels.text(level), place, n, k % 2, taken));
     axes(pen, s, left, top, wide, high, ink);
     scale(pen, s, left + wide + 14, top, high, ink);

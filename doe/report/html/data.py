@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from doe.report.content.answer import tolerance_of
-from doe.report.content.fronts import complete, fronts, picks
+from doe.report.content.fronts import bounds, complete, fronts, picks
 from doe.report.content.record import Factor, Record, factors, fits, part, responses
 from doe.report.words import quantity, rounded_down
 
@@ -67,21 +67,23 @@ def _rounded(value: float | None, digits: int = 6) -> float | None:
 
 def _surfaces(summary: Record) -> list[dict[str, Any]]:
     """Terms and coefficients; with the covariance also what a 95 % confidence interval needs."""
-    found = []
+    found, limits = [], bounds(summary)
     for name, fitted in fits(summary).items():
         coefficients = fitted["coefficients"]
-        covariance = fitted.get("covariance")
+        covariance, missed = fitted.get("covariance"), fitted.get("model_error") or {}
         residual = next(
             (row["df"] for row in fitted.get("anova") or [] if row.get("source") == "residual"), None
         )
         found.append(
             {
                 "name": name,
+                "bounds": limits.get(name, []),
                 **_named(name),
                 "terms": list(coefficients),
                 "coefficients": list(coefficients.values()),
                 "covariance": covariance,
-                "student": _student(residual) if covariance and residual else None,
+                "student": _student(missed.get("dof") or residual) if covariance and residual else None,
+                "missed": missed.get("variance"),
                 "power": _power(fitted.get("transform")),
             }
         )

@@ -37,6 +37,7 @@ const model = (() => {
     let variance = 0;
     for (let i = 0; i < x.length; i++)
       for (let j = 0; j < x.length; j++) variance += x[i] * surface.covariance[i][j] * x[j];
+    variance += surface.missed || 0;
     const half = surface.student * Math.sqrt(Math.max(variance, 0)), middle = linear(surface, coded);
     return Math.abs(back(surface, middle + half) - back(surface, middle - half)) / 2;
   }

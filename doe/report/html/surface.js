@@ -95,9 +95,10 @@ const surface_3d = (() => {
   // Contours of the surface, dropped to the floor.
   function floor(pen, s, screen) {
     const n = s.z.length;
-    for (const level of page.ticks(s.low, s.high, 9)) {
-      pen.strokeStyle = viridis.css((level - s.low) / (s.high - s.low));
-      pen.lineWidth = 1.3;
+    const lines = page.ticks(s.low, s.high, 9).map(level => [level, viridis.css((level - s.low) / (s.high - s.low)), 1.3]);
+    for (const [level, paint, thick] of [...lines, ...s.bounds.map(bound => [bound, page.colour("vermilion"), 2.6])]) {
+      pen.strokeStyle = paint;
+      pen.lineWidth = thick;
       pen.beginPath();
       for (const segment of contours.segments(s.z, level))
         segment.forEach(([i, j], end) => {

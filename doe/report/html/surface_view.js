@@ -32,7 +32,7 @@
     const heights = [...z.flat(), ...points.map(each => each.z)].filter(Number.isFinite);
     const low = Math.min(...heights), high = Math.max(...heights);
     return {
-      x: [fx.low, fx.high], y: [fy.low, fy.high], z, points, marks, low, high: high > low ? high : low + 1,
+      bounds: one.bounds || [], x: [fx.low, fx.high], y: [fy.low, fy.high], z, points, marks, low, high: high > low ? high : low + 1,
       labels: [page.named(fx), page.named(fy), page.named(one)],
       marker: [marker[x], marker[y]], height: on(marker),
     };

@@ -1,0 +1,150 @@
+"""The pick of the simulator's own front: what its tolerances leave of it, and its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.designs import to_coded
+from doe.study.back_off import Conditioned, Missed, standard_errors_of
+from doe.study.confirmation import Confirmed
+from doe.study.direct import Direct
+from doe.study.drawn import quadratics
+from doe.study.goals import goals_of, rounded_within, tolerances_of
+from doe.study_file import Study
+
+if TYPE_CHECKING:
+    from doe.pareto.direct_tolerance import DirectAware, Neighbourhood
+    from doe.pareto.tolerance_aware import ToleranceBox
+    from doe.response_surface import Surface
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class DirectPick:
+    """A row of the direct front and why it was picked; ``aware`` is None where the study asks for no tolerances."""
+
+    row: int
+    reason: str
+    aware: DirectAware | None
+
+
+def direct_pick(
+    study: Study,
+    surfaces: Sequence[Surface],
+    direct: Direct,
+    simulated: Sequence[Confirmed] = (),
+    failed: int = 0,
+) -> DirectPick:
+    """The point of the direct front by the study's rule, of what tolerances leave where the study asks for that.
+
+    It keeps every limit with the probability that the study asks for, by the standard errors of its fresh runs and by
+    what these missed at points ``simulated``, which are not picked again; each of the ``failed`` among them, picked and not
+    kept, lets the back-off grow by its own size.
+    """
+    from scipy import special
+
+    from doe.pareto.direct_tolerance import direct_aware, pick_among
+
+    front, goals = direct.front, goals_of(study)
+    coded = to_coded(front.points, study.centre, study.step)
+    quantile = float(special.ndtri(study.file.confirmation.limit_probability))
+    shift, margin = _doubt(study, direct, coded, simulated)
+    margin *= quantile * (1.0 + failed)
+    below, above = margin - shift, margin + shift
+    ran = front.baseline_values
+    ran = None if ran is None or not np.isfinite(ran).all() else ran
+    baselines = [] if ran is None else [goals.costs(ran)]
+    costs, violations = front.costs, goals.violations(front.values - below, front.values + above)
+    aware, after = None, ""
+    if study.file.front.tolerance_aware != "none":
+        here, base = _neighbourhood(study, surfaces, direct, coded, front.values), None
+        if ran is not None:
+            at = to_coded(study.baseline, study.centre, study.step)[None]
+            base = _neighbourhood(study, surfaces, direct, at, ran[None])
+        aware = direct_aware(_box(study), here, goals, base, below, above)
+        costs, violations = aware.costs, aware.violations
+        if not (violations <= 0.0).all(axis=1).any():
+            violations = goals.violations(front.values - below, front.values + above)
+        baselines += [] if aware.robust_baseline is None else [aware.robust_baseline]
+        after = ", by what its tolerances leave of it"
+    fresh = np.array(
+        [
+            not any(np.array_equal(rounded_within(study, point), each.point) for each in simulated)
+            for point in front.points
+        ]
+    )
+    rows = np.flatnonzero(fresh) if fresh.any() else np.arange(len(front.points))
+    row, reason = pick_among(costs[rows], violations[rows], goals, baselines, study.file.front.pick)
+    words = f"{reason.replace('front points', 'points of the direct front')}{after}"
+    return DirectPick(int(rows[row]), words, aware)
+
+
+@dataclass(frozen=True, eq=False)
+class Local:
+    """Responses about a simulated point: its own level, the shape of the surfaces and the slopes by which the search's
+    runs correct it. ``coded`` (k,), ``values`` (m,) and ``slopes`` (k, m) are of the point, ``baseline`` (m,) of the baseline.
+    """
+
+    coded: Array
+    values: Array
+    slopes: Array
+    baseline: Array
+
+
+def local_of(
+    study: Study, surfaces: Sequence[Surface], direct: Direct, pick: Confirmed, baseline: Confirmed
+) -> Local:
+    """About the simulated pick of a direct front."""
+    coded = to_coded(pick.point, study.centre, study.step)
+    here = _neighbourhood(study, surfaces, direct, coded[None], pick.values[None])
+    return Local(coded, pick.values, here.slopes[0], baseline.values)
+
+
+def _box(study: Study) -> ToleranceBox:
+    from doe.pareto.tolerance_aware import ToleranceBox
+
+    settings = study.file.front
+    assert settings.tolerance_aware != "none"
+    return ToleranceBox(
+        tolerances_of(study),
+        settings.tolerance_aware,
+        settings.quantile,
+        settings.distribution,
+        settings.tolerance_samples,
+    )
+
+
+def _neighbourhood(
+    study: Study, surfaces: Sequence[Surface], direct: Direct, coded: Array, values: Array
+) -> Neighbourhood:
+    """About coded points (n, k) of known responses (n, m)."""
+    from doe.pareto.direct_tolerance import Neighbourhood
+
+    forms, searched = quadratics(surfaces, len(study.factors)), direct.front.searched
+    runs = to_coded(searched.points, study.centre, study.step)
+    return Neighbourhood.of(forms, coded, values, runs, searched.values)
+
+
+def _doubt(study: Study, direct: Direct, coded: Array, simulated: Sequence[Confirmed]) -> tuple[Array, Array]:
+    """Mean and standard deviation (f, m) of what the front's fresh runs err by, given what they missed at the points
+    simulated, each beside its nearest row."""
+    front = direct.front
+    shift, deviation = np.zeros_like(front.values), front.standard_errors.copy()
+    if not simulated:
+        return shift, deviation
+    at = to_coded(np.array([each.point for each in simulated]), study.centre, study.step)
+    rows = ((at[:, None] - coded[None]) ** 2).sum(axis=-1).argmin(axis=1)
+    values, errors = np.array([each.values for each in simulated]), standard_errors_of(simulated)
+    for index in range(values.shape[1]):
+        misses = values[:, index] - front.values[rows, index]
+        field = Conditioned(Missed(coded[rows], misses, errors[:, index], deviation[rows, index]))
+        shift[:, index], left = field(coded, front.standard_errors[:, index])
+        # The error of one more simulation counts too.
+        deviation[:, index] = np.hypot(left, errors[:, index].max())
+    return shift, deviation

@@ -1,0 +1,195 @@
+"""Where a pick or a front lies at the edge of the region, and what is to be had beyond it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.designs import to_coded
+from doe.study.confirmation import Choice, Confirmed, confirmed_from
+from doe.study.drawn import jacobian
+from doe.study.failure import Failure
+from doe.study.goals import goals_of, region_of
+from doe.study_file import Study
+from rbdyn.faults import InputError
+
+if TYPE_CHECKING:
+    from doe.response_surface import Surface
+    from doe.study.simulations import Simulations
+
+Array = NDArray[np.float64]
+
+NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
+AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
+STEP = 1e-3  # coded units over which surfaces are differentiated
+MICROMETRE_MM = 1e-3
+
+
+@dataclass(frozen=True)
+class Outward:
+    """A factor whose pick lies at a bound of the region, and how each response with a goal changes beyond it.
+
+    ``gains`` by response: [improvement, its 95 % half-width] in units of the response over ``unit`` (a micrometre of a
+    factor in millimetres, else one unit of the factor); the half-width is NaN where it is not known. ``source`` is
+    "surfaces" or "simulation".
+    """
+
+    factor: str
+    side: str
+    bound: float
+    gains: Mapping[str, tuple[float, float]]
+    unit: str
+    source: str
+
+    @property
+    def sentence(self) -> str:
+        """In words."""
+        told = ", ".join(f"{name} {gain:+.2g} ± {error:.2g}" for name, (gain, error) in self.gains.items())
+        return (
+            f"{self.factor} lies at the {self.side} bound of the region, {self.bound:.4g}; gain to be had per {self.unit} "
+            f"beyond it by {self.source}: {told}"
+        )
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Factors of the pick at a bound, and the shares of the fronts within `NEAR` of one (None: no such front)."""
+
+    outward: tuple[Outward, ...]
+    front_share: float
+    direct_share: float | None
+
+    @property
+    def sentence(self) -> str:
+        """All of it in words."""
+        shares = f"{100.0 * self.front_share:.0f} % of the front on the surfaces"
+        if self.direct_share is not None:
+            shares += f" and {100.0 * self.direct_share:.0f} % of the direct front"
+        shares += f" lies within {100.0 * NEAR:g} % of a bound of the region"
+        if not self.outward:
+            return f"The pick lies inside the region; {shares}."
+        where = "; ".join(each.sentence for each in self.outward)
+        return f"THE PICK LIES AT THE EDGE of the region: {where}. {shares}; a wider design may find more."
+
+
+def share_at_edge(study: Study, points: Array) -> float:
+    """Share of points (n, k) in factor units within `NEAR` of a bound of the region."""
+    return float(_sides(study, points).any(axis=1).mean())
+
+
+def edge_of(
+    study: Study,
+    surfaces: Sequence[Surface],
+    pick: Confirmed,
+    front: Array,
+    direct: Array | None,
+    simulations: Simulations | None,
+) -> Edge:
+    """Where the pick and the fronts' points (n, k) lie; beyond the bounds ``simulations`` tell, else the surfaces."""
+    sides = _sides(study, pick.point[None])[0]
+    names = [(index, side) for index, side in enumerate(sides.tolist()) if side]
+    told = {} if simulations is None else _simulated(study, pick, names, simulations)
+    outward = []
+    for index, side in names:
+        gains, source = told.get(index), "simulation"
+        if gains is None:
+            gains, source = _on_surfaces(study, surfaces, pick.point, index, side), "the surfaces"
+        unit, scale = _unit(study, index)
+        reach = region_of(study)[index] * study.step[index]
+        outward.append(
+            Outward(
+                study.factors[index],
+                "upper" if side > 0 else "lower",
+                float(study.centre[index] + side * reach),
+                {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()},
+                unit,
+                source,
+            )
+        )
+    far = None if direct is None else share_at_edge(study, direct)
+    return Edge(tuple(outward), share_at_edge(study, front), far)
+
+
+def _sides(study: Study, points: Array) -> NDArray[np.int64]:
+    """-1 at a lower bound, 1 at an upper one, else 0, for points (n, k)."""
+    coded, reach = to_coded(points, study.centre, study.step), region_of(study)
+    near = np.abs(coded) >= reach * (1.0 - 2.0 * NEAR)
+    return np.where(near, np.sign(coded), 0.0).astype(np.int64)
+
+
+def _unit(study: Study, index: int) -> tuple[str, float]:
+    """What a gain is per, and how many units of the factor that is."""
+    return ("µm", MICROMETRE_MM) if study.factors[index].endswith("_mm") else ("unit", 1.0)
+
+
+def _on_surfaces(
+    study: Study, surfaces: Sequence[Surface], point: Array, index: int, side: int
+) -> dict[str, tuple[float, float]]:
+    """Gains a unit of the factor outward, with the error of the slope: of the coefficients and of the model's own error."""
+    from scipy import special
+
+    from doe.response_surface.model_error import REACH
+
+    goals = goals_of(study)
+    coded = to_coded(point, study.centre, study.step)
+    ahead = coded + side * STEP * np.eye(coded.size)[index]
+    gains = {}
+    for column, response in enumerate(goals.objectives):
+        surface = surfaces[response]
+        ends = [float(surface.predict(at)) for at in (coded, ahead)]
+        values = np.zeros(len(study.responses))
+        values[response] = ends[0]
+        slope = float(goals.slopes(values)[column])
+        change = jacobian(surface, ahead) - jacobian(surface, coded)
+        variance = float(change @ surface.covariance @ change) / STEP**2
+        if surface.model_error is not None:
+            # The slope of a field of correlation exp(-(d/REACH)^2) has 2/REACH^2 times its variance.
+            by_field = float(jacobian(surface, coded)[surface.terms.index("1")])
+            variance += by_field**2 * 2.0 / REACH**2 * surface.model_error.variance
+        dof = surface.interval_dof
+        student = float(special.stdtrit(dof, 0.975)) if dof > 0 else np.nan
+        scale = 1.0 / study.step[index]
+        gains[surface.name] = (
+            -slope * (ends[1] - ends[0]) / STEP * scale,
+            student * float(np.sqrt(variance)) * scale,
+        )
+    return gains
+
+
+def _simulated(
+    study: Study, pick: Confirmed, names: Sequence[tuple[int, int]], simulations: Simulations
+) -> dict[int, dict[str, tuple[float, float]]]:
+    """Gains a unit of each factor from runs beyond its bound, like those of the confirmation; none where a run fails."""
+    from doe import clearance
+
+    scenes, kept = [], []
+    for index, side in names:
+        point = pick.point.copy()
+        point[index] += side * AHEAD * study.step[index]
+        try:
+            scenes.append(clearance.confirmation_scene(study, point))
+        except InputError:
+            # A factor cannot go there: nothing lies beyond the bound.
+            continue
+        kept.append((index, point))
+    labels = [f"beyond the bound of {study.factors[index]}" for index, _ in kept]
+    results = simulations.run(scenes, labels, simulations.progress("beyond the region")) if kept else []
+    goals = goals_of(study)
+    told = {}
+    for (index, point), result in zip(kept, results, strict=True):
+        if isinstance(result, Failure):
+            continue
+        there = confirmed_from(study, Choice(point, ""), result)
+        gain = (goals.costs(pick.values) - goals.costs(there.values)) / (AHEAD * study.step[index])
+        joint = np.hypot(*(np.nan_to_num(each.error[goals.objectives]) for each in (pick, there)))
+        told[index] = {
+            study.responses[response]: (float(g), float(e))
+            for response, g, e in zip(
+                goals.objectives, gain, joint / (AHEAD * study.step[index]), strict=True
+            )
+        }
+    return told

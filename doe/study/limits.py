@@ -1,0 +1,99 @@
+"""Limits of responses, judged by what was simulated: kept, broken or undecided."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import Literal
+
+import numpy as np
+
+from doe.study.confirmation import Confirmed
+from doe.study.goals import goals_of
+from doe.study_file import Study
+
+Verdict = Literal["kept", "undecided", "broken"]
+
+# From the best to the worst.
+ORDER: tuple[Verdict, ...] = ("kept", "undecided", "broken")
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A limit of a response against its simulated ``value`` with its joint 95 % half-width ``error`` (NaN: unknown).
+
+    ``one_sided`` times the half-width is the error on one side at the probability that the study asks for.
+    """
+
+    response: str
+    sense: str
+    bound: float
+    value: float
+    error: float
+    one_sided: float
+
+    @property
+    def room(self) -> float:
+        """How far the value is on the good side of the bound; negative beyond it."""
+        return self.bound - self.value if self.sense == "<=" else self.value - self.bound
+
+    @property
+    def verdict(self) -> Verdict:
+        """Kept by more than the one-sided error, broken by more than the error, else undecided."""
+        if self.room > self.one_sided * self.error:
+            return "kept"
+        return "broken" if -self.room > self.error else "undecided"
+
+    @property
+    def shown(self) -> str:
+        """The limit with its value in words."""
+        error = "?" if np.isnan(self.error) else f"{self.error:.2g}"
+        return f"{self.response} {self.sense} {self.bound:g} (simulated {self.value:.5g} ± {error})"
+
+
+def limits_of(study: Study, confirmed: Confirmed) -> list[Limit]:
+    """The limits of the study at a simulated point, one a response: of a lower and an upper one that with the worse
+    verdict, or with less room."""
+    one_sided = NormalDist().inv_cdf(study.file.confirmation.limit_probability) / NormalDist().inv_cdf(0.975)
+    worst: dict[int, Limit] = {}
+    for index, sense, bound in goals_of(study).limited:
+        found = Limit(
+            study.responses[index],
+            sense,
+            bound,
+            float(confirmed.values[index]),
+            float(confirmed.error[index]),
+            one_sided,
+        )
+        known = worst.get(index)
+        if known is None or _badness(found) > _badness(known):
+            worst[index] = found
+    return [worst[index] for index in sorted(worst)]
+
+
+def verdict_of(limits: Sequence[Limit]) -> Verdict:
+    """The worst verdict; kept without limits."""
+    return max((limit.verdict for limit in limits), key=ORDER.index, default="kept")
+
+
+def sentence(limits: Sequence[Limit], probability: float, tried: int) -> str:
+    """What became of the limits at the pick, the bad ones first; empty without limits."""
+    if not limits:
+        return ""
+    words = {
+        "broken": "LIMIT BROKEN at the pick: {}, beyond by more than its error",
+        "undecided": "LIMIT UNDECIDED at the pick: {}, within its error of the bound",
+        "kept": f"Limit kept at the pick with a probability of at least {probability:g}: {{}}",
+    }
+    parts = [
+        words[verdict].format(", ".join(each.shown for each in group))
+        for verdict in reversed(ORDER)
+        if (group := [limit for limit in limits if limit.verdict == verdict])
+    ]
+    tries = "the first point simulated" if tried == 1 else f"{tried} points were tried"
+    return f"{'. '.join(parts)} ({tries})."
+
+
+def _badness(limit: Limit) -> tuple[int, float]:
+    return ORDER.index(limit.verdict), -limit.room
