@@ -83,6 +83,12 @@ def accuracy(
     replicates: Annotated[
         bool, typer.Option("--replicates", help="Statistical error against run time, instead.")
     ] = False,
+    coverage: Annotated[
+        bool, typer.Option("--coverage", help="How often the stated intervals hold the truth, instead.")
+    ] = False,
+    repeats: Annotated[
+        int | None, typer.Option(min=2, metavar="N", help="Repeats of the coverage; 200 unless given.")
+    ] = None,
     options: Annotated[bool, typer.Option("--options", help="What each option costs, instead.")] = False,
     stability: Annotated[
         bool, typer.Option("--stability", help="How stiff and extreme variants of the scene end, instead.")
@@ -118,6 +124,7 @@ def accuracy(
             "methods": methods,
             "slices": slices,
             "replicates": replicates,
+            "coverage": coverage,
             "options": options,
             "stability": stability,
             "scaling": scaling,
@@ -130,6 +137,7 @@ def accuracy(
         given = {
             "turns": trajectory,
             "scenes": scenes,
+            "repeats": repeats,
             "sought": None if sought is None else 0.01 * sought,
         }
         limits = {key: value for key, value in given.items() if value is not None}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import os
 import platform
 from dataclasses import dataclass
@@ -30,6 +31,15 @@ class Quantity:
     statistical_error: float | None
     numerical_error: float | None
     effective_samples: float
+
+    @property
+    def error(self) -> float | None:
+        """Half-width of the 95 % interval that is stated: statistical and numerical error as root sum of squares.
+
+        They err independently, and a sum would be too wide. None where neither was estimated.
+        """
+        known = [error for error in (self.statistical_error, self.numerical_error) if error is not None]
+        return math.hypot(*known) if known else None
 
     def as_dict(self) -> dict[str, float | None]:
         """JSON form."""

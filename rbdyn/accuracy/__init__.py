@@ -8,6 +8,7 @@ Studies, each a module with ``study(scene, progress) -> Report``; the command ``
   ``method_bias``, the statistics of those that are compiled
 - ``slicing`` (``--slices``): slices of a roller with a profile
 - ``replication`` (``--replicates``): statistical error against replicates and turns
+- ``coverage`` (``--coverage``): how often the stated intervals hold the truth
 - ``rbdyn.option_cost`` (``--options``): what each option of a scene costs
 - ``rbdyn.stability`` (``--stability``): how extreme variants of a scene end
 - ``rbdyn.scaling`` (``--scaling``): time by rollers and slices, memory by turns
@@ -51,6 +52,7 @@ STUDIES = {
     "methods": "rbdyn.accuracy.comparison",
     "slices": "rbdyn.accuracy.slicing",
     "replicates": "rbdyn.accuracy.replication",
+    "coverage": "rbdyn.accuracy.coverage",
     "options": "rbdyn.option_cost",
     "stability": "rbdyn.stability",
     "scaling": "rbdyn.scaling",

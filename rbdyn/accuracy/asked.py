@@ -18,7 +18,7 @@ JUDGED = ("tolerances", "methods", "slices", "replicates")
 def asked_study(flags: Mapping[str, bool], limits: Mapping[str, Any], scene: Scene | BallScene) -> str:
     """Name of the study: that of the only flag set, or the default of the scene's kind of bearing.
 
-    ``limits``: options of single studies, "turns", "scenes" and "sought". Raises InputError for two flags, for a study of the other
+    ``limits``: options of single studies, "turns", "scenes", "repeats" and "sought". Raises InputError for two flags, for a study of the other
     kind of bearing, and for limits that the study does not know.
     """
     chosen = [name for name, wished in flags.items() if wished]
@@ -39,4 +39,6 @@ def asked_study(flags: Mapping[str, bool], limits: Mapping[str, Any], scene: Sce
         raise InputError([f"--sought-percent {100.0 * limits['sought']:g}: {why}"])
     if "scenes" in limits and name != "battery":
         raise InputError([f"--scenes {limits['scenes']}: goes with --battery only; leave it out"])
+    if "repeats" in limits and name != "coverage":
+        raise InputError([f"--repeats {limits['repeats']}: goes with --coverage only; leave it out"])
     return name

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rbdyn.dynamics.bias import compare
-from rbdyn.dynamics.drift import drifts
+from rbdyn.dynamics.drift import TESTED, slow_change
 from rbdyn.dynamics.metrics import (
     CAGE_SLIP,
     CAGE_SPEED,
@@ -40,7 +39,7 @@ JUDGED = {
 FEW_SAMPLES = 10.0
 # Numerical errors that are said: beyond a twentieth of the value, or beyond a hundredth where they rule the sum.
 LARGE, NOTICEABLE = 0.05, 0.01
-# With companions the scatter alone makes the numerical error up to two and a half times the statistical one.
+# Companions tighter than the run let scatter alone make the numerical error up to two and a half times the statistical one.
 RULES = 3.0
 
 
@@ -54,14 +53,23 @@ def settled(
 
 
 def quantities(
-    scene: Scene, runs: Sequence[Replicate], companions: Sequence[Replicate]
+    scene: Scene, runs: Sequence[Replicate], companions: Sequence[Replicate], since: int | None = None
 ) -> dict[str, Quantity]:
-    """Every figure with its errors, by the name it has in a record."""
-    comparison = compare(runs, companions, scene.numerics.rtol) if companions else None
+    """Every figure with its errors, by the name it has in a record.
+
+    ``since``: batch from which the replicates show what regimes there are, that from which they count unless given.
+    """
     steady = scene.operation.schedule is None
-    found = drifts(runs) if steady else {}
+    since = runs[0].first if since is None else since
     return {
-        name: quantity(figure, runs, companions, comparison, found[name].bias if name in found else 0.0, unit)
+        name: quantity(
+            figure,
+            runs,
+            companions,
+            scene.numerics.rtol,
+            slow_change(figure, TESTED.get(name, figure), runs, since, steady=steady),
+            unit,
+        )
         for name, (figure, unit) in FIGURES.items()
     }
 

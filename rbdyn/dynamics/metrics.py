@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.batch_means import estimate
-from rbdyn.dynamics.bias import Comparison, companion_error, missing_power
+from rbdyn.dynamics.bias import companion_error, missing_power
 from rbdyn.dynamics.equations import (
     INNER_LOAD,
     LAND_LOAD,
@@ -201,24 +201,24 @@ def quantity(
     figure: Figure,
     runs: Sequence[Replicate],
     companions: Sequence[Replicate],
-    comparison: Comparison | None,
-    drift_bias: float,
+    rtol: float,
+    slow: float,
     unit: float = 1.0,
 ) -> Quantity:
     """A figure with its 95 % errors, times ``unit``.
 
     Statistical: batch means over all replicates (``rbdyn.dynamics.batch_means``) and, as root sum of squares, the
-    ``drift_bias`` that the counted turns show (``rbdyn.dynamics.drift``). Numerical: of the power loss what
-    the power balance misses, of all else from companions and how they ``compare`` (``rbdyn.dynamics.bias``). None where
-    it was not estimated.
+    half-width ``slow`` of what changes slowly (``rbdyn.dynamics.drift``). Numerical: from companions of runs at
+    ``rtol``, and of the power loss what the power balance misses (``rbdyn.dynamics.bias``). None where it was not
+    estimated.
     """
     ours = estimate([figure.moments(run) for run in runs], figure.of_sums)
+    statistical = None if ours.half_width is None else math.hypot(ours.half_width, slow)
     numerical = None
-    if figure is POWER_LOSS:
-        numerical = missing_power(runs)
-    elif comparison is not None:
+    if companions:
         theirs = estimate([figure.moments(run) for run in companions], figure.of_sums)
-        numerical = companion_error(ours, theirs, comparison)
-    statistical = None if ours.half_width is None else math.hypot(ours.half_width, drift_bias)
+        numerical = companion_error(ours, theirs, rtol)
+    if figure is POWER_LOSS:
+        numerical = math.hypot(missing_power(runs), numerical or 0.0)
     statistical, numerical = (None if x is None else unit * x for x in (statistical, numerical))
     return Quantity(unit * ours.value, statistical, numerical, ours.effective_samples)

@@ -1,9 +1,9 @@
 """Replicates that run until their figures no longer drift.
 
-Where a figure drifts over the counted turns (``drift``), everything up to here is dropped and every replicate goes on for
-as long as it took so far, at most ``numerics.extend_limit`` times the turns asked for: the window doubles, so a slow
-regime is seen at last, and of a run that stops the turns dropped are no more than those counted. Companions run just as
-far. Nothing depends on the clock or on the number of threads.
+Where a figure drifts over the counted turns (``drift``), the run has slow regimes and a small step would not show the
+rest of them: every replicate goes on until it is four times as long, then twice, at most ``numerics.extend_limit`` times
+the turns asked for, and each time the last half counts. Companions run just as far. Nothing depends on the clock or on
+the number of threads.
 """
 
 from __future__ import annotations
@@ -18,31 +18,37 @@ from rbdyn.dynamics.bias import companion_tolerance
 from rbdyn.dynamics.drift import drifting
 from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.metrics import Replicate
-from rbdyn.dynamics.recording import Recording
+from rbdyn.dynamics.recording import Recording, batches_of
 from rbdyn.dynamics.transient import start_of_counting
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 
 
 class Stage(NamedTuple):
-    """Where replicates stand: from which batch they count, and the turns after the warm-up that they ran."""
+    """Where replicates stand: from which batch they count, the turns after the warm-up that they ran, and how often they
+    were lengthened because of a drift."""
 
     first: int
     turns: float
+    looks: int = 0
 
 
 @dataclass(frozen=True)
 class Ensemble:
-    """Replicates and companions as they are counted, why there are no companions although asked for, shaft turns of the
-    transient (None where it cannot be told), and what a result has to say of its length."""
+    """Replicates and companions as they are counted, the batch from which they count where nothing drifts, why there are
+    no companions although asked for, shaft turns of the transient (None where it cannot be told), and what a result has
+    to say of its length."""
 
     runs: list[Replicate]
     companions: list[Replicate]
+    since: int
     fault: str | None
     transient_turns: float | None
     notes: tuple[str, ...]
 
 
+# How many times as long a run gets at the first drift, and at every other or where that is too much.
+GROWTH = (4.0, 2.0)
 # Makes the recording of a replicate at a tolerance.
 Start = Callable[[int, float, Stop], Recording]
 
@@ -75,17 +81,17 @@ def run_until_settled(
         if longer is None:
             break
         stage = longer
-    notes = (*begin.notes, *length_notes(scene, runs, stage, begin.first, extends))
+    notes = (*begin.notes, *length_notes(scene, runs, stage, extends))
     if not numerics.companions:
-        return Ensemble(runs, [], None, begin.turns, notes)
+        return Ensemble(runs, [], begin.first, None, begin.turns, notes)
     rtol = companion_tolerance(numerics.rtol)
     others = Team(start, range(numerics.companions), rtol, workers, Stop(outer=stop), progress, 0, team.done)
     try:
         companions = [run.counted_from(stage.first) for run in others.to(stage.turns)]
     except RunError as error:
         fault = f"a companion at numerics.rtol = {rtol:g} could not go on ({error})"
-        return Ensemble(runs, [], fault, begin.turns, notes)
-    return Ensemble(runs, companions, None, begin.turns, notes)
+        return Ensemble(runs, [], begin.first, fault, begin.turns, notes)
+    return Ensemble(runs, companions, begin.first, None, begin.turns, notes)
 
 
 class Team:
@@ -140,27 +146,29 @@ def next_stage(scene: Scene, runs: Sequence[Replicate], stage: Stage) -> Stage |
 
     Where ``discard_turns = "auto"`` left fewer turns than asked for, they are made up first.
     """
-    numerics, turn_s, window = scene.numerics, scene.turn_s, scene.impact_window_turns
-    ran = numerics.warm_up_turns + stage.turns
-    limit = numerics.extend_limit * (numerics.warm_up_turns + numerics.turns)
-    missing = numerics.turns - runs[0].duration / turn_s
+    numerics, window = scene.numerics, scene.impact_window_turns
+    warm_up, batches = numerics.warm_up_turns, batches_of(scene)
+    longest = numerics.extend_limit * (warm_up + numerics.turns) * (1.0 + 1e-9)
+    missing = numerics.turns - runs[0].duration / scene.turn_s
     if missing > 1e-6 * numerics.turns:
-        longer = Stage(stage.first, stage.turns + math.ceil(missing / window - 1e-9) * window)
-    elif drifting(runs):
-        longer = Stage(len(runs[0].durations), stage.turns + math.ceil(ran / window - 1e-9) * window)
-    else:
+        longer = stage._replace(turns=stage.turns + math.ceil(missing / window - 1e-9) * window)
+        return longer if warm_up + longer.turns <= longest else None
+    if not drifting(runs):
         return None
-    return longer if numerics.warm_up_turns + longer.turns <= limit * (1.0 + 1e-9) else None
+    for growth in GROWTH if stage.looks == 0 else GROWTH[-1:]:
+        turns = math.ceil((growth * (warm_up + stage.turns) - warm_up) / window - 1e-9) * window
+        if warm_up + turns <= longest:
+            counted = math.ceil(0.5 * (warm_up + turns) / window) * batches.per_window
+            return Stage(len(batches.ends(turns)) - counted, turns, stage.looks + 1)
+    return None
 
 
-def length_notes(
-    scene: Scene, runs: Sequence[Replicate], stage: Stage, first: int, extends: bool
-) -> tuple[str, ...]:
+def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, extends: bool) -> tuple[str, ...]:
     """What a reader should know of how long the runs took and what is counted of them."""
     numerics, turn_s = scene.numerics, scene.turn_s
     notes = []
     counted = runs[0].duration / turn_s
-    if stage.first != first:
+    if stage.looks:
         dropped = float(runs[0].durations[: stage.first].sum()) / turn_s
         notes.append(
             f"length: figures drifted, so each replicate ran {dropped + counted:.4g} shaft turns in place of "

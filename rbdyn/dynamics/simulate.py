@@ -21,6 +21,7 @@ from rbdyn.dynamics.method import (
     EXPLICIT,
     advance_by,
     cheaper_method,
+    explicit_method,
     pair_of,
     stiffness_cost,
     stiffness_notes,
@@ -68,6 +69,7 @@ class Run:
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
         y = start_state(scene, bearing, np.random.default_rng(seeds))
         numerics = scene.numerics
+        explicit = explicit_method(numerics.method, numerics.rtol)
         n = y.size
         first_step = 1e-3 * scales(scene).length / scales(scene).speed
         self.carry = Carry(
@@ -80,7 +82,7 @@ class Run:
             clock=np.array([0.0, first_step, PI_START_ERROR, 0.0, 0.0]),
             counts=np.zeros(4, dtype=np.int64),
             stiffness=np.zeros(3),
-            pair=pair_of(numerics.method),
+            pair=pair_of(explicit),
         )
         self.tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
         self.sample_step = scene.turn_s / numerics.samples_per_turn
@@ -88,7 +90,7 @@ class Run:
         control_by = cache(self._control_by)
         if self.method == "auto":
             self.method, stiffness = cheaper_method(
-                scene, bearing, control_by, self.carry, self.tally, self.sample_step
+                scene, bearing, explicit, control_by, self.carry, self.tally, self.sample_step
             )
             # The implicit method does not see what it overcomes.
             self.carry.stiffness[:] = stiffness if self.method == "rosenbrock" else 0.0
@@ -200,7 +202,8 @@ def simulate(
     stop = Stop(outer=stop)
     bearing = roller_bearing(scene)
     compile_s = 0.0
-    if (laws := (scene.numerics.method, _types(bearing))) not in _prepared:
+    method = scene.numerics.method, explicit_method(scene.numerics.method, scene.numerics.rtol)
+    if (laws := (method, _types(bearing))) not in _prepared:
         compile_s = prepare(scene, bearing)
         _prepared.add(laws)
     started = time.perf_counter()
@@ -249,7 +252,7 @@ def _gather(
 ) -> SimulationResult:
     runs, companions = ensemble.runs, ensemble.companions
     everything = [*runs, *companions]
-    figures = quantities(scene, runs, companions)
+    figures = quantities(scene, runs, companions, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
     inner_load, outer_load = (
         max(getattr(run, f"max_{race}_load") for run in runs) for race in ("inner", "outer")

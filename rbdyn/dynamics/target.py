@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.batch_means import estimate
-from rbdyn.dynamics.bias import FACTOR, SAFETY, companion_tolerance, mean_gap
+from rbdyn.dynamics.bias import bias_scale, companion_tolerance, mean_gap
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.error_bars import FIGURES, settled
 from rbdyn.dynamics.metrics import Replicate
@@ -34,7 +34,7 @@ from rbdyn.scene import Scene
 Array = NDArray[np.float64]
 
 AIMED = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
-SCATTERED = AIMED[:2]  # their numerical error comes from companions, that of the loss from the power balance
+SCATTERED = AIMED[:2]  # their bias is seen over the tolerance, that of the loss by the power balance
 LARGEST_TARGET = 0.5
 
 LADDER = (0.1, 0.03, 0.01, 0.003)
@@ -51,8 +51,8 @@ MOST_RUNS = 3
 # Counted turns of one run at most: minutes.
 MOST_TURNS = 100_000.0
 NORMAL = 1.96
-# Mean size of a difference that is all scatter, over its 95 % half-width: sqrt(2 / pi) / 1.96.
-MEAN_SIZE = 0.407
+# A difference that is all scatter and its 95 % half-width together, over that half-width: sqrt(1 + 1 / 1.96^2).
+NOISY_DIFFERENCE = 1.123
 # What adds up over runs in the cost of a result; the rest of it tells of the run that is reported.
 ADDED = ("wall_s", "compile_s", "cpu_s", "steps", "rejected_steps", "rhs_evaluations", "turns")
 
@@ -157,10 +157,10 @@ def reach(
 
 
 def total_error(figure: Quantity) -> float | None:
-    """Statistical plus numerical error over the value; None where one is unknown, 0 where both are nothing."""
+    """Stated error over the value; None where a part of it is unknown, 0 where both parts are nothing."""
     if figure.statistical_error is None or figure.numerical_error is None:
         return None
-    error = figure.statistical_error + figure.numerical_error
+    error = figure.error or 0.0
     if error == 0.0:
         return 0.0
     return error / abs(figure.value) if figure.value != 0.0 else None
@@ -234,16 +234,16 @@ def turns_needed(model: Model, scene: Scene, rtol: float, target: float) -> floa
     """Counted turns, in all, that bring every figure within the target; infinite where its bias alone is larger."""
     needed = 0.0
     for name in AIMED:
-        room = target - model.systematic(name, rtol)
-        noise = _noise_factor(name, scene, rtol) * NORMAL * model.scatter[name]
-        needed = max(needed, (noise / room) ** 2 if room > 0.0 else math.inf)
+        room = target**2 - model.systematic(name, rtol) ** 2
+        noise = _noise_factor(scene, rtol) * NORMAL * model.scatter[name]
+        needed = max(needed, noise**2 / room if room > 0.0 else math.inf)
     return needed
 
 
 def predicted_error(model: Model, scene: Scene, name: str, rtol: float, turns: float) -> float:
     """Total relative error of a figure after so many counted turns in all."""
-    noise = _noise_factor(name, scene, rtol) * NORMAL * model.scatter[name] / math.sqrt(turns)
-    return model.systematic(name, rtol) + noise
+    noise = _noise_factor(scene, rtol) * NORMAL * model.scatter[name] / math.sqrt(turns)
+    return math.hypot(model.systematic(name, rtol), noise)
 
 
 def learned(model: Model, scene: Scene, choice: Choice, result: SimulationResult) -> Model:
@@ -256,10 +256,10 @@ def learned(model: Model, scene: Scene, choice: Choice, result: SimulationResult
             continue
         size = abs(figure.value)
         scatter[name] = statistical / size * math.sqrt(turns) / NORMAL
+        if numerical <= 2.0 * _companion_noise(scene, choice.rtol) * statistical:
+            continue
         if name in SCATTERED:
-            noise = _companion_noise(scene, choice.rtol) * statistical
-            if numerical > 2.0 * noise:
-                bias[name] = (numerical - noise) / size / choice.rtol
+            bias[name] = numerical / size / choice.rtol
         else:
             gaps = gaps * max(numerical / size / model.systematic(name, choice.rtol), 1.0)
     return replace(model, scatter=scatter, bias=bias, gaps=gaps)
@@ -277,16 +277,14 @@ def _choice(model: Model, scene: Scene, rtol: float, needed: float) -> Choice:
     return Choice(rtol, turns, replicates, (turns + numerics.warm_up_turns) * cost)
 
 
-def _noise_factor(name: str, scene: Scene, rtol: float) -> float:
-    """Total over statistical error where there is no bias: the difference from companions, and its half-width."""
-    return 1.0 + ((1.0 + MEAN_SIZE) * _companion_noise(scene, rtol) if name in SCATTERED else 0.0)
+def _noise_factor(scene: Scene, rtol: float) -> float:
+    """Total over statistical error where there is no bias: the difference from companions is noise then."""
+    return math.hypot(1.0, NOISY_DIFFERENCE * _companion_noise(scene, rtol))
 
 
 def _companion_noise(scene: Scene, rtol: float) -> float:
     """Part of the numerical error that is half-width, over the statistical error (``rbdyn.dynamics.bias``)."""
-    looser = companion_tolerance(rtol) > rtol
-    scale = SAFETY / (FACTOR - 1.0) if looser else FACTOR / (FACTOR - 1.0)
-    return scale * math.sqrt(1.0 + 1.0 / scene.numerics.companion_share)
+    return bias_scale(rtol) * math.sqrt(1.0 + 1.0 / scene.numerics.companion_share)
 
 
 def _scatter(name: str, series: Sequence[Sequence[Replicate]], scene: Scene) -> float:
@@ -302,7 +300,7 @@ def _scatter(name: str, series: Sequence[Sequence[Replicate]], scene: Scene) -> 
 
 
 def _bias(name: str, series: Sequence[Sequence[Replicate]], scatter: float, turns: float) -> float:
-    """Bound of the relative bias over rtol: safety times the slope of the figure over the tolerance, where that stands
+    """Relative bias over rtol: the slope of the figure over the tolerance, where that stands
     out of its scatter; none otherwise, as the run itself will tell. ``turns``: of all replicates of one pilot."""
     figure = FIGURES[name][0]
     values = [estimate([figure.moments(run) for run in runs], figure.of_sums).value for runs in series]
@@ -311,7 +309,7 @@ def _bias(name: str, series: Sequence[Sequence[Replicate]], scatter: float, turn
     relative, away = np.array(values) / values[-1], np.array(LADDER) - np.mean(LADDER)
     slope = float(away @ relative / (away @ away))
     half_width = NORMAL * scatter / math.sqrt(turns * float(away @ away))
-    return SAFETY * abs(slope) if abs(slope) > half_width else 0.0
+    return abs(slope) if abs(slope) > half_width else 0.0
 
 
 def _along(rtol: float, ladder: Array, values: Array) -> float:
