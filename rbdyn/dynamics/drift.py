@@ -95,6 +95,7 @@ def drift_of(figure: Figure, runs: Sequence[Replicate]) -> Drift | None:
     half = rows // 2
     if half == 0:
         return None
+    size = abs(float(figure.of_sums(np.sum([part.sum(axis=0) for part in moments], axis=0))))
     early, late = (
         [part[rows - 2 * half : rows - half] for part in moments],
         [part[-half:] for part in moments],
