@@ -32,6 +32,7 @@ SHORT = (
     "numerics.replicates=2",
     "numerics.impact_window_turns=2",
     "numerics.companion=false",
+    "numerics.extend=false",
 )
 CONSERVATIVE = (
     "traction.model=off",

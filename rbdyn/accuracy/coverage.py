@@ -21,8 +21,9 @@ from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.coverage/1"
 REPEATS = 200
-# Of the truth: replicates, turns counted and discarded at least, rtol at most, seed.
-TRUTH_REPLICATES, TRUTH_TURNS, TRUTH_DISCARD, TRUTH_RTOL, TRUTH_SEED = 64, 400.0, 200.0, 1e-3, 987_654
+# Of the truth: replicates and turns counted over those of the scene at least, rtol at most, seed. It discards half as
+# many turns as it counts.
+TRUTH_REPLICATES, TRUTH_LENGTH, TRUTH_RTOL, TRUTH_SEED = 64, 10.0, 1e-3, 987_654
 FIRST_SEED, SEED_STEP = 5000, 37
 # Shares of a sound interval; a single figure scatters by 3 % over 200 repeats.
 POOLED, LOWEST = (0.94, 0.96), 0.90
@@ -104,11 +105,12 @@ def truth_of(scene: Scene) -> Scene:
     """The scene as its truth is found: long after its transient, or as long as asked for where a schedule runs."""
     numerics = scene.numerics
     steady = scene.operation.schedule is None
+    turns = TRUTH_LENGTH * numerics.turns
     return with_numerics(
         scene,
         replicates=max(TRUTH_REPLICATES, numerics.replicates),
-        turns=max(TRUTH_TURNS, numerics.turns) if steady else numerics.turns,
-        discard_turns=max(TRUTH_DISCARD, numerics.warm_up_turns) if steady else numerics.discard_turns,
+        turns=turns if steady else numerics.turns,
+        discard_turns=max(0.5 * turns, numerics.warm_up_turns) if steady else numerics.discard_turns,
         rtol=min(TRUTH_RTOL, 0.1 * numerics.rtol),
         impact_window_turns=scene.impact_window_turns,
         seed=TRUTH_SEED,

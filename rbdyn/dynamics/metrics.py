@@ -216,8 +216,9 @@ def quantity(
     statistical = None if ours.half_width is None else math.hypot(ours.half_width, slow)
     numerical = None
     if companions:
-        theirs = estimate([figure.moments(run) for run in companions], figure.of_sums)
-        numerical = companion_error(ours, theirs, rtol)
+        sums = np.sum([figure.moments(run).sum(axis=0) for run in companions], axis=0)
+        times_fewer = sum(run.duration for run in runs) / sum(run.duration for run in companions)
+        numerical = companion_error(ours, float(figure.of_sums(sums)), times_fewer, rtol)
     if figure is POWER_LOSS:
         numerical = math.hypot(missing_power(runs), numerical or 0.0)
     statistical, numerical = (None if x is None else unit * x for x in (statistical, numerical))
