@@ -31,8 +31,10 @@ class Footprint:
 def footprint(scene: Scene, bearing: RollerBearing) -> Footprint:
     """Sizes for a scene whose bearing has been run. Raises KeyError where nothing was compiled for its laws."""
     from rbdyn.dynamics.geometry import layout_of
+    from rbdyn.dynamics.method import explicit_method, pair_of
 
-    return Footprint(layout_of(scene).size, parameter_bytes(bearing), instructions(bearing))
+    pair = pair_of(explicit_method(scene.numerics.method, scene.numerics.rtol))
+    return Footprint(layout_of(scene).size, parameter_bytes(bearing), instructions(bearing, pair))
 
 
 def law_types(parameters: Any) -> set[type]:
@@ -56,18 +58,18 @@ def _parts(parameters: Any) -> Iterator[Any]:
             yield from _parts(part)
 
 
-def instructions(bearing: RollerBearing) -> int:
-    """Instructions (of LLVM, optimised) that the time integration of a bearing was compiled to.
+def instructions(bearing: RollerBearing, pair: Any) -> int:
+    """Instructions (of LLVM, optimised) that the time integration of a bearing by an explicit pair was compiled to.
 
     Raises KeyError where the integration was not yet compiled, or loaded, for these types of laws.
     """
     import numba
 
-    from rbdyn.dynamics.runge_kutta import DORMAND_PRINCE, advance
+    from rbdyn.dynamics.runge_kutta import advance
 
-    kind, pair = numba.typeof(bearing), numba.typeof(DORMAND_PRINCE)
+    kind, of_pair = numba.typeof(bearing), numba.typeof(pair)
     for signature, compiled in advance.overloads.items():
-        if signature[0] == kind and signature[2].types[-1] == pair:
+        if signature[0] == kind and signature[2].types[-1] == of_pair:
             module = compiled.library._get_module_for_linking()
             return sum(1 for body in module.functions for block in body.blocks for _ in block.instructions)
     raise KeyError(kind)

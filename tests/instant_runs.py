@@ -24,6 +24,7 @@ def instant_result(scene: Scene) -> SimulationResult:
         name: Quantity(base * scale, 0.01 * base * scale, None, 10.0)
         for name, scale in (
             ("impact_force", 1.0),
+            ("impact_contact_force", 1.0),
             ("whirl_deviation_ratio", 0.01),
             ("power_loss", 3.0),
             ("cage_speed_rpm", 200.0),

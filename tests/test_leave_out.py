@@ -192,8 +192,9 @@ def test_unit_compiled_code_grows_with_the_laws(outer, conservative):
     sizes = []
     for scene in (conservative, outer):
         bearing = roller_bearing(scene)
-        Run(scene, bearing, 0, scene.numerics.rtol, Stop()).to(0.0)
-        sizes.append(instructions(bearing))
+        run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
+        run.to(0.0)
+        sizes.append(instructions(bearing, run.carry.pair))
     assert 1000 < sizes[0] < 0.9 * sizes[1]
 
 

@@ -20,6 +20,8 @@ from rbdyn.faults import RunError
 
 
 def run_of(scene, rtol, replicate=0):
+    numerics = scene.numerics.model_copy(update={"method": "rk45"})
+    scene = scene.model_copy(update={"numerics": numerics})
     return Run(scene, roller_bearing(scene), replicate, rtol, Stop())
 
 
@@ -253,6 +255,9 @@ def test_oracle_peak_inside_one_step(conservative, evaluate):
     run = run_of(conservative, 1e-4)
     carry, h, speed = run.carry, 2e-5, 1.0
     y = carry.y
+    # The whole bearing turned back until the first pocket stands at angle 0.
+    back = np.exp(-1j * y[52]) * (y[:10] + 1j * y[10:20])
+    y[:10], y[10:20], y[52] = back.real, back.imag, 0.0
     y[10], y[50:52] = run.bearing.pocket.half_clearance - 1e-6, 0.0
     for fall in (0.7, 1.0, 1.6):
         carry.k[:] = 0.0

@@ -11,7 +11,8 @@ batches of all replicates: a mean, a ratio, a standard deviation over a mean. It
 
 Both look at deviations from the mean over all replicates, so replicates that differ lengthen the memory and widen the
 interval; where one remembers its start to its end the joined batches are whole replicates, and the interval is
-Student's over replicates.
+Student's over replicates. So it is from eight replicates on, which are independent by their making: a memory found in
+short series is itself uncertain, and of the bearing of Chen et al. 2022 intervals by it held the impact in 90 of 100.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ MEMORIES = 8.0
 MOST_BATCHES = 64
 # A single replicate is cut into so many at least.
 FEWEST_BATCHES = 4
+# Replicates from which each is one batch.
+ENOUGH_REPLICATES = 8
 
 
 class Estimate(NamedTuple):
@@ -126,6 +129,8 @@ def _pseudo_values(moments: Array, total: Array, figure: Callable[[Array], Array
 
 def _joined(moments: Array, memory: float, batches: int, replicates: int) -> Array:
     """Neighbouring batches of one replicate summed into as many as its memory allows."""
+    if replicates >= ENOUGH_REPLICATES:
+        return moments.sum(axis=0)[None]
     length = max(math.ceil(1.0 + MEMORIES * (memory - 1.0)), batches // MOST_BATCHES)
     fewest = FEWEST_BATCHES if replicates == 1 else 1
     count = min(max(len(moments) // length, fewest), len(moments))
