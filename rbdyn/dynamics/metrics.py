@@ -36,7 +36,7 @@ class Replicate:
     Arrays over batches, from the start on; figures count from the batch ``first``, and ``per_window`` batches make an
     impact window. ``whirl``: samples, sum and sum of squares of the cage centre's speed; ``work``: integrals of the
     loss powers, then of those that come in by shafts and loads; ``largest``: loads; ``energy``: kinetic, elastic and
-    load energy together at the ends of batches, as far as the count may begin or ends there; ``energy_scale``: contact load times approach;
+    load energy together at the ends of batches; ``energy_scale``: contact load times approach;
     ``stiffness``: as in ``runge_kutta.Carry``.
     """
 
