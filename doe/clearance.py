@@ -70,9 +70,7 @@ def read_scene(study: Study) -> dict[str, Any]:
     return data
 
 
-def scene_at(
-    study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]
-) -> Scene:
+def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
     """The study's scene at factor values, with a seed. Raises InputError when a value is impossible."""
     path = study.beside(study.file.scene.file)
     assignments = [f"{factor.key}={float(x)!r}" for factor, x in zip(study.file.factor, factors, strict=True)]
@@ -233,9 +231,7 @@ def _in_threads(
     run_all(runs(), workers, stop, lambda one: give(taken[one.place], one.result()))
 
 
-def _on_cluster(
-    texts: Mapping[str, str], scheduler: str, points: Sequence[Point], take: Take, give: Give
-) -> None:
+def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point], take: Take, give: Give) -> None:
     """Engine of a cluster, whose scheduler knows best what runs where: it gets all points at once."""
     from doe.study.cluster import run_on_cluster
 
@@ -272,9 +268,7 @@ def attempt_text(text: str, version: str) -> Ran:
     host, pid = socket.gethostname(), os.getpid()
     if code_version() != version:
         raise InputError(
-            [
-                f"worker {host}, process {pid}: runs another version of rbdyn or of its sources; install the same"
-            ]
+            [f"worker {host}, process {pid}: runs another version of rbdyn or of its sources; install the same"]
         )
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 

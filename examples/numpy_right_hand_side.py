@@ -80,9 +80,7 @@ def race(
     orbit = tangential / distance
     entrainment = 0.5 * ((spin - orbit) * lever + (ring_speed - orbit) * ring_lever)
     u, q = np.maximum(np.abs(entrainment), 1e-12), np.maximum(load, 1e-30)
-    rolling = (
-        law.rolling.force_scale * np.sqrt(q * u) / (1.0 + law.rolling.regime_scale * q**5 / u**2.5) ** 0.1
-    )
+    rolling = law.rolling.force_scale * np.sqrt(q * u) / (1.0 + law.rolling.regime_scale * q**5 / u**2.5) ** 0.1
     rolling = np.copysign(rolling, entrainment)
 
     along = traction + rolling * (ring_lever + lever) / distance
@@ -99,9 +97,7 @@ def bar_load(contact: Any, approach: Array) -> Array:
     return contact.stiffness * y**10
 
 
-def pocket(
-    law: Any, ex: Array, ey: Array, at: Array, velocity: Array, spin: Array, cage_speed: float
-) -> Pull:
+def pocket(law: Any, ex: Array, ey: Array, at: Array, velocity: Array, spin: Array, cage_speed: float) -> Pull:
     """Pocket walls on rollers at ``at`` (2, Z) from the cage's centre; (ex, ey): mid-lines of the pockets."""
     offset, height = at[1] * ex - at[0] * ey, at[0] * ex + at[1] * ey
     wall, approach = np.sign(offset), np.abs(offset) - law.half_clearance
@@ -156,9 +152,7 @@ def land(guide: Any, at: Array, velocity: Array, cage_speed: float) -> tuple[Arr
 def laws_of(parameters: Any) -> set[str]:
     """Names of the laws that a bearing is made of."""
     parts = [part for part in parameters if hasattr(part, "_fields")]
-    return {type(part).__name__ for part in parts if type(part).__name__ != "Race"}.union(
-        *map(laws_of, parts)
-    )
+    return {type(part).__name__ for part in parts if type(part).__name__ != "Race"}.union(*map(laws_of, parts))
 
 
 class NumpyRightHandSide:

@@ -214,8 +214,7 @@ def table_4() -> pd.DataFrame:
 def what_is_left_out() -> list[tuple[str, int, int, int, int]]:
     """How the search depends on what the paper leaves out: (choice, solved, fewest and most searches, iterations in all)."""
     choices: list[tuple[str, Search, Damping]] = [
-        (f"step {step:g} of the radius of O1", Search(step=step), Damping())
-        for step in (0.01, 0.03, 0.1, 0.3, 1.0)
+        (f"step {step:g} of the radius of O1", Search(step=step), Damping()) for step in (0.01, 0.03, 0.1, 0.3, 1.0)
     ]
     choices += [(f"mu in N and {unit}", Search(), Damping(length_unit=length))
                 for unit, length in (("m", 1.0), ("um", 1e-6))]  # fmt: skip
@@ -373,10 +372,7 @@ def main(
     print_table(
         "what the paper leaves out, over Table 3",
         ("choice", "solved", "searches", "iterations in all"),
-        [
-            (name, f"{solved}", f"{few}-{most}", f"{steps}")
-            for name, solved, few, most, steps in what_is_left_out()
-        ],
+        [(name, f"{solved}", f"{few}-{most}", f"{steps}") for name, solved, few, most, steps in what_is_left_out()],
     )
     typer.echo(
         f"figure 7: search and plain Newton differ by {found['method_gap']:.1e} deg (paper: 0.84 %) and plain Newton fails at "

@@ -54,9 +54,7 @@ def point(speed: float, rings: str, form: str, load: tuple[float, float] = LOADS
         raise RuntimeError(f"{rings}, {form}, {speed:g} rpm: {result.status}")
     record = result.as_dict()
     found = {
-        f"{layer}_layer_{race}_deg": float(
-            np.mean([ball[f"{race}_angle_deg"] for ball in record[layer]["balls"]])
-        )
+        f"{layer}_layer_{race}_deg": float(np.mean([ball[f"{race}_angle_deg"] for ball in record[layer]["balls"]]))
         for layer, race in ANGLES
     }
     grown = record.get("ring_growth_um", {})
@@ -92,9 +90,7 @@ def loads(speed: float = SPEEDS[-1], cases: Sequence[tuple[float, float]] = LOAD
         record: dict[str, object] = {"radial_N": load[0], "axial_N": load[1], "rings": name}
         for form, race in itertools.product(FORMS[1:], RACES):
             key = f"inner_layer_{race}_deg"
-            record[f"{form}_{race}_percent"] = 100.0 * (
-                point(speed, name, form, load)[key] / without[key] - 1.0
-            )
+            record[f"{form}_{race}_percent"] = 100.0 * (point(speed, name, form, load)[key] / without[key] - 1.0)
         records.append(record)
     return pd.DataFrame(records)
 
@@ -111,9 +107,7 @@ def statements(frame: pd.DataFrame) -> list[tuple[str, str, str]]:
     ratio = ceramic[ours] / thick[ours]
     # Ceramic with growth against steel without: two changes at once.
     bare = top.loc[("steel", "none")]
-    mixed = [
-        100.0 * (ceramic[f"inner_layer_{race}_deg"] / bare[f"inner_layer_{race}_deg"] - 1.0) for race in RACES
-    ]
+    mixed = [100.0 * (ceramic[f"inner_layer_{race}_deg"] / bare[f"inner_layer_{race}_deg"] - 1.0) for race in RACES]
     return [
         (
             "every contact angle decreases with growth (Figs. 3 to 6)",
@@ -205,9 +199,7 @@ def draw(frame: pd.DataFrame, path: Path) -> None:
             style = {"none": "o-", "thick_ring": "s--", "paper": "^:"}[form]
             label = f"{rings}, {'no growth' if form == 'none' else form.replace('_', ' ')}"
             colour = "C0" if rings == "steel" else "C1"
-            axis.plot(
-                part["speed_rpm"], part[f"{layer}_layer_{race}_deg"], style, color=colour, ms=3.5, label=label
-            )
+            axis.plot(part["speed_rpm"], part[f"{layer}_layer_{race}_deg"], style, color=colour, ms=3.5, label=label)
         axis.set_title(f"Fig. {number}: {layer} layer, {race} contact angle", fontsize=10)
         axis.set_xlabel("speed [rpm]")
         axis.set_ylabel("mean over the balls [deg]")

@@ -134,9 +134,7 @@ def bench() -> Bench:
 HELD = np.array([math.nan, math.nan, math.nan, 0.0, 0.0])
 
 
-def solved(
-    errors: RaceErrors, steps: int = STEPS, turns: int = TURNS, given: np.ndarray | None = None
-) -> Followed:
+def solved(errors: RaceErrors, steps: int = STEPS, turns: int = TURNS, given: np.ndarray | None = None) -> Followed:
     """Equilibria of the bearing with its errors through ``turns`` turns of the inner ring."""
     test = bench()
     balls = ball_path(errors, test.turning, steps, turns)
@@ -291,13 +289,9 @@ def draw_orbits(frame: pd.DataFrame, paths: dict[str, Followed], file: Path) -> 
     figure, axes = canvas(2, 3)
     for axis, (number, part) in zip(axes.ravel(), frame.groupby("case"), strict=True):
         for reading in part["reading"]:
-            path = 1e6 * (
-                paths[f"{number}: {reading}"].path - paths[f"{number}: {reading}"].path.mean(axis=0)
-            )
+            path = 1e6 * (paths[f"{number}: {reading}"].path - paths[f"{number}: {reading}"].path.mean(axis=0))
             if number == 3:
-                axis.plot(
-                    np.arange(len(path)) / STEPS, path[:, 2] - FACE_RADIUS * path[:, 4], label=reading, lw=0.8
-                )
+                axis.plot(np.arange(len(path)) / STEPS, path[:, 2] - FACE_RADIUS * path[:, 4], label=reading, lw=0.8)
             else:
                 axis.plot(path[:, 0], path[:, 1], label=reading, lw=0.8)
         axis.set_title(f"({number}) {part['errors'].iloc[0]}", fontsize=9)

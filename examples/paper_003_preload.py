@@ -94,9 +94,7 @@ def bearing(
     """Scene of the paper's bearing under an axial force [N]."""
     speed, tilt = MODELS[model]
     steel = {"elastic_modulus_GPa": MODULUS_GPA, "poisson_ratio": 0.3, "density_kg_m3": 7850.0}
-    angle = (
-        {"contact_angle_deg": ANGLE_DEG} if clearance_mm is None else {"radial_clearance_mm": clearance_mm}
-    )
+    angle = {"contact_angle_deg": ANGLE_DEG} if clearance_mm is None else {"radial_clearance_mm": clearance_mm}
     return BallScene.from_dict(
         {
             "bearing": {
@@ -128,9 +126,7 @@ def solved(scene: Any) -> dict[str, float]:
     if not solution.found:
         raise RuntimeError(solution.status)
     most = int(np.argmax(solution.inner_load))
-    life = row_life(
-        solution.inner_load, solution.outer_load, fatigue.plain_capacities(scene.bearing), "inner"
-    )
+    life = row_life(solution.inner_load, solution.outer_load, fatigue.plain_capacities(scene.bearing), "inner")
     return {
         "inner": 1e-6 * float(peak_pressure(model.inner_contact, solution.inner_load.max())),
         "outer": 1e-6 * float(peak_pressure(model.outer_contact, solution.outer_load.max())),
@@ -195,12 +191,10 @@ def table3() -> pd.DataFrame:
             "life_h paper": hours,
         }
         for name in MODELS:
-            record[f"life_h {name}"] = solved(bearing(WORKING_AXIAL_N, name, clearance_mm=1e-3 * clearance))[
-                "life"
-            ]
-        record["life_h axial load alone"] = solved(
-            bearing(WORKING_AXIAL_N, radial=0.0, clearance_mm=1e-3 * clearance)
-        )["life"]
+            record[f"life_h {name}"] = solved(bearing(WORKING_AXIAL_N, name, clearance_mm=1e-3 * clearance))["life"]
+        record["life_h axial load alone"] = solved(bearing(WORKING_AXIAL_N, radial=0.0, clearance_mm=1e-3 * clearance))[
+            "life"
+        ]
         records.append(record)
     return pd.DataFrame(records)
 
@@ -275,9 +269,7 @@ def _clearance_table(frame: pd.DataFrame) -> Table:
     columns = {"angle_deg paper": "angle: paper", "angle_deg eq 17": "eq 17", "life_h paper": "life: paper"}
     columns |= {f"life_h {name}": f"L-P {name}" for name in MODELS}
     columns |= {"life_h axial load alone": "L-P, 40 N axial alone"}
-    return _whole(
-        frame, "clearance_um", columns, "Angle [deg] and life [h] at 63000 rpm by diametral clearance [um]"
-    )
+    return _whole(frame, "clearance_um", columns, "Angle [deg] and life [h] at 63000 rpm by diametral clearance [um]")
 
 
 def _optimum_table() -> Table:

@@ -24,9 +24,7 @@ def ball(
     ] = None,
     preload: Annotated[
         str | None,
-        typer.Option(
-            metavar="N", help="Stress and life over axial preload, start:stop:count or a,b,c, instead."
-        ),
+        typer.Option(metavar="N", help="Stress and life over axial preload, start:stop:count or a,b,c, instead."),
     ] = None,
     clearance: Annotated[
         str | None, typer.Option(metavar="UM", help="The same over the diametral clearance, instead.")
@@ -45,9 +43,7 @@ def ball(
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Also the stiffness matrix and cost.")
-    ] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also the stiffness matrix and cost.")] = False,
 ) -> None:
     """Find the equilibrium of a ball bearing: contact angles, loads, stiffness, stress, life."""
     with guarded(as_json):

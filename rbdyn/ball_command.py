@@ -81,9 +81,7 @@ def _print_row(title: str, record: dict[str, Any], verbose: bool) -> None:
         "outer_load_N",
         "centrifugal_force_N",
     )
-    rows = [
-        (f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in record["balls"]
-    ]
+    rows = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in record["balls"]]
     print_table(title, header, rows)
     print(
         "ring: "

@@ -140,9 +140,7 @@ def _single(scene: BallScene, option: str) -> SingleRowScene:
         raise InputError([f"--{option}: is a study of one row of balls; a double-decker has two"]) from None
 
 
-def run(
-    scene: BallScene, asked: Mapping[str, str | None], wanted: float, out: Path | None, as_json: bool
-) -> int:
+def run(scene: BallScene, asked: Mapping[str, str | None], wanted: float, out: Path | None, as_json: bool) -> int:
     """Carry out the one study asked for, print and write it; returns the exit code. Raises InputError."""
     chosen = {name: value for name, value in asked.items() if value is not None}
     if len(chosen) > 1:
@@ -181,9 +179,7 @@ def _print_optimum(record: dict[str, Any]) -> None:
     print_table("", (what, "inner stress [MPa]", "outer stress [MPa]", "L10r [million turns]"), rows)
     for best, title in (("least_stress", "least stress"), ("longest_life", "longest life")):
         at = record[best]
-        print(
-            f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns"
-        )
+        print(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
     for note in record["notes"]:
         print(f"note: {note}")
 

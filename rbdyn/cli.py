@@ -76,9 +76,7 @@ def accuracy(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the study as JSON, CSV and pictures here.")
     ] = None,
-    methods: Annotated[
-        bool, typer.Option("--methods", help="Other integrators beside ours, instead.")
-    ] = False,
+    methods: Annotated[bool, typer.Option("--methods", help="Other integrators beside ours, instead.")] = False,
     slices: Annotated[bool, typer.Option("--slices", help="Slices of a profiled roller, instead.")] = False,
     replicates: Annotated[
         bool, typer.Option("--replicates", help="Statistical error against run time, instead.")
@@ -108,9 +106,7 @@ def accuracy(
     ] = None,
     sought: Annotated[
         float | None,
-        typer.Option(
-            "--sought-percent", min=0.01, max=50.0, help="Bias of an output that counts; by default 1 %."
-        ),
+        typer.Option("--sought-percent", min=0.01, max=50.0, help="Bias of an output that counts; by default 1 %."),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -166,9 +162,7 @@ def slip_map(
     replicates: Replicates = None,
     seed: Seed = None,
     workers: Workers = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write map.json, map.csv and map.png here.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write map.json, map.csv and map.png here.")] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -224,9 +218,7 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     from rbdyn.faults import InputError
 
     if turns is not None or replicates is not None:
-        raise InputError(
-            [f"--target {target}: chooses turns and replicates itself; drop --turns and --replicates"]
-        )
+        raise InputError([f"--target {target}: chooses turns and replicates itself; drop --turns and --replicates"])
     return target_of(target)
 
 
@@ -273,19 +265,13 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
         f"{result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to load or compile"
     )
     for race, at in result.races.items():
-        film = (
-            f", film {at['central_film_um']:.2g} um, lambda {at['lambda_ratio']:.2g}"
-            if "lambda_ratio" in at
-            else ""
-        )
+        film = f", film {at['central_film_um']:.2g} um, lambda {at['lambda_ratio']:.2g}" if "lambda_ratio" in at else ""
         print(
             f"{race} race at its largest load: {at['max_pressure_MPa']:.0f} MPa over {at['half_width_um']:.0f} um each way"
             + film
         )
     if len(result.clearance) > 2:
-        parts = ", ".join(
-            f"{name.replace('_', ' ')} {value:+.1f} um" for name, value in result.clearance.items()
-        )
+        parts = ", ".join(f"{name.replace('_', ' ')} {value:+.1f} um" for name, value in result.clearance.items())
         print(f"clearance: {parts}")
     if verbose:
         if result.transient_turns is not None:
@@ -315,15 +301,11 @@ def _print_target(target: dict[str, Any]) -> None:
 
 @app.command()
 def show(
-    result: Annotated[
-        Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")
-    ],
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write here; by default in 'show' beside the result.")
     ] = None,
-    turns: Annotated[
-        float | None, typer.Option(help="Counted shaft turns to show; at most 20 unless given.")
-    ] = None,
+    turns: Annotated[float | None, typer.Option(help="Counted shaft turns to show; at most 20 unless given.")] = None,
     replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, typer.Option("--animate", help="Also a moving picture and a player.")] = False,
     lyapunov: Annotated[bool, typer.Option("--lyapunov", help="Also the largest Lyapunov exponent.")] = False,

@@ -182,9 +182,7 @@ def _fast_log(x):
         z = s * s
         w = z * z
         # ln((1 + s)/(1 - s)) = 2 s (1 + z/3 + z^2/5 + ...), minimax coefficients of fdlibm.
-        even = w * fma(
-            w, fma(w, 1.531383769920937332e-01, 2.222219843214978396e-01), 3.999999999940941908e-01
-        )
+        even = w * fma(w, fma(w, 1.531383769920937332e-01, 2.222219843214978396e-01), 3.999999999940941908e-01)
         odd = fma(w, fma(w, 1.479819860511658591e-01, 1.818357216161805012e-01), 2.857142874366239149e-01)
         odd = fma(w, odd, 6.666666666666735130e-01)
         half_square = 0.5 * f * f
@@ -230,9 +228,7 @@ def _root_from_body(s, guess, n):
     def body(s, guess, n):
         share = (n - 1) / n
         r = fma(-s, guess, 1.0)
-        inner = fma(
-            (share + 1.0) / 2.0 * r, fma((share + 2.0) / 3.0 * r, fma((share + 3.0) / 4.0, r, 1.0), 1.0), 1.0
-        )
+        inner = fma((share + 1.0) / 2.0 * r, fma((share + 2.0) / 3.0 * r, fma((share + 3.0) / 4.0, r, 1.0), 1.0), 1.0)
         return s * fma(share * r, inner, 1.0)
 
     return body
@@ -289,14 +285,10 @@ def _fast_cos_sin(x):
         r = fma(-whole, PIO2_3, fma(-whole, PIO2_2, fma(-whole, PIO2_1, x)))
         z = r * r
         # Minimax coefficients of fdlibm for |r| < pi/4.
-        high = fma(
-            z, fma(z, 1.58969099521155010221e-10, -2.50507602534068634195e-08), 2.75573137070700676789e-06
-        )
+        high = fma(z, fma(z, 1.58969099521155010221e-10, -2.50507602534068634195e-08), 2.75573137070700676789e-06)
         low = fma(z, fma(z, high, -1.98412698298579493134e-04), 8.33333333332248946124e-03)
         sine = fma(r * z, fma(z, low, -1.66666666666666324348e-01), r)
-        high = fma(
-            z, fma(z, -1.13596475577881948265e-11, 2.08757232129817482790e-09), -2.75573143513906633035e-07
-        )
+        high = fma(z, fma(z, -1.13596475577881948265e-11, 2.08757232129817482790e-09), -2.75573143513906633035e-07)
         low = fma(z, fma(z, high, 2.48015872894767294178e-05), -1.38888888888741095749e-03)
         cosine = fma(z * z, fma(z, low, 4.16666666666666019037e-02), fma(z, -0.5, 1.0))
         quarter = _bits(shifted)

@@ -70,9 +70,7 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
         more = _sentences(model, error, source, only="value_error")
         # What is bad was not left out, even if it is missed now.
         faults += [
-            fault
-            for fault in more
-            if ": missing; " not in fault or not any(_key(place) in fault for place in bad)
+            fault for fault in more if ": missing; " not in fault or not any(_key(place) in fault for place in bad)
         ]
     raise InputError(dict.fromkeys(faults))
 
@@ -105,17 +103,13 @@ def _without(data: Any, locations: list[tuple[int | str, ...]]) -> Any:
     return {key: _without(value, inner[key]) for key, value in data.items() if () not in inner[key]}
 
 
-def _sentences(
-    model: type[BaseModel], error: ValidationError, source: str, only: str | None = None
-) -> list[str]:
+def _sentences(model: type[BaseModel], error: ValidationError, source: str, only: str | None = None) -> list[str]:
     sentences: list[str] = []
     mends: dict[str, list[str]] = {}
     for fault in error.errors():
         kind, value = fault["type"], fault["input"]
         # Where a key may be of several kinds, each kind complains: keep what fits the value given.
-        alien = (
-            "model_type" if isinstance(value, str) else "literal_error" if isinstance(value, Mapping) else ""
-        )
+        alien = "model_type" if isinstance(value, str) else "literal_error" if isinstance(value, Mapping) else ""
         if (kind == alien and _names_a_kind(str(fault["loc"][-1]))) or (only and kind != only):
             continue
         place = _place(fault["loc"])

@@ -45,9 +45,7 @@ def law_types(parameters: Any) -> set[type]:
 def parameter_bytes(parameters: Any) -> int:
     """Size of all numbers and arrays within the parameters of a bearing."""
     return sum(
-        part.nbytes if isinstance(part, np.ndarray) else 8
-        for part in _parts(parameters)
-        if not isinstance(part, tuple)
+        part.nbytes if isinstance(part, np.ndarray) else 8 for part in _parts(parameters) if not isinstance(part, tuple)
     )
 
 

@@ -81,9 +81,7 @@ def mounted_rings(
         shaft=Ring(shaft_bore, bore, material_of(mounting.shaft_material), shaft_rise, inner_speed),
         inner_ring=Ring(bore, inner_race, inner_material, inner_rise, inner_speed),
         outer_ring=Ring(outer_race, outside, outer_material, outer_rise, outer_speed),
-        housing=Ring(
-            outside, housing_outside, material_of(mounting.housing_material), housing_rise, outer_speed
-        ),
+        housing=Ring(outside, housing_outside, material_of(mounting.housing_material), housing_rise, outer_speed),
         inner_interference=mounting.inner_interference_um * 1e-6,
         outer_interference=mounting.outer_interference_um * 1e-6,
         element_temperature_rise=element_rise,

@@ -51,9 +51,7 @@ class Quantity:
         }
 
     def __str__(self) -> str:
-        errors = [
-            f"± {self.statistical_error:.2g} (statistical)" if self.statistical_error is not None else ""
-        ]
+        errors = [f"± {self.statistical_error:.2g} (statistical)" if self.statistical_error is not None else ""]
         errors.append(f"± {self.numerical_error:.2g} (numerical)" if self.numerical_error is not None else "")
         return " ".join((f"{self.value:.5g}", *filter(None, errors)))
 

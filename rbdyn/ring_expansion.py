@@ -96,9 +96,7 @@ def loosening_speed(inner: Ring, outer: Ring, interference: float) -> float:
         return 0.0
     radius = outer.inner_radius
     overlap = 0.5 * interference + inner.thermal_growth(radius) - outer.thermal_growth(radius)
-    opening = replace(outer, speed=1.0).rotation_growth(radius) - replace(inner, speed=1.0).rotation_growth(
-        radius
-    )
+    opening = replace(outer, speed=1.0).rotation_growth(radius) - replace(inner, speed=1.0).rotation_growth(radius)
     return math.sqrt(overlap / opening) if opening > 0.0 else math.inf
 
 

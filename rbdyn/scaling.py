@@ -116,14 +116,10 @@ def with_rollers(scene: Scene, count: int) -> Scene:
     bearing, cage, operation = scene.bearing, scene.cage, scene.operation
     if bearing.roller_diameter_errors_um is not None:
         raise InputError(
-            [
-                "bearing.roller_diameter_errors_um: holds for its own number of rollers only; leave it out to scale"
-            ]
+            ["bearing.roller_diameter_errors_um: holds for its own number of rollers only; leave it out to scale"]
         )
     if operation.schedule is not None:
-        raise InputError(
-            ["operation.schedule: would have to be scaled with the rollers; leave it out to scale"]
-        )
+        raise InputError(["operation.schedule: would have to be scaled with the rollers; leave it out to scale"])
     ratio = count / bearing.rollers
     keys = {
         "bearing.rollers": count,
@@ -190,9 +186,7 @@ def peak_memory(scene: Scene, turns: int) -> float:
 
     Raises RunError where that process fails.
     """
-    chosen = with_options(
-        scene, [f"numerics.turns={turns}", "numerics.replicates=1", "numerics.companion=false"]
-    )
+    chosen = with_options(scene, [f"numerics.turns={turns}", "numerics.replicates=1", "numerics.companion=false"])
     found = subprocess.run(
         [sys.executable, "-c", "from rbdyn.scaling import print_peak_memory; print_peak_memory()"],
         input=json.dumps(chosen.model_dump(mode="json", exclude_none=True)),
@@ -266,9 +260,7 @@ def report(found: Scaling) -> Report:
         tables=tables,
         sentences=sentences,
         sheets={
-            "scaling": [
-                {"of": kind, **point.__dict__} for kind, points in found.points.items() for point in points
-            ]
+            "scaling": [{"of": kind, **point.__dict__} for kind, points in found.points.items() for point in points]
         },
         pictures={"scaling": lambda path: _draw(found, path)},
     )

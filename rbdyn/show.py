@@ -47,9 +47,7 @@ class Asked:
         if not other:
             return []
         change = ", ".join(f"{name} {then.get(name, 'unknown')} then and {now[name]} now" for name in other)
-        return [
-            f"this motion may differ from that of the result, which was computed with other versions: {change}"
-        ]
+        return [f"this motion may differ from that of the result, which was computed with other versions: {change}"]
 
 
 def ask(path: Path, turns: float | None, replicate: int) -> Asked:
@@ -62,9 +60,7 @@ def ask(path: Path, turns: float | None, replicate: int) -> Asked:
     fewest = FEWEST_SAMPLES / numerics.samples_per_turn
     chosen = min(SHOWN_TURNS, numerics.turns) if turns is None else turns
     if turns is not None and not fewest <= turns <= numerics.turns:
-        faults.append(
-            f"--turns {turns:g}: the result counted {numerics.turns:g} turns; choose from {fewest:g} to that"
-        )
+        faults.append(f"--turns {turns:g}: the result counted {numerics.turns:g} turns; choose from {fewest:g} to that")
     if not 1 <= replicate <= numerics.replicates:
         faults.append(f"--replicate {replicate}: the result has {numerics.replicates}; count from 1 to that")
     if faults:
@@ -228,11 +224,7 @@ def print_record(record: dict[str, Any], folder: Path, quiet: bool, verbose: boo
     ]
     for name, hit in record["largest"].items():
         where = "" if hit["roller"] is None else f", roller {hit['roller']}"
-        when = (
-            "never touched"
-            if hit["time_ms"] is None
-            else f"{hit['force_N']:.4g} at {hit['time_ms']:.4g} ms{where}"
-        )
+        when = "never touched" if hit["time_ms"] is None else f"{hit['force_N']:.4g} at {hit['time_ms']:.4g} ms{where}"
         rows.append((f"largest load, {name.replace('_', ' ')} [N]", when))
     for name, race in record["races"].items():
         worst = f"{race['pressure_GPa']:.3g} GPa, {race['slip_m_s']:.3g} m/s, {race['pressure_velocity_MPa_m_s']:.3g} MPa m/s"

@@ -129,10 +129,7 @@ def slip_map(
     )
     stop = Stop()
     tasks = [
-        (place, rtol, replicate)
-        for place in range(len(scenes))
-        for rtol, count in series
-        for replicate in range(count)
+        (place, rtol, replicate) for place in range(len(scenes)) for rtol, count in series for replicate in range(count)
     ]
     runs: dict[tuple[int, float, int], Replicate] = {}
     causes: dict[int, str] = {}
@@ -158,9 +155,7 @@ def slip_map(
     points = []
     for place, point in enumerate(scenes):
         cause = causes.get(place)
-        ours, theirs = (
-            [runs[place, rtol, i] for i in range(count)] if cause is None else [] for rtol, count in series
-        )
+        ours, theirs = ([runs[place, rtol, i] for i in range(count)] if cause is None else [] for rtol, count in series)
         points.append(_point(point, ours, theirs, cause))
     wall_s = time.perf_counter() - started
     return SlipMap(tuple(speeds_rpm), tuple(loads_N), tuple(points), wall_s, scene.numerics.seed)
@@ -189,6 +184,4 @@ def _point(scene: Scene, runs: list[Replicate], companions: list[Replicate], cau
         return Point(speed, load, f"failed: {cause}", {}, None)
     runs, companions, _ = settled(scene, runs, companions)
     found = quantities(scene, runs, companions)
-    return Point(
-        speed, load, "ok", {name: found[name] for name in FIGURES}, max(run.power_gap for run in runs)
-    )
+    return Point(speed, load, "ok", {name: found[name] for name in FIGURES}, max(run.power_gap for run in runs))

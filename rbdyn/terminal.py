@@ -32,9 +32,7 @@ def guarded(as_json: bool) -> Iterator[None]:
         # The reader of a pipe has seen enough; what is left unwritten goes nowhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
-        sentence = (
-            f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
-        )
+        sentence = f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
         _leave(as_json, BAD_INPUT, {"status": "refused", "faults": [sentence]}, [sentence])
 
 
@@ -56,9 +54,7 @@ def output_folder(path: Path) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(
-            [f"--out {path}: cannot be made a folder ({error.strerror}); name another"]
-        ) from None
+        raise InputError([f"--out {path}: cannot be made a folder ({error.strerror}); name another"]) from None
     return path
 
 

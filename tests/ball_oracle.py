@@ -49,9 +49,7 @@ def cramer(*rows):
     def determinant(*columns):
         a, b, c = ([row[i] for i in columns] for row in rows)
         return (
-            a[0] * (b[1] * c[2] - b[2] * c[1])
-            - a[1] * (b[0] * c[2] - b[2] * c[0])
-            + a[2] * (b[0] * c[1] - b[1] * c[0])
+            a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
         )
 
     whole = determinant(0, 1, 2)
@@ -111,14 +109,10 @@ class Bearing:
         else:
             angle = mp.acos(1 - number(drawing["radial_clearance_mm"]) / 1000 / (2 * between))
         gamma = diameter * mp.cos(angle) / pitch
-        modulus = 2 / sum(
-            (1 - number(m.poisson_ratio) ** 2) / number(m.elastic_modulus) for m in (ball, ring)
-        )
+        modulus = 2 / sum((1 - number(m.poisson_ratio) ** 2) / number(m.elastic_modulus) for m in (ball, ring))
         inner, outer = Hertz(diameter, fi, gamma, modulus), Hertz(diameter, fo, -gamma, modulus)
         mass = number(ball.density) * mp.pi * diameter**3 / 6
-        w_in, w_out = (
-            number(operation.get(key, 0)) * mp.pi / 30 for key in ("inner_speed_rpm", "outer_speed_rpm")
-        )
+        w_in, w_out = (number(operation.get(key, 0)) * mp.pi / 30 for key in ("inner_speed_rpm", "outer_speed_rpm"))
         cage = (w_in * (1 - gamma) + w_out * (1 + gamma)) / 2
         values = {
             "diameter": diameter,
@@ -241,9 +235,7 @@ def derivatives(function, *arguments):
         step = h * max(abs(arguments[i]), mp.mpf(10) ** -4)
         ahead[i] += step
         behind[i] -= step
-        columns.append(
-            [float((a - b) / (2 * step)) for a, b in zip(function(*ahead), function(*behind), strict=True)]
-        )
+        columns.append([float((a - b) / (2 * step)) for a, b in zip(function(*ahead), function(*behind), strict=True)])
     return np.array(columns).T
 
 

@@ -223,9 +223,7 @@ REWRITTEN = {
     "rollers of equal radii": lambda b: b._replace(sizes=unequal_rollers(np.full(b.rollers, b.sizes.radius))),
     "no imbalance": lambda b: b._replace(cage=UnbalancedCage(*b.cage, 0.0)),
     "no weight": lambda b: b._replace(gravity=Gravity(0.0, 0.0)),
-    "outer ring at no speed": lambda b: b._replace(
-        drive=TwoSpeedDrive(b.drive.inner_speed, 0.0, b.drive.load_x)
-    ),
+    "outer ring at no speed": lambda b: b._replace(drive=TwoSpeedDrive(b.drive.inner_speed, 0.0, b.drive.load_x)),
     "asperities that carry nothing": lambda b: on_both(
         b, traction=lambda race: MixedTraction(race.traction, 0.1, 0.02, 1e6, 0.1)
     ),

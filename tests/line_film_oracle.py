@@ -24,13 +24,9 @@ def rigid(meniscus):
     def over(function, end):
         # In s = arsinh(xi) a far meniscus is near.
         ends = math.asinh(-meniscus), math.asinh(end)
-        return quad(
-            lambda s: function(math.sinh(s)) * math.cosh(s), *ends, epsabs=1e-13, epsrel=1e-9, limit=400
-        )[0]
+        return quad(lambda s: function(math.sinh(s)) * math.cosh(s), *ends, epsabs=1e-13, epsrel=1e-9, limit=400)[0]
 
-    end = brentq(
-        lambda e: over(lambda x: (x * x - e * e) / (1.0 + x * x) ** 3, e), 1e-6 * meniscus, min(meniscus, 0.6)
-    )
+    end = brentq(lambda e: over(lambda x: (x * x - e * e) / (1.0 + x * x) ** 3, e), 1e-6 * meniscus, min(meniscus, 0.6))
     load = -over(lambda x: x * (x * x - end * end) / (1.0 + x * x) ** 3, end)
     return load, over(lambda x: 0.5 * (x * x - end * end) ** 2 / (1.0 + x * x) ** 3, end)
 
@@ -138,9 +134,7 @@ def newton(contact, p, h0, alpha):
         h, density, change, mobility, wet = contact.terms(p, h0, alpha)
         steep = np.diff(p) / dx
         residual = np.zeros(n + 1)
-        residual[1:-2] = (
-            np.diff(mobility * steep - (density * h)[:-1]) - penalty * (weight * np.minimum(p, 0.0))[1:-1]
-        )
+        residual[1:-2] = np.diff(mobility * steep - (density * h)[:-1]) - penalty * (weight * np.minimum(p, 0.0))[1:-1]
         residual[[0, n - 1, n]] = p[0], p[-1], weight @ p - 0.5 * math.pi
         flow = (3.0 * mobility * steep / (h[1:] + h[:-1]))[:, None] * (slope[1:] + slope[:-1])
         flow -= density[:-1, None] * slope[:-1]

@@ -94,9 +94,7 @@ def race(scene, mass, ring, roller, radius, encloses):
         return race_overlap(scene, encloses, radius, between + shift, ring.angle + turn)
 
     middle = float(overlap(np.zeros(2), 0.0))
-    elastic, stiffness, approach, lean = race_load(
-        scene, encloses, middle, math.atan2(between[1], between[0])
-    )
+    elastic, stiffness, approach, lean = race_load(scene, encloses, middle, math.atan2(between[1], between[0]))
     if elastic == 0.0:
         return 0.0, 0.0, 0.0, 0.0
     if scene.bearing.outer_waviness if encloses else scene.bearing.inner_waviness:
@@ -162,9 +160,7 @@ def film_on_wall(scene, roller, cage, point, to_wall, along, gap):
 
     def seen(body, place):
         """Velocity of a body at a place, less that of the roller's centre, in axes that turn with the cage."""
-        return float(
-            (body.velocity_at(place) - roller.velocity - cage.spin * turned(place - roller.centre)) @ along
-        )
+        return float((body.velocity_at(place) - roller.velocity - cage.spin * turned(place - roller.centre)) @ along)
 
     round_speed, plane_speed = seen(roller, point), seen(cage, point)
     entrainment = 0.5 * (round_speed + plane_speed)

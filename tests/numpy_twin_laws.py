@@ -203,9 +203,7 @@ def rheology_of(scene, oil):
     if table.model == "limiting_shear":
         return rheology.LimitingShear(oil.viscosity, oil.pressure_coefficient, table.limiting_shear_ratio)
     name = table.rheology_oil or scene.lubricant.oil
-    return rheology.thermal_newtonian(
-        name, scene.lubricant.temperature_C, oil.conductivity, table.largest_shear_ratio
-    )
+    return rheology.thermal_newtonian(name, scene.lubricant.temperature_C, oil.conductivity, table.largest_shear_ratio)
 
 
 def fluid_traction(scene, encloses, slip, load):
@@ -219,9 +217,7 @@ def fluid_traction(scene, encloses, slip, load):
         film = film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
         mu = float(rheology.traction_coefficient(rheology_of(scene, oil), contact, abs(slip), load, film))
         # Carter's creep of the rolling bodies, mu = 2 R u/(b u_e), in series with the film.
-        width = math.sqrt(
-            8.0 * load * contact.radius / (math.pi * contact.length * modulus(scene, "roller", "rings"))
-        )
+        width = math.sqrt(8.0 * load * contact.radius / (math.pi * contact.length * modulus(scene, "roller", "rings")))
         creep = 2.0 * contact.radius * abs(slip) / (width * contact.entrainment_speed)
         return math.copysign(1.0 / math.hypot(1.0 / mu, 1.0 / creep), slip)
     a, b, c, d = gupta_constants(table)

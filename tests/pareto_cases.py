@@ -39,9 +39,7 @@ def noisy_bowls(seed, noise, failing=False):
 def edited_study(folder, *replacements):
     """The example study with a small search, without tolerances but of the pocket, and replaced text; in ``folder``."""
     text = (EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8")
-    text = text.replace("population = 100", "population = 40").replace(
-        "generations = 200", "generations = 30"
-    )
+    text = text.replace("population = 100", "population = 40").replace("generations = 200", "generations = 30")
     text = re.sub(r"^tolerance(_aware)? = .*\n", "", text, flags=re.MULTILINE)
     pocket = 'factor = "pocket_clearance_mm"\n'
     text = text.replace(pocket, pocket + "half_width_mm = 0.005\n")

@@ -46,9 +46,7 @@ def fitted(name: str, runs: list[list[float]]) -> dict[str, Any]:
         "terms": terms,
         "covariance": (0.01 * np.eye(len(terms))).tolist(),
         "standard_errors": dict.fromkeys(terms, 0.1),
-        "anova": [
-            {"source": source, "ss": 1.5, "df": df, "ms": 1.5, "f": 4.0, "p": 0.01} for source, df in rows
-        ],
+        "anova": [{"source": source, "ss": 1.5, "df": df, "ms": 1.5, "f": 4.0, "p": 0.01} for source, df in rows],
         "lack_of_fit": {"ss": 1.0, "df": 5, "f": 2.0, "p": 0.2},
         "pure_error": {"ss": 1.0, "df": 5, "ms": 0.2},
         **{"r2": 0.98, "adjusted_r2": 0.97, "predicted_r2": 0.9, "press": 3.0},
@@ -191,9 +189,7 @@ def motion(rollers: int = 6, frames: int = 40) -> dict[str, Any]:
         "ahead_um": each, "out_um": each, "spin": each, "outer_load_N": [500.0] * len(each), "inner_load_N": each,
         "pocket_load_N": [20.0] * len(each), "land_load_N": still,
     }  # fmt: skip
-    orbit = {
-        axis: [20.0 * trig(0.1 * k) for k in range(60)] for axis, trig in (("x", math.cos), ("y", math.sin))
-    }
+    orbit = {axis: [20.0 * trig(0.1 * k) for k in range(60)] for axis, trig in (("x", math.cos), ("y", math.sin))}
     one = {
         "t_s": [1e-5 * k for k in range(60)],
         "cage_orbit_um": orbit,

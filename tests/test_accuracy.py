@@ -57,9 +57,7 @@ def test_unit_default_study_has_statistics_and_trajectories(outer, tmp_path):
     assert files == ["accuracy.json", "accuracy.csv", "trajectory.csv", "accuracy.png", "trajectory.png"]
     assert all((tmp_path / name).stat().st_size > 100 for name in files)
     saved = json.loads((tmp_path / "accuracy.json").read_text())
-    assert {"format", "status", "rows", "conclusion", "turns", "replicates", "machine", "versions"} <= set(
-        saved
-    )
+    assert {"format", "status", "rows", "conclusion", "turns", "replicates", "machine", "versions"} <= set(saved)
     assert saved["format"] == "rbdyn.accuracy/1" and len(saved["rows"]) == 2
     methods = {row["method"] for row in saved["trajectory"]["rows"]}
     assert methods == {"rbdyn RK45", "RK4, fixed step", "velocity Verlet"}
@@ -92,9 +90,7 @@ def test_unit_slices_of_a_cylinder_are_refused(outer):
 def test_unit_expected_half_width_is_that_of_student():
     """Unit: for the whole sample it is Student's interval; a quarter of a large one is twice as wide."""
     sample = np.random.default_rng(1).normal(5.0, 1.0, 400)
-    assert replication.expected_half_width(sample, 400) == pytest.approx(
-        student_half_width(sample) / sample.mean()
-    )
+    assert replication.expected_half_width(sample, 400) == pytest.approx(student_half_width(sample) / sample.mean())
     ratio = replication.expected_half_width(sample, 100) / replication.expected_half_width(sample, 400)
     assert ratio == pytest.approx(2.0, rel=0.02)
 
@@ -103,10 +99,7 @@ def test_rate_scatter_of_independent_turns():
     """Rate: means of independent turns scatter by one over root of turns; copies of one turn do not."""
     turns = (10, 20, 40, 80)
     draws = [np.random.default_rng(seed) for seed in range(40)]
-    free = [
-        replication.slope(turns, [10.0 + draw.normal(size=(200, n)).mean(axis=1) for n in turns])
-        for draw in draws
-    ]
+    free = [replication.slope(turns, [10.0 + draw.normal(size=(200, n)).mean(axis=1) for n in turns]) for draw in draws]
     assert np.mean([found.power for found in free]) == pytest.approx(-0.5, abs=0.02)
     assert np.mean([found.as_expected for found in free]) > 0.8
     stuck = replication.slope(turns, [10.0 + draws[0].normal(size=200) for _ in turns])

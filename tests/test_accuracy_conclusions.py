@@ -94,13 +94,9 @@ def test_unit_noisy_tolerances_conclude_nothing(outer):
 def test_unit_sharp_tolerances_conclude(outer):
     """Unit: errors of 0.2 % name the loosest tolerance within 1 %, tighter where that is sought."""
     rows = tolerance_rows((0.03, 0.004, 0.001), 0.002, gaps=(1e-4, 1e-4, 1e-5, 1e-7))
-    assert tolerances.conclusion(rows, outer).startswith(
-        "rtol 0.02 is the loosest whose biases measure at most 1 %"
-    )
+    assert tolerances.conclusion(rows, outer).startswith("rtol 0.02 is the loosest whose biases measure at most 1 %")
     told = tolerances.conclusion(rows, outer, 0.003)
-    assert told.startswith(
-        "rtol 0.01 is the loosest whose biases measure at most 0.3 % (their errors at most 0.2 %)"
-    )
+    assert told.startswith("rtol 0.01 is the loosest whose biases measure at most 0.3 % (their errors at most 0.2 %)")
     biased = tolerance_rows((0.03, 0.02, 0.02), 0.002)
     assert "no tolerance looser than the reference, rtol 0.0001," in tolerances.conclusion(biased, outer)
     assert tolerances.conclusion(rows[-1:], outer).startswith("no tolerance looser than the reference")
@@ -165,9 +161,7 @@ def test_unit_replicates_conclude_only_what_the_pool_allows(outer):
     turns = (10.0, 20.0, 40.0, 80.0)
 
     def study(pool, size):
-        samples = {
-            n: {name: 1.0 + size * draw.normal(size=pool) / math.sqrt(n) for name in OUTPUTS} for n in turns
-        }
+        samples = {n: {name: 1.0 + size * draw.normal(size=pool) / math.sqrt(n) for name in OUTPUTS} for n in turns}
         rows = replication.replication_rows(samples, dict.fromkeys(turns, 1.0), (2, 4, 8, 16, 32))
         slopes = {name: replication.slope(turns, [samples[n][name] for n in turns]) for name in OUTPUTS}
         return " ".join(replication.conclusion(rows, slopes, outer, pool))

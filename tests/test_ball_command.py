@@ -56,9 +56,7 @@ def test_unit_studies_refuse_what_they_cannot_do(study, assignments, words):
 
 def test_command_line_writes_results_and_pictures(command, tmp_path):
     """Command line: --out writes the record, the balls, three pictures and the path of a wavy ring."""
-    done = command(
-        "ball", QUIET, "--set", "errors.inner_roundness=[{order=2, amplitude_um=0.5}]", "--out", tmp_path
-    )
+    done = command("ball", QUIET, "--set", "errors.inner_roundness=[{order=2, amplitude_um=0.5}]", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     written = {path.name for path in tmp_path.iterdir()}
     assert written == {"result.json", "balls.csv", "loads.png", "angles.png", "section.png", "runout.csv"}

@@ -31,9 +31,7 @@ def turned(load, angle):
     return np.array([c * x - s * y, s * x + c * y, z, c * u - s * v, s * u + c * v])
 
 
-@pytest.mark.parametrize(
-    "table", [SMALL, LARGE, DEEP], ids=["71808 outer", "218 hybrid", "209 with clearance"]
-)
+@pytest.mark.parametrize("table", [SMALL, LARGE, DEEP], ids=["71808 outer", "218 hybrid", "209 with clearance"])
 def test_oracle_equilibrium_to_30_digits(table):
     """Oracle: the root of all equations written once more, found to 30 digits, is this solution to 1e-10 and better."""
     case = scene(table)
@@ -126,9 +124,7 @@ def test_invariant_load_turned_by_a_pitch_permutes_the_balls(pitches, x, y, z, u
     assert other.displacement == pytest.approx(turned(one.displacement, angle), rel=0.0, abs=1e-13)
     assert other.inner_load == pytest.approx(np.roll(one.inner_load, pitches), rel=1e-8, abs=1e-8)
     assert other.outer_angle == pytest.approx(np.roll(one.outer_angle, pitches), rel=0.0, abs=1e-9)
-    assert other.gyroscopic_moment == pytest.approx(
-        np.roll(one.gyroscopic_moment, pitches), rel=1e-8, abs=1e-12
-    )
+    assert other.gyroscopic_moment == pytest.approx(np.roll(one.gyroscopic_moment, pitches), rel=1e-8, abs=1e-12)
 
 
 @given(x=FORCE, y=FORCE, z=FORCE, u=FORCE, v=FORCE)
@@ -180,8 +176,7 @@ def test_invariant_stiffness_is_the_slope_of_the_reaction(name):
         step = np.zeros(5)
         step[i] = 2e-9 / unit[i]
         ahead, behind = (
-            solve(row, control, load, found.displacement + side * step, found).reaction
-            for side in (1.0, -1.0)
+            solve(row, control, load, found.displacement + side * step, found).reaction for side in (1.0, -1.0)
         )
         slope = (ahead - behind) / 4e-9 / unit
         assert scaled[:, i] == pytest.approx(slope, rel=0.0, abs=1e-6 * largest)

@@ -66,6 +66,4 @@ def test_stiff_where_there_is_no_equilibrium_a_sentence_tells():
     assert not lost.found
     assert "no equilibrium was found" in lost.status and "raise model.light_load_share" in lost.status
     assert not any(np.isnan(part).any() for part in lost if isinstance(part, np.ndarray))
-    balanced(
-        *model_of(LARGE, operation={"inner_speed_rpm": 30_000.0}, model={"raceway_control": "inner"}), load
-    )
+    balanced(*model_of(LARGE, operation={"inner_speed_rpm": 30_000.0}, model={"raceway_control": "inner"}), load)

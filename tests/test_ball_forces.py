@@ -107,8 +107,7 @@ def test_unit_strength_leads_from_the_cage_to_the_race_control(name):
     model = MODELS[name]
     place = places(model, 0.6, 0.4, 12e-6, 11e-6)
     none, half, full = (
-        compiled_forces(model.control, strength, model.row, *place, 12e-6, 11e-6)
-        for strength in (0.0, 0.5, 1.0)
+        compiled_forces(model.control, strength, model.row, *place, 12e-6, 11e-6) for strength in (0.0, 0.5, 1.0)
     )
     cage = MODELS["common_cage"]
     expected = compiled_forces(cage.control, 0.0, cage.row, *place, 12e-6, 11e-6)
@@ -123,9 +122,7 @@ def test_unit_textbook_law_where_nothing_is_blended(name):
     """Unit: a loaded ball at a usual angle, its friction within 0.8 of the limit, meets the textbook equations to 1e-14."""
     model, row = MODELS[name], MODELS[name].row
     ai, ao, di, do = 0.62, 0.41, 14e-6, 13e-6
-    residual, ring, *_, pull, moment = compiled_forces(
-        model.control, 1.0, row, *places(model, ai, ao, di, do), di, do
-    )
+    residual, ring, *_, pull, moment = compiled_forces(model.control, 1.0, row, *places(model, ai, ao, di, do), di, do)
     qi, qo = row.inner_stiffness * di**1.5, row.outer_stiffness * do**1.5
     spinning = model.control.spinning
     if name == "hybrid":
@@ -161,17 +158,14 @@ def test_unit_blends_have_no_kink(name, what):
     else:
         told = compiled_forces(model.control, 1.0, row, *places(model, ai, ao, di, do), di, do)
         inner, outer = (
-            stiffness * depth**1.5
-            for stiffness, depth in ((row.inner_stiffness, di), (row.outer_stiffness, do))
+            stiffness * depth**1.5 for stiffness, depth in ((row.inner_stiffness, di), (row.outer_stiffness, do))
         )
         share = 0.0
         if name == "hybrid":
             weight = model.control.inner_weight
             share = weight / (1.0 + weight)
         used = max(share / inner, (1.0 - share) / outer) * 2.0 * abs(told[7]) / spinning.ball_diameter
-        model = model._replace(
-            control=model.control._replace(spinning=spinning._replace(friction=used / 0.8))
-        )
+        model = model._replace(control=model.control._replace(spinning=spinning._replace(friction=used / 0.8)))
     sides = []
     for off in (1.0 - 1e-9, 1.0 + 1e-9):
         place = places(model, ai * (off if what == "across the groove" else 1.0), ao, di * off, do)
@@ -214,13 +208,7 @@ def test_unit_held_is_smooth_and_bounded(function):
             assert 0.8 * limit < value < limit
             assert function(-part * limit, limit) == (-value, by_force, -by_limit)
             step = 1e-6
-            forward = (
-                function(part * limit * (1.0 + step), limit)[0]
-                - function(part * limit * (1.0 - step), limit)[0]
-            )
+            forward = function(part * limit * (1.0 + step), limit)[0] - function(part * limit * (1.0 - step), limit)[0]
             assert by_force == pytest.approx(forward / (2.0 * step * part * limit), rel=1e-4)
-            wider = (
-                function(part * limit, limit * (1.0 + step))[0]
-                - function(part * limit, limit * (1.0 - step))[0]
-            )
+            wider = function(part * limit, limit * (1.0 + step))[0] - function(part * limit, limit * (1.0 - step))[0]
             assert by_limit == pytest.approx(wider / (2.0 * step * limit), rel=1e-4)

@@ -51,9 +51,7 @@ def motion_of(spinning, share, inner, outer, motion=compiled_motion):
     return motion(spinning, share, math.cos(inner), math.sin(inner), math.cos(outer), math.sin(outer))
 
 
-@given(
-    share=st.floats(0.0, 1.0), inner=ANGLE, spread=st.floats(-0.8, 0.8), inner_speed=SPEED, outer_speed=SPEED
-)
+@given(share=st.floats(0.0, 1.0), inner=ANGLE, spread=st.floats(-0.8, 0.8), inner_speed=SPEED, outer_speed=SPEED)
 @settings(max_examples=60, deadline=None)
 def test_oracle_rolling_by_vectors(share, inner, spread, inner_speed, outer_speed):
     """Oracle: orbit and spin for which both contacts roll without slip and the spin moments balance, by vectors to 40 digits.
@@ -100,9 +98,7 @@ def test_literature_outer_and_inner_raceway_control(inner, outer):
         assert moment == pytest.approx(INERTIA * spin * orbit * sb, rel=1e-12)
         rolling = Rolling(fp, g, share, (si, ci), (so, co), w, 0.0)
         free, ruled = (
-            (rolling.inner_spin, rolling.outer_spin)
-            if share == 0.0
-            else (rolling.outer_spin, rolling.inner_spin)
+            (rolling.inner_spin, rolling.outer_spin) if share == 0.0 else (rolling.outer_spin, rolling.inner_spin)
         )
         assert abs(ruled) < 1e-11 * w and abs(free) > 1e-3 * w
 

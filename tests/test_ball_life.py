@@ -19,9 +19,7 @@ MODULUS = 210e9 / (1.0 - 0.3**2)
 
 def reported_row(clearance, lever=None):
     """Deep groove row of the commercial report: Z 7, D 11.5, d_m 43.5 mm, f 0.52 and 0.53, 210 GPa."""
-    return rigid_rings.rigid_row(
-        7, 11.5e-3, 43.5e-3, 0.52, 0.53, MODULUS, radial_clearance=clearance, lever=lever
-    )
+    return rigid_rings.rigid_row(7, 11.5e-3, 43.5e-3, 0.52, 0.53, MODULUS, radial_clearance=clearance, lever=lever)
 
 
 def reported_life(loads):
@@ -67,9 +65,7 @@ def test_closed_form_axial_load_and_clearance():
     angle, approach = rest.angle[0], rest.approach[0]
     assert rest.load == pytest.approx(np.full(7, 1000.0 / (7.0 * math.sin(angle))), rel=1e-11)
     stretched = row.groove_distance + approach
-    assert math.cos(angle) == pytest.approx(
-        row.groove_distance * math.cos(row.free_angle) / stretched, rel=1e-12
-    )
+    assert math.cos(angle) == pytest.approx(row.groove_distance * math.cos(row.free_angle) / stretched, rel=1e-12)
 
 
 def test_closed_form_radial_load_of_many_balls():
@@ -184,9 +180,7 @@ def test_both_roads_to_the_race_capacities_meet(angle, gamma):
     radians = math.radians(angle)
     pitch = 10e-3 * math.cos(radians) / gamma
     direct = life.lundberg_palmgren_capacities(12, 10e-3, pitch, radians, 0.52, 0.53)
-    capacity = rating.dynamic_capacity(
-        12, 10e-3, pitch, radians, 0.52, 0.53, rating_factor=1.0 / rating.REDUCTION
-    )
+    capacity = rating.dynamic_capacity(12, 10e-3, pitch, radians, 0.52, 0.53, rating_factor=1.0 / rating.REDUCTION)
     rated = life.rated_capacities(capacity, 12, gamma, radians, 0.52, 0.53)
     scaled = np.array(rated) * math.cos(radians) ** -0.3
     assert scaled == pytest.approx(direct, rel=0.012)

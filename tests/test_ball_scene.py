@@ -205,9 +205,7 @@ def test_unit_contact_angle_and_clearance_follow_from_each_other():
     # Drawn by its angle or by its clearance, a bearing is the same row.
     one = row_of(scene(DEEP)).row
     other = row_of(
-        scene(
-            DEEP, bearing={"radial_clearance_mm": None, "contact_angle_deg": math.degrees(row.contact_angle)}
-        )
+        scene(DEEP, bearing={"radial_clearance_mm": None, "contact_angle_deg": math.degrees(row.contact_angle)})
     ).row
     for a, b in zip(one, other, strict=True):
         assert a == pytest.approx(b, rel=1e-12)
@@ -217,8 +215,7 @@ def test_unit_raceway_control_of_a_scene():
     """Unit: each name gives its law, without gyroscopic moment no inertia, and 'unsigned' turns the sign."""
     assert isinstance(row_of(scene(SMALL, model={"raceway_control": "common_cage"})).control, CommonCage)
     shares = {
-        name: row_of(scene(SMALL, model={"raceway_control": name})).control
-        for name in ("outer", "inner", "half")
+        name: row_of(scene(SMALL, model={"raceway_control": name})).control for name in ("outer", "inner", "half")
     }
     assert {name: law.inner for name, law in shares.items()} == {"outer": 0.0, "inner": 1.0, "half": 0.5}
     assert all(isinstance(law, FixedShare) for law in shares.values())
@@ -251,9 +248,7 @@ def test_command_line_the_wrong_kind_of_bearing():
     ):
         told = CliRunner().invoke(app, [command, str(file)])
         assert told.exit_code == 2 and word in told.output and "Traceback" not in told.output
-    told = CliRunner().invoke(
-        app, ["ball", str(BALLS), "--set", "bearing.balls=60", "--set", "model.solver=guess"]
-    )
+    told = CliRunner().invoke(app, ["ball", str(BALLS), "--set", "bearing.balls=60", "--set", "model.solver=guess"])
     assert told.exit_code == 2 and "balls = 60" in told.output and "model.solver" in told.output
 
 

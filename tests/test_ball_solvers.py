@@ -84,9 +84,7 @@ def test_unit_jacobian_by_differences(problem, ours):
         ahead, behind = u.copy(), u.copy()
         ahead[i] += step
         behind[i] -= step
-        slope = (filled(free.control, system, ahead)[0] - filled(free.control, system, behind)[0]) / (
-            2.0 * step
-        )
+        slope = (filled(free.control, system, ahead)[0] - filled(free.control, system, behind)[0]) / (2.0 * step)
         assert slope == pytest.approx(jacobian[:, i], abs=1e-6 * np.abs(jacobian).max())
 
 
@@ -122,9 +120,7 @@ def test_oracle_all_solvers_find_the_same_equilibrium(solver):
     assert ours.status == theirs.status == "ok"
     assert theirs.displacement == pytest.approx(ours.displacement, rel=1e-6, abs=1e-13)
     assert theirs.inner_load == pytest.approx(ours.inner_load, rel=1e-6)
-    assert theirs.stiffness == pytest.approx(
-        ours.stiffness, rel=1e-4, abs=1e-4 * np.abs(ours.stiffness).max()
-    )
+    assert theirs.stiffness == pytest.approx(ours.stiffness, rel=1e-4, abs=1e-4 * np.abs(ours.stiffness).max())
 
 
 @given(balls=st.integers(3, 12), angle=st.floats(1.0, 44.0), step=st.floats(0.01, 0.5))
@@ -158,9 +154,7 @@ def test_invariant_search_points_lie_outside_both_circles_and_turn_inward(balls,
 
 def test_unit_offset_distance_is_that_of_the_means():
     points = np.array([[[0.0, 0.0], [2.0, 0.0]], [[1.0, 3.0], [1.0, 5.0]]])
-    assert offset_distances(points, np.array([[1.0, 0.0, 9.0, 9.0], [1.0, 0.0, 9.0, 9.0]])) == pytest.approx(
-        [0.0, 4.0]
-    )
+    assert offset_distances(points, np.array([[1.0, 0.0, 9.0, 9.0], [1.0, 0.0, 9.0, 9.0]])) == pytest.approx([0.0, 4.0])
 
 
 def test_limit_rule_a_refuses_unloaded_balls_only_as_printed():

@@ -62,9 +62,7 @@ def assert_as_alone(found, place, scene):
         assert shown[f"{race}_angle_max_deg"] == pytest.approx(angles.max(), **near)
         assert shown[f"{race}_pressure_MPa"] == pytest.approx(record["max_stress_MPa"][race], rel=1e-10)
     for axis in "xyz":
-        assert shown[f"stiffness_{axis}_N_per_um"] == pytest.approx(
-            record["stiffness"][f"{axis}_N_per_um"], rel=1e-8
-        )
+        assert shown[f"stiffness_{axis}_N_per_um"] == pytest.approx(record["stiffness"][f"{axis}_N_per_um"], rel=1e-8)
     forces = [shown[f"force_{axis}_N"] for axis in "xyz"]
     assert forces == pytest.approx(row.reaction[:3], rel=1e-9, abs=1e-9 * np.abs(row.reaction).max())
     speeds = scene.operation.inner_speed_rpm, scene.operation.outer_speed_rpm
@@ -131,15 +129,11 @@ def test_invariant_the_order_of_points_does_not_matter(grid):
 def test_unit_three_keys_stand_in_the_order_of_the_table():
     """Unit: whatever way the snake went, a row of the table has the figures of its own keys."""
     radial = "operation.radial_load_N"
-    table = sweep(
-        scene_with(), {LOAD: [150.0, 250.0], radial: [100.0, 200.0], SPEED: [5e3, 1e4, 2e4]}
-    ).table()
+    table = sweep(scene_with(), {LOAD: [150.0, 250.0], radial: [100.0, 200.0], SPEED: [5e3, 1e4, 2e4]}).table()
     assert table[SPEED].tolist() == [5e3, 1e4, 2e4] * 4 and table[LOAD].tolist() == [150.0] * 6 + [250.0] * 6
     assert table["force_z_N"].to_numpy() == pytest.approx(table[LOAD].to_numpy(), rel=1e-8)
     assert table["force_x_N"].to_numpy() == pytest.approx(table[radial].to_numpy(), rel=1e-8)
-    assert (table["L10_h"] * table[SPEED] * 60.0 / 1e6).to_numpy() == pytest.approx(
-        table["L10_Mrev"].to_numpy()
-    )
+    assert (table["L10_h"] * table[SPEED] * 60.0 / 1e6).to_numpy() == pytest.approx(table["L10_Mrev"].to_numpy())
 
 
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=4))
@@ -224,9 +218,7 @@ def test_unit_a_double_decker_goes_point_by_point(tmp_path):
     assert shown["x_mm"] == pytest.approx(alone["displacement_mm"]["x"], rel=1e-9)
     assert shown["middle_ring_speed_rpm"] == pytest.approx(alone["middle_ring"]["speed_rpm"])
     for row in ("inner", "outer"):
-        assert shown[f"{row}_row_outer_pressure_MPa"] == pytest.approx(
-            alone[row]["max_stress_MPa"]["outer"], rel=1e-9
-        )
+        assert shown[f"{row}_row_outer_pressure_MPa"] == pytest.approx(alone[row]["max_stress_MPa"]["outer"], rel=1e-9)
         most = max(ball["inner_angle_deg"] for ball in alone[row]["balls"])
         assert shown[f"{row}_row_inner_angle_max_deg"] == pytest.approx(most, rel=1e-8)
     assert set(found.balls()["row"]) == {"inner", "outer"}
@@ -304,9 +296,7 @@ def test_trend_speed_drives_the_contact_angles_apart(grid):
 def test_unit_pictures(grid, tmp_path):
     """Unit: few lines are lines, many a map; an equilibrium gives three pictures; none is empty."""
     names = pictures.pictures(grid, tmp_path)
-    names += pictures.pictures(
-        sweep(scene_with(), {LOAD: np.linspace(100.0, 400.0, 8), SPEED: [1e4, 2e4]}), tmp_path
-    )
+    names += pictures.pictures(sweep(scene_with(), {LOAD: np.linspace(100.0, 400.0, 8), SPEED: [1e4, 2e4]}), tmp_path)
     assert names == ["angles.png", "pressure_and_life.png", "stiffness.png", "map.png"]
     names += ball_pictures.pictures(equilibrium(scene_with()), tmp_path)
     assert names[4:] == ["loads.png", "angles.png", "section.png"]
@@ -337,9 +327,7 @@ def test_command_line_table_and_exit_codes(broken, grid, monkeypatch, capsys):
     monkeypatch.setattr(sweeps, "sweep", lambda *rest: broken)
     assert sweep_command.run(scene_with(), [f"{SPEED}=1,2"], None, False, True) == 1
     shown = capsys.readouterr()
-    assert "failed" in shown.out and shown.err.startswith(
-        f"2 points, the first at {SPEED} = 10000: no equilibrium"
-    )
+    assert "failed" in shown.out and shown.err.startswith(f"2 points, the first at {SPEED} = 10000: no equilibrium")
     monkeypatch.setattr(sweeps, "sweep", lambda *rest: grid)
     assert sweep_command.run(scene_with(), [f"{SPEED}=1,2"], None, False, True) == 0
     assert "12 points" in capsys.readouterr().out

@@ -71,9 +71,7 @@ def test_widest_processes_leave_the_rest_unspent_and_narrowest_are_refused():
     wide = [Cost(b=1.0, widest_mm=0.01), Cost(b=1.0, widest_mm=0.01)]
     assert cheapest(wide, [1.0, 1.0], 0.1, "worst_case") == [0.01, 0.01]
     links = [costly(1, 9.0, 1.0, narrowest_mm=0.03), costly(-1, 8.0, 1.0, narrowest_mm=0.03)]
-    with pytest.raises(
-        InputError, match=r"narrowest tolerances of the cost curves fill 0\.0600 mm of 0\.0500 mm"
-    ):
+    with pytest.raises(InputError, match=r"narrowest tolerances of the cost curves fill 0\.0600 mm of 0\.0500 mm"):
         solve(chain(links, (0.9, 0.95), method="cost"), samples=10)
 
 
@@ -102,9 +100,7 @@ def test_a_yield_of_equal_normal_parts_follows_the_normal_law():
 def test_tolerances_for_a_yield_lie_between_those_of_no_and_of_all_failures():
     links = [(1, 9.0, {"distribution": "uniform"}), (-1, 8.0, {"distribution": "triangular"})]
     widths = [
-        solve(chain(links, (0.9, 1.1), mode="yield", target_yield=target), samples=10)
-        .allocation[0]
-        .tolerance_mm
+        solve(chain(links, (0.9, 1.1), mode="yield", target_yield=target), samples=10).allocation[0].tolerance_mm
         for target in (0.999999, 0.99, 0.9)
     ]
     assert 0.1 < widths[0] < widths[1] < widths[2]

@@ -83,9 +83,7 @@ def test_several_chains_print_one_json_object():
     record = json.loads(shown.stdout)
     assert list(record) == ["chains", "status"] and record["status"] == "ok"
     assert list(record["chains"]) == ["radial", "guide", "pocket"]
-    assert {"closing_link", "yield", "contributions", "allocation", "status"} <= set(
-        record["chains"]["guide"]
-    )
+    assert {"closing_link", "yield", "contributions", "allocation", "status"} <= set(record["chains"]["guide"])
 
 
 def test_text_shows_parts_limits_yield_ppm_contributions_and_classes(solved, capsys):

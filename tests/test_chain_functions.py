@@ -81,10 +81,7 @@ def test_worst_case_between_the_corners_is_found():
 def test_no_assembly_leaves_the_worst_case(places):
     plain = fitted()
     function, parts = closing_function(plain.link), given_parts(plain.link)
-    sizes = {
-        p.name: p.nominal_mm + p.middle_mm + x * p.tolerance_mm / 2
-        for p, x in zip(parts, places, strict=True)
-    }
+    sizes = {p.name: p.nominal_mm + p.middle_mm + x * p.tolerance_mm / 2 for p, x in zip(parts, places, strict=True)}
     low, high = interval(function, parts, "worst_case")
     assert low - 1e-12 <= function.value(sizes) <= high + 1e-12
 
@@ -93,9 +90,7 @@ def test_root_sum_square_takes_the_slopes_at_mid_tolerance():
     plain = fitted()
     low, high = interval(closing_function(plain.link), given_parts(plain.link), "rss")
     slope = 27 / 34.5
-    assert high - low == pytest.approx(
-        np.sqrt(0.01**2 + 0.01**2 + (slope * 0.016) ** 2 + (slope * 0.006) ** 2)
-    )
+    assert high - low == pytest.approx(np.sqrt(0.01**2 + 0.01**2 + (slope * 0.016) ** 2 + (slope * 0.006) ** 2))
     assert (low + high) / 2 == pytest.approx(34.695 - 34.5 - slope * 0.007)
 
 
@@ -104,8 +99,7 @@ def test_monte_carlo_takes_the_kink_and_reports_what_a_straight_line_misses():
     result = solve(plain, samples=SAMPLES)
     generator = np.random.default_rng(5)
     a, b, c, d = (
-        p.nominal_mm + p.mean_mm + p.sigma_mm * generator.standard_normal(SAMPLES)
-        for p in given_parts(plain.link)
+        p.nominal_mm + p.mean_mm + p.sigma_mm * generator.standard_normal(SAMPLES) for p in given_parts(plain.link)
     )
     expected = a - b - np.maximum(c - d - 0.005, 0) * 27 / 34.5
     assert result.mean_mm == pytest.approx(expected.mean(), abs=5e-5)
@@ -127,18 +121,14 @@ def test_temperature_widens_in_proportion_and_varies():
     result = solve(with_functions(chain([(1, 40.0, 0.01, 0.0)], (39.0, 41.0)), growth), samples=10)
     assert result.nominal_mm == pytest.approx(40 - 0.024)
     assert result.worst_case_mm == pytest.approx((40 - 0.0288, 40.01 - 40.01 * 12e-6 * 45), abs=1e-8)
-    assert result.contributions["warm"]["worst_case_percent"] == pytest.approx(
-        100 * 0.0072 / 0.0172, rel=1e-3
-    )
+    assert result.contributions["warm"]["worst_case_percent"] == pytest.approx(100 * 0.0072 / 0.0172, rel=1e-3)
 
 
 def test_a_function_may_use_a_function():
     links = [{"name": "gap", "coefficient": 0, "expression": "a - b"}]
     links.append({"name": "slant", "coefficient": 1, "expression": "sqrt(gap**2 + 4**2)"})
     result = solve(
-        with_functions(
-            chain([(0, 9.0, 0.1, -0.1, {"fixed": True}), (1, 6.0, 0.0, 0.0)], (10.8, 11.2)), *links
-        ),
+        with_functions(chain([(0, 9.0, 0.1, -0.1, {"fixed": True}), (1, 6.0, 0.0, 0.0)], (10.8, 11.2)), *links),
         samples=10,
     )
     assert result.nominal_mm == pytest.approx(11.0)
@@ -148,9 +138,7 @@ def test_a_function_may_use_a_function():
 def test_a_function_without_a_value_is_refused():
     root = {"name": "root", "coefficient": 1, "expression": "sqrt(a - 5)"}
     with pytest.raises(InputError, match="no finite closing link"):
-        solve(
-            with_functions(chain([(0, 5.0, 0.02, -0.01), (1, 2.0, 0.0, 0.0)], (1, 3)), root), samples=SAMPLES
-        )
+        solve(with_functions(chain([(0, 5.0, 0.02, -0.01), (1, 2.0, 0.0, 0.0)], (1, 3)), root), samples=SAMPLES)
 
 
 def test_a_part_that_cannot_bring_the_closing_link_to_its_limits_is_refused():
@@ -160,9 +148,7 @@ def test_a_part_that_cannot_bring_the_closing_link_to_its_limits_is_refused():
 
 
 def test_expressions_read_arithmetic_and_nothing_else():
-    assert evaluate("max(a, 2*b, 0) - abs(-b)/2 + cos(0)*pi**2", {"a": 1.0, "b": 3.0}) == pytest.approx(
-        4.5 + np.pi**2
-    )
+    assert evaluate("max(a, 2*b, 0) - abs(-b)/2 + cos(0)*pi**2", {"a": 1.0, "b": 3.0}) == pytest.approx(4.5 + np.pi**2)
     assert names_in("min(a, b) + a*sqrt(c)") == ["a", "b", "c"]
     for text in (
         "__import__('os')",

@@ -36,9 +36,7 @@ def exact(plain):
 
 def drawn(plain, samples=SAMPLES, **options):
     search = Allocation(plain)
-    return draw(
-        search.function, given_parts(plain.link), plain.closing_link, samples=samples, seed=2, **options
-    )
+    return draw(search.function, given_parts(plain.link), plain.closing_link, samples=samples, seed=2, **options)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -131,9 +129,7 @@ def test_the_order_of_links_does_not_matter_and_shares_add_up(links, low, width)
 
 
 def test_one_link_and_none_need_no_lattice():
-    assert exact(chain([(-1, 5.0, 0.1, 0.0, {"distribution": "uniform"})], (-5.09, -5.0))) == pytest.approx(
-        (0.1, 0)
-    )
+    assert exact(chain([(-1, 5.0, 0.1, 0.0, {"distribution": "uniform"})], (-5.09, -5.0))) == pytest.approx((0.1, 0))
     assert exact(chain([(1, 5.0, 0.0, 0.0)], (5.1, 6.0))) == (1, 0)
 
 
@@ -144,9 +140,7 @@ def test_quantiles_and_moments_of_the_closing_link():
     assert result.standard_deviation_mm == pytest.approx(deviation, rel=0.01)
     assert (result.cp, result.cpk) == pytest.approx((2 / (6 * deviation), 0.99 / (3 * deviation)), rel=0.01)
     assert result.quantiles_mm[0.5] == pytest.approx(2.99, abs=3e-4)
-    assert result.quantiles_mm[0.975] - result.quantiles_mm[0.025] == pytest.approx(
-        3.92 * deviation, rel=0.02
-    )
+    assert result.quantiles_mm[0.975] - result.quantiles_mm[0.025] == pytest.approx(3.92 * deviation, rel=0.02)
 
 
 def test_capability_narrows_a_normal_part():

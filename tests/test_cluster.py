@@ -53,9 +53,7 @@ def started(folder: Path, workers: int, **environment: str) -> Iterator[Cluster]
 
     with ExitStack() as processes:
         told = folder / "scheduler.json"
-        scheduler = start(
-            "dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(told)
-        )
+        scheduler = start("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(told))
         deadline = time.monotonic() + 60.0
         while not told.exists() and time.monotonic() < deadline:
             time.sleep(0.05)
@@ -73,9 +71,7 @@ def slow_echo(text: str) -> Ran:
     return Ran({"text": text}, None, 0.0, pid=os.getpid())
 
 
-def collected(
-    address: str, texts: list[str], ended: Callable[[int, Ran], None] | None = None
-) -> dict[int, Ran]:
+def collected(address: str, texts: list[str], ended: Callable[[int, Ran], None] | None = None) -> dict[int, Ran]:
     """What a cluster makes of texts."""
     found: dict[int, Ran] = {}
 
@@ -91,9 +87,7 @@ def collected(
 @pytest.mark.slow
 def test_study_on_a_cluster_that_loses_a_worker_has_the_bits_of_a_local_one(tmp_path):
     path = short_study(tmp_path, SHORT.replace("turns=3,", "turns=40,") + ",step_budget_per_turn=4000")
-    path.write_text(
-        path.read_text(encoding="utf-8").replace("centre = 0.15", "centre = 0.12"), encoding="utf-8"
-    )
+    path.write_text(path.read_text(encoding="utf-8").replace("centre = 0.15", "centre = 0.12"), encoding="utf-8")
     study = Study.load(path)
     for name in ("here", "there"):
         (tmp_path / name).mkdir()
@@ -135,9 +129,7 @@ def test_cluster_gives_each_place_its_own_and_tells_what_is_gone(tmp_path, monke
             place: {"text": text} for place, text in enumerate(texts)
         }
         with pytest.raises(RunError, match="its workers are gone; finished runs are kept"):
-            collected(
-                there.address, ["0.01"] + ["60"] * 3, lambda place, ran: [w.kill() for w in there.workers]
-            )
+            collected(there.address, ["0.01"] + ["60"] * 3, lambda place, ran: [w.kill() for w in there.workers])
     (tmp_path / "scheduler.json").unlink()
     with started(tmp_path, 1) as there, pytest.raises(RunError, match="the scheduler is gone; finished runs"):
         collected(there.address, ["0.01"] + ["60"] * 3, lambda place, ran: there.scheduler.kill())

@@ -25,10 +25,7 @@ def test_command_line_help_and_import_load_nothing_heavy():
     """Command line: help and import stay light; a scene can be read without numba."""
     assert loaded_by("import rbdyn") == []
     assert loaded_by("import sys; sys.argv = ['rbdyn', '--help']; from rbdyn.cli import run; run()") == []
-    assert (
-        loaded_by("import sys; sys.argv = ['rbdyn', 'simulate', '--help']; from rbdyn.cli import run; run()")
-        == []
-    )
+    assert loaded_by("import sys; sys.argv = ['rbdyn', 'simulate', '--help']; from rbdyn.cli import run; run()") == []
     assert loaded_by("from rbdyn import Scene, SimulationResult, InputError, RunError") == []
     assert loaded_by(f"from rbdyn import Scene; Scene.load({str(EXAMPLE)!r})") == []
     # A simulation needs numba, and no response surface, front, table or picture.
@@ -111,9 +108,7 @@ def test_command_line_bad_input(command, tmp_path):
         "--set",
         "operation.radial_load_N=-3.0",
     )
-    shown = refused(
-        command("simulate", EXAMPLE, *faulty), "bearing.rollers = 1", "guidance?", "radial_load_N = -3.0"
-    )
+    shown = refused(command("simulate", EXAMPLE, *faulty), "bearing.rollers = 1", "guidance?", "radial_load_N = -3.0")
     assert shown.stdout == ""
     assert len(shown.stderr.splitlines()) == 3
     assert all(line.startswith(str(EXAMPLE)) for line in shown.stderr.splitlines())
@@ -161,8 +156,7 @@ def test_command_line_second_process_finds_compiled_code(command, tmp_path):
     """
     arguments = ("simulate", EXAMPLE, *QUICK, "--json")
     first, second = (
-        json.loads(command(*arguments, NUMBA_CACHE_DIR=str(tmp_path)).stdout)["cost"]["compile_s"]
-        for _ in range(2)
+        json.loads(command(*arguments, NUMBA_CACHE_DIR=str(tmp_path)).stdout)["cost"]["compile_s"] for _ in range(2)
     )
     assert second < 0.25 * first
     assert list(tmp_path.rglob("*.nbi"))

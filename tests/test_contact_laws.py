@@ -88,9 +88,7 @@ def rebound(alpha, speed, contact=LINE, mass=2.5e-3):
         return y[0]
 
     leaves.terminal, leaves.direction = True, -1.0  # type: ignore[attr-defined]
-    end = solve_ivp(
-        fall, (0.0, 1e-1), [0.0, speed], "DOP853", events=leaves, rtol=1e-11, atol=1e-17, max_step=2e-5
-    )
+    end = solve_ivp(fall, (0.0, 1e-1), [0.0, speed], "DOP853", events=leaves, rtol=1e-11, atol=1e-17, max_step=2e-5)
     return -end.y_events[0][0][1] / speed
 
 
@@ -99,9 +97,7 @@ def test_literature_hunt_crossley_restitution(alpha):
     """Literature: e = 1 - alpha v to first order, by following an impact of one body through the law."""
     for speed in (0.01, 0.02, 0.04):
         # The next term of the exact restitution is of the order (alpha v)^2.
-        assert 1.0 - rebound(alpha, speed) == pytest.approx(
-            alpha * speed, abs=2.0 * (alpha * speed) ** 2 + 1e-6
-        )
+        assert 1.0 - rebound(alpha, speed) == pytest.approx(alpha * speed, abs=2.0 * (alpha * speed) ** 2 + 1e-6)
 
 
 @pytest.mark.parametrize("restitution", [0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 1.0])
@@ -229,9 +225,9 @@ def test_literature_rolling_resistance_at_the_papers_point():
         assert 0.20 < resistance(load, 26.2)[0] < 0.24  # the range of both races, widened by its rounding
     assert rolling_resistance.aihara_thermal_factor(0.25, 1.0, 1.0) == pytest.approx(0.91, abs=0.005)
     oil = oil_at("MIL-L-7808", 100.0)
-    assert rolling_resistance.aihara_thermal_factor(
-        oil.viscosity_slope, oil.conductivity, 26.2
-    ) == pytest.approx(0.91, abs=0.01)
+    assert rolling_resistance.aihara_thermal_factor(oil.viscosity_slope, oil.conductivity, 26.2) == pytest.approx(
+        0.91, abs=0.01
+    )
 
 
 @given(load=st.floats(1e-10, 1e6), speed=st.floats(1e-8, 1e3))
@@ -373,11 +369,7 @@ def test_unit_fast_roots_and_angles():
         assert compiled_cos_sin(x) == pytest.approx((math.cos(x), math.sin(x)), rel=0.0, abs=3e-16)
     for p, size in zip(draw.normal(size=5000), 10.0 ** draw.uniform(-6.0, 6.0, 5000), strict=True):
         assert compiled_atan(p, size) == pytest.approx(math.atan2(p, size), rel=4e-16, abs=0.0)
-    assert compiled_atan(0.0, 2.0) == 0.0 and compiled_atan(-1.0, 1.0) == pytest.approx(
-        -math.pi / 4.0, rel=4e-16
-    )
-    assert np.isnan(
-        [*compiled_roots(math.nan), *compiled_cos_sin(math.nan), compiled_atan(math.nan, 1.0)]
-    ).all()
+    assert compiled_atan(0.0, 2.0) == 0.0 and compiled_atan(-1.0, 1.0) == pytest.approx(-math.pi / 4.0, rel=4e-16)
+    assert np.isnan([*compiled_roots(math.nan), *compiled_cos_sin(math.nan), compiled_atan(math.nan, 1.0)]).all()
     assert tenth_root(2.0) == 2.0**0.1 and eighteenth_root(2.0) == 2.0 ** (1.0 / 18.0)
     assert fast_cos_sin(1.0) == (math.cos(1.0), math.sin(1.0)) and fast_atan(1.0, 2.0) == math.atan2(1.0, 2.0)

@@ -98,9 +98,7 @@ def test_literature_two_factors_in_two_blocks():
 
 def test_literature_three_factors_in_three_blocks():
     """Literature: NIST/SEMATECH e-Handbook, Table 3.30: half cubes of 4, 6 axial points at 1.633, 2 centres each."""
-    design = central_composite_design(
-        3, alpha="orthogonal_blocks", centre_replicates=6, blocks=True, cube_blocks=2
-    )
+    design = central_composite_design(3, alpha="orthogonal_blocks", centre_replicates=6, blocks=True, cube_blocks=2)
     assert np.bincount(design.block).tolist() == [6, 6, 8]
     assert design.coded.max() == pytest.approx(1.63299, abs=5e-6)
     for block in (0, 1):

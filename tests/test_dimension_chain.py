@@ -288,9 +288,7 @@ def test_wrong_chains_are_refused_with_key_value_and_mend(links, settings, words
 
 
 def test_all_faults_of_a_file_come_at_once_with_its_name(tmp_path):
-    text = PRINTED.replace("coefficient = -1", "coefficient = 0").replace(
-        "upper_mm = 0.290", "upper_mm = 0.2"
-    )
+    text = PRINTED.replace("coefficient = -1", "coefficient = 0").replace("upper_mm = 0.290", "upper_mm = 0.2")
     path = written(tmp_path, text)
     with pytest.raises(InputError) as caught:
         read_chain(path)

@@ -32,9 +32,7 @@ def test_runs_nearby_correct_the_shape_of_the_surfaces():
 
 def test_along_what_was_not_varied_the_surfaces_alone_tell():
     runs = np.column_stack([np.linspace(-1.0, 1.0, 50), np.zeros(50)])
-    here = Neighbourhood.of(
-        FLAT, np.zeros((1, 2)), np.zeros((1, 2)), runs, runs @ np.array([[3.0, 0.0], [9.0, 9.0]])
-    )
+    here = Neighbourhood.of(FLAT, np.zeros((1, 2)), np.zeros((1, 2)), runs, runs @ np.array([[3.0, 0.0], [9.0, 9.0]]))
     assert here.slopes[0] == pytest.approx(np.array([[3.0, 0.0], [0.0, 0.0]]), abs=1e-9)
 
 
@@ -64,9 +62,7 @@ def test_the_study_follows_the_direct_front(tmp_path, monkeypatch):
     instantly(monkeypatch.setattr)
     monkeypatch.setattr(clearance, "histories", lambda *rest: {})
     monkeypatch.setattr(clearance, "draw_motion", lambda *rest: [])
-    path = short_study(
-        tmp_path, SHORT, ("evaluations = 2000\npopulation = 50", "evaluations = 200\npopulation = 16")
-    )
+    path = short_study(tmp_path, SHORT, ("evaluations = 2000\npopulation = 50", "evaluations = 200\npopulation = 16"))
     text = path.read_text(encoding="utf-8").replace('name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = "min"',
         'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = "max"')  # fmt: skip
     path.write_text(text.replace("population = 100", "population = 24"), encoding="utf-8")

@@ -16,9 +16,7 @@ HEAVY = {"numba", "scipy", "pandas", "sklearn", "pymoo", "matplotlib"}
 
 def doe(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Run the command in a process of its own."""
-    return subprocess.run(
-        [sys.executable, "-m", "doe", *arguments], capture_output=True, text=True, timeout=300
-    )
+    return subprocess.run([sys.executable, "-m", "doe", *arguments], capture_output=True, text=True, timeout=300)
 
 
 def brief_study(folder: Path) -> str:
@@ -58,9 +56,7 @@ def test_help_loads_nothing_heavy():
 
 
 def test_fit_loads_no_compiler_no_optimiser_no_plots():
-    assert (
-        loaded_by(invoke("fit", STUDY, "--data", TABLE, "--json")) & {"numba", "pymoo", "matplotlib"} == set()
-    )
+    assert loaded_by(invoke("fit", STUDY, "--data", TABLE, "--json")) & {"numba", "pymoo", "matplotlib"} == set()
 
 
 def test_chain_loads_no_compiler_and_no_tables():
@@ -101,9 +97,7 @@ def test_fit_json_keeps_the_contract():
 
 def test_front_json_keeps_the_contract(tmp_path):
     record = json.loads(doe("front", brief_study(tmp_path), "--data", TABLE, "--json").stdout)
-    assert {"front", "hypervolume", "ideal", "nadir", "knee", "baseline", "generations", "seed"} <= set(
-        record
-    )
+    assert {"front", "hypervolume", "ideal", "nadir", "knee", "baseline", "generations", "seed"} <= set(record)
     assert {"factors", "responses", "errors"} <= set(record["front"][0])
 
 

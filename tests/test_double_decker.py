@@ -110,9 +110,7 @@ def test_oracle_stiffness_is_that_of_both_rows_in_series(control, tilt):
         step = np.zeros(5)
         step[k] = 0.05 if k < 3 else 5e-5
         ends = [
-            solve_double_decker(
-                model.stack, load_of(scene) + side * step, given_of(scene), model.middle_given, found
-            )
+            solve_double_decker(model.stack, load_of(scene) + side * step, given_of(scene), model.middle_given, found)
             for side in (1.0, -1.0)
         ]
         matrix[:, k] = (ends[0].displacement - ends[1].displacement)[:free] / (2.0 * step[k])
@@ -142,9 +140,7 @@ def test_limit_of_a_rigid_outer_row():
         outer_stiffness=1e5 * row.outer_stiffness,
         rest_deflection=row.rest_deflection / 1e5 ** (2.0 / 3.0),
     )
-    found = solve_double_decker(
-        model.stack._replace(outer=Layer(stiff, control)), load_of(scene), SQUARE, SQUARE
-    )
+    found = solve_double_decker(model.stack._replace(outer=Layer(stiff, control)), load_of(scene), SQUARE, SQUARE)
     alone = solve(*model.stack.inner, load_of(scene), SQUARE)
     assert found.found
     assert found.displacement[:3] == pytest.approx(alone.displacement[:3], rel=2e-3, abs=1e-12)
@@ -272,9 +268,7 @@ def test_unit_speed_of_the_middle_ring():
     assert double_decker_of(heavier).split.status == "outer layer stands"
 
 
-@pytest.mark.parametrize(
-    ("gamma", "factor"), [(0.01, 14.9), (0.05, 15.7), (0.09, 16.5), (0.12, 15.9), (0.2, 14.0)]
-)
+@pytest.mark.parametrize(("gamma", "factor"), [(0.01, 14.9), (0.05, 15.7), (0.09, 16.5), (0.12, 15.9), (0.2, 14.0)])
 def test_literature_static_capacity(gamma, factor):
     """Literature: C0 = f0 Z D^2 cos a_0 with f0 of ISO 76 as commonly tabulated, to 1.5 %: both races in their turn."""
     table = {"balls": 10, "ball_diameter_mm": 8.0, "inner_groove_factor": 0.52, "outer_groove_factor": 0.53}
@@ -289,9 +283,7 @@ def test_literature_static_capacity(gamma, factor):
 @pytest.mark.parametrize("control", ["outer", "hybrid"])
 def test_oracle_load_on_middle_ring_by_the_balance_of_each_ball(control):
     """Oracle: wherever the balls stand, the middle ring feels what the inner ring gives, less what is left on each ball."""
-    model = double_decker_of(
-        scene_of(f"model.raceway_control='{control}'", "operation.inner_speed_rpm=40000.0")
-    )
+    model = double_decker_of(scene_of(f"model.raceway_control='{control}'", "operation.inner_speed_rpm=40000.0"))
     _, found = solved(scene_of("operation.inner_speed_rpm=40000.0", "model.raceway_control='common_cage'"))
     row, rule = model.stack.inner
     forces, moments, expected = [], [], np.zeros(3)
@@ -301,9 +293,7 @@ def test_oracle_load_on_middle_ring_by_the_balance_of_each_ball(control):
             row.axial[j] + found.inner.displacement[2],
             row.radial[j] + found.inner.displacement[0] * c + found.inner.displacement[1] * s,
         )
-        residual, ring, *_, pull, moment = ball_forces.bodies[type(rule)](
-            rule, 1.0, row, *place, x, y, *depths
-        )
+        residual, ring, *_, pull, moment = ball_forces.bodies[type(rule)](rule, 1.0, row, *place, x, y, *depths)
         radial = ring[1] + pull - residual[1]
         expected += [radial * c, radial * s, ring[0] - residual[0]]
         forces.append(pull)
@@ -322,9 +312,7 @@ def test_unit_bad_double_deckers_are_refused():
             scene_of(*overrides)
         return caught.value.faults
 
-    (nested,) = faults(
-        "bearing.outer.pitch_diameter_mm=25.0", "bearing.outer.balls=12", "bearing.outer.bore_mm=9.0"
-    )
+    (nested,) = faults("bearing.outer.pitch_diameter_mm=25.0", "bearing.outer.balls=12", "bearing.outer.bore_mm=9.0")
     assert "bearing.outer.pitch_diameter_mm = 25" in nested and "larger" in nested
     (dry,) = faults("bearing.middle.speed_split='torque_balance'")
     assert "lubricant: missing" in dry
@@ -336,9 +324,7 @@ def test_unit_bad_double_deckers_are_refused():
     with pytest.raises(InputError) as caught:
         BallScene.from_dict(data)
     bore, outside = caught.value.faults
-    assert (
-        "bearing.inner.bore_mm: missing" in bore and "bearing.outer.outside_diameter_mm: missing" in outside
-    )
+    assert "bearing.inner.bore_mm: missing" in bore and "bearing.outer.outside_diameter_mm: missing" in outside
 
 
 def test_limit_still_bearing_has_no_growth_and_no_middle_speed():

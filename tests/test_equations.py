@@ -185,9 +185,7 @@ def twin_errors(scene, bearing, y, outcome):
     errors = {}
     for name, size in acting.items():
         mine, theirs = outcome.dy[blocks[name]], expected.dy[blocks[name]]
-        errors[name] = np.abs(mine - theirs).max(initial=0.0) / max(
-            size, np.abs(theirs).max(initial=0.0), 1e-300
-        )
+        errors[name] = np.abs(mine - theirs).max(initial=0.0) / max(size, np.abs(theirs).max(initial=0.0), 1e-300)
     for kind, names in (("power", POWERS), ("loads", ("wall", "outer", "inner", "land", "contact"))):
         mine, theirs = getattr(outcome, kind), getattr(expected, kind)
         for name, a, b in zip(names, mine, theirs, strict=True):
@@ -325,6 +323,4 @@ def test_unit_each_switch_silences_its_own_power():
     found = iter(interpreted([(*on, *assignments) for assignments in SWITCHES]))
     for assignments, silent in SWITCHES.items():
         power = np.abs([next(found).power for _ in range(6)]).max(axis=0)[:SHAFT]
-        assert {name for name, value in zip(LOSSES, power, strict=True) if value == 0.0} == silent, (
-            assignments
-        )
+        assert {name for name, value in zip(LOSSES, power, strict=True) if value == 0.0} == silent, assignments

@@ -226,9 +226,7 @@ def test_unit_total_error_and_target_option():
 def test_run_to_a_target(outer):
     """A run to 10 % meets it by its own error bars, says how, and is the same again."""
     scene = outer.model_copy(
-        update={
-            "numerics": outer.numerics.model_copy(update={"impact_window_turns": 10.0, "discard_turns": 20.0})
-        }
+        update={"numerics": outer.numerics.model_copy(update={"impact_window_turns": 10.0, "discard_turns": 20.0})}
     )
     result = simulate(scene, target=0.1)
     told = result.target

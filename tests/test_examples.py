@@ -68,11 +68,7 @@ def test_literature_friction_formulas(effort):
     """Literature: SKF 151 W of rolling, Palmgren 117, 154 and 265 W at 24000 rpm and 1300 N; the races take as much."""
     from published.operating import friction
 
-    row = (
-        friction(effort, (12000, 24000), (1300, 2600))
-        .frame.set_index(["speed_rpm", "load_N"])
-        .loc[(24000, 1300)]
-    )
+    row = friction(effort, (12000, 24000), (1300, 2600)).frame.set_index(["speed_rpm", "load_N"]).loc[(24000, 1300)]
     assert row["skf_rolling_W"] == pytest.approx(151.0, abs=1.0)
     assert row["palmgren_2_W"] == pytest.approx(117.0, abs=1.0)
     assert row["palmgren_3_W"] == pytest.approx(154.0, abs=1.0)

@@ -21,16 +21,12 @@ TABLE = pd.read_csv(EXAMPLES / "ccd_table4.csv")
 RESPONSES = ["impact_force_N", "whirl_deviation_ratio", "power_loss_W"]
 
 
-def run(
-    folder: Path, table: pd.DataFrame | str, *options: str, replace: tuple[str, str] = ("", "")
-) -> Result:
+def run(folder: Path, table: pd.DataFrame | str, *options: str, replace: tuple[str, str] = ("", "")) -> Result:
     """The command on a table and the example study, changed by ``replace``."""
     study(folder, replace)
     text = table if isinstance(table, str) else table.to_csv(index=False)
     (folder / "table.csv").write_text(text, encoding="utf-8")
-    return CliRunner().invoke(
-        app, ["fit", str(folder / "study.toml"), "--data", str(folder / "table.csv"), *options]
-    )
+    return CliRunner().invoke(app, ["fit", str(folder / "study.toml"), "--data", str(folder / "table.csv"), *options])
 
 
 def study(folder: Path, replace: tuple[str, str] = ("", "")) -> Path:

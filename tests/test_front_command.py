@@ -78,9 +78,7 @@ def test_record_carries_errors_convergence_and_gains(tmp_path):
 def test_goals_limits_and_rule_of_the_file_are_kept(tmp_path):
     impact = IMPACT.replace('"min"', '"target"\ntarget = 190.0')
     power = POWER.replace('"min"', '"none"\nupper = 400.0\nlower = 380.0')
-    study, _, record = front_of(
-        tmp_path, (IMPACT, impact), (POWER, power), ("[front]", '[front]\npick = "weights"')
-    )
+    study, _, record = front_of(tmp_path, (IMPACT, impact), (POWER, power), ("[front]", '[front]\npick = "weights"'))
     assert set(record["ideal"]) == {"impact_force_N", "whirl_deviation_ratio"}
     # The back-off from the limits of the loss, whose surface misses much, keeps the impact off its target.
     assert 189.5 < record["ideal"]["impact_force_N"] < 210.0
@@ -128,9 +126,7 @@ def test_impossible_limit_is_one_sentence_with_the_least_violation(tmp_path):
 def test_goals_that_make_no_sense_are_refused_with_their_key(tmp_path, replace, words):
     with pytest.raises(InputError) as refused:
         edited_study(tmp_path, replace)
-    assert any(words in fault and "response[1]." in fault for fault in refused.value.faults), (
-        refused.value.faults
-    )
+    assert any(words in fault and "response[1]." in fault for fault in refused.value.faults), refused.value.faults
 
 
 def test_one_goal_has_no_front(tmp_path):
@@ -168,9 +164,7 @@ def test_missing_and_too_wide_tolerances_are_named(tmp_path):
     asked = ("[front]", '[front]\ntolerance_aware = "worst_case"')
     with pytest.raises(InputError) as refused:
         front_of(tmp_path, TOLERANCES[0], asked)
-    assert [fault.split(":")[1] for fault in refused.value.faults] == [
-        " factor.tolerance of guide_clearance_mm"
-    ]
+    assert [fault.split(":")[1] for fault in refused.value.faults] == [" factor.tolerance of guide_clearance_mm"]
     with pytest.raises(InputError, match="leaves no room in the region"):
         front_of(tmp_path, TOLERANCES[0], (TOLERANCES[1][0], TOLERANCES[1][1].replace("0.01", "0.2")), asked)
 

@@ -143,9 +143,7 @@ def test_inner_race_is_softer_and_bears_more_pressure():
     assert hertz.peak_pressure(inner, 100.0) > hertz.peak_pressure(outer, 100.0)
     assert inner.stiffness < outer.stiffness
     loads = np.array([0.0, 1.0, 8.0])
-    assert hertz.peak_pressure(inner, loads) == pytest.approx(
-        hertz.peak_pressure(inner, 1.0) * np.array([0, 1, 2])
-    )
+    assert hertz.peak_pressure(inner, loads) == pytest.approx(hertz.peak_pressure(inner, 1.0) * np.array([0, 1, 2]))
 
 
 @pytest.mark.parametrize(

@@ -168,10 +168,7 @@ def mirror(scene):
     for key in ("outer_waviness", "inner_waviness"):
         waves = getattr(bearing, key)
         changes[key] = [wave.model_copy(update={"phase_deg": -wave.phase_deg}) for wave in waves]
-    turned = {
-        key: -getattr(operation, key)
-        for key in ("inner_speed_rpm", "outer_speed_rpm", "gravity_direction_deg")
-    }
+    turned = {key: -getattr(operation, key) for key in ("inner_speed_rpm", "outer_speed_rpm", "gravity_direction_deg")}
     if operation.schedule is not None:
         speeds = [-speed for speed in operation.schedule.inner_speed_rpm]
         turned["schedule"] = operation.schedule.model_copy(update={"inner_speed_rpm": speeds})
@@ -237,9 +234,7 @@ def test_invariant_momentum_without_external_force(everything):
 
 def test_invariant_power_balance_with_every_law(everything):
     """Invariant: work of shafts and loads = losses + change of energy over a path, the better the tighter the tolerance."""
-    level = everything.model_copy(
-        update={"bearing": everything.bearing.model_copy(update={"tilt_mrad": 1e-9})}
-    )
+    level = everything.model_copy(update={"bearing": everything.bearing.model_copy(update={"tilt_mrad": 1e-9})})
     gaps = []
     for rtol in (1e-2, 1e-3, 1e-4):
         run = Run(level, roller_bearing(level), 0, rtol, Stop())

@@ -24,8 +24,7 @@ LONGER = ("numerics.turns=60", "numerics.discard_turns=20", "numerics.replicates
 def results(make_scene):
     """The example by either pair."""
     return {
-        method: simulate(make_scene(*LONGER, f"numerics.method={method}"), workers=1)
-        for method in ("rk45", "rk43")
+        method: simulate(make_scene(*LONGER, f"numerics.method={method}"), workers=1) for method in ("rk45", "rk43")
     }
 
 

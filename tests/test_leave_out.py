@@ -278,6 +278,4 @@ def test_command_line_imports_what_the_scene_needs():
 
 def test_unit_the_plain_path_is_the_general_one():
     """Agreement: ``interpreted_leave_out``, in a process where nothing is compiled."""
-    fresh(
-        "-m", "pytest", "-q", "-p", "no:cacheprovider", FOLDER / "interpreted_leave_out.py", interpreted=True
-    )
+    fresh("-m", "pytest", "-q", "-p", "no:cacheprovider", FOLDER / "interpreted_leave_out.py", interpreted=True)

@@ -123,8 +123,7 @@ def test_unit_number_of_laminae():
         whole = static_loads(13, 10.0, 11.0, 8e3, 1, profiled=False)
         cut = np.repeat(whole / slices, slices, axis=2)
         one, many = (
-            life.reference_life(q, q, capacity=50e3, gamma=GAMMA, edges=False).million_turns
-            for q in (whole, cut)
+            life.reference_life(q, q, capacity=50e3, gamma=GAMMA, edges=False).million_turns for q in (whole, cut)
         )
         assert many == pytest.approx(one, rel=1e-12)
     few, many = (

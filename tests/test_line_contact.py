@@ -157,8 +157,7 @@ def test_oracle_derivatives_of_sliced_laws(contact, overlap, azimuth):
     assert (load > 0.0) == (stiffness > 0.0) and approach > 0.0
     turn = 1e-7
     turned = [
-        compiled_line_energy(contact, overlap, math.cos(azimuth + by), math.sin(azimuth + by))
-        for by in (turn, -turn)
+        compiled_line_energy(contact, overlap, math.cos(azimuth + by), math.sin(azimuth + by)) for by in (turn, -turn)
     ]
     # A turn lifts the ends of the roller by some 2e-10 m.
     assume(min(abs(overlap - hertz_line.slice_drop(contact, k, nx, ny)) for k in range(31)) > 1e-8)

@@ -209,9 +209,7 @@ def test_oracle_statistics_of_other_methods(outer):
     """Oracle: with fine steps both fixed-step methods close the power balance and lose our power; coarse ones do not."""
     rows = {
         (row.method, row.setting): row
-        for row in method_bias.bias_rows(
-            outer, ((RUNGE_KUTTA_4, (8.0, 0.25)), (VELOCITY_VERLET, (1.0, 0.0625)))
-        )
+        for row in method_bias.bias_rows(outer, ((RUNGE_KUTTA_4, (8.0, 0.25)), (VELOCITY_VERLET, (1.0, 0.0625))))
     }
     exploded, fine_rk4, coarse, fine = rows.values()
     assert exploded.status.startswith("failed: not finite") and exploded.found is None

@@ -55,9 +55,7 @@ def test_interval_of_a_true_model_is_that_of_the_textbook():
     before, after, told = coverage(POINTS, 0.0)
     # One fit in twenty is doubted by chance, and its interval only grows.
     assert told < 0.15 and 0.9 < before <= after < 0.99
-    surface = fit(
-        POINTS, wavy(1, 0.0, 1.0)(POINTS) + NOISE * np.random.default_rng(1).normal(size=20), **KEYWORDS
-    )
+    surface = fit(POINTS, wavy(1, 0.0, 1.0)(POINTS) + NOISE * np.random.default_rng(1).normal(size=20), **KEYWORDS)
     assert surface.model_error is None and surface.interval_dof == surface.residual_dof == 10
     low, high = surface.confidence_interval([0.5, 0.5, 0.5])
     half = special.stdtrit(10, 0.975) * surface.prediction_standard_error([0.5, 0.5, 0.5])
@@ -76,9 +74,7 @@ def test_variance_is_that_of_the_field_on_average():
 
 
 def test_words_and_figures_of_it():
-    surface = fit(
-        POINTS, wavy(2, 3.0, 0.7)(POINTS) + NOISE * np.random.default_rng(2).normal(size=20), **KEYWORDS
-    )
+    surface = fit(POINTS, wavy(2, 3.0, 0.7)(POINTS) + NOISE * np.random.default_rng(2).normal(size=20), **KEYWORDS)
     lack, pure = surface.lack_of_fit, surface.pure_error
     # With the repeats at the centre, which the model meets by a term of its own, the share is one a run of the rest.
     assert surface.model_error.variance == pytest.approx(lack["ss"] / lack["df"] - pure["ms"], rel=0.05)

@@ -64,9 +64,7 @@ def test_unit_whirl_of_a_circle(make_scene, sense):
     assert orbit.eccentricity(history) == pytest.approx(np.full(len(history.time), 50e-6), rel=1e-12)
     assert orbit.whirl_speed(history) == pytest.approx(np.full(len(history.time), rate), rel=1e-9)
     assert orbit.whirl_ratio(history) == pytest.approx(sense * WHIRL / CAGE, rel=1e-9)
-    assert list(orbit.whirl_quantiles(history).values()) == pytest.approx(
-        [sense * WHIRL / CAGE] * 5, rel=1e-9
-    )
+    assert list(orbit.whirl_quantiles(history).values()) == pytest.approx([sense * WHIRL / CAGE] * 5, rel=1e-9)
     edges, density = orbit.whirl_histogram(history)
     assert (density * np.diff(edges)).sum() == pytest.approx(1.0)
     assert edges[0] < sense * WHIRL / CAGE < edges[-1]
@@ -91,9 +89,7 @@ def test_unit_whirl_of_a_cage_at_the_centre(make_scene):
     assert not orbit.whirl_speed(made(make_scene())).any()
 
 
-@pytest.mark.parametrize(
-    ("order", "turn_of", "points"), [(1.0, "shaft", 10), (2.0, "shaft", 10), (CAGE, "cage", 4)]
-)
+@pytest.mark.parametrize(("order", "turn_of", "points"), [(1.0, "shaft", 10), (2.0, "shaft", 10), (CAGE, "cage", 4)])
 def test_unit_poincare_of_a_periodic_orbit_is_a_point(make_scene, order, turn_of, points):
     """Unit: an orbit that repeats with every turn meets its section in one point; another does not."""
     scene = make_scene()
@@ -110,9 +106,7 @@ def test_unit_poincare_of_a_shaft_that_turns_backward(make_scene):
     scene = make_scene()
     forward = made(scene, **circling(scene, 0.31))
     backward = dataclasses.replace(forward, inner_angle=-forward.inner_angle)
-    assert orbit.poincare(backward, "shaft")[0] == pytest.approx(
-        orbit.poincare(forward, "shaft")[0], abs=1e-15
-    )
+    assert orbit.poincare(backward, "shaft")[0] == pytest.approx(orbit.poincare(forward, "shaft")[0], abs=1e-15)
 
 
 def test_unit_spectrum_of_a_sine(make_scene):
@@ -120,9 +114,7 @@ def test_unit_spectrum_of_a_sine(make_scene):
     scene = make_scene()
     history = made(scene)
     # Five turns a segment: 80 Hz between frequencies.
-    signal = (
-        7.0 + 3.0 * np.sin(2.0 * np.pi * 1600.0 * history.time) + np.cos(2.0 * np.pi * 4000.0 * history.time)
-    )
+    signal = 7.0 + 3.0 * np.sin(2.0 * np.pi * 1600.0 * history.time) + np.cos(2.0 * np.pi * 4000.0 * history.time)
     spectrum = orbit.spectrum(history, signal)
     assert spectrum.frequency[1] == pytest.approx(80.0)
     (first, size), (second, lesser) = spectrum.peaks(2)
@@ -180,8 +172,7 @@ def test_unit_contact_pressure_and_sliding(make_scene):
 def test_literature_the_cage_moves_chaotically(outer):
     """Literature: two runs part exponentially, whatever separation and tolerance show it (Benettin et al. 1980)."""
     found = [
-        lyapunov_exponent(outer, 12.0, separation=separation, rtol=1e-4 * separation)
-        for separation in (1e-3, 1e-4)
+        lyapunov_exponent(outer, 12.0, separation=separation, rtol=1e-4 * separation) for separation in (1e-3, 1e-4)
     ]
     for exponent in found:
         assert exponent.per_turn - exponent.per_turn_half_width > 1.0

@@ -25,9 +25,7 @@ def test_literature_growth_and_contact_angles(example):
     assert steel["inner_layer_outer_percent"] == pytest.approx(-1.00, abs=0.01)
     assert steel["inner_layer_inner_percent"] == pytest.approx(-1.39, abs=0.01)
     assert steel["outer_layer_outer_percent"] == pytest.approx(-0.022, abs=0.001)
-    assert ceramic["inner_layer_outer_percent"] / steel["inner_layer_outer_percent"] == pytest.approx(
-        0.28, abs=0.01
-    )
+    assert ceramic["inner_layer_outer_percent"] / steel["inner_layer_outer_percent"] == pytest.approx(0.28, abs=0.01)
     printed = part.loc[("steel", "paper", 40000)]
     assert printed["inner_growth_um"] == pytest.approx(0.2632, abs=1e-4)
     assert example.LARGEST / printed["inner_layer_outer_percent"] == pytest.approx(2.35, abs=0.05)

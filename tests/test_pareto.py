@@ -33,9 +33,7 @@ def test_pareto_set_of_two_bowls_is_the_line_between_their_bottoms(two):
 def test_hypervolume_of_two_bowls_against_the_exact_front(two):
     line = np.linspace(0, 1, 4001)[:, None] * [1.0, 0.0, 0.0]
     exact = bowls(2)(line)
-    assert hypervolume(two.values, np.zeros(2), np.ones(2)) >= 0.99 * hypervolume(
-        exact, np.zeros(2), np.ones(2)
-    )
+    assert hypervolume(two.values, np.zeros(2), np.ones(2)) >= 0.99 * hypervolume(exact, np.zeros(2), np.ones(2))
     # f2 = (1 - sqrt(f1))^2 leaves 1/6 of the unit square below the front.
     assert hypervolume(exact, np.zeros(2), np.ones(2)) == pytest.approx(1.21 - 1 / 6, abs=1e-3)
 
@@ -119,9 +117,7 @@ def test_non_dominated_agrees_with_the_definition_on_many_points():
 
 
 def test_agreeing_objectives_leave_one_point():
-    only = front(
-        lambda x: np.column_stack([x[:, 0], 2 * x[:, 0]]), [0.0], [1.0], population=10, generations=5
-    )
+    only = front(lambda x: np.column_stack([x[:, 0], 2 * x[:, 0]]), [0.0], [1.0], population=10, generations=5)
     assert only.values.shape == (1, 2)
     assert only.knee == only.pick == 0
 

@@ -23,10 +23,7 @@ def true_volume(points):
 @pytest.fixture(scope="module")
 def found():
     """Fronts of several seeds."""
-    return [
-        direct_front(noisy_bowls(seed, NOISE), LOWER, UPPER, goals=GOALS, seed=seed, **BUDGET)
-        for seed in range(8)
-    ]
+    return [direct_front(noisy_bowls(seed, NOISE), LOWER, UPPER, goals=GOALS, seed=seed, **BUDGET) for seed in range(8)]
 
 
 def scores(fronts, attribute):
@@ -90,9 +87,7 @@ def test_failed_points_are_kept_apart():
     assert len(each.failures) > 10 and (each.failures[:, 2] > 0.5).all()
     assert (each.points[:, 2] <= 0.5).all() and np.isfinite(each.values).all()
     with pytest.raises(ValueError, match="every run failed"):
-        direct_front(
-            lambda points: (np.full((len(points), 2), np.nan),) * 2, LOWER, UPPER, goals=GOALS, **BUDGET
-        )
+        direct_front(lambda points: (np.full((len(points), 2), np.nan),) * 2, LOWER, UPPER, goals=GOALS, **BUDGET)
 
 
 def test_limits_hold_in_the_direct_front():
@@ -126,9 +121,7 @@ def test_hypervolume_of_noisy_points_is_corrected_for_luck():
     random, scale = np.random.default_rng(3), (np.zeros(2), np.ones(2))
     drawn = [exact + errors * random.standard_normal(exact.shape) for _ in range(40)]
     believed = np.mean([hypervolume(costs, *scale) for costs in drawn])
-    volumes, stated = zip(
-        *(noisy_hypervolume(costs, errors, *scale, draws=60) for costs in drawn), strict=True
-    )
+    volumes, stated = zip(*(noisy_hypervolume(costs, errors, *scale, draws=60) for costs in drawn), strict=True)
     truth = hypervolume(exact, *scale)
     assert abs(np.mean(volumes) - truth) < 0.5 * abs(believed - truth)
     assert np.std(volumes) == pytest.approx(np.mean(stated), rel=0.5)

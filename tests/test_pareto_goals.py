@@ -63,9 +63,7 @@ def test_impossible_limits_name_the_least_violation():
 
 
 def test_limits_and_costs_of_ranges_are_those_of_the_worse_end():
-    goals = Goals.of(
-        ["min", "max", "target", "none"], target=[None, None, 5.0, None], upper=[None, None, 9.0, 1.0]
-    )
+    goals = Goals.of(["min", "max", "target", "none"], target=[None, None, 5.0, None], upper=[None, None, 9.0, 1.0])
     low, high = np.array([[1.0, 2.0, 3.0, 4.0]]), np.array([[10.0, 20.0, 6.0, 5.0]])
     assert goals.worst(low, high).tolist() == [[10.0, -2.0, 2.0]]
     assert goals.violations(low, high).tolist() == [[0.0, 4.0]]

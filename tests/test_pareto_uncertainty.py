@@ -41,9 +41,7 @@ def test_gain_of_the_published_pick_is_that_of_statsmodels(table):
     for letter, factor in zip("ABC", study.file.factor, strict=True):
         data[letter] = (data[factor.name] - factor.centre) / factor.step
     second = "A + B + C + A:B + A:C + B:C + I(A**2) + I(B**2) + I(C**2)"
-    for gain, terms in zip(
-        predicted_gains(study, surfaces, PAPER_PICK), ("A + B + C", second, second), strict=True
-    ):
+    for gain, terms in zip(predicted_gains(study, surfaces, PAPER_PICK), ("A + B + C", second, second), strict=True):
         model = smf.ols(f"{gain.response} ~ {terms}", data).fit()
         a, b, c = -0.6, 0.74, -0.3
         change = [a, b, c] if terms == "A + B + C" else [a, b, c, a * b, a * c, b * c, a * a, b * b, c * c]
@@ -104,9 +102,7 @@ def test_drawn_coefficients_have_the_quantiles_of_t():
         np.array([5.0, -1.0]), np.array([[4.0, 1.9], [1.9, 1.0]]), 6, 40000, np.random.default_rng(1)
     )
     # 97.5 % quantile of t with 6 degrees of freedom: 2.447.
-    assert np.quantile(drawn[:, 0], [0.025, 0.5, 0.975]) == pytest.approx(
-        [5 - 4.894, 5.0, 5 + 4.894], abs=0.15
-    )
+    assert np.quantile(drawn[:, 0], [0.025, 0.5, 0.975]) == pytest.approx([5 - 4.894, 5.0, 5 + 4.894], abs=0.15)
     assert np.corrcoef(drawn.T)[0, 1] == pytest.approx(0.95, abs=0.01)
 
 

@@ -27,9 +27,7 @@ CONTACT = LineContact(3.73e8)
 HALF = 0.15e-3
 DRY = Pocket(HALF, RADIUS, CONTACT, HuntCrossleyDamping(0.75), CoulombTraction(0.05, 0.02))
 WET = LubricatedPocket(DRY._replace(half_clearance=HALF - FLOOR), FILM, HALF, RADIUS)
-LIPPED = LippedPocket(
-    DRY, 21.75e-3, 30e-6, RADIUS, CONTACT, HuntCrossleyDamping(0.75), CoulombTraction(0.05, 0.02)
-)
+LIPPED = LippedPocket(DRY, 21.75e-3, 30e-6, RADIUS, CONTACT, HuntCrossleyDamping(0.75), CoulombTraction(0.05, 0.02))
 LIPPED_WET = LIPPED._replace(walls=WET)
 POCKETS = {"dry": DRY, "wet": WET, "lips": LIPPED, "lips, wet": LIPPED_WET}
 
@@ -94,9 +92,7 @@ def test_oracle_complementarity(sigma, entrainment):
     gap, slide = 1e-5, 2.0
     closing = closing_at(sigma, entrainment, gap)
     load, moment, sheared = complementary_film(VISCOSITY, RADIUS, gap, entrainment, closing)
-    push, tangential, on_roller, _ = wall_film(
-        FILM, gap, closing, entrainment - 0.5 * slide, entrainment + 0.5 * slide
-    )
+    push, tangential, on_roller, _ = wall_film(FILM, gap, closing, entrainment - 0.5 * slide, entrainment + 0.5 * slide)
     assert push == pytest.approx(load * LENGTH, rel=1e-4)
     # Half the gap times the pressure's slope; far from a parting contact the grid is coarse beside it.
     held = 0.5 * (tangential - on_roller)
@@ -138,9 +134,7 @@ def test_unit_film_force_is_smooth():
     for at in ((3.0, 0.0), (0.0, 3.0)):
         for direction in ((1.0, 0.0), (0.0, 1.0)):
             ahead, here, behind = (
-                np.array(
-                    film_shape.py_func(*(a + side * step * d for a, d in zip(at, direction, strict=True)))[:2]
-                )
+                np.array(film_shape.py_func(*(a + side * step * d for a, d in zip(at, direction, strict=True)))[:2])
                 for side in (1.0, 0.0, -1.0)
             )
             assert (ahead - here) / step == pytest.approx((here - behind) / step, abs=1e-5)
@@ -332,8 +326,7 @@ def test_unit_contact_length_of_the_scene(make_scene):
 
     wet = ("model.pocket_film=true", "cage.guidance=roller")
     plain, given = (
-        roller_bearing(make_scene(*wet, *more)).pocket
-        for more in ((), ("cage.pocket_contact_length_mm=2.0",))
+        roller_bearing(make_scene(*wet, *more)).pocket for more in ((), ("cage.pocket_contact_length_mm=2.0",))
     )
     share = {3.5: plain.contact.stiffness, 2.0: given.contact.stiffness}
     assert share[2.0] / share[3.5] == pytest.approx((2.0 / 3.5) ** (8.0 / 9.0), rel=1e-12)

@@ -73,9 +73,7 @@ def test_film_is_thinner_inside_and_thinnest_off_the_middle():
         factor = films.thermal_factor(ball, OIL, loads)
         assert np.all((factor > 0.1) & (factor < 1.0)) and np.all(np.diff(factor) < 0.0)
         assert np.all(films.thermal_factor(ball, OIL, loads, slip=1.0) < factor)
-    assert np.all(
-        films.central_film(RACES["inner"], OIL, loads) < films.central_film(RACES["outer"], OIL, loads)
-    )
+    assert np.all(films.central_film(RACES["inner"], OIL, loads) < films.central_film(RACES["outer"], OIL, loads))
 
 
 def test_thermal_factor_is_the_one_of_line_contacts_at_equal_pressure():
@@ -84,9 +82,7 @@ def test_thermal_factor_is_the_one_of_line_contacts_at_equal_pressure():
     pressure = peak_pressure(ball.contact, 300.0)
     roller = line.RollingContact(4e-3, 5e-3, STEEL, SPEED)
     load = 2.0 * math.pi * 4e-3 * 5e-3 * pressure**2 / STEEL
-    assert films.thermal_factor(ball, OIL, 300.0) == pytest.approx(
-        line.thermal_factor(roller, OIL, load), rel=1e-13
-    )
+    assert films.thermal_factor(ball, OIL, 300.0) == pytest.approx(line.thermal_factor(roller, OIL, load), rel=1e-13)
 
 
 def test_limit_of_long_ellipses_is_near_the_line_contact():

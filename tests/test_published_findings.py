@@ -100,9 +100,7 @@ def test_literature_order_of_cages_by_clearance(base):
     }  # fmt: skip
     found = skidding_findings(base, slips(rigid))
     assert (found[medium].verdict, found[extensive].verdict) == ("agrees", "differs")
-    assert (
-        "Part III" in found[medium].source and found[extensive].source == "Dawoud et al., Part I (abstract)"
-    )
+    assert "Part III" in found[medium].source and found[extensive].source == "Dawoud et al., Part I (abstract)"
     assert {found[medium].kind, found[extensive].kind} == {"measured"}
     swapped = rigid | {brass: rigid[light], light: rigid[brass]}
     assert skidding_findings(base, slips(swapped))[medium].verdict == "differs"
@@ -158,9 +156,7 @@ def test_unit_other_checks_name_their_kinds():
     assert [(one.kind, one.verdict) for one in formulas] == [("cross-check", "agrees")] * 2
     assert friction_findings(pd.Series(watts | palmgren | {"total_W": 300.0}))[1].verdict == "differs"
 
-    frame = pd.DataFrame(
-        {"law": ["a", "a"], "fill": [1.0, 0.1], "ratio": [0.5, 0.8], "ratio_error": [0.05, 0.05]}
-    )
+    frame = pd.DataFrame({"law": ["a", "a"], "fill": [1.0, 0.1], "ratio": [0.5, 0.8], "ratio_error": [0.05, 0.05]})
     (whirl,) = whirl_findings(frame)
     assert (whirl.kind, whirl.verdict) == (
         "model against model",

@@ -152,11 +152,9 @@ def test_unit_errors_that_do_not_go_with_the_balls():
         "ball_sphericity": [{"order": 2, "amplitude_um": 0.1, "balls": [9]}],
     }
     found = faults(validated(FormErrors, table, "scene"), Z, 12.7, 70.0)
-    assert [
-        any(word in sentence for sentence in found) for word in ("one a ball", "ball 9 of 7", "hundredth")
-    ] == [True] * 3
+    assert [any(word in sentence for sentence in found) for word in ("one a ball", "ball 9 of 7", "hundredth")] == [
+        True
+    ] * 3
     assert faults(validated(FormErrors, TABLE, "scene"), Z, 12.7, 70.0) == []
-    coarse = validated(
-        FormErrors, {"ball_sphericity": [{"order": 20, "amplitude_um": 0.1}], "steps": 100}, "scene"
-    )
+    coarse = validated(FormErrors, {"ball_sphericity": [{"order": 20, "amplitude_um": 0.1}], "steps": 100}, "scene")
     assert "take at least 111" in faults(coarse, Z, 12.7, 70.0)[0]

@@ -106,9 +106,7 @@ def test_oracle_force_is_virtual_work(side, contact):
             -slope((0.0, 1.0), 0.0, 1e-8),
             -slope((0.0, 0.0), 1.0, 1e-5),
         ]
-        found = compiled_contact(
-            race, side, ROLLER, *place, 0.0, 0.0, 0.0, 0.0, math.cos(turned), math.sin(turned)
-        )
+        found = compiled_contact(race, side, ROLLER, *place, 0.0, 0.0, 0.0, 0.0, math.cos(turned), math.sin(turned))
         assert found[4] > 10.0
         # Round-off of millijoules over the steps.
         assert found[:2] == pytest.approx(expected[:2], rel=1e-7, abs=1e-6)
@@ -126,9 +124,7 @@ def test_invariant_contact_wrench(side, seed):
     place = (RADIUS[side] - side * (ROLLER - 1e-5)) * np.array([math.cos(azimuth), math.sin(azimuth)])
     velocity = draw.uniform(-20.0, 20.0, 2)
     state = (*place, *velocity, spin, speed, math.cos(turned), math.sin(turned))
-    fx, fy, on_roller, on_ring, load, friction, rolling, damping, _ = compiled_contact(
-        race, side, ROLLER, *state
-    )
+    fx, fy, on_roller, on_ring, load, friction, rolling, damping, _ = compiled_contact(race, side, ROLLER, *state)
     assert place[0] * fy - place[1] * fx + on_roller + on_ring == pytest.approx(0.0, abs=1e-14 * load)
     lost = -(fx * velocity[0] + fy * velocity[1] + on_roller * spin + on_ring * speed)
 
@@ -208,7 +204,5 @@ def test_unit_scene_makes_the_form(make_scene):
     assert layout_of(turning).clock == 60
     inner = roller_bearing(turning).inner
     assert inner.reach == pytest.approx(inner.radius + 4.5e-3 + 2e-6 + 3e-6, rel=1e-12)
-    driven = make_scene(
-        "bearing.outer_waviness=[{order=2, amplitude_um=10.0}]", "operation.outer_speed_rpm=100.0"
-    )
+    driven = make_scene("bearing.outer_waviness=[{order=2, amplitude_um=10.0}]", "operation.outer_speed_rpm=100.0")
     assert layout_of(driven).clock == 60

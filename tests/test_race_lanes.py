@@ -46,11 +46,7 @@ def test_unit_alike_and_either(outer):
     cut = sliced(LineContact(1e9), np.zeros(3), np.zeros(3), 0.0, 0.0)
     for one, other in ((cut, cut), (LineContact(1.0), RoundRace()), (cut, LineContact(1.0))):
         assert not compiled_alike(one, other) and not alike(one, other)
-    assert (
-        compiled_either(True, LineContact(1.0), RoundRace())
-        == either(True, LineContact(1.0), RoundRace())
-        == ()
-    )
+    assert compiled_either(True, LineContact(1.0), RoundRace()) == either(True, LineContact(1.0), RoundRace()) == ()
 
 
 def test_unit_races_that_share_vectors(outer, everything):
@@ -60,9 +56,7 @@ def test_unit_races_that_share_vectors(outer, everything):
     assert not compiled_share(plain.outer, plain.inner._replace(contact=rich.inner.contact))
 
 
-@pytest.mark.parametrize(
-    "assignments", [(), ("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.06")]
-)
+@pytest.mark.parametrize("assignments", [(), ("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.06")])
 def test_invariant_nothing_acts_across_a_gap(make_scene, assignments):
     """Invariant: where a pocket has a way left it acts with nothing at all; where it acts it has none."""
     pocket = roller_bearing(make_scene(*assignments)).pocket

@@ -79,9 +79,7 @@ def test_page_is_whole_small_and_fetches_nothing(page):
 
 def test_answer_comes_first(page):
     words = " ".join(Outline(page).words)
-    answer = words[
-        words.index("Skip to the answer") : words.index("What was asked", words.index("radial clearance"))
-    ]
+    answer = words[words.index("Skip to the answer") : words.index("What was asked", words.index("radial clearance"))]
     for text in (
         "0.0225",
         "0.1850",
@@ -151,9 +149,7 @@ def test_pick_is_the_one_that_the_study_stands_by():
         "gains": {RESPONSES[0]: VERDICT | {"percent": 5.5}},
     }
     record["confirmation"]["pick"]["reason"] = "by what manufacture leaves of it"
-    record["confirmation"]["without_tolerances"] = record["confirmation"].pop("knee") | {
-        "factors": plain["factors"]
-    }
+    record["confirmation"]["without_tolerances"] = record["confirmation"].pop("knee") | {"factors": plain["factors"]}
     text = html_report(record)
     beside = data_of(text)["beside"]
     assert beside["pick"]["x"] == pytest.approx(list(aware["factors"].values()), rel=1e-5)
@@ -181,9 +177,7 @@ def spoilt(record, name):
     return json.loads(json.dumps(record).replace(FACTORS[0], json.dumps(name)[1:-1]))
 
 
-@pytest.mark.parametrize(
-    "name", ["</script><b>bold</b>", "a<!--b", "{{DATA}} & 'c'", 'd" onload="e', "|pipe|*star*"]
-)
+@pytest.mark.parametrize("name", ["</script><b>bold</b>", "a<!--b", "{{DATA}} & 'c'", 'd" onload="e', "|pipe|*star*"])
 def test_no_name_breaks_the_page(name, page):
     spoiled = html_report(spoilt(summary(), name), motion())
     outline = Outline(spoiled)

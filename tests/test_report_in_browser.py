@@ -23,9 +23,7 @@ PICTURE = "return document.getElementById(arguments[0]).toDataURL()"
 def browser(tmp_path_factory):
     """One headless browser for all tests, with the page in a file."""
     if CHROMIUM is None or DRIVER is None:
-        pytest.skip(
-            "no chromium with chromedriver is installed (Debian: apt install chromium chromium-driver)"
-        )
+        pytest.skip("no chromium with chromedriver is installed (Debian: apt install chromium chromium-driver)")
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
@@ -291,11 +289,7 @@ def test_tables_sort_by_a_column(browser):
     page = opened(browser)
     column = "return [...document.querySelectorAll('#design table')[0].tBodies[0].rows].map(row => parseFloat(row.cells[5].textContent))"
     before = page.execute_script(column)
-    (head,) = (
-        each
-        for each in page.find_elements("css selector", "#design .sort")
-        if each.text == "impact force [N]"
-    )
+    (head,) = (each for each in page.find_elements("css selector", "#design .sort") if each.text == "impact force [N]")
     head.click()
     assert page.execute_script(column) == sorted(before) != before
     head.click()

@@ -188,18 +188,12 @@ def test_oracle_newtonian_slope(load):
     slip = 1e-9
     expected = closed_form_slope(0.016, 5.2e-9, load, FILM)
     thermal = rheology.ThermalNewtonian(0.016, 5.2e-9, 0.045, 0.133)
-    assert rheology.traction_coefficient(thermal, INNER, slip, load, FILM) == pytest.approx(
-        expected * slip, rel=1e-6
-    )
+    assert rheology.traction_coefficient(thermal, INNER, slip, load, FILM) == pytest.approx(expected * slip, rel=1e-6)
     eyring = rheology.Eyring(0.016, 5.2e-9, 1e9)
-    assert rheology.traction_coefficient(eyring, INNER, slip, load, FILM) == pytest.approx(
-        expected * slip, rel=1e-6
-    )
+    assert rheology.traction_coefficient(eyring, INNER, slip, load, FILM) == pytest.approx(expected * slip, rel=1e-6)
     limiting = rheology.LimitingShear(0.016, 5.2e-9, 0.07)
     # At the edge of the contact the limit is low at any slip: there the sum is off by 1e-5.
-    assert rheology.traction_coefficient(limiting, INNER, slip, load, FILM) == pytest.approx(
-        expected * slip, rel=2e-5
-    )
+    assert rheology.traction_coefficient(limiting, INNER, slip, load, FILM) == pytest.approx(expected * slip, rel=2e-5)
 
 
 def test_unit_large_shear():

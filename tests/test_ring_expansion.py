@@ -58,9 +58,7 @@ def test_unit_lame_at_its_surfaces():
     a, b, p, e, nu = 10e-3, 16e-3, 50e6, STEEL.elastic_modulus, STEEL.poisson_ratio
     ring = Ring(a, b, STEEL)
     wall = b**2 - a**2
-    assert ring.pressure_growth(a, inside=p) == pytest.approx(
-        p * a / e * ((a**2 + b**2) / wall + nu), rel=1e-13
-    )
+    assert ring.pressure_growth(a, inside=p) == pytest.approx(p * a / e * ((a**2 + b**2) / wall + nu), rel=1e-13)
     assert ring.pressure_growth(b, inside=p) == pytest.approx(2.0 * p * a**2 * b / (e * wall), rel=1e-13)
     outside = -p * b / e * ((a**2 + b**2) / wall - nu)
     assert ring.pressure_growth(b, outside=p) == pytest.approx(outside, rel=1e-13)
@@ -75,9 +73,7 @@ def test_unit_solid_disk():
     solid = Ring(0.0, 20e-3, STEEL, temperature_rise=30.0, speed=OMEGA)
     hollow = replace(solid, inner_radius=1e-9)
     for radius in (5e-3, 20e-3):
-        assert solid.growth(radius, outside=4e7) == pytest.approx(
-            hollow.growth(radius, outside=4e7), rel=1e-12
-        )
+        assert solid.growth(radius, outside=4e7) == pytest.approx(hollow.growth(radius, outside=4e7), rel=1e-12)
     b, nu, e = 20e-3, STEEL.poisson_ratio, STEEL.elastic_modulus
     assert solid.rotation_growth(b) == pytest.approx(STEEL.density * OMEGA**2 * b**3 * (1.0 - nu) / (4.0 * e))
     assert solid.pressure_growth(b, outside=4e7) == pytest.approx(-(1.0 - nu) * 4e7 * b / e)
@@ -119,9 +115,7 @@ def test_oracle_ring_against_a_boundary_value_solver(inner):
         return np.array([first, right[1] + outside / 1e8])
 
     radii = np.geomspace(start, 20e-3, 400)
-    solved = solve_bvp(
-        slopes, ends, radii, np.vstack((radii / 20e-3, -np.ones(400))), tol=1e-9, max_nodes=50_000
-    )
+    solved = solve_bvp(slopes, ends, radii, np.vstack((radii / 20e-3, -np.ones(400))), tol=1e-9, max_nodes=50_000)
     assert solved.success
     for radius in np.linspace(start, 20e-3, 7)[1:]:
         expected = float(solved.sol(radius)[0]) * scale

@@ -39,9 +39,7 @@ def test_literature_printed_growth_is_a_free_annulus_of_the_pitch_circle():
     printed = printed_growth(18e-3, 12e-3, STEEL, SPEED)
     assert printed == pytest.approx(annulus.rotation_growth(9e-3), rel=1e-13)
     # On the race, where balls touch, the ring grows a quarter less.
-    assert inner_ring().rotation_growth(inner_ring().outer_radius) / printed == pytest.approx(
-        0.759, abs=0.001
-    )
+    assert inner_ring().rotation_growth(inner_ring().outer_radius) / printed == pytest.approx(0.759, abs=0.001)
 
 
 @pytest.mark.parametrize("form", ["thick", "printed"])
@@ -70,17 +68,13 @@ def test_limit_middle_ring_of_no_wall():
 
 def test_unit_which_race_grows():
     """Unit: a turning inner ring closes the gap, a turning outer ring opens it; rotation leaves the grooves' radii."""
-    still = groove_change(
-        inner_ring(speed=0.0), outer_ring(), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL
-    )
+    still = groove_change(inner_ring(speed=0.0), outer_ring(), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL)
     assert still == (0.0, 0.0, 0.0)
     inner = groove_change(inner_ring(), outer_ring(), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL)
     outer = groove_change(
         inner_ring(speed=0.0), outer_ring(speed=SPEED), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL
     )
-    both = groove_change(
-        inner_ring(), outer_ring(speed=SPEED), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL
-    )
+    both = groove_change(inner_ring(), outer_ring(speed=SPEED), 3e-3, (0.515, 0.525), ANGLE, ball_material=STEEL)
     assert inner.radial == inner_ring().rotation_growth(inner_ring().outer_radius) > 0.0 > outer.radial
     assert both.radial == pytest.approx(inner.radial + outer.radial, rel=1e-12)
     assert inner[1:] == outer[1:] == (0.0, 0.0)
@@ -95,9 +89,7 @@ def test_unit_uniform_heat_scales_the_row():
     assert hot.radial == pytest.approx(strain * 0.04 * 3e-3 * math.cos(ANGLE), rel=1e-9)
     assert hot.inner_reach == pytest.approx(strain * 0.015 * 3e-3, rel=1e-9)
     assert hot.outer_reach == pytest.approx(strain * 0.025 * 3e-3, rel=1e-9)
-    hybrid = groove_change(
-        *rings, 3e-3, (0.515, 0.525), ANGLE, ball_material=CERAMIC, ball_temperature_rise=80.0
-    )
+    hybrid = groove_change(*rings, 3e-3, (0.515, 0.525), ANGLE, ball_material=CERAMIC, ball_temperature_rise=80.0)
     assert hybrid.inner_reach - hot.inner_reach == pytest.approx(1.5e-3 * 80.0 * (12e-6 - 3.2e-6), rel=1e-9)
 
 
@@ -226,9 +218,7 @@ def test_unit_growth_of_a_single_row(form):
 def test_unit_mounted_double_decker():
     """Unit: a press fit closes the inner row, a tight housing the outer one, heat of a steel bearing only scales."""
     file = Path(__file__).parent.parent / "examples" / "double_decker.toml"
-    text = tomllib.loads(
-        file.read_text().replace("bore_mm = 12.0", "").replace("outside_diameter_mm = 42.0", "")
-    )
+    text = tomllib.loads(file.read_text().replace("bore_mm = 12.0", "").replace("outside_diameter_mm = 42.0", ""))
     text["operation"]["inner_speed_rpm"] = 0.0
     text["mounting"] = {"bore_mm": 12.0, "outside_diameter_mm": 42.0, "housing_diameter_mm": 60.0}
 

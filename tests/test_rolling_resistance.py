@@ -70,14 +70,10 @@ def test_oracle_elastic_inlet_share(dynamic_load):
     film, force = oracle.grubin(dynamic_load)
     for distance in (0.1, 0.3, 1.0, 3.0, 10.0, 30.0):
         gap = rolling.gap_ahead(distance)
-        share = 1.0 / (
-            1.0 + 2.0 * dynamic_load / (math.pi * force * math.sqrt(gap)) + 0.3 * math.pi * force / gap
-        )
+        share = 1.0 / (1.0 + 2.0 * dynamic_load / (math.pi * force * math.sqrt(gap)) + 0.3 * math.pi * force / gap)
         starved_film, starved_force = oracle.grubin(dynamic_load, distance)
         assert share == pytest.approx(starved_force / force, abs=0.032)
-        assert oracle.goksem_hargreaves_share(dynamic_load, distance) == pytest.approx(
-            starved_force / force, abs=0.1
-        )
+        assert oracle.goksem_hargreaves_share(dynamic_load, distance) == pytest.approx(starved_force / force, abs=0.1)
         if dynamic_load > 1.0:
             continue
         contact = film_thickness.RollingContact(RADIUS, LENGTH, MODULUS, 1.0)

@@ -171,9 +171,7 @@ def vibrating(scene):
 def fixed_step(scene, step, duration):
     """State after ``duration`` in steps of exactly ``step``: no error is ever too large."""
     run = vibrating(scene)
-    control = run.control._replace(
-        inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step
-    )
+    control = run.control._replace(inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step)
     run.carry.clock[1] = step
     assert run.advance(run.bearing, control, run.carry, run.tally, duration, 1.0) == rk.FINISHED
     return run.carry.y
@@ -196,9 +194,7 @@ def test_invariant_stable_where_explicit_steps_are_not(outer):
     implicit = fixed_step(outer, step, 0.05 * outer.turn_s)
     assert np.abs(implicit - still.carry.y)[20:40].max() < 0.1
     run = vibrating(outer)
-    control = run.control._replace(
-        inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step
-    )
+    control = run.control._replace(inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step)
     run.carry.clock[1] = step
     rk.advance(run.bearing, control, run.carry, run.tally, 0.05 * outer.turn_s, 1.0)
     explicit = np.abs(run.carry.y - still.carry.y)[20:40].max()
@@ -229,9 +225,7 @@ def test_invariant_power_balance(make_scene, changes):
         start = sum(mechanical_energy(run.bearing, run.carry.y))
         run.to(2.0)
         change = sum(mechanical_energy(run.bearing, run.carry.y)) - start
-        gaps.append(
-            abs(run.tally.work[SHAFT] - run.tally.work[:SHAFT].sum() - change) / run.tally.work[SHAFT]
-        )
+        gaps.append(abs(run.tally.work[SHAFT] - run.tally.work[:SHAFT].sum() - change) / run.tally.work[SHAFT])
     assert gaps[0] < 0.005
     assert all(tight < loose for loose, tight in pairwise(gaps))
 

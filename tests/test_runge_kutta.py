@@ -35,9 +35,7 @@ def vibrating(scene):
 def fixed_step(scene, step, duration):
     """State after ``duration`` in steps of exactly ``step``: no error is ever too large."""
     run = vibrating(scene)
-    control = run.control._replace(
-        inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step
-    )
+    control = run.control._replace(inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step)
     run.carry.clock[1] = step
     assert rk.advance(run.bearing, control, run.carry, run.tally, duration, 1.0) == rk.FINISHED
     assert run.carry.counts[0] == pytest.approx(duration / step, abs=1.1)
@@ -200,9 +198,7 @@ def test_invariant_power_balance(fixture, request):
         start = sum(mechanical_energy(run.bearing, run.carry.y))
         run.to(4.0)
         change = sum(mechanical_energy(run.bearing, run.carry.y)) - start
-        gaps.append(
-            abs(run.tally.work[SHAFT] - run.tally.work[:SHAFT].sum() - change) / run.tally.work[SHAFT]
-        )
+        gaps.append(abs(run.tally.work[SHAFT] - run.tally.work[:SHAFT].sum() - change) / run.tally.work[SHAFT])
     assert gaps[1] < 0.005
     assert (run.tally.work >= 0.0).all()
     assert all(tight < 0.5 * loose for loose, tight in pairwise(gaps))
@@ -281,9 +277,7 @@ def test_unit_nan_is_refused(outer):
     """Unit: a state that is not finite stops the run and names what it touches."""
     run = run_of(outer, 1e-4)
     run.carry.y[4] = np.nan
-    with pytest.raises(
-        RunError, match=r"replicate 1 \(seed 1\) stopped at t = 0 s.*roller 5 .* is not finite"
-    ):
+    with pytest.raises(RunError, match=r"replicate 1 \(seed 1\) stopped at t = 0 s.*roller 5 .* is not finite"):
         run.to(1.0)
 
 
@@ -304,9 +298,7 @@ def test_unit_step_underflow_names_component_and_mend(outer):
     run = run_of(outer, 1e-4)
     run.control = run.control._replace(smallest_step=1e-4)
     run.carry.clock[1] = 1e-3
-    with pytest.raises(
-        RunError, match=r"the step fell below 0.0001 s because of .*(roller|cage|ring).*numerics\.rtol"
-    ):
+    with pytest.raises(RunError, match=r"the step fell below 0.0001 s because of .*(roller|cage|ring).*numerics\.rtol"):
         run.to(1.0)
 
 

@@ -181,17 +181,12 @@ def test_invariant_classes_are_ordered():
     """Invariant: a finer class never permits more, and a larger bore never less."""
     bores = (5e-3, 15e-3, 25e-3, 40e-3, 70e-3)
     radial = np.array(
-        [
-            [running_accuracy(name, bore).radial for name in ("P2", "P4", "P5", "P6", "normal")]
-            for bore in bores
-        ]
+        [[running_accuracy(name, bore).radial for name in ("P2", "P4", "P5", "P6", "normal")] for bore in bores]
     )
     assert np.all(np.diff(radial, axis=1) > 0.0) and np.all(np.diff(radial, axis=0) >= 0.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "bore", "sentence"), [("P3", 0.07, "choose one of"), ("P4", 0.3, "up to 80 mm")]
-)
+@pytest.mark.parametrize(("name", "bore", "sentence"), [("P3", 0.07, "choose one of"), ("P4", 0.3, "up to 80 mm")])
 def test_unit_unknown_limits_are_refused(name, bore, sentence):
     """Unit: nothing is made up outside the tables."""
     with pytest.raises(ValueError, match=sentence):

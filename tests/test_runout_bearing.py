@@ -101,12 +101,8 @@ def test_oracle_proportion_for_small_errors(bench, response):
     orders = (1, 17, 18, 19, 36)
     for factor in (1.0, 2.0):
         draw = np.random.default_rng(4)
-        forms = {
-            kind: waviness(*((n, factor * SMALL, draw.uniform(0.0, 6.0)) for n in orders)) for kind in kinds
-        }
-        balls = tuple(
-            waviness((2, factor * SMALL, p), (3, factor * SMALL, 2 * p)) for p in draw.uniform(0.0, 6.0, Z)
-        )
+        forms = {kind: waviness(*((n, factor * SMALL, draw.uniform(0.0, 6.0)) for n in orders)) for kind in kinds}
+        balls = tuple(waviness((2, factor * SMALL, p), (3, factor * SMALL, 2 * p)) for p in draw.uniform(0.0, 6.0, Z))
         errors = {**forms, "sphericity": balls, "ball_diameter": factor * SMALL * draw.standard_normal(Z)}
         full = followed(bench, **errors).path
         linear = respond(response, ball_path(replace(perfect(Z), **errors), bench.turning, STEPS))
@@ -120,9 +116,7 @@ def test_invariant_permutation_of_the_balls(bench):
     draw = np.random.default_rng(8)
     large = 0.3e-6 * draw.standard_normal(Z)
     path = ball_path(replace(perfect(Z), ball_diameter=large), bench.turning, 12)
-    moved = ball_path(
-        replace(perfect(Z), ball_diameter=np.roll(large, 1)), bench.turning, 12, start=-2.0 * math.pi / Z
-    )
+    moved = ball_path(replace(perfect(Z), ball_diameter=np.roll(large, 1)), bench.turning, 12, start=-2.0 * math.pi / Z)
     paths = [follow(bench.row, bench.control, bench.load, balls, 1).path for balls in (path, moved)]
     assert paths[0] == pytest.approx(paths[1], rel=1e-6, abs=1e-12)
     assert np.ptp(paths[0][:, 0]) > 1e-8
@@ -173,9 +167,7 @@ def test_unit_design_meets_its_class(bench):
     assert found.yielded == pytest.approx(0.9, abs=4.0 * found.standard_error)
     assert found.check.agreeing == found.check.bearings == 6
     assert max(found.check.radial_rms, found.check.face_rms) < 0.05
-    wide, fine = (
-        design(bench, lot, radial_limit=limit, axial_limit=limit, **given) for limit in (2e-6, 1e-6)
-    )
+    wide, fine = (design(bench, lot, radial_limit=limit, axial_limit=limit, **given) for limit in (2e-6, 1e-6))
     assert fine.inner_sway == pytest.approx(0.5 * wide.inner_sway, rel=1e-3)
     assert fine.check is None and fine.yielded == fine.proportional
 
@@ -211,9 +203,7 @@ def test_oracle_full_runout_of_a_bearing_of_a_lot(bench):
 def test_oracle_walk_against_single_solutions(bench):
     """Oracle: step by step from the one before, also under a radial load, is as solved anew at each step."""
     load = np.array([120.0, -40.0, 500.0, 0.3, 0.0])
-    errors = replace(
-        perfect(Z), inner_roundness=waviness((4, 1e-6, 0.1)), ball_diameter=0.2e-6 * np.arange(Z) / Z
-    )
+    errors = replace(perfect(Z), inner_roundness=waviness((4, 1e-6, 0.1)), ball_diameter=0.2e-6 * np.arange(Z) / Z)
     balls = ball_path(errors, bench.turning, 9)
     found = follow(bench.row, bench.control, load, balls, 1)
     for step in (0, 4, 8):
@@ -226,9 +216,7 @@ def test_oracle_walk_against_single_solutions(bench):
         )
         alone = solve(here, bench.control, load)
         assert found.path[step] == pytest.approx(alone.displacement, rel=1e-6, abs=1e-13)
-        assert found.largest_load[step] == pytest.approx(
-            max(alone.inner_load.max(), alone.outer_load.max()), rel=1e-6
-        )
+        assert found.largest_load[step] == pytest.approx(max(alone.inner_load.max(), alone.outer_load.max()), rel=1e-6)
     assert found.residual < 1e-7
     assert np.all(bench.row.cosine == np.cos(2.0 * math.pi * np.arange(Z) / Z))
 

@@ -39,9 +39,7 @@ def test_unit_slices_cut_the_roller(outer):
     """Unit: so many slices share the load; one is the plain law."""
     contact = roller_bearing(with_slices(outer, 11)).outer.contact
     assert np.count_nonzero(contact.share) == 11 and contact.share.sum() == pytest.approx(1.0)
-    assert type(roller_bearing(with_slices(outer, 1)).outer.contact) is type(
-        roller_bearing(outer).outer.contact
-    )
+    assert type(roller_bearing(with_slices(outer, 1)).outer.contact) is type(roller_bearing(outer).outer.contact)
 
 
 def test_unit_what_cannot_be_scaled_is_refused(make_scene):
@@ -70,9 +68,7 @@ def test_unit_times_are_measured_and_written(found, tmp_path):
     assert (ten.size, twenty.size) == SOME and [point.size for point in found.points["slices"]] == [1]
     assert ten.rhs_ns > 0.0 and 1.6 < twenty.rhs_per_turn / ten.rhs_per_turn < 2.4
     assert ten.turn_ms == pytest.approx(ten.rhs_ns * ten.rhs_per_turn * 1e-6)
-    whole = Scaling(
-        {**found.points, "slices": list(found.points["rollers"])}, [Memory(4, 100.0), Memory(8, 100.0)]
-    )
+    whole = Scaling({**found.points, "slices": list(found.points["rollers"])}, [Memory(4, 100.0), Memory(8, 100.0)])
     assert write(report(whole), tmp_path) == ["scaling.json", "scaling.csv", "scaling.png"]
     saved = json.loads((tmp_path / "scaling.json").read_text())
     assert saved["format"] == "rbdyn.scaling/1" and set(saved["fits"]) == {"rollers", "slices"}

@@ -33,9 +33,7 @@ def test_two_equal_normal_parts_follow_the_closed_form(classes, by):
     edges = np.linspace(-3, 3, classes + 1) if by == "width" else ndtri(np.linspace(0, 1, classes + 1))
     edges[[0, -1]] = -np.inf, np.inf
     shares = np.diff(truncnorm(-np.inf, np.inf).cdf(edges))
-    within = sum(
-        p * truncnorm(low, high).var() for p, low, high in zip(shares, edges[:-1], edges[1:], strict=True)
-    )
+    within = sum(p * truncnorm(low, high).var() for p, low, high in zip(shares, edges[:-1], edges[1:], strict=True))
     sigma = 0.012 / 6
     assert found.matched_deviation_mm == pytest.approx(sigma * sqrt(2 * within), rel=0.015)
     assert found.random_deviation_mm == pytest.approx(sigma * sqrt(2), rel=0.01)
@@ -44,9 +42,7 @@ def test_two_equal_normal_parts_follow_the_closed_form(classes, by):
     assert found.matched == pytest.approx(1 - chance, abs=chance)
 
 
-@pytest.mark.parametrize(
-    ("limits", "needed"), [((0.276, 0.300), 1), ((0.282, 0.294), 2), ((0.2855, 0.2905), 5)]
-)
+@pytest.mark.parametrize(("limits", "needed"), [((0.276, 0.300), 1), ((0.282, 0.294), 2), ((0.2855, 0.2905), 5)])
 def test_classes_needed_divide_the_worst_case(limits, needed):
     # Two tolerances of 0.012 mm in n classes leave 0.024/n about 0.288 mm.
     assert matched(EQUAL, limits).classes_needed == needed

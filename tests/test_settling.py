@@ -34,9 +34,7 @@ def made_of(loss, first=0, per_window=1, impact=None):
     largest[:, POCKET_LOAD] = largest[:, POCKET_CONTACT_LOAD] = loss if impact is None else impact
     whirl[:, 0] = 10.0
     ones = np.ones(count)
-    return Replicate(
-        first, per_window, ones, whirl, work, largest, ones, ones, np.zeros(count + 1), 1.0, 1, 0, 1, 0.0
-    )
+    return Replicate(first, per_window, ones, whirl, work, largest, ones, ones, np.zeros(count + 1), 1.0, 1, 0, 1, 0.0)
 
 
 def noisy(draw, replicates, length, trend=lambda turns: 0.0 * turns, first=0):
@@ -132,9 +130,7 @@ def test_unit_a_run_that_drifts_goes_on(example):
     assert slow.since == 20
     endless = settled_run(example, lambda turns: 0.01 * turns)
     assert {(len(run.durations), run.first) for run in endless.runs} == {(480, 240)}
-    assert (
-        "still drift over the 240 turns" in endless.notes[1] and "numerics.extend_limit" in endless.notes[1]
-    )
+    assert "still drift over the 240 turns" in endless.notes[1] and "numerics.extend_limit" in endless.notes[1]
 
 
 def test_unit_lengthening_is_bounded_and_can_be_forbidden(example):
@@ -143,9 +139,7 @@ def test_unit_lengthening_is_bounded_and_can_be_forbidden(example):
     def ramp(turns):
         return 0.05 * turns
 
-    limited = example.model_copy(
-        update={"numerics": example.numerics.model_copy(update={"extend_limit": 3.0})}
-    )
+    limited = example.model_copy(update={"numerics": example.numerics.model_copy(update={"extend_limit": 3.0})})
     assert len(settled_run(limited, ramp).runs[0].durations) == 120
     fixed = example.model_copy(update={"numerics": example.numerics.model_copy(update={"extend": False})})
     found = settled_run(fixed, ramp)
@@ -274,7 +268,5 @@ def test_oracle_a_slow_regime_is_seen(outer):
     truth = run(**truth_numbers, extend=False).power_loss
     longer, short = run(**numbers, extend=True), run(**numbers, extend=False)
     assert longer.counted_turns >= 120.0 and short.counted_turns == pytest.approx(40.0)
-    assert abs(longer.power_loss.value - truth.value) <= math.hypot(
-        longer.power_loss.error, truth.statistical_error
-    )
+    assert abs(longer.power_loss.value - truth.value) <= math.hypot(longer.power_loss.error, truth.statistical_error)
     assert abs(short.power_loss.value - truth.value) > abs(longer.power_loss.value - truth.value)

@@ -87,9 +87,7 @@ def test_show_film_moves(shown):
     """Show: the moving picture has more than one frame."""
     from PIL import Image
 
-    film = shown[0] / next(
-        name for name in shown[1]["files"] if name.startswith("bearing.") and name[-1] != "l"
-    )
+    film = shown[0] / next(name for name in shown[1]["files"] if name.startswith("bearing.") and name[-1] != "l")
     if film.suffix == ".gif":
         with Image.open(film) as frames:
             assert frames.n_frames > 20
@@ -133,9 +131,7 @@ def test_show_player_data_is_the_motion(page, saved):
     assert 1.0 < data["magnification"] <= data["largest_magnification"]
     out, load = np.array(data["out_um"]), np.array(data["outer_load_N"])
     # An outer contact is a roller within a few micrometres beyond the clearance, but not inside it.
-    assert (out[load > 0.0] > 1e3 * data["outer_gap"] - 0.1).all() and out.max() < 1e3 * data[
-        "outer_gap"
-    ] + 20.0
+    assert (out[load > 0.0] > 1e3 * data["outer_gap"] - 0.1).all() and out.max() < 1e3 * data["outer_gap"] + 20.0
     away = np.hypot(data["cage_x_um"], data["cage_y_um"]).max()
     assert np.abs(data["ahead_um"]).max() < 1e3 * data["pocket_gap"] + away + 20.0
 

@@ -39,9 +39,7 @@ def test_literature_share_of_oil():
 
 def test_literature_palmgren_in_his_units():
     """Literature: both branches of M0 and M1 in N mm, by hand."""
-    assert oil_torque(3000.0 * RPM, 0.05, 20e-6, 2.0) == pytest.approx(
-        1e-10 * 2.0 * 60000.0 ** (2 / 3) * 50.0**3
-    )
+    assert oil_torque(3000.0 * RPM, 0.05, 20e-6, 2.0) == pytest.approx(1e-10 * 2.0 * 60000.0 ** (2 / 3) * 50.0**3)
     assert oil_torque(-10.0 * RPM, 0.05, 20e-6, 2.0) == pytest.approx(160e-10 * 2.0 * 50.0**3)
     angle = math.radians(15.0)
     # P0 = 0.5 (100) + 0.46 (200) = 142 N, P1 = 0.9 (200) cot 15 - 10 = 661.8 N.

@@ -33,9 +33,7 @@ def test_literature_speeds_at_the_papers_point(outer):
 
 def test_invariant_rolling_without_slip(outer):
     """Invariant: at the kinematic speeds a roller slips on neither raceway of the bearing without clearance."""
-    scene = outer.model_copy(
-        update={"bearing": outer.bearing.model_copy(update={"radial_clearance_mm": 0.0})}
-    )
+    scene = outer.model_copy(update={"bearing": outer.bearing.model_copy(update={"radial_clearance_mm": 0.0})})
     motion, (outer_radius, inner_radius) = kinematics(scene), raceway_radii(scene)
     roller = 4.5e-3
     orbit = motion.cage_speed * (outer_radius - roller)
@@ -197,8 +195,6 @@ def test_unit_scales(outer):
     bearing = roller_bearing(outer)
     scale = scales(outer)
     assert scale.load == pytest.approx(130.0)  # 1300 N over ten rollers
-    assert bearing.inner.contact.stiffness * scale.length ** (10.0 / 9.0) == pytest.approx(
-        scale.load, rel=1e-12
-    )
+    assert bearing.inner.contact.stiffness * scale.length ** (10.0 / 9.0) == pytest.approx(scale.load, rel=1e-12)
     stiffness = 10.0 / 9.0 * scale.load / scale.length
     assert scale.speed == pytest.approx(scale.length * math.sqrt(stiffness / bearing.roller_mass), rel=1e-12)

@@ -51,9 +51,7 @@ def test_results_and_failures_are_kept_with_their_facts(path):
             ("key 2", "failed", 1.0),
         ]
     with sqlite3.connect(path) as connection:
-        facts = connection.execute(
-            "SELECT study, label, run, factors, pid FROM runs WHERE key = 'key 1'"
-        ).fetchone()
+        facts = connection.execute("SELECT study, label, run, factors, pid FROM runs WHERE key = 'key 1'").fetchone()
     assert facts == ("clearance", "design run 1", 1, '{"x": 0.5}', os.getpid())
 
 
@@ -166,9 +164,7 @@ def test_only_one_gets_a_run_until_it_is_given_back(path):
     with Store(path) as one, Store(path) as two:
         assert one.claim(POINTS[:3]) == {"key 1", "key 2", "key 3"}
         assert two.claim(POINTS[:4]) == {"key 4"}
-        assert [(claim.key, claim.pid) for claim in two.claims()] == [
-            (f"key {n}", os.getpid()) for n in (1, 2, 3, 4)
-        ]
+        assert [(claim.key, claim.pid) for claim in two.claims()] == [(f"key {n}", os.getpid()) for n in (1, 2, 3, 4)]
         one.put("key 1", result(1))
         one.release()
         assert two.claim(POINTS[:3]) == {"key 2", "key 3"}
@@ -252,9 +248,7 @@ def test_many_openings_at_once_make_one_store(path):
         "    store.put('k' + sys.argv[2], {})"
     )
     processes = [
-        subprocess.Popen(
-            [sys.executable, "-c", code, str(path), str(number)], stdout=subprocess.PIPE, text=True
-        )
+        subprocess.Popen([sys.executable, "-c", code, str(path), str(number)], stdout=subprocess.PIPE, text=True)
         for number in range(3)
     ]
     assert all(process.wait(60) == 0 for process in processes)

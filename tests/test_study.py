@@ -100,12 +100,12 @@ def test_summary_answers_the_question(finished):
     parts = summary["chains"]["pocket"]["allocation"]
     width, roller = parts["pocket_width"], parts["roller_diameter"]
     pocket = summary["pick"]["pocket_clearance_mm"]
-    assert width["nominal_mm"] + width["upper_mm"] - roller["nominal_mm"] - roller[
-        "lower_mm"
-    ] == pytest.approx(pocket + 0.005, abs=1e-9)
-    assert width["nominal_mm"] + width["lower_mm"] - roller["nominal_mm"] - roller[
-        "upper_mm"
-    ] == pytest.approx(pocket - 0.005, abs=1e-9)
+    assert width["nominal_mm"] + width["upper_mm"] - roller["nominal_mm"] - roller["lower_mm"] == pytest.approx(
+        pocket + 0.005, abs=1e-9
+    )
+    assert width["nominal_mm"] + width["lower_mm"] - roller["nominal_mm"] - roller["upper_mm"] == pytest.approx(
+        pocket - 0.005, abs=1e-9
+    )
 
 
 def test_pick_stands_on_the_resolution_of_the_drawing(finished):

@@ -220,9 +220,7 @@ def test_impact_limited_to_90_newtons_of_the_bearing_itself(tmp_path, design):
     text = f"{text[:start]}[design]\n{design}\nseed = 1\n\n{text[end:]}".replace(
         "replicates = 2\n", "replicates = 16\n"
     )
-    (tmp_path / "study.toml").write_text(
-        text.replace("population = 24", "population = 100"), encoding="utf-8"
-    )
+    (tmp_path / "study.toml").write_text(text.replace("population = 24", "population = 100"), encoding="utf-8")
     outcome = run_study(Study.load(tmp_path / "study.toml"), tmp_path, None, lambda title: silent)
     (found,) = outcome.limits
     if outcome.verdict == "kept":

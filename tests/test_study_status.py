@@ -64,11 +64,7 @@ def test_running_study_tells_who_runs_what_and_how_long_it_will_take(tmp_path, m
     assert last["points"] == {"total": 20, "done": 18, "failed": 2, "running": 0, "missing": 0}
     print_status(middle, quiet=False)
     shown = capsys.readouterr().out
-    assert (
-        "6 done, 2 failed" in shown
-        and "failed: design run 2, design run 4: " in shown
-        and "time left" in shown
-    )
+    assert "6 done, 2 failed" in shown and "failed: design run 2, design run 4: " in shown and "time left" in shown
 
 
 def test_command_reads_only_and_loads_no_compiler(tmp_path, monkeypatch):

@@ -71,9 +71,7 @@ def test_failed_points_are_left_out_told_and_not_tried_again_unless_asked(tmp_pa
     )
     assert runs.places == [place for place in range(20) if place + 1 not in (3, 18, 19)]
     (note,) = runs.notes
-    assert note.startswith(
-        "3 design runs failed and are left out: design run 3, design run 18, design run 19: "
-    )
+    assert note.startswith("3 design runs failed and are left out: design run 3, design run 18, design run 19: ")
     assert note.count("the oil froze") == 1
     ran.clear()
     again = run_design(study, tmp_path, 2, silent)
@@ -170,9 +168,7 @@ def test_two_processes_share_a_study_and_nothing_runs_twice(tmp_path):
 def test_killed_process_is_taken_over_at_once_by_one_that_waits_for_it(tmp_path, monkeypatch):
     study, out = short_study(tmp_path), tmp_path / "out"
     slow = start(study, out, 30.0, 19)
-    wait_for(
-        lambda: (out / STORE).exists() and study_status(Study.load(study), out)["points"]["running"] == 20
-    )
+    wait_for(lambda: (out / STORE).exists() and study_status(Study.load(study), out)["points"]["running"] == 20)
     ran = instantly(monkeypatch.setattr)
     seen: list[tuple[int, int]] = []
 

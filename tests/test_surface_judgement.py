@@ -23,9 +23,7 @@ def noise(seed, size=20, deviation=1.0):
 
 def surface_of(values, points=POINTS, **keywords):
     """Surface through values on the three-factor design."""
-    return fit(
-        points, values, name="y", centre=CENTRE[: points.shape[1]], step=STEP[: points.shape[1]], **keywords
-    )
+    return fit(points, values, name="y", centre=CENTRE[: points.shape[1]], step=STEP[: points.shape[1]], **keywords)
 
 
 def sentence(surface, words):
@@ -48,9 +46,7 @@ def test_prediction_is_the_sum_of_its_terms(model):
     a, b, c = np.moveaxis(actual, -1, 0)
     columns = {"1": 1, "A": a, "B": b, "C": c, "AB": a * b, "AC": a * c, "BC": b * c}
     columns |= {"A^2": a**2, "B^2": b**2, "C^2": c**2}
-    assert sum(x * columns[term] for term, x in surface.actual_coefficients.items()) == pytest.approx(
-        expected
-    )
+    assert sum(x * columns[term] for term, x in surface.actual_coefficients.items()) == pytest.approx(expected)
 
 
 def test_draws_follow_their_coefficients():
@@ -75,11 +71,7 @@ def test_elimination_is_the_order_of_the_largest_p_each_time():
         fitted = solve(model_matrix(POINTS, terms), values)
         t = fitted.coefficients / np.sqrt(fitted.mean_square * np.diag(fitted.inverse))
         p = dict(zip(terms, 2 * stats.t.sf(np.abs(t), fitted.dof), strict=True))
-        free = [
-            term
-            for term in terms
-            if term != "1" and not any(term in other for other in terms if other != term)
-        ]
+        free = [term for term in terms if term != "1" and not any(term in other for other in terms if other != term)]
         assert removal["term"] == max(free, key=p.get)
         assert removal["p"] == pytest.approx(p[removal["term"]]) and removal["p"] > 0.05
         terms = tuple(term for term in terms if term != removal["term"])
@@ -89,9 +81,7 @@ def test_elimination_is_the_order_of_the_largest_p_each_time():
 def test_eigenvalue_errors_are_those_of_a_fit_in_rotated_axes():
     # Along its own axes an eigenvalue is the coefficient of a square, and its error that coefficient's
     # (Bisgaard and Ankenman 1996); the turn is taken as known, so the two agree to first order.
-    curved = (
-        POINTS[:, 0] ** 2 + 3 * POINTS[:, 1] ** 2 - 2 * POINTS[:, 2] ** 2 + 1.5 * POINTS[:, 0] * POINTS[:, 1]
-    )
+    curved = POINTS[:, 0] ** 2 + 3 * POINTS[:, 1] ** 2 - 2 * POINTS[:, 2] ** 2 + 1.5 * POINTS[:, 0] * POINTS[:, 1]
     surface = surface_of(curved + noise(5, deviation=0.1))
     found = surface.canonical
     turn = np.array(found["eigenvectors"]).T
@@ -231,9 +221,7 @@ def test_a_run_met_exactly_leaves_its_figures_undefined():
     points = np.vstack([central_composite(2, centre_replicates=0), [[0.0, 0.0]], [[0.5, 0.5]]])
     points = np.column_stack([points, np.zeros(len(points))])
     points[-1, 2] = 1.0
-    surface = fit(
-        points, noise(18, len(points)), name="y", model="linear", centre=np.zeros(3), step=np.ones(3)
-    )
+    surface = fit(points, noise(18, len(points)), name="y", model="linear", centre=np.zeros(3), step=np.ones(3))
     last = surface.diagnostics["runs"][-1]
     assert last["leverage"] == pytest.approx(1.0)
     assert last["standardized"] is None and last["cook"] is None

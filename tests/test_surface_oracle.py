@@ -122,9 +122,7 @@ def test_influence(pair):
     assert ours.diagnostics["outlier"]["run"] == worst + 1
     bonferroni = whitened.outlier_test(method="bonferroni")[worst, 2]
     assert ours.diagnostics["outlier"]["p"] == close(bonferroni)
-    assert ours.diagnostics["normality"]["p"] == close(
-        stats.shapiro(influence.resid_studentized_internal).pvalue
-    )
+    assert ours.diagnostics["normality"]["p"] == close(stats.shapiro(influence.resid_studentized_internal).pvalue)
 
 
 def test_intervals_of_predictions(pair):
@@ -208,8 +206,7 @@ def test_orthogonal_blocks_leave_the_surface_as_it_is():
     design = central_composite_design(3, alpha="orthogonal_blocks", centre_replicates=6, blocks=True)
     values = 10 + design.coded @ [1.0, 2.0, 3.0] + np.random.default_rng(5).normal(size=len(design.coded))
     with_blocks, without = (
-        fit(design.coded, values, name="y", centre=CENTRE, step=STEP, block=block)
-        for block in (design.block, None)
+        fit(design.coded, values, name="y", centre=CENTRE, step=STEP, block=block) for block in (design.block, None)
     )
     assert with_blocks.coefficients == close(without.coefficients)
     assert with_blocks.blocks and not without.blocks

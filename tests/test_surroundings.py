@@ -115,9 +115,7 @@ def test_oracle_angle_is_the_integral_of_speed(everything):
     run.to(2.0)
     clock = layout_of(everything).clock
     time, inner, outer = run.carry.y[clock:]
-    assert time == pytest.approx(run.carry.clock[0], rel=1e-12) and time == pytest.approx(
-        2.0 * everything.turn_s
-    )
+    assert time == pytest.approx(run.carry.clock[0], rel=1e-12) and time == pytest.approx(2.0 * everything.turn_s)
     speed = run.bearing.drive.inner_speed
     expected, _ = quad(lambda t: value_at(speed, t), 0.0, time, points=[2e-3], epsrel=1e-12)
     # The clock does not limit the steps, which are short against its ramps of milliseconds.
@@ -141,9 +139,7 @@ def test_oracle_support_alone():
     end = 5e-4
     found = solve_ivp(flow, (0.0, end), [1e-5, 0.0, 0.0, 0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-18).y[:, -1]
     damped = omega * math.sqrt(1.0 - zeta**2)
-    swing = math.exp(-zeta * omega * end) * (
-        math.cos(damped * end) + zeta * omega / damped * math.sin(damped * end)
-    )
+    swing = math.exp(-zeta * omega * end) * (math.cos(damped * end) + zeta * omega / damped * math.sin(damped * end))
     assert found[:2] == pytest.approx(rest + (np.array([1e-5, 0.0]) - rest) * swing, rel=1e-8)
 
     def energy(y):
@@ -225,8 +221,7 @@ def test_invariant_constant_schedule_is_steady(make_scene, everything):
     steady = everything.operation.model_copy(update={"schedule": None})
     scheduled = everything.operation.model_copy(update={"schedule": constant})
     bearing, other = (
-        roller_bearing(everything.model_copy(update={"operation": operation}))
-        for operation in (scheduled, steady)
+        roller_bearing(everything.model_copy(update={"operation": operation})) for operation in (scheduled, steady)
     )
     # Written with points of the same value, so that both are of one type.
     drive = other.drive._replace(
@@ -310,9 +305,7 @@ def test_unit_kinematic_cage_angle_follows_the_angles(make_scene):
     """Unit: the slip is measured against rolling without slip over what both rings really turned."""
     from rbdyn.dynamics.recording import kinematic_cage_angle
 
-    scene = make_scene(
-        "bearing.radial_clearance_mm=0.0", "operation.outer_speed_rpm=-6000.0", "numerics.turns=4"
-    )
+    scene = make_scene("bearing.radial_clearance_mm=0.0", "operation.outer_speed_rpm=-6000.0", "numerics.turns=4")
     turned = np.array([4.0, -1.0]) * 2.0 * math.pi
     found = kinematic_cage_angle(scene, np.array([3.0, 5.0]), np.array([3.0, 5.0]) + turned)
     assert found == pytest.approx((4.0 * 17.25 - 1.0 * 26.25) / 43.5 * 2.0 * math.pi, rel=1e-12)

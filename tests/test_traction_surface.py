@@ -148,9 +148,7 @@ def test_unit_surface_is_smooth_and_ends_level(name):
             logs.append(math.log(mu * (1.0 + ratio) / ratio))
         assert (logs[1] - logs[0]) / step == pytest.approx((logs[2] - logs[1]) / step, abs=2e-5)
     assert compiled_traction(surface, 1.0, 1e9) == compiled_traction(surface, 1.0, 2.0 * LARGEST)
-    assert compiled_traction(surface, 1e6, 500.0) == pytest.approx(
-        compiled_traction(surface, 1e5, 500.0), rel=1e-3
-    )
+    assert compiled_traction(surface, 1e6, 500.0) == pytest.approx(compiled_traction(surface, 1e5, 500.0), rel=1e-3)
 
 
 def test_unit_light_rollers_are_driven_less():
@@ -210,9 +208,7 @@ def law_of(*assignments, load=2600.0, speed=26.2):
 def test_unit_laws_of_a_scene():
     """Unit: the defaults give the load-independent law of before; each model and mixed friction give theirs."""
     assert law_of() == FOUR
-    assert law_of("traction.mu_0=0.02") == BlendedFourConstantTraction(
-        *four_constants(0.02, 0.050, 0.036, 1.0), 0.02
-    )
+    assert law_of("traction.mu_0=0.02") == BlendedFourConstantTraction(*four_constants(0.02, 0.050, 0.036, 1.0), 0.02)
     assert law_of("traction.model=coulomb") == CoulombTraction(0.1, 0.02)
     assert law_of("traction.model=coulomb", "traction.coulomb=0.0") == NoTraction()
     assert law_of("traction.model=off") == NoTraction()
@@ -246,9 +242,7 @@ def test_unit_inputs_of_a_film_reach_the_law():
     assert compiled_traction(stiff, 0.1, 600.0) > 1.2 * compiled_traction(plain, 0.1, 600.0)
     santotrac = law_of("traction.model=thermal_newtonian", "traction.rheology_oil=Santotrac 30")
     assert compiled_traction(santotrac, 0.1, 600.0) > compiled_traction(SURFACES["thermal"], 0.1, 600.0)
-    smooth, rough = (
-        law_of("traction.friction=mixed", f"lubricant.race_roughness_um={s}") for s in (0.05, 0.3)
-    )
+    smooth, rough = (law_of("traction.friction=mixed", f"lubricant.race_roughness_um={s}") for s in (0.05, 0.3))
     assert rough.share_scale < smooth.share_scale
     starved = law_of("traction.friction=mixed", "lubricant.inlet_distance=0.5")
     assert starved.share_scale < smooth.share_scale

@@ -89,9 +89,7 @@ def test_trend_load_zone_widens_as_clearance_shrinks():
 def test_trend_power_loss_falls_with_guide_clearance():
     """Trend: the loss falls as the guide clearance grows, for a film shears less."""
     long = ("numerics.turns=40", "numerics.replicates=8")
-    assert_rises(
-        [result(*long, f"cage.guide_clearance_mm={mm}").power_loss for mm in (0.23, 0.15, 0.1, 0.066)]
-    )
+    assert_rises([result(*long, f"cage.guide_clearance_mm={mm}").power_loss for mm in (0.23, 0.15, 0.1, 0.066)])
 
 
 def test_trend_cage_never_outruns_rolling():

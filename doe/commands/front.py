@@ -71,9 +71,7 @@ def _point(study: Study, text: str) -> list[float]:
     parts = [part.strip() for part in text.split(",")]
     named = any("=" in part for part in parts)
     if not named and len(parts) != len(study.factors):
-        raise InputError(
-            [f"--point {text}: give one value a factor ({', '.join(study.factors)}), or name=value"]
-        )
+        raise InputError([f"--point {text}: give one value a factor ({', '.join(study.factors)}), or name=value"])
     pairs = [part.partition("=")[::2] for part in parts] if named else zip(study.factors, parts, strict=True)
     faults = []
     for name, number in ((name.strip(), number.strip()) for name, number in pairs):

@@ -66,9 +66,7 @@ def searched(
         Store(folder / STORE, study.path.stem) as store,
         progress_bar("direct front", quiet) as progress,
     ):
-        return find_direct(
-            study, found, Simulations(store, workers, scheduler, retry, lambda title: progress)
-        )
+        return find_direct(study, found, Simulations(store, workers, scheduler, retry, lambda title: progress))
 
 
 @contextmanager

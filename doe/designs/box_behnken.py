@@ -36,8 +36,7 @@ def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = Fals
     """
     if factors not in TOGETHER:
         raise ValueError(
-            f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; "
-            'use kind = "central_composite"'
+            f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; use kind = \"central_composite\""
         )
     number = BLOCKS.get(factors, 1) if blocks else 1
     if blocks and number == 1:

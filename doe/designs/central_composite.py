@@ -22,9 +22,7 @@ def central_composite(
 
     See `central_composite_design` for the parameters and what is raised.
     """
-    return central_composite_design(
-        factors, alpha=alpha, centre_replicates=centre_replicates, cube=cube
-    ).coded
+    return central_composite_design(factors, alpha=alpha, centre_replicates=centre_replicates, cube=cube).coded
 
 
 def central_composite_design(

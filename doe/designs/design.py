@@ -56,9 +56,7 @@ class Design:
         )
 
 
-def assembled(
-    parts: Sequence[tuple[str, Array]], blocks: Sequence[int], reach: float, region: Region
-) -> Design:
+def assembled(parts: Sequence[tuple[str, Array]], blocks: Sequence[int], reach: float, region: Region) -> Design:
     """A design in standard order from (kind, points) parts, with the block of every run."""
     coded = np.vstack([points for _, points in parts]) + 0.0  # no negative zeros
     kinds = tuple(kind for kind, points in parts for _ in points)

@@ -117,8 +117,7 @@ def evaluate(
             for radius, shell in zip(radii.tolist(), shells, strict=True)
         ],
         "fraction_of_design_space": [
-            {"percent": percent, "variance": float(np.percentile(spread, percent))}
-            for percent in range(0, 101, 5)
+            {"percent": percent, "variance": float(np.percentile(spread, percent))} for percent in range(0, 101, 5)
         ],
         "vif": _inflation(matrix, covariance, terms),
         "leverage": (orthogonal**2).sum(axis=1).tolist(),

@@ -27,9 +27,7 @@ def full_factorial(factors: int, *, levels: int = 3, centre_replicates: int = 0)
             'give fewer levels or use kind = "sobol"'
         )
     values = np.linspace(-1.0, 1.0, levels)
-    return _filled(
-        "grid", np.array([each[::-1] for each in product(values, repeat=factors)]), centre_replicates
-    )
+    return _filled("grid", np.array([each[::-1] for each in product(values, repeat=factors)]), centre_replicates)
 
 
 def latin_hypercube(factors: int, *, runs: int = 60, seed: int = 1, centre_replicates: int = 0) -> Design:

@@ -76,9 +76,7 @@ class Allocation:
             slope = self.function.sensitivities(middle(parts))[moved]
             step = self._missing(parts) / slope if slope else inf
             parts = [
-                replace(part, nominal_mm=round(part.nominal_mm + step, DIGITS))
-                if part.name == moved
-                else part
+                replace(part, nominal_mm=round(part.nominal_mm + step, DIGITS)) if part.name == moved else part
                 for part in parts
             ]
             if moved not in self.function.arguments or abs(step) < SLACK:
@@ -167,8 +165,7 @@ class Allocation:
         free = {link.name: link for link in self.chain.free}
         ladders = {name: list(grade_tolerances(link.nominal).items()) for name, link in free.items()}
         steps = {
-            name: sum(width <= tolerances[name] + SLACK for _, width in ladder) - 1
-            for name, ladder in ladders.items()
+            name: sum(width <= tolerances[name] + SLACK for _, width in ladder) - 1 for name, ladder in ladders.items()
         }
 
         def parts(steps: Mapping[str, int]) -> list[Part]:

@@ -62,9 +62,7 @@ class ClosingFunction:
                 known[function.name] = function.value(known)
                 total = total + function.coefficient * known[function.name]
         if not np.isfinite(np.sum(total)):
-            raise NoValueError(
-                "some sizes that are within reach give no finite closing link; mend the functions"
-            )
+            raise NoValueError("some sizes that are within reach give no finite closing link; mend the functions")
         return total
 
     def sensitivities(self, sizes: Sizes) -> dict[str, float]:
@@ -83,13 +81,9 @@ def closing_function(links: Sequence[Link]) -> ClosingFunction:
     """
     by_name = {link.name: link for link in links}
     functions = [
-        Function(link.name, link.coefficient, _function(link, by_name))
-        for link in links
-        if not link.is_dimension
+        Function(link.name, link.coefficient, _function(link, by_name)) for link in links if not link.is_dimension
     ]
-    used = [
-        name for link in links for name in (*used_links(link), *([link.name] if link.thermal_growth else []))
-    ]
+    used = [name for link in links for name in (*used_links(link), *([link.name] if link.thermal_growth else []))]
     return ClosingFunction(
         # A thermal growth counts as a function; the part of its name only varies the temperature.
         {link.name: link.coefficient * link.is_dimension for link in links if is_part(link)},

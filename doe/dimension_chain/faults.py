@@ -87,9 +87,7 @@ def _link_faults(link: Link, rule: Allocate, used: bool) -> list[str]:
     elif link.fit is not None:
         lower, upper = coded_limits(link)
     if mean is not None and not (bare or half) and not lower <= mean <= upper:
-        found.append(
-            f"mean_mm = {mean}: is a deviation from the nominal; put it between lower_mm and upper_mm"
-        )
+        found.append(f"mean_mm = {mean}: is a deviation from the nominal; put it between lower_mm and upper_mm")
     if free and lettered and (outside := _sentence(lambda: positioned(link.nominal, link.position, 0.0))):
         found.append(f'position = "{link.position}": {outside}')
     return [f'link "{link.name}": {sentence}' for sentence in found]
@@ -99,9 +97,7 @@ def _function_faults(link: Link) -> list[str]:
     """Faults of a link that is a function: it takes nothing that only a dimension has."""
     kinds = [key for key in ("press_fit", "thermal_growth", "expression") if getattr(link, key) is not None]
     found = [f"{' and '.join(kinds)} stand together; a link is one of them"] if len(kinds) > 1 else []
-    alien = [
-        key for key in ("nominal_mm", "upper_mm", "lower_mm", "fit", "mean_mm", "cost") if getattr(link, key)
-    ]
+    alien = [key for key in ("nominal_mm", "upper_mm", "lower_mm", "fit", "mean_mm", "cost") if getattr(link, key)]
     found += [f"{key} = {getattr(link, key)}: a link of kind {kinds[0]} has none; remove it" for key in alien]
     rise = link.thermal_growth
     if rise and rise.lower_K > rise.upper_K:
@@ -126,15 +122,9 @@ def _reference_faults(chain: Chain) -> list[str]:
             ]
             grown = link.thermal_growth and before.get(link.thermal_growth.of)
             if grown and not (grown.is_dimension and grown.nominal > 0):
-                found.append(
-                    f'link "{link.name}": thermal_growth.of = "{grown.name}": must be a positive dimension'
-                )
+                found.append(f'link "{link.name}": thermal_growth.of = "{grown.name}": must be a positive dimension')
         bore = link.press_fit and before.get(link.press_fit.bore)
-        if (
-            link.press_fit
-            and bore
-            and (wrong := _sentence(partial(fit_factor, link.press_fit, bore.nominal)))
-        ):
+        if link.press_fit and bore and (wrong := _sentence(partial(fit_factor, link.press_fit, bore.nominal))):
             found.append(f'link "{link.name}": press_fit: {wrong}')
         before.setdefault(link.name, link)
     return found
@@ -195,9 +185,7 @@ def _room_faults(chain: Chain) -> list[str]:
 
 def _nearest(limits: ClosingLink, width: float) -> str:
     middle = (limits.lower_mm + limits.upper_mm) / 2
-    return (
-        f"the nearest that can be met are wider than {middle - width / 2:.4f} to {middle + width / 2:.4f} mm"
-    )
+    return f"the nearest that can be met are wider than {middle - width / 2:.4f} to {middle + width / 2:.4f} mm"
 
 
 def _sentence(attempt: Callable[[], object]) -> str | None:

@@ -22,11 +22,7 @@ BETWEEN = 512  # points between the corners
 
 def interval(function: ClosingFunction, parts: Sequence[Part], mode: Mode) -> Interval:
     """Least and greatest closing link, mm: by root sum square about mid-tolerance in mode "rss", else worst case."""
-    return (
-        linear_interval(function, parts, mode)
-        if mode == "rss" or function.linear
-        else _searched(function, parts)
-    )
+    return linear_interval(function, parts, mode) if mode == "rss" or function.linear else _searched(function, parts)
 
 
 def linear_interval(function: ClosingFunction, parts: Sequence[Part], mode: Mode) -> Interval:
@@ -74,9 +70,7 @@ def _least(function: ClosingFunction, parts: list[Part], sign: int) -> float:
 
     generator = np.random.default_rng(0)
     if len(varying) <= CORNERS:
-        corners = np.array(list(product((0.0, 1.0), repeat=len(varying)))).reshape(
-            2 ** len(varying), len(varying)
-        )
+        corners = np.array(list(product((0.0, 1.0), repeat=len(varying)))).reshape(2 ** len(varying), len(varying))
     else:
         corners = generator.integers(0, 2, (2**CORNERS, len(varying))).astype(float)
     at_corners = value(corners)
@@ -91,7 +85,5 @@ def _least(function: ClosingFunction, parts: list[Part], sign: int) -> float:
 
     start = inside[at_inside.argmin()] if at_inside.min() < lowest else corners[at_corners.argmin()]
     scale = max(part.tolerance_mm for part in varying)
-    found = minimize(
-        lambda place: float(value(place[None, :])[0]) / scale, start, bounds=[(0.0, 1.0)] * len(varying)
-    )
+    found = minimize(lambda place: float(value(place[None, :])[0]) / scale, start, bounds=[(0.0, 1.0)] * len(varying))
     return min(lowest, scale * float(found.fun))

@@ -198,7 +198,5 @@ def _delta(column: int, grade: int) -> float:
 
 def _listed(rows: Mapping[int, tuple[int, ...]], grade: int, letter: str) -> tuple[int, ...]:
     if grade not in rows:
-        raise ValueError(
-            f"is not listed here: {letter} has the grades {', '.join(str(each) for each in rows)}"
-        )
+        raise ValueError(f"is not listed here: {letter} has the grades {', '.join(str(each) for each in rows)}")
     return rows[grade]

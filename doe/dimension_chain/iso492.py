@@ -34,13 +34,9 @@ def ring_limits(nominal_mm: float, code: str) -> tuple[float, float]:
     """
     name, _, surface = code.partition(" ")
     if surface not in SURFACES or name not in BORE:
-        raise ValueError(
-            f'is no ring class such as "P5 bore" or "Normal outside"; classes known: {", ".join(BORE)}'
-        )
+        raise ValueError(f'is no ring class such as "P5 bore" or "Normal outside"; classes known: {", ".join(BORE)}')
     ranges, rows = SURFACES[surface]
     column = bisect_left(ranges, nominal_mm)
     if nominal_mm <= 0 or column >= len(rows[name]):
-        raise ValueError(
-            f"is listed here from 0 to {ranges[len(rows[name]) - 1]:g} mm; give the deviations themselves"
-        )
+        raise ValueError(f"is listed here from 0 to {ranges[len(rows[name]) - 1]:g} mm; give the deviations themselves")
     return 1e-3 * rows[name][column], 0.0

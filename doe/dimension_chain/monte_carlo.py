@@ -61,9 +61,7 @@ def draw(
 
     def chunk(index: int) -> dict[str, tuple[int, int]]:
         out = values[starts[index] : starts[index] + CHUNK]
-        closing = _closing(
-            function, parts, laws, shared is None, np.random.default_rng(streams[index]), len(out)
-        )
+        closing = _closing(function, parts, laws, shared is None, np.random.default_rng(streams[index]), len(out))
         np.copyto(out, closing[shared or "as_given"])
         return {law: _outside(each, limits) for law, each in closing.items()}
 

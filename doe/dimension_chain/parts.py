@@ -52,9 +52,7 @@ def allocated_part(link: Link, tolerance: float, grade: str | None = None) -> Pa
     return _part(link, link.nominal, lower, upper, None, grade)
 
 
-def _part(
-    link: Link, nominal: float, lower: float, upper: float, mean: float | None, grade: str | None
-) -> Part:
+def _part(link: Link, nominal: float, lower: float, upper: float, mean: float | None, grade: str | None) -> Part:
     lower, upper = round(lower, DIGITS), round(upper, DIGITS)
     return Part(
         link.name,

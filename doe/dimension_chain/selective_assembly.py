@@ -71,8 +71,7 @@ def selective_assembly(
     """Sort, match and judge ``wish.samples`` of every part; see `SelectiveAssembly`."""
     generator = np.random.default_rng(wish.seed)
     sizes = {
-        part.name: part.nominal_mm + quantile(part, part.distribution, generator.random(wish.samples))
-        for part in parts
+        part.name: part.nominal_mm + quantile(part, part.distribution, generator.random(wish.samples)) for part in parts
     }
     pair = _pair(parts, wish)
     edges = [class_edges(part, wish.classes, wish.by) for part in pair]

@@ -177,9 +177,7 @@ def _solved(search: Allocation, samples: int, seed: int, threads: int | None) ->
         cpk=nearer / (3 * deviation) if varies else None,
         linearisation=None if function.linear else _linearisation(function, parts, drawn),
         cost=_cost(chain, allocation),
-        selective=None
-        if chain.selective is None
-        else selective_assembly(function, parts, limits, chain.selective),
+        selective=None if chain.selective is None else selective_assembly(function, parts, limits, chain.selective),
         samples=samples,
         seed=seed,
     )
@@ -233,7 +231,9 @@ def _status(search: Allocation, parts: list[Part], allocation: list[Part], share
     nearest = ", ".join(f"{part.name} {part.text}" for part in allocation if part.name in free)
     if mode == "yield":
         wanted = f"a yield of {search.chain.allocate.target_yield:g} is wanted"
-        why = f"worst-case tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g} where {wanted}"
+        why = (
+            f"worst-case tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g} where {wanted}"
+        )
     else:
         kind = "worst-case" if mode == "worst_case" else "RSS"
         why = f"{kind} tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g}"

@@ -118,8 +118,6 @@ def _lattice(
         low, high = reaches[part.name]
         count = int(np.ceil((high - low) / step)) + 2
         # Shares of the cells about low, low + step, ...
-        edges: Array = (low + step * (np.arange(count + 1, dtype=float) - 0.5)) / function.coefficients[
-            part.name
-        ]
+        edges: Array = (low + step * (np.arange(count + 1, dtype=float) - 0.5)) / function.coefficients[part.name]
         spectrum = spectrum * np.fft.rfft(np.abs(np.diff(share_below(part, kinds[part.name], edges))), length)
     return start + step * np.arange(length, dtype=float), np.fft.irfft(spectrum, length)

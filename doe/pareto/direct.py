@@ -115,9 +115,7 @@ def direct_front(
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     check_search(low, high, population, 1, 2)
     if not 0.1 <= resample <= 0.9 or not 0.5 < confidence < 1.0:
-        raise ValueError(
-            f"resample = {resample}, confidence = {confidence}: must be in [0.1, 0.9] and (0.5, 1)"
-        )
+        raise ValueError(f"resample = {resample}, confidence = {confidence}: must be in [0.1, 0.9] and (0.5, 1)")
     if evaluations < 5 * population:
         raise ValueError(
             f"evaluations = {evaluations}: must be at least five populations ({5 * population}); give more runs "
@@ -187,9 +185,7 @@ def _search(
     from pymoo.problems.static import StaticProblem
 
     class Surviving(Survival):
-        def _do(
-            self, problem: Any, pop: Any, *arguments: Any, n_survive: int | None = None, **rest: Any
-        ) -> Any:
+        def _do(self, problem: Any, pop: Any, *arguments: Any, n_survive: int | None = None, **rest: Any) -> Any:
             costs, errors = pop.get("F"), pop.get("errors")
             place = _behind(order(costs, errors, confidence), pop.get("broken"))
             crowding = np.zeros(len(pop))

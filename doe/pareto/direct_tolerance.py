@@ -51,13 +51,10 @@ class Neighbourhood:
     def parts(self, offsets: Array) -> Array:
         """Responses (n, s, m) of parts at coded ``offsets`` (s, k) from every point."""
         shape = [
-            surface.around(self.points, offsets) - surface.predict(self.points)[:, None]
-            for surface in self.surfaces
+            surface.around(self.points, offsets) - surface.predict(self.points)[:, None] for surface in self.surfaces
         ]
         told: Array = (
-            self.values[:, None, :]
-            + np.stack(shape, axis=-1)
-            + np.einsum("sk,nkm->nsm", offsets, self.slopes)
+            self.values[:, None, :] + np.stack(shape, axis=-1) + np.einsum("sk,nkm->nsm", offsets, self.slopes)
         )
         return told
 

@@ -55,9 +55,7 @@ class Goals:
             _filled(lower, count, -np.inf),
             _filled(upper, count, np.inf),
             np.ones(count) if weight is None else np.array(weight, float),
-            np.array(
-                [(np.nan, np.nan) if pair is None else pair for pair in desired or [None] * count], float
-            ),
+            np.array([(np.nan, np.nan) if pair is None else pair for pair in desired or [None] * count], float),
         )
         for index, kind in enumerate(kinds):
             if kind == "target" and not np.isfinite(goals.target[index]):
@@ -94,9 +92,7 @@ class Goals:
             {
                 "min": high[..., i],
                 "max": -low[..., i],
-                "target": np.maximum(
-                    np.abs(low[..., i] - self.target[i]), np.abs(high[..., i] - self.target[i])
-                ),
+                "target": np.maximum(np.abs(low[..., i] - self.target[i]), np.abs(high[..., i] - self.target[i])),
             }[self.kinds[i]]
             for i in self.objectives
         ]

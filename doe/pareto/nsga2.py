@@ -186,10 +186,7 @@ def search(
         violations = np.vstack([judged.violations for _, judged in history])
         closest = _scaled(violations).sum(axis=1).argmin()
         raise InfeasibleError(points[closest], violations[closest])
-    kept = [
-        Archive(points[rows], judged.costs[rows])
-        for (points, judged), rows in zip(history, allowed, strict=True)
-    ]
+    kept = [Archive(points[rows], judged.costs[rows]) for (points, judged), rows in zip(history, allowed, strict=True)]
     return Search(archives(kept), count, sum(int(rows.sum()) for rows in allowed) / count)
 
 

@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-EXACT_FACTORS = (
-    4  # up to here every face of a box is searched; beyond, its corners and lines along the factors
-)
+EXACT_FACTORS = 4  # up to here every face of a box is searched; beyond, its corners and lines along the factors
 
 
 def identity(values: Array) -> Array:
@@ -57,9 +55,7 @@ class Quadratic:
         return np.minimum(*ends), np.maximum(*ends)
 
     def _form(self, points: Array) -> Array:
-        form: Array = (
-            self.constant + points @ self.linear + np.einsum("...j,jk,...k->...", points, self.matrix, points)
-        )
+        form: Array = self.constant + points @ self.linear + np.einsum("...j,jk,...k->...", points, self.matrix, points)
         return form
 
 

@@ -32,9 +32,7 @@ class SurrogateLoss:
     def sentence(self) -> str:
         """Whether the surfaces lose anything that can be told from noise."""
         if self.loss_percent is None or self.error_percent is None:
-            return (
-                "The direct front lies wholly behind that of the surfaces; give the direct search more runs."
-            )
+            return "The direct front lies wholly behind that of the surfaces; give the direct search more runs."
         figure = f"{self.loss_percent:+.1f} ± {self.error_percent:.1f} % of the direct front's hypervolume"
         if abs(self.loss_percent) <= self.error_percent:
             return f"The surfaces lose {figure}: nothing that can be told from the noise."
@@ -53,9 +51,7 @@ def noisy_hypervolume(
     """
     random = np.random.default_rng(seed)
     believed = hypervolume(costs, ideal, nadir)
-    drawn = [
-        hypervolume(costs + errors * random.standard_normal(costs.shape), ideal, nadir) for _ in range(draws)
-    ]
+    drawn = [hypervolume(costs + errors * random.standard_normal(costs.shape), ideal, nadir) for _ in range(draws)]
     return 2.0 * believed - float(np.mean(drawn)), float(np.std(drawn, ddof=1))
 
 

@@ -94,9 +94,7 @@ def widest_tolerances(
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     room = np.minimum(centre - low, high - centre)
     if (share <= 0.0).any() or not 0.0 < probability < 1.0:
-        raise ValueError(
-            f"ratios = {share.tolist()}, probability = {probability}: must be positive and in (0, 1)"
-        )
+        raise ValueError(f"ratios = {share.tolist()}, probability = {probability}: must be positive and in (0, 1)")
     if (room < -1e-9 * (high - low)).any():
         raise ValueError(f"pick = {centre.tolist()}: lies outside the region; pick a point within it")
     parts = _Parts(
@@ -153,9 +151,7 @@ class _Parts:
         """Largest scale up to which the limits are kept."""
         top = float((self.room / ratios).max())
         steps = np.linspace(0.0, top, march + 1)
-        first = next(
-            (i for i in range(1, march + 1) if self.kept(self.half(ratios, steps[i])) < probability), None
-        )
+        first = next((i for i in range(1, march + 1) if self.kept(self.half(ratios, steps[i])) < probability), None)
         if first is None:
             return top
         good, bad = float(steps[first - 1]), float(steps[first])
@@ -217,9 +213,7 @@ def _nothing(parts: _Parts, limit: str, cause: str) -> WidestTolerances:
     )
 
 
-def _result(
-    parts: _Parts, scale: float, ratios: Array, probability: float, names: Sequence[str]
-) -> WidestTolerances:
+def _result(parts: _Parts, scale: float, ratios: Array, probability: float, names: Sequence[str]) -> WidestTolerances:
     top = float((parts.room / ratios).max())
     if scale <= 1e-6 * top:
         first = names[int(parts.broken(parts.half(ratios, 1e-3 * top)).argmax())]

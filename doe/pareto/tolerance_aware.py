@@ -46,9 +46,7 @@ class ToleranceBox:
     distribution: Distribution = "normal"
     samples: int = 256
 
-    def judge(
-        self, surfaces: Sequence[Quadratic], goals: Goals, points: Array, doubt: Doubt | None = None
-    ) -> Judged:
+    def judge(self, surfaces: Sequence[Quadratic], goals: Goals, points: Array, doubt: Doubt | None = None) -> Judged:
         """Robust costs (n, q) and violations (n, c) of coded points (n, k); limits hold all over the ``doubt``."""
         below, above = (0.0, 0.0) if doubt is None else doubt(points)
         if self.kind == "worst_case":
@@ -139,9 +137,7 @@ def tolerance_aware_front(
     """
     low, high = lower + box.half, upper - box.half
     check_search(low, high, population, generations, keep)
-    found = search(
-        lambda points: box.judge(surfaces, goals, points, doubt), low, high, population, generations, seed
-    )
+    found = search(lambda points: box.judge(surfaces, goals, points, doubt), low, high, population, generations, seed)
     points, costs = found.archives[-1]
     nominal_baseline = goals.costs(_nominal(surfaces, baseline[None]))[0]
     baseline_costs = box.judge(surfaces, goals, baseline[None]).costs[0]

@@ -63,9 +63,7 @@ def _print_answer(outcome: Outcome) -> None:
         index = study.responses.index(gain.response)
         cells = [_value(each, index) for each in (outcome.baseline, outcome.pick)]
         rows.append((gain.response, *cells, f"{gain.percent:+.2f} ± {gain.error:.2f} %", gain.verdict))
-    print_table(
-        "confirmed by simulation (95 % intervals)", ("", "baseline", "pick", "improvement", "verdict"), rows
-    )
+    print_table("confirmed by simulation (95 % intervals)", ("", "baseline", "pick", "improvement", "verdict"), rows)
     print(statement(outcome.gains["pick"]))
     _print_limits(outcome)
     print(f"pick: {outcome.pick.reason}")
@@ -81,9 +79,7 @@ def _print_limits(outcome: Outcome) -> None:
     """Every limit at the baseline and at the pick, judged by simulation."""
     rows = []
     for limit in outcome.limits:
-        base = next(
-            each for each in limits_of(outcome.study, outcome.baseline) if each.response == limit.response
-        )
+        base = next(each for each in limits_of(outcome.study, outcome.baseline) if each.response == limit.response)
         told = [(f"{each.value:.5g} ± {each.error:.2g}", each.verdict) for each in (base, limit)]
         rows.append((f"{limit.response} {limit.sense} {limit.bound:g}", *told[0], *told[1]))
     if rows:
@@ -127,9 +123,7 @@ def _print_other_points(outcome: Outcome) -> None:
 def _print_beside(reference: str, outcome: Outcome) -> None:
     rows = []
     for row in outcome.beside:
-        rows.append(
-            (row.response, "level: min, mean, max", _three(row.our_range), _three(row.their_range), "")
-        )
+        rows.append((row.response, "level: min, mean, max", _three(row.our_range), _three(row.their_range), ""))
         for factor, (ours, theirs) in row.effects.items():
             same = "same sign" if ours[0] * theirs[0] > 0.0 else "opposite sign"
             rows.append(("", f"effect of {factor}", _effect(ours), _effect(theirs), same))

@@ -79,7 +79,5 @@ def _responses(outcome: Outcome, row: int | None) -> dict[str, Any]:
     runs = outcome.runs
     return {
         name: {"value": float(value), "error": or_none(error)}
-        for name, value, error in zip(
-            outcome.study.responses, runs.values[row], runs.errors[row], strict=True
-        )
+        for name, value, error in zip(outcome.study.responses, runs.values[row], runs.errors[row], strict=True)
     }

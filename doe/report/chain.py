@@ -87,9 +87,7 @@ def _print_selective(chain: ChainResult, verbose: bool) -> None:
     found = chain.selective
     assert found is not None
     low, high = found.worst_case_mm
-    needed = (
-        "no number of classes keeps" if found.classes_needed is None else f"{found.classes_needed} would keep"
-    )
+    needed = "no number of classes keeps" if found.classes_needed is None else f"{found.classes_needed} would keep"
     print(
         f"matched in {found.classes} classes: closing link {low:.4f} to {high:.4f} mm in worst case ({needed} the "
         f"limits), {100 * found.matched:.2f} % of the parts find a mate, {found.good:.6f} ± "

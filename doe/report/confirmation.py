@@ -62,10 +62,7 @@ def edge_record(edge: Edge) -> dict[str, Any]:
                 "bound": each.bound,
                 "per": each.unit,
                 "source": each.source,
-                "gains": {
-                    name: {"value": gain, "error": or_none(error)}
-                    for name, (gain, error) in each.gains.items()
-                },
+                "gains": {name: {"value": gain, "error": or_none(error)} for name, (gain, error) in each.gains.items()},
             }
             for each in edge.outward
         },
@@ -78,8 +75,7 @@ def edge_record(edge: Edge) -> dict[str, Any]:
 def gains_record(gains: Sequence[Gain]) -> dict[str, Any]:
     """Gains by response."""
     return {
-        gain.response: {"percent": gain.percent, "error_percent": gain.error, "verdict": gain.verdict}
-        for gain in gains
+        gain.response: {"percent": gain.percent, "error_percent": gain.error, "verdict": gain.verdict} for gain in gains
     }
 
 
@@ -89,9 +85,7 @@ def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
 
     front, loss = direct.front, direct.loss
     rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
-    surrogate = zip(
-        direct.surrogate_points, direct.surrogate_values, 1.96 * direct.surrogate_errors, strict=True
-    )
+    surrogate = zip(direct.surrogate_points, direct.surrogate_values, 1.96 * direct.surrogate_errors, strict=True)
     points = [_point(study, *row) for row in rows]
     return {
         "front": points,

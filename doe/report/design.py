@@ -91,9 +91,7 @@ def _print_evaluation(found: dict[str, Any], verbose: bool) -> None:
         told = "orthogonal" if found["blocks"]["orthogonal"] else "not orthogonal"
         cosine = found["blocks"]["largest_cosine"]
         rows.append(["blocks", f"{told} to the terms (largest cosine {cosine:.3f})"])
-    title = (
-        f"{found['model']} model, {len(found['terms'])} terms, over the {region['shape']} of {size} (coded)"
-    )
+    title = f"{found['model']} model, {len(found['terms'])} terms, over the {region['shape']} of {size} (coded)"
     print_table(title, ["", "value"], rows)
     terms = [
         [term, f"{inflation:.3f}", *(_percent(found["power_percent"][term][key]) for key in SIGMAS)]
@@ -101,9 +99,7 @@ def _print_evaluation(found: dict[str, Any], verbose: bool) -> None:
     ]
     print_table("", ["term", "VIF", "power for 1 sigma [%]", "power for 2 sigma [%]"], terms)
     if verbose:
-        shells = [
-            [f"{shell[key]:.3f}" for key in ("radius", "min", "mean", "max")] for shell in found["by_radius"]
-        ]
+        shells = [[f"{shell[key]:.3f}" for key in ("radius", "min", "mean", "max")] for shell in found["by_radius"]]
         print_table("scaled prediction variance by radius", ["radius", "min", "mean", "max"], shells)
 
 

@@ -85,9 +85,7 @@ def point_record(study: Study, surfaces: list[Surface], point: Array) -> dict[st
     return _named(study, point, values, half_widths(surfaces, errors))
 
 
-def asked_point_record(
-    study: Study, surfaces: list[Surface], front: ParetoFront, point: Array
-) -> dict[str, Any]:
+def asked_point_record(study: Study, surfaces: list[Surface], front: ParetoFront, point: Array) -> dict[str, Any]:
     """A point that was asked for: its gains over the baseline, and what the front makes of it."""
     from doe.pareto.archive import dominates
 
@@ -143,8 +141,7 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
     sure = record["pick_dominates_baseline"]
     print(record["statement"])
     flattered = ", ".join(
-        f"{name} {gain['selection_optimism_percent']:+.2f} %"
-        for name, gain in record["predicted_gains"].items()
+        f"{name} {gain['selection_optimism_percent']:+.2f} %" for name, gain in record["predicted_gains"].items()
     )
     print(f"the rule picks what errors flatter; luck expected in these gains: {flattered}")
     print(
@@ -152,9 +149,7 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
         f"baseline with probability {sure['probability']:.3f} ± {1.96 * sure['standard_error']:.3f}"
     )
     for limit in record["constraints"]:
-        print(
-            f"limit: {limit['response']} {limit['sense']} {limit['limit']:g}; the pick has {limit['value']:.5g}"
-        )
+        print(f"limit: {limit['response']} {limit['sense']} {limit['limit']:g}; the pick has {limit['value']:.5g}")
     if record["feasible_share"] < 1.0:
         print(f"{100 * record['feasible_share']:.1f} % of the evaluated points keep all limits")
     _print_convergence(record)
@@ -210,8 +205,7 @@ def _named(study: Study, point: Array, values: Array, errors: Array) -> dict[str
         "factors": dict(zip(study.factors, point.tolist(), strict=True)),
         "responses": dict(zip(study.responses, values.tolist(), strict=True)),
         "errors": {
-            name: None if np.isnan(error) else float(error)
-            for name, error in zip(study.responses, errors, strict=True)
+            name: None if np.isnan(error) else float(error) for name, error in zip(study.responses, errors, strict=True)
         },
     }
 

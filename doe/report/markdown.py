@@ -38,9 +38,7 @@ def _render(block: Block) -> str:
         case Bullets(items):
             return "\n".join(f"- {_plain(item)}" for item in items)
         case Tiles(tiles):
-            rows = [
-                (each.name, f"{each.value} {each.unit}".strip(), ", ".join(each.beneath)) for each in tiles
-            ]
+            rows = [(each.name, f"{each.value} {each.unit}".strip(), ", ".join(each.beneath)) for each in tiles]
             return _table(Table("", ("clearance", "value", ""), rows, text_columns=(2,)))
         case Table():
             return _table(block)
@@ -51,9 +49,7 @@ def _table(table: Table) -> str:
     words = {0, *table.text_columns}
     lines = [f"**{_plain(table.caption)}**", ""] if table.caption else []
     lines.append(_row(table.header))
-    lines.append(
-        "|" + "|".join(" :-- " if place in words else " --: " for place in range(len(table.header))) + "|"
-    )
+    lines.append("|" + "|".join(" :-- " if place in words else " --: " for place in range(len(table.header))) + "|")
     lines += [_row(row) for row in table.rows]
     return "\n".join(lines + (["", _plain(table.note)] if table.note else []))
 

@@ -42,16 +42,12 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
         top = values.max()
         for bound in _bounds(study, surface.name):
             if floor < bound < top + 0.5 * span:
-                corners = [
-                    np.array([[side[0, 0], side[0, -1]], [side[-1, 0], side[-1, -1]]]) for side in (x, y)
-                ]
+                corners = [np.array([[side[0, 0], side[0, -1]], [side[-1, 0], side[-1, -1]]]) for side in (x, y)]
                 plane = np.full((2, 2), bound)
                 axis.plot_surface(*corners, plane, color="tab:red", alpha=0.25, linewidth=0)
                 top = max(top, bound)
             if values.min() < bound < values.max():
-                axis.contour(
-                    x, y, values, zdir="z", offset=floor, colors="tab:red", levels=[bound], linewidths=2.0
-                )
+                axis.contour(x, y, values, zdir="z", offset=floor, colors="tab:red", levels=[bound], linewidths=2.0)
         axis.set_zlim(floor, top)
         axis.set_xlabel(label(study.factors[0]), labelpad=8)
         axis.set_ylabel(label(study.factors[panel]), labelpad=8)
@@ -89,9 +85,7 @@ def pareto_front(outcome: Outcome, path: Path) -> None:
             coded = to_coded(each.point, study.centre, study.step)
             told = [float(surface.predict(coded)) for surface in surfaces]
             size = 13 if marker == "*" else 6
-            axis.plot(
-                told[i], told[j], marker, color=color, markersize=size, label=f"{words} on the surfaces"
-            )
+            axis.plot(told[i], told[j], marker, color=color, markersize=size, label=f"{words} on the surfaces")
             axis.plot(
                 each.values[i],
                 each.values[j],

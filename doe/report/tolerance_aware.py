@@ -64,11 +64,7 @@ def print_tolerance_aware(record: dict[str, Any]) -> None:
     """What the tolerances cost, and whether the picks survive them."""
     pick, names = record["pick"], list(record["baseline_robust"])
     widths = ", ".join(f"{name} ± {width:g}" for name, width in record["half_widths"].items())
-    kind = (
-        "worst case"
-        if record["kind"] == "worst_case"
-        else f"{100 * record['quantile']:g} % of the parts keep"
-    )
+    kind = "worst case" if record["kind"] == "worst_case" else f"{100 * record['quantile']:g} % of the parts keep"
     rows = [
         ("baseline", *(f"{record['baseline_robust'][name]:.5g}" for name in names)),
         ("plain pick", *(f"{record['plain_pick_robust'][name]:.5g}" for name in names)),

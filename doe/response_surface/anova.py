@@ -47,9 +47,7 @@ def term_rows(terms: tuple[str, ...], solution: LeastSquares) -> list[AnovaRow]:
     """Partial sum of squares, F and p of each coefficient."""
     count = len(terms)
     squares = (solution.coefficients[:count] ** 2 / np.diag(solution.inverse)[:count]).tolist()
-    return [
-        row(term, ss, 1, solution.mean_square, solution.dof) for term, ss in zip(terms, squares, strict=True)
-    ]
+    return [row(term, ss, 1, solution.mean_square, solution.dof) for term, ss in zip(terms, squares, strict=True)]
 
 
 def anova(
@@ -67,10 +65,7 @@ def anova(
     return [
         row("model", max(within - residual, 0.0), model_df, *error),
         *(each for each in term_rows(terms, solution) if each["source"] != "1"),
-        *(
-            [row("block", solution.partial_sum(block_columns), len(block_columns), *error)]
-            * bool(block_columns)
-        ),
+        *([row("block", solution.partial_sum(block_columns), len(block_columns), *error)] * bool(block_columns)),
         row("residual", residual, solution.dof),
         *_lack_of_fit(response, solution, groups),
         AnovaRow(
@@ -110,9 +105,7 @@ def complement(part: float, whole: float) -> float | None:
     return None if share is None else 1.0 - share
 
 
-def _lack_of_fit(
-    response: Array, solution: LeastSquares, groups: NDArray[np.int64]
-) -> tuple[AnovaRow, AnovaRow]:
+def _lack_of_fit(response: Array, solution: LeastSquares, groups: NDArray[np.int64]) -> tuple[AnovaRow, AnovaRow]:
     pure_df = len(response) - len(np.unique(groups))
     if pure_df == 0:
         return row("lack_of_fit", None, solution.dof), row("pure_error", None, 0)

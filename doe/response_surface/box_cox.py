@@ -116,9 +116,7 @@ def check_positive(values: ArrayLike, name: str) -> None:
     bad = np.flatnonzero(~(np.isfinite(response) & (response > 0.0)))
     if bad.size:
         found = f"the value of run {bad[0] + 1} is {response[bad[0]]:g}"
-        raise ValueError(
-            f'{name}: {found}, but a power transform needs positive values; use transform = "none"'
-        )
+        raise ValueError(f'{name}: {found}, but a power transform needs positive values; use transform = "none"')
 
 
 def forward(values: ArrayLike, exponent: float) -> Array:

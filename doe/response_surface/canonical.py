@@ -48,9 +48,7 @@ class Canonical(TypedDict):
     distance: float | None
 
 
-def stationary_point(
-    terms: tuple[str, ...], coefficients: Array, centre: Array, step: Array
-) -> StationaryPoint | None:
+def stationary_point(terms: tuple[str, ...], coefficients: Array, centre: Array, step: Array) -> StationaryPoint | None:
     """The single stationary point, or None where a direction does not bend."""
     _, gradient, matrix = second_order(terms, coefficients, centre.size)
     eigenvalues = np.linalg.eigvalsh(matrix).astype(float)
@@ -101,9 +99,7 @@ def describe_canonical(name: str, found: Canonical, place: StationaryPoint | Non
     head = f"{name}: stationary point at {where} (coded), {region} the region of the runs, "
     if "ridge" not in found["nature"]:
         kind = f"a {found['nature']} (eigenvalues {values})"
-        return (
-            head + kind + ("." if found["inside"] else "; the best point lies on the border of the region.")
-        )
+        return head + kind + ("." if found["inside"] else "; the best point lies on the border of the region.")
     axis = int(np.argmin(np.abs(found["eigenvalues"])))
     direction = " ".join(
         f"{x:+.2f} {letter}" for letter, x in zip(letters(26), found["eigenvectors"][axis], strict=False)

@@ -61,9 +61,7 @@ def diagnose(solution: LeastSquares, response: Array) -> Diagnostics:
     # Of a run that takes up the whole residual nothing is left to judge it by.
     rest = solution.dof - standardized**2
     judged = tested & (rest > EXACT * solution.dof) & (solution.dof > 1)
-    studentized = _where(
-        judged, standardized * np.sqrt(max(solution.dof - 1, 0) / np.where(judged, rest, 1.0))
-    )
+    studentized = _where(judged, standardized * np.sqrt(max(solution.dof - 1, 0) / np.where(judged, rest, 1.0)))
     cook = standardized**2 * solution.leverage / safe / len(solution.coefficients)
     columns = (
         *(response.tolist(), (response - solution.residuals).tolist(), solution.residuals.tolist()),

@@ -163,9 +163,7 @@ def fit_gaussian(
 def _search(
     objective: Callable[[Array], tuple[float, Array]], first: Array, bounds: Array, steps: int
 ) -> tuple[Array, float]:
-    found = optimize.minimize(
-        objective, first, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": steps}
-    )
+    found = optimize.minimize(objective, first, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": steps})
     return found.x, found.fun
 
 

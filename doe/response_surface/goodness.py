@@ -20,9 +20,7 @@ def observation_variance(solution: LeastSquares) -> float:
     return solution.mean_square * float((1.0 / solution.weights).mean())
 
 
-def goodness(
-    solution: LeastSquares, response: Array, predicted: Array, block: NDArray[np.int64]
-) -> dict[str, Any]:
+def goodness(solution: LeastSquares, response: Array, predicted: Array, block: NDArray[np.int64]) -> dict[str, Any]:
     """R2 and its kin on the scatter within blocks; the others by the definitions of Myers et al."""
     within = sum_within(response, solution.weights, block)
     free = len(response) - len(np.unique(block))

@@ -28,9 +28,7 @@ Array = NDArray[np.float64]
 Told = Literal["repeats", "known variance"]
 
 SIGNIFICANT = 0.05
-REACH = (
-    1.0  # coded units within which what a surface misses stays alike: half the edge of the cube of a design
-)
+REACH = 1.0  # coded units within which what a surface misses stays alike: half the edge of the cube of a design
 
 
 @dataclass(frozen=True)
@@ -86,9 +84,7 @@ def correlation(one: Array, other: Array) -> Array:
     return alike
 
 
-def draw_fields(
-    error: ModelError | None, coded: Array, draws: int, random: np.random.Generator
-) -> Array | None:
+def draw_fields(error: ModelError | None, coded: Array, draws: int, random: np.random.Generator) -> Array | None:
     """Fields (draws, n) that the surface might as well miss at coded points (n, k); None without a model error."""
     if error is None:
         return None

@@ -291,9 +291,7 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
     covariance = solution.mean_square * solution.inverse
     groups = replicate_groups(data.points, data.block)
     known = (
-        None
-        if variances is None
-        else compare(solution, matrix, response, variances, data.replicates, groups, count)
+        None if variances is None else compare(solution, matrix, response, variances, data.replicates, groups, count)
     )
     table = anova(terms, solution, response, data.points, data.block)
     if known is not None:

@@ -105,9 +105,7 @@ def _summary(surface: Surface) -> str:
     precision = surface.adequate_precision
     weak = precision is not None and precision < DISCERNIBLE
     tail = (
-        f" Adequate precision {precision:.3g} is below {DISCERNIBLE:g}: the scatter hides the surface."
-        if weak
-        else ""
+        f" Adequate precision {precision:.3g} is below {DISCERNIBLE:g}: the scatter hides the surface." if weak else ""
     )
     if adjusted - predicted > FAR_APART:
         return (

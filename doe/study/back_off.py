@@ -65,9 +65,7 @@ class Conditioned:
         """Mean (n,) and standard deviation (n,) of the error at coded points (n, k) of ``stated`` standard errors (n,)."""
         from doe.response_surface.model_error import correlation
 
-        link = (
-            self._scale**2 * correlation(coded, self._missed.points) * np.outer(stated, self._missed.stated)
-        )
+        link = self._scale**2 * correlation(coded, self._missed.points) * np.outer(stated, self._missed.stated)
         told = link @ self._solve
         left = (self._scale * stated) ** 2 - (told * link).sum(axis=1)
         return told @ self._missed.misses, np.sqrt(left.clip(0.0))

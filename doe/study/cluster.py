@@ -134,9 +134,7 @@ def _client(address: str) -> Iterator[Any]:
     # What answers there may be anything, and its words mean anything.
     except Exception:
         raise InputError(
-            [
-                f"--scheduler {address}: no dask scheduler answers there within {CONNECT_S:g} s; check the address"
-            ]
+            [f"--scheduler {address}: no dask scheduler answers there within {CONNECT_S:g} s; check the address"]
         ) from None
     try:
         try:

@@ -128,9 +128,7 @@ def statement(gains: Sequence[Gain]) -> str:
     told = {
         "real, more than its error": [gain for gain in gains if gain.percent > wider * gain.error],
         "a real loss, more than its error": [gain for gain in gains if -gain.percent > wider * gain.error],
-        "inside its own noise: no gain is shown": [
-            gain for gain in gains if abs(gain.percent) <= wider * gain.error
-        ],
+        "inside its own noise: no gain is shown": [gain for gain in gains if abs(gain.percent) <= wider * gain.error],
     }
     parts = [
         f"{', '.join(f'{each.response} {each.percent:+.2f} ± {wider * each.error:.2f} %' for each in group)}: {words}"

@@ -85,9 +85,7 @@ def evaluation(study: Study, design: Design) -> dict[str, Any]:
 
     check_runs(study, design)
     factors = len(study.factors)
-    model = max(
-        (response.model for response in study.file.response), key=lambda each: len(model_terms(factors, each))
-    )
+    model = max((response.model for response in study.file.response), key=lambda each: len(model_terms(factors, each)))
     terms = model_terms(factors, model)
     found = evaluate(design.coded, terms, design.block, region=design.region, reach=design.extent)
     return {"model": model, **found}

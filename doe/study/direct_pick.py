@@ -97,9 +97,7 @@ class Local:
     baseline: Array
 
 
-def local_of(
-    study: Study, surfaces: Sequence[Surface], direct: Direct, pick: Confirmed, baseline: Confirmed
-) -> Local:
+def local_of(study: Study, surfaces: Sequence[Surface], direct: Direct, pick: Confirmed, baseline: Confirmed) -> Local:
     """About the simulated pick of a direct front."""
     coded = to_coded(pick.point, study.centre, study.step)
     here = _neighbourhood(study, surfaces, direct, coded[None], pick.values[None])

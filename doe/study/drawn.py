@@ -81,6 +81,5 @@ def quadratics(surfaces: Sequence[Surface], factors: int) -> list[Quadratic]:
     from doe.response_surface.terms import second_order
 
     return [
-        Quadratic(*second_order(surface.terms, surface.coefficients, factors), link_of(surface))
-        for surface in surfaces
+        Quadratic(*second_order(surface.terms, surface.coefficients, factors), link_of(surface)) for surface in surfaces
     ]

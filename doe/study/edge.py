@@ -188,8 +188,6 @@ def _simulated(
         joint = np.hypot(*(np.nan_to_num(each.error[goals.objectives]) for each in (pick, there)))
         told[index] = {
             study.responses[response]: (float(g), float(e))
-            for response, g, e in zip(
-                goals.objectives, gain, joint / (AHEAD * study.step[index]), strict=True
-            )
+            for response, g, e in zip(goals.objectives, gain, joint / (AHEAD * study.step[index]), strict=True)
         }
     return told

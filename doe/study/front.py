@@ -113,8 +113,7 @@ def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
     from scipy import stats
 
     factors = [
-        float(stats.t.ppf(0.975, surface.interval_dof)) if surface.interval_dof > 0 else np.nan
-        for surface in surfaces
+        float(stats.t.ppf(0.975, surface.interval_dof)) if surface.interval_dof > 0 else np.nan for surface in surfaces
     ]
     widths: Array = np.array(factors) * standard_errors
     return widths

@@ -55,9 +55,7 @@ def reference_runs(study: Study) -> Runs | None:
         distance = [float(np.abs(table.coded[row] - point).max()) for row in left]
         if not distance or min(distance) > 0.02:
             raise InputError(
-                [
-                    f"{path}: no run left for the design point {point.round(3).tolist()} (coded); mend the reference"
-                ]
+                [f"{path}: no run left for the design point {point.round(3).tolist()} (coded); mend the reference"]
             )
         order.append(left.pop(int(np.argmin(distance))))
     return Runs(table.coded[order], table.actual[order], table.values[order], table.errors[order])

@@ -52,12 +52,8 @@ class Runs:
 
     def only(self, places: list[int]) -> Runs:
         """The rows at these places."""
-        coded, actual, values, errors = (
-            array[places] for array in (self.coded, self.actual, self.values, self.errors)
-        )
-        replicates, block = (
-            None if array is None else array[places] for array in (self.replicates, self.block)
-        )
+        coded, actual, values, errors = (array[places] for array in (self.coded, self.actual, self.values, self.errors))
+        replicates, block = (None if array is None else array[places] for array in (self.replicates, self.block))
         return Runs(coded, actual, values, errors, self.notes, replicates, block)
 
 
@@ -157,6 +153,4 @@ def read_runs(study: Study, path: Path) -> Runs:
     """Runs of a CSV table instead of simulated ones. Raises InputError."""
     table = study.read_table(path)
     coded = to_coded(table.actual, study.centre, study.step)
-    return Runs(
-        coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block
-    )
+    return Runs(coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block)

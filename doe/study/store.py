@@ -120,9 +120,7 @@ class Store:
                 if not tables:
                     for statement in SCHEMA:
                         connection.execute(statement)
-                    connection.executemany(
-                        "INSERT INTO meta VALUES (?, ?)", [("format", FORMAT), ("version", VERSION)]
-                    )
+                    connection.executemany("INSERT INTO meta VALUES (?, ?)", [("format", FORMAT), ("version", VERSION)])
                     tables = self._tables()
         meta = dict(self._connection.execute("SELECT name, value FROM meta")) if "meta" in tables else {}
         found = meta.get("version", "1") if meta.get("format") == FORMAT else ""
@@ -328,9 +326,7 @@ class Store:
                     f"{self.path}: cannot be written ({error}); finished runs are kept: make room on the disk and start "
                     "again"
                 ) from None
-            raise InputError(
-                [f"{self.path}: cannot be used as a store of runs ({error}); move it away"]
-            ) from None
+            raise InputError([f"{self.path}: cannot be used as a store of runs ({error}); move it away"]) from None
 
 
 def run_key(scene: dict[str, Any], version: str) -> str:

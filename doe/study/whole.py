@@ -124,16 +124,10 @@ def run_study(
         clock.lap("direct_s")
         chosen = choose(study, surfaces, found, searched, simulations)
         confirmed, at = chosen.confirmed, None if searched is None else searched.front.points
-        edge = edge_of(
-            study, surfaces, confirmed["pick"], chosen.front.points, at, simulations if direct else None
-        )
+        edge = edge_of(study, surfaces, confirmed["pick"], chosen.front.points, at, simulations if direct else None)
         clock.lap("confirmation_s")
     pick = confirmed["pick"].point
-    local = (
-        None
-        if searched is None
-        else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])
-    )
+    local = None if searched is None else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])
     tolerances = _tolerances(study, surfaces, pick, local)
     chains, notes = solve_chains(study, pick, tolerances)
     if reference is not None:
@@ -152,9 +146,7 @@ def run_study(
         tried=chosen.tried,
         confirmed=confirmed,
         gains={
-            name: gains(study, confirmed["baseline"], each)
-            for name, each in confirmed.items()
-            if name != "baseline"
+            name: gains(study, confirmed["baseline"], each) for name, each in confirmed.items() if name != "baseline"
         },
         tolerances=tolerances,
         chains=chains,
@@ -177,9 +169,7 @@ def _checked(study: Study) -> Runs | None:
     return reference_runs(study)
 
 
-def _tolerances(
-    study: Study, surfaces: list[Surface], point: Array, local: Local | None
-) -> WidestTolerances | None:
+def _tolerances(study: Study, surfaces: list[Surface], point: Array, local: Local | None) -> WidestTolerances | None:
     from doe.study.widest import widest_of
 
     settings = study.file.tolerances

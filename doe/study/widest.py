@@ -61,9 +61,7 @@ def widest_of(
         return np.hstack([goals.costs(values), goals.violations(values, values)])
 
     # Of every part its own nominal point and baseline: they may have surfaces of their own.
-    centre_values, reference_values = (
-        responses(np.repeat(each, settings.samples, axis=0)) for each in (nominal, base)
-    )
+    centre_values, reference_values = (responses(np.repeat(each, settings.samples, axis=0)) for each in (nominal, base))
     if local is not None:
         reference_values = np.broadcast_to(local.baseline, reference_values.shape)
     reference = goals.costs(reference_values)

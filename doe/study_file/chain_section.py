@@ -33,15 +33,11 @@ class StudyChain(Strict):
         if self.file is None and not self.link:
             raise ValueError("link: missing; give the links, or the file that has them")
         if self.file is not None and (self.link or self.allocate or self.monte_carlo or self.selective):
-            raise ValueError(
-                f"file = {self.file!r}: has the links and all about them; leave out one or the other"
-            )
+            raise ValueError(f"file = {self.file!r}: has the links and all about them; leave out one or the other")
         return self
 
 
-def chain_table(
-    chain: StudyChain, folder: Path, value: float, half_width: float | None = None
-) -> Mapping[str, Any]:
+def chain_table(chain: StudyChain, folder: Path, value: float, half_width: float | None = None) -> Mapping[str, Any]:
     """CHAIN.toml contents of a study's chain at a picked value [mm]; ``folder`` is where the study lies.
 
     ``half_width`` [mm] stands in where the chain gives none. Raises InputError where neither is there, or the chain is
@@ -50,9 +46,7 @@ def chain_table(
     half = chain.half_width_mm if chain.half_width_mm is not None else half_width
     if half is None:
         raise InputError(
-            [
-                f"chain {chain.name}: half_width_mm: missing, and no tolerance of {chain.factor} is known; add it"
-            ]
+            [f"chain {chain.name}: half_width_mm: missing, and no tolerance of {chain.factor} is known; add it"]
         )
     limits = {"lower_mm": value - half, "upper_mm": value + half}
     if chain.file is not None:

@@ -25,9 +25,7 @@ class Factor(Strict):
 
 
 Kind = Literal["central_composite", "box_behnken", "full_factorial", "latin_hypercube", "sobol"]
-Alpha = Literal[
-    "rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "face_centred", "inscribed"
-]
+Alpha = Literal["rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "face_centred", "inscribed"]
 
 # Keys that only some kinds of design know.
 KEYS_OF = {

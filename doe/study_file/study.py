@@ -80,11 +80,7 @@ class StudyFile(Strict):
             repeated = [name for name, count in Counter(given).items() if count > 1]
             faults += [f"{kind}.name = {name!r}: used more than once; name each once" for name in repeated]
         known = ", ".join(names)
-        faults += [
-            f"baseline.{key}: no such factor; name one of {known}"
-            for key in self.baseline
-            if key not in names
-        ]
+        faults += [f"baseline.{key}: no such factor; name one of {known}" for key in self.baseline if key not in names]
         faults += [
             f"chain.factor = {chain.factor!r}: no such factor; name one of {known}"
             for chain in self.chain

@@ -61,13 +61,9 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
         if name not in table.columns
     ]
     used = [name for name in (*wanted, *errors, "replicates", "block", "run") if name in table.columns]
-    faults += [
-        f"{path}: column {name!r} comes {header[name]} times; keep one" for name in used if header[name] > 1
-    ]
+    faults += [f"{path}: column {name!r} comes {header[name]} times; keep one" for name in used if header[name] > 1]
     for name in used:
-        faults += _faults_of(
-            path, name, table[name], optional=name in errors, whole=name not in wanted + errors
-        )
+        faults += _faults_of(path, name, table[name], optional=name in errors, whole=name not in wanted + errors)
     if faults:
         raise InputError(faults)
     if "run" in table.columns and table["run"].duplicated().any():
@@ -82,9 +78,7 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     )
 
 
-def _means_of_replicates(
-    path: Path, table: pd.DataFrame, factors: list[str], responses: list[str]
-) -> pd.DataFrame:
+def _means_of_replicates(path: Path, table: pd.DataFrame, factors: list[str], responses: list[str]) -> pd.DataFrame:
     """One row a run: mean, half width and number of its replicates."""
     from scipy import special
 

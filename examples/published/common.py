@@ -95,9 +95,7 @@ def verdict_of(beyond: float, error: float) -> Verdict:
 def findings_table(findings: Sequence[Finding]) -> Table:
     """A line a finding."""
     header = ("finding", "source", "kind", "ours", "verdict")
-    return Table(
-        "what is published", header, tuple((f.words, f.source, f.kind, f.ours, f.verdict) for f in findings)
-    )
+    return Table("what is published", header, tuple((f.words, f.source, f.kind, f.ours, f.verdict) for f in findings))
 
 
 def tally_table(findings: Sequence[Finding]) -> Table:
@@ -107,9 +105,7 @@ def tally_table(findings: Sequence[Finding]) -> Table:
         "published findings by kind",
         ("kind", "findings", *get_args(Verdict)),
         tuple(
-            (kind, f"{len(own)}", *(f"{own.count(word)}" for word in get_args(Verdict)))
-            for kind, own in rows
-            if own
+            (kind, f"{len(own)}", *(f"{own.count(word)}" for word in get_args(Verdict))) for kind, own in rows if own
         ),
     )
 
@@ -118,9 +114,7 @@ def tally(findings: Sequence[Finding]) -> str:
     """The same in words: 'measured 2 of 3 agree (1 untested), trend 3 of 3 agree'."""
     parts = []
     for kind, count, agree, _, *rest in tally_table(findings).rows:
-        doubts = ", ".join(
-            f"{n} {word}" for n, word in zip(rest, ("unclear", "untested"), strict=True) if n != "0"
-        )
+        doubts = ", ".join(f"{n} {word}" for n, word in zip(rest, ("unclear", "untested"), strict=True) if n != "0")
         parts.append(f"{kind} {agree} of {count} agree" + (f" ({doubts})" if doubts else ""))
     return ", ".join(parts)
 

@@ -114,9 +114,7 @@ def rolling_power(scene: Scene) -> tuple[float, float]:
     loads = contact_loads(scene)
     for side, radius in zip(loads, reduced_radii(scene), strict=True):
         law = rolling_law(scene, oil, radius)
-        power = np.array(
-            [2.0 * speed * rolling_force(law, load, speed) if load > 0.0 else 0.0 for load in side]
-        )
+        power = np.array([2.0 * speed * rolling_force(law, load, speed) if load > 0.0 else 0.0 for load in side])
         total, idle = total + power.sum(), idle + power[loads[1] == 0.0].sum()
     return float(total), float(idle)
 
@@ -146,8 +144,7 @@ def point(name: str, speed_rpm: float, load_n: float, grade: int) -> dict[str, A
     bore, outside = float(row["bore_mm"]), float(row["outside_diameter_mm"])
     rolling, sliding = (shaft * moment for moment in skf_moments(speed_rpm, load_n, viscosity, bore, outside))
     palmgren = [
-        shaft * sum(palmgren_moments(speed_rpm, load_n, viscosity, 0.5 * (bore + outside), f0))
-        for f0 in (2, 3)
+        shaft * sum(palmgren_moments(speed_rpm, load_n, viscosity, 0.5 * (bore + outside), f0)) for f0 in (2, 3)
     ]
     (ours, idle), (short, _) = rolling_power(flooded), rolling_power(starved)
     return {
@@ -167,9 +164,7 @@ def spread(ratios: Sequence[float]) -> tuple[float, float, float]:
 
 def exponents(frame: pd.DataFrame, column: str) -> np.ndarray:
     """Of speed, load and viscosity, each bearing with its own constant."""
-    variables = np.log(
-        np.column_stack((frame["speed_rpm"], frame["load_N"], frame["grade"].map(viscosity_cst)))
-    )
+    variables = np.log(np.column_stack((frame["speed_rpm"], frame["load_N"], frame["grade"].map(viscosity_cst))))
     basis = np.hstack((variables, pd.get_dummies(frame["bearing"]).to_numpy(float)))
     return np.linalg.lstsq(basis, np.log(frame[column].to_numpy()), rcond=None)[0][:3]
 
@@ -237,9 +232,7 @@ def regime_table(frame: pd.DataFrame) -> Table:
         "flooded/Palmgren f0 2",
         "idle rollers",
     )
-    return Table(
-        "median, and where 80 % of the points lie; share of ours by rollers without load", header, tuple(rows)
-    )
+    return Table("median, and where 80 % of the points lie; share of ours by rollers without load", header, tuple(rows))
 
 
 def exponent_table(frame: pd.DataFrame) -> Table:

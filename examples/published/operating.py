@@ -229,9 +229,7 @@ def skf_moments(
     mean = 0.5 * (bore_mm + outside_mm)
     flow = viscosity_cst * speed_rpm
     heating = 1.0 / (1.0 + 1.84e-9 * (speed_rpm * mean) ** 1.28 * viscosity_cst**0.64)
-    starvation = math.exp(
-        -3e-8 * flow * (bore_mm + outside_mm) * math.sqrt(5.1 / (2.0 * (outside_mm - bore_mm)))
-    )
+    starvation = math.exp(-3e-8 * flow * (bore_mm + outside_mm) * math.sqrt(5.1 / (2.0 * (outside_mm - bore_mm))))
     rolling = heating * starvation * 1.09e-6 * mean**2.41 * load_n**0.31 * flow**0.6
     boundary = math.exp(-2.6e-8 * flow**1.4 * mean)
     sliding = 0.0015 * mean**0.9 * load_n * (boundary * 0.15 + (1.0 - boundary) * 0.02)
@@ -258,9 +256,7 @@ def friction(
     records = []
     for speed, load in points:
         shaft = speed * math.pi / 30.0 * 1e-3
-        result = simulated(
-            CHEN, effort, (f"operation.inner_speed_rpm={speed}", f"operation.radial_load_N={load}")
-        )
+        result = simulated(CHEN, effort, (f"operation.inner_speed_rpm={speed}", f"operation.radial_load_N={load}"))
         terms = result.power_terms
         races = ("outer_race_traction", "inner_race_traction", "rolling_resistance", "race_damping")
         rolling, sliding = skf_moments(speed, load, viscosity, 27.0, 60.0)
@@ -336,12 +332,8 @@ def draw_friction(by_speed: pd.DataFrame, by_load: pd.DataFrame, path: Path) -> 
     for axis, part, key in zip(axes[0], (by_speed, by_load), ("speed_rpm", "load_N"), strict=True):
         axis.plot(part[key], part["total_W"], "o-", label="ours, total")
         axis.plot(part[key], part["races_W"], "o--", label="ours, races")
-        axis.plot(
-            part[key], part["skf_rolling_W"] + part["skf_sliding_W"], "k-", label="SKF, rolling and sliding"
-        )
-        axis.fill_between(
-            part[key], part["palmgren_2_W"], part["palmgren_6_W"], alpha=0.2, label="Palmgren, f0 2 to 6"
-        )
+        axis.plot(part[key], part["skf_rolling_W"] + part["skf_sliding_W"], "k-", label="SKF, rolling and sliding")
+        axis.fill_between(part[key], part["palmgren_2_W"], part["palmgren_6_W"], alpha=0.2, label="Palmgren, f0 2 to 6")
         axis.set_xlabel(key)
         axis.set_ylabel("power loss [W]")
         axis.grid(alpha=0.3)

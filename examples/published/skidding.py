@@ -62,9 +62,7 @@ ASSUMPTIONS: tuple[tuple[str, tuple[str, ...]], ...] = (
 QUICK = ("one traction curve", "oil fraction 5 %")
 
 
-def slip(
-    effort: Effort, speed_rpm: float, load_n: float, overrides: Sequence[str] = ()
-) -> tuple[float, float, float]:
+def slip(effort: Effort, speed_rpm: float, load_n: float, overrides: Sequence[str] = ()) -> tuple[float, float, float]:
     """Cage slip with its 95 % error, and cage speed [rpm]."""
     point = (f"operation.inner_speed_rpm={speed_rpm}", f"operation.radial_load_N={load_n}")
     result = simulated(NU215, effort, (*point, *overrides))
@@ -86,18 +84,14 @@ def nu215(
     for name, overrides in ASSUMPTIONS:
         if assumptions is None or name in assumptions:
             records.append((name, 5000, 1000, *slip(effort, 5000, 1000, overrides)))
-    frame = pd.DataFrame(
-        records, columns=["case", "speed_rpm", "load_N", "slip", "slip_error", "cage_speed_rpm"]
-    )
+    frame = pd.DataFrame(records, columns=["case", "speed_rpm", "load_N", "slip", "slip_error", "cage_speed_rpm"])
     base = frame[frame["case"] == "as assumed"].set_index(["speed_rpm", "load_N"])
     changed = frame[frame["case"] != "as assumed"].set_index("case")
     map_rows = tuple(
         (f"{speed} rpm", *(percent_slip(*base.loc[(speed, load), ["slip", "slip_error"]]) for load in loads))
         for speed in speeds
     )
-    case_rows = tuple(
-        (str(name), percent_slip(row["slip"], row["slip_error"])) for name, row in changed.iterrows()
-    )
+    case_rows = tuple((str(name), percent_slip(row["slip"], row["slip_error"])) for name, row in changed.iterrows())
     found = findings(base, changed, loads)
 
     def draw(path: Path) -> None:
@@ -199,9 +193,7 @@ def assumed_findings(here: pd.Series, changed: pd.DataFrame) -> list[Finding]:
         row = named[tight]
         told = f"{percent_slip(row['slip'], row['slip_error'])} % ({tight})"
         words = "no slip of the set at tight clearance, all rollers preloaded"
-        found.append(
-            Finding(words, PART_III, "measured", told, "agrees" if abs(row["slip"]) < NO_SLIP else "differs")
-        )
+        found.append(Finding(words, PART_III, "measured", told, "agrees" if abs(row["slip"]) < NO_SLIP else "differs"))
     return found
 
 

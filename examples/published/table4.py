@@ -94,9 +94,7 @@ def coded(points: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame({name: (points[name] - centre) / step for name, (_, centre, step) in FACTORS.items()})
 
 
-def level_ratio(
-    values: pd.Series, errors: pd.Series, reference: Theirs, response: str
-) -> tuple[float, float]:
+def level_ratio(values: pd.Series, errors: pd.Series, reference: Theirs, response: str) -> tuple[float, float]:
     """Our mean over the design runs as a share of theirs, with its 95 % error."""
     weight = reference.counts / reference.counts.sum()
     mean, their_mean = float(weight @ values), float(weight @ reference.values[response])
@@ -140,9 +138,7 @@ def sign(own: tuple[float, float], other: tuple[float, float]) -> str:
 def reciprocal_terms(points: pd.DataFrame, power: pd.Series) -> tuple[float, float, float, float]:
     """Constant [W], 1/guide and 1/pocket term at the centre [W] of the power loss, and R^2 of that fit."""
     guide, pocket = points["guide_clearance_mm"], points["pocket_clearance_mm"]
-    basis = np.column_stack(
-        (np.ones(len(points)), 0.15 / guide, 0.30 / pocket, points["radial_clearance_mm"])
-    )
+    basis = np.column_stack((np.ones(len(points)), 0.15 / guide, 0.30 / pocket, points["radial_clearance_mm"]))
     found = np.linalg.lstsq(basis, power, rcond=None)[0]
     rest = power - basis @ found
     return float(found[0]), float(found[1]), float(found[2]), float(1.0 - rest.var() / power.var())
@@ -214,9 +210,7 @@ def findings(frame: pd.DataFrame) -> tuple[Finding, ...]:
             way = "rises" if row[f"theirs_{factor}"] > 0.0 else "falls"
             verdict = SIGN_VERDICTS[row[f"sign_{factor}"]]
             told = f"{row[f'sign_{factor}']} ({law})"
-            found.append(
-                Finding(f"{name} {way} with {SHORT[factor]} clearance", SOURCE, "trend", told, verdict)
-            )
+            found.append(Finding(f"{name} {way} with {SHORT[factor]} clearance", SOURCE, "trend", told, verdict))
     return tuple(found)
 
 
@@ -244,12 +238,8 @@ def effects_table(frame: pd.DataFrame) -> Table:
     rows = []
     for row in frame.to_dict("records"):
         for name in FACTORS:
-            pairs = [
-                plus_minus(row[f"{who}_{name}"], row[f"{who}_error_{name}"]) for who in ("ours", "theirs")
-            ]
-            rows.append(
-                (PLAIN[row["response"]], row["law"], SHORT[name], *pairs, row[f"sign_{name}"], "trend")
-            )
+            pairs = [plus_minus(row[f"{who}_{name}"], row[f"{who}_error_{name}"]) for who in ("ours", "theirs")]
+            rows.append((PLAIN[row["response"]], row["law"], SHORT[name], *pairs, row[f"sign_{name}"], "trend"))
     return Table(
         "linear effects per step (A 0.005, B and C 0.05 mm); 'unclear' where one of the two is within its error",
         ("response", "traction law", "clearance", "ours", "theirs", "sign", "kind"),
@@ -274,9 +264,7 @@ def conclusion(frame: pd.DataFrame, fits: Sequence[tuple[str, float, float, floa
     signs = frame[[f"sign_{name}" for name in FACTORS]].to_numpy().ravel()
     counts = {word: int((signs == word).sum()) for word in ("same", "opposite", "unclear")}
     ratios = frame.groupby("response")["level_ratio"]
-    spans = "; ".join(
-        f"{PLAIN[name]} {ratios.min()[name]:.2f} to {ratios.max()[name]:.2f}" for name in RESPONSES
-    )
+    spans = "; ".join(f"{PLAIN[name]} {ratios.min()[name]:.2f} to {ratios.max()[name]:.2f}" for name in RESPONSES)
     return (
         f"Our levels over theirs are {spans}. Of {len(signs)} linear effects {counts['same']} have the paper's sign, "
         f"{counts['opposite']} the opposite one, {counts['unclear']} are lost in their error. The loss falls with guide "

@@ -92,9 +92,7 @@ def whirl(
             axes[0][0].errorbar(part["fill"], part["ratio"], part["ratio_error"], marker="o", label=law)
             axes[0][1].plot(part["fill"], part["contacts_per_turn"], "o-", label=law)
         axes[0][0].axhspan(*PAPER, alpha=0.15, label="Chen et al. 2022, Table 4")
-        axes[0][0].axhline(
-            ISOTROPIC, color="black", linewidth=0.8, linestyle=":", label="isotropic random velocity"
-        )
+        axes[0][0].axhline(ISOTROPIC, color="black", linewidth=0.8, linestyle=":", label="isotropic random velocity")
         axes[0][0].set_ylabel("cage whirl deviation ratio")
         axes[0][1].set_ylabel("dry land contacts a cage turn")
         for axis in axes[0]:

@@ -41,9 +41,7 @@ class Run(NamedTuple):
     solve_us: float
 
 
-def study(
-    scene: BallScene, progress: Callable[[int, int], None] | None = None, scenes: int = SCENES
-) -> Report:
+def study(scene: BallScene, progress: Callable[[int, int], None] | None = None, scenes: int = SCENES) -> Report:
     """``rbdyn accuracy --battery``, its first ``scenes`` scenes."""
     drawn = cases(scenes, SEED, **{key: getattr(scene.model, key) for key in MODEL})
     ball, rings = scene.material("ball"), scene.material("inner_ring")
@@ -81,11 +79,7 @@ def study(
         ),
         sentences=(
             *causes(_some(solvers)),
-            *(
-                f"{name}: {count} of its equilibria are others than ours"
-                for name, count in others.items()
-                if count
-            ),
+            *(f"{name}: {count} of its equilibria are others than ours" for name, count in others.items() if count),
             f"rule a as printed refuses {refused} of the equilibria that the finite search found, for their unloaded balls",
             sentence,
         ),
@@ -160,14 +154,10 @@ def _steps_table(runs: Sequence[Run]) -> Table:
             continued = sum(solution.strides > 0 for solution in own)
             cells.append((control, f"{np.median(steps):.0f}", f"{np.percentile(steps, 99.0):.0f}",
                           f"{max(steps)}", f"{continued}"))  # fmt: skip
-    return Table(
-        "Newton steps of the convex solver", ("control", "median", "99 %", "most", "continued"), cells
-    )
+    return Table("Newton steps of the convex solver", ("control", "median", "99 %", "most", "continued"), cells)
 
 
-def _share_table(
-    title: str, kinds: Sequence[str], runs: dict[str, list[Run]], kind_of: Callable[[Case], str]
-) -> Table:
+def _share_table(title: str, kinds: Sequence[str], runs: dict[str, list[Run]], kind_of: Callable[[Case], str]) -> Table:
     """Share that each solver solves of the scenes of each kind."""
     cells = []
     for kind in kinds:

@@ -92,9 +92,7 @@ def study(
 ) -> Report:
     """``rbdyn accuracy`` of a ball bearing. Raises InputError for two rows, RunError where there is no equilibrium."""
     if not isinstance(scene, SingleRowScene):
-        raise InputError(
-            [f"bearing.kind = {scene.bearing.kind!r}: its solvers are not compared; take one of its rows"]
-        )
+        raise InputError([f"bearing.kind = {scene.bearing.kind!r}: its solvers are not compared; take one of its rows"])
     counted = Progress(progress, len(LIMITED) * (len(limits) + perturbations))
     attempts = work_precision(problem_of(scene), limits, counted)
     nearby = perturbed(scene, perturbations)

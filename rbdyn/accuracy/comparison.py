@@ -152,9 +152,7 @@ def attempt(method: Method, setting: float, stretches: Sequence[Stretch], known:
         derivatives += calls
         cpu_s += timed(method, stretch, setting)
     error = worst(errors)
-    return Attempt(
-        method.name, label, OK, error.position_m, error.scaled, cpu_s / turns * 1e3, derivatives / turns
-    )
+    return Attempt(method.name, label, OK, error.position_m, error.scaled, cpu_s / turns * 1e3, derivatives / turns)
 
 
 def run(method: Method, stretch: Stretch, setting: float) -> tuple[str, Any, int, float]:
@@ -201,9 +199,7 @@ def speedups(attempts: Sequence[Attempt], floor: float) -> dict[str, Speedup]:
     return {name: ratio for name, ratio in found.items() if ratio is not None}
 
 
-def conclusion(
-    attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: float, turns: float
-) -> list[str]:
+def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: float, turns: float) -> list[str]:
     """In words: who is faster at equal error, and what failed."""
     sentences = []
     if ratios:

@@ -47,6 +47,4 @@ def times_faster(ours: Curve, theirs: Curve) -> Speedup | None:
     at = np.linspace(np.log(low), np.log(high), POINTS)
     our_time, their_time = (np.interp(at, *np.log(np.array(points)).T) for points in fronts)
     ratio = np.exp(their_time - our_time)
-    return Speedup(
-        low, high, float(np.exp((their_time - our_time).mean())), ratio.min().item(), ratio.max().item()
-    )
+    return Speedup(low, high, float(np.exp((their_time - our_time).mean())), ratio.min().item(), ratio.max().item())

@@ -97,9 +97,7 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
         if row.found is None or row.power_gap is None or row.turn_ms is None or row.power_gap > NEGLIGIBLE:
             continue
         verdict = row.found.verdict(sought)
-        if verdict == "within" and (
-            row.method not in best or row.turn_ms < (best[row.method].turn_ms or 0.0)
-        ):
+        if verdict == "within" and (row.method not in best or row.turn_ms < (best[row.method].turn_ms or 0.0)):
             best[row.method] = row
         if verdict == "undecided":
             hidden += row.found.hidden(f"{row.method}, {row.setting}", sought)
@@ -150,9 +148,7 @@ def _replicates(scene: Scene, start: Callable[[int], Run]) -> list[Replicate]:
     return [record(start(index)) for index in range(scene.numerics.replicates)]
 
 
-def _row(
-    scene: Scene, method: str, setting: str, runs: Sequence[Replicate], reference: Sequence[Replicate]
-) -> Row:
+def _row(scene: Scene, method: str, setting: str, runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Row:
     turns = scene.numerics.turns + scene.numerics.warm_up_turns
     return Row(
         method=method,

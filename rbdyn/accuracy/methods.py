@@ -89,9 +89,7 @@ def fixed_step(scene: Scene, contact_times: float) -> float:
 class FixedStepRun(Run):
     """A run whose steps are fixed: about ``step`` [s], cut so that a whole number of them fits each leg."""
 
-    def __init__(
-        self, scene: Scene, bearing: RollerBearing, replicate: int, step: float, verlet: bool
-    ) -> None:
+    def __init__(self, scene: Scene, bearing: RollerBearing, replicate: int, step: float, verlet: bool) -> None:
         super().__init__(scene, bearing, replicate, 1.0, Stop())
         self.step, self.verlet, self.pairs = step, verlet, velocity_of(self.layout)
 
@@ -103,11 +101,7 @@ class FixedStepRun(Run):
             return
         steps = steps_of(duration, self.step)
         rest = (carry.y, duration / steps, steps, carry.scratch, self.tally)
-        done = (
-            velocity_verlet(self.bearing, self.pairs, *rest)
-            if self.verlet
-            else runge_kutta_4(self.bearing, *rest)
-        )
+        done = velocity_verlet(self.bearing, self.pairs, *rest) if self.verlet else runge_kutta_4(self.bearing, *rest)
         carry.clock[0] += duration * done / steps
         carry.counts[0] += done
         carry.counts[2] += done if self.verlet else 4 * done
@@ -119,9 +113,7 @@ def by_fixed_step(verlet: bool) -> Callable[..., Callable[[], Arrived]]:
     """``ready`` of velocity Verlet, or else of the classical Runge-Kutta method."""
 
     def ready(stretch: Stretch, contact_times: float) -> Callable[[], Arrived]:
-        run = FixedStepRun(
-            stretch.scene, stretch.bearing, 0, fixed_step(stretch.scene, contact_times), verlet
-        )
+        run = FixedStepRun(stretch.scene, stretch.bearing, 0, fixed_step(stretch.scene, contact_times), verlet)
         run.carry.y[:] = stretch.start
 
         def go() -> Arrived:
@@ -138,9 +130,7 @@ def compiled(stretch: Stretch) -> RightHandSide:
     return RightHandSide(stretch.bearing, stretch.start.size, int(BUDGET_PER_TURN * stretch.turns))
 
 
-def by_scipy(
-    name: str, function: Callable[[Stretch], Any] = compiled
-) -> Callable[..., Callable[[], Arrived]]:
+def by_scipy(name: str, function: Callable[[Stretch], Any] = compiled) -> Callable[..., Callable[[], Arrived]]:
     """``ready`` of a method of scipy.integrate.solve_ivp, on the right-hand side that ``function(stretch)`` gives."""
 
     def ready(stretch: Stretch, rtol: float) -> Callable[[], Arrived]:
@@ -185,9 +175,7 @@ def by_cvode(name: str) -> Callable[..., Callable[[], Arrived]]:
                 dy[:] = np.nan
 
         steps = int(BUDGET_PER_TURN * stretch.turns) + 1
-        solver = CVODE(
-            fill, method=name, rtol=NO_RELATIVE_TOLERANCE, atol=rtol * stretch.scale, max_num_steps=steps
-        )
+        solver = CVODE(fill, method=name, rtol=NO_RELATIVE_TOLERANCE, atol=rtol * stretch.scale, max_num_steps=steps)
 
         def go() -> Arrived:
             solver.init_step(0.0, stretch.start)

@@ -99,8 +99,7 @@ def study(
         sentences=sentences,
         sheets={
             "replicates": [
-                {"replicates": row.replicates, "turns": row.turns, "cpu_s": row.cpu_s} | row.half_width
-                for row in rows
+                {"replicates": row.replicates, "turns": row.turns, "cpu_s": row.cpu_s} | row.half_width for row in rows
             ]
         },
         pictures={"replicates": lambda path: _draw(rows, path)},
@@ -122,9 +121,7 @@ def pool_of_runs(
         longer = scene.model_copy(update={"numerics": numerics})
         bearing = roller_bearing(longer)
         prepare(longer, bearing)
-        runs = run_series(longer, bearing, [numerics.rtol], None, lambda done, total: counted.step(), Stop())[
-            0
-        ]
+        runs = run_series(longer, bearing, [numerics.rtol], None, lambda done, total: counted.step(), Stop())[0]
         values[length] = {name: np.array([figure(run) for run in runs]) for name, figure in OUTPUTS.items()}
         cpu_s[length] = float(np.mean([run.cpu_s for run in runs]))
     return values, cpu_s

@@ -108,9 +108,7 @@ def slice_rows(
         cut = with_options(scene, (f"model.slices={count}",))
         bearing = roller_bearing(cut)
         prepare(cut, bearing)
-        series[count] = run_series(
-            cut, bearing, [cut.numerics.rtol], 1, lambda done, total: counted.step(), Stop()
-        )[0]
+        series[count] = run_series(cut, bearing, [cut.numerics.rtol], 1, lambda done, total: counted.step(), Stop())[0]
     errors = load_errors(scene, counts)
     return [
         Row(

@@ -114,9 +114,7 @@ def statistics_bias(
     failures: dict[float, str] = {}
     for rtol in ordered:
         try:
-            series[rtol] = run_series(scene, bearing, [rtol], 1, lambda done, total: counted.step(), Stop())[
-                0
-            ]
+            series[rtol] = run_series(scene, bearing, [rtol], 1, lambda done, total: counted.step(), Stop())[0]
         except RunError as error:
             if rtol == ordered[0]:
                 raise

@@ -166,9 +166,7 @@ def _(contact, approach):
     y2 = y * y
     y4 = y2 * y2
     indentation_stiffness = 10.0 / 9.0 * contact.stiffness * y
-    in_series = (
-        indentation_stiffness * contact.bar_stiffness / (indentation_stiffness + contact.bar_stiffness)
-    )
+    in_series = indentation_stiffness * contact.bar_stiffness / (indentation_stiffness + contact.bar_stiffness)
     return contact.stiffness * (y4 * y4 * y2), in_series
 
 
@@ -177,9 +175,7 @@ def root_stiffness(contact, stiffness, approach):
     """Square root of the tangent stiffness [sqrt(N/m)] that a contact has at an approach [m]."""
 
 
-@root_stiffness.body(
-    PowerLineContact, LogarithmicLineContact, LineContactOnBar, SlicedLineContact, TiltedLineContact
-)
+@root_stiffness.body(PowerLineContact, LogarithmicLineContact, LineContactOnBar, SlicedLineContact, TiltedLineContact)
 def _(contact, stiffness, approach):
     return math.sqrt(stiffness)
 

@@ -87,9 +87,7 @@ def _shape(curvature_difference: float) -> tuple[float, Ellipse]:
     return now, ellipse(now)
 
 
-def point_contact(
-    curvature_sum: float, curvature_difference: float, equivalent_modulus: float
-) -> PointContact:
+def point_contact(curvature_sum: float, curvature_difference: float, equivalent_modulus: float) -> PointContact:
     """Contact of two bodies whose principal curvatures sum to ``curvature_sum`` [1/m].
 
     ``curvature_difference``: F = |r_I1 - r_I2 + r_II1 - r_II2| over that sum, for principal planes in common.
@@ -133,9 +131,7 @@ def race_curvature(ball_diameter: float, groove_factor: float, gamma: float) -> 
     return total / ball_diameter, (across + along) / total
 
 
-def ball_on_race(
-    ball_diameter: float, groove_factor: float, gamma: float, equivalent_modulus: float
-) -> PointContact:
+def ball_on_race(ball_diameter: float, groove_factor: float, gamma: float, equivalent_modulus: float) -> PointContact:
     """Contact of a ball [m] with a race; the long axis lies across the groove. Arguments as ``race_curvature``."""
     total, difference = race_curvature(ball_diameter, groove_factor, gamma)
     return point_contact(total, difference, equivalent_modulus)
@@ -151,9 +147,7 @@ def contact_area(contact: PointContact, load: Any) -> Any:
     return math.pi * contact.semi_major * contact.semi_minor * np.cbrt(load) ** 2
 
 
-def hamrock_brewe(
-    curvature_sum: float, curvature_difference: float, equivalent_modulus: float
-) -> PointContact:
+def hamrock_brewe(curvature_sum: float, curvature_difference: float, equivalent_modulus: float) -> PointContact:
     """The same contact by fits, to cross-check only: k = 1.0339 (R_y/R_x)^0.636 (Brewe and Hamrock 1977).
 
     E = 1.0003 + 0.5968 R_x/R_y and K = 1.5277 + 0.6023 ln(R_y/R_x), made for R_y/R_x from 1 to 100.

@@ -34,9 +34,7 @@ def rolling_radius(ball_diameter: float, gamma: float) -> float:
     return 0.5 * ball_diameter * (1.0 - gamma)
 
 
-def entrainment_speed(
-    pitch_diameter: float, gamma: float, inner_speed: float, outer_speed: float = 0.0
-) -> float:
+def entrainment_speed(pitch_diameter: float, gamma: float, inner_speed: float, outer_speed: float = 0.0) -> float:
     """Mean surface speed [m/s] of both contacts in pure rolling: d_m/4 (1 - g^2) |w_i - w_o|; the speeds in rad/s."""
     return 0.25 * pitch_diameter * (1.0 - gamma**2) * abs(inner_speed - outer_speed)
 

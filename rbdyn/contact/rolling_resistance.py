@@ -41,9 +41,7 @@ class StarvedRollingResistance(NamedTuple):
     regime_scale: float  # of the flooded contact [(N/sqrt(m/s))^-5]
     rigid_share: float  # what the meniscus leaves of the rigid branch [-]
     beyond_scale: float  # beyond = beyond_scale u^0.25/sqrt(Q), shear beyond the meniscus [N^0.5 (m/s)^-0.25]
-    short_scale: (
-        float  # short = short_scale u^0.75/Q, flooded force over that of a short inlet [N (m/s)^-0.75]
-    )
+    short_scale: float  # short = short_scale u^0.75/Q, flooded force over that of a short inlet [N (m/s)^-0.75]
     rigid_load: float  # Q^2/u where Hertz's width is that of rigid cylinders [N^2 s/m]
 
 

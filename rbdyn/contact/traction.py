@@ -258,9 +258,7 @@ class _Grid:
 
     def exact(self, i: Any, j: Any) -> tuple[Any, Any]:
         """The coefficient and x/(1 + x) at positions."""
-        ratio = np.expm1(
-            np.maximum(i * self.slip_cell, 1e-9)
-        )  # at rest both vanish: their quotient is sought
+        ratio = np.expm1(np.maximum(i * self.slip_cell, 1e-9))  # at rest both vanish: their quotient is sought
         load = (self.load_start + j * self.load_cell) ** 2
         return np.asarray(self.coefficient(ratio * self.scale, load)), ratio / (1.0 + ratio)
 
@@ -318,9 +316,7 @@ class _Grid:
 def _polynomials(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Polynomial of each cell, (cells, 16), from value, slopes and twist at its corners, (i, j, 4) per cell size."""
     # Values and slopes at both ends of an edge, times this, are the coefficients of its cubic.
-    cubic = np.array(
-        [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [-3.0, 3.0, -2.0, -1.0], [2.0, -2.0, 1.0, 1.0]]
-    )
+    cubic = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [-3.0, 3.0, -2.0, -1.0], [2.0, -2.0, 1.0, 1.0]])
     value, along, across, twist = np.moveaxis(nodes, -1, 0)
     near, far = slice(None, -1), slice(1, None)
     corners = {(0, 0): (near, near), (0, 1): (near, far), (1, 0): (far, near), (1, 1): (far, far)}

@@ -102,10 +102,7 @@ def drift_of(figure: Figure, runs: Sequence[Replicate]) -> Drift | None:
     )
     if len(runs) >= FEWEST_REPLICATES:
         change = np.array(
-            [
-                figure.of_sums(b.sum(axis=0)) - figure.of_sums(a.sum(axis=0))
-                for a, b in zip(early, late, strict=True)
-            ]
+            [figure.of_sums(b.sum(axis=0)) - figure.of_sums(a.sum(axis=0)) for a, b in zip(early, late, strict=True)]
         )
         error = float(change.std(ddof=1)) / math.sqrt(len(runs))
         return Drift(float(change.mean()), error, len(runs) - 1, size)
@@ -141,9 +138,7 @@ def unseen_regime(figure: Figure, runs: Sequence[Replicate], since: int) -> floa
     return farthest / (len(runs) + 1)
 
 
-def slow_change(
-    figure: Figure, tested: Figure, runs: Sequence[Replicate], since: int, *, steady: bool
-) -> float:
+def slow_change(figure: Figure, tested: Figure, runs: Sequence[Replicate], since: int, *, steady: bool) -> float:
     """Half-width that slow change adds to a figure: drift left over and regimes unseen, as root sum of squares; none in a
     run that is not ``steady``, whose figures change with its schedule."""
     if not steady:

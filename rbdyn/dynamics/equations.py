@@ -185,9 +185,7 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
         pocket_friction += wall[5]
         pocket_damping += wall[6]
         pocket_film += wall[7]
-    on_outer, on_inner = race_forces(
-        bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch
-    )
+    on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
     per_mass, per_inertia = 1.0 / bearing.roller_mass, 1.0 / bearing.roller_inertia
     for i in range(2 * z, 4 * z):
         dy[row, i] *= per_mass

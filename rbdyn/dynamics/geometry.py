@@ -63,9 +63,7 @@ def shaft_speeds(scene: Scene) -> tuple[float, float]:
     return operation.inner_speed_rpm * math.pi / 30.0, operation.outer_speed_rpm * math.pi / 30.0
 
 
-def kinematics(
-    scene: Scene, inner_speed: float | None = None, outer_speed: float | None = None
-) -> Kinematics:
+def kinematics(scene: Scene, inner_speed: float | None = None, outer_speed: float | None = None) -> Kinematics:
     """Epicyclic speeds, cage = (inner R_i + outer R_o)/(R_i + R_o), at ring speeds [rad/s] or the nominal ones."""
     nominal = shaft_speeds(scene)
     inner_speed = nominal[0] if inner_speed is None else inner_speed
@@ -115,12 +113,7 @@ def needs_clock(scene: Scene) -> bool:
     """Whether anything depends on time or on the angle of a ring."""
     operation, bearing = scene.operation, scene.bearing
     turning_form = bearing.inner_waviness or (bearing.outer_waviness and operation.outer_speed_rpm != 0.0)
-    return bool(
-        operation.schedule
-        or operation.rotating_load_N > 0.0
-        or operation.unbalance_g_mm > 0.0
-        or turning_form
-    )
+    return bool(operation.schedule or operation.rotating_load_N > 0.0 or operation.unbalance_g_mm > 0.0 or turning_form)
 
 
 def layout_of(scene: Scene) -> Layout:
@@ -161,9 +154,7 @@ def slip_scale(bearing: RollerBearing, load: float) -> float:
     return scale
 
 
-def absolute_tolerance(
-    scene: Scene, bearing: RollerBearing, rtol: float, method: str = "rk45"
-) -> NDArray[np.float64]:
+def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method: str = "rk45") -> NDArray[np.float64]:
     """Tolerance of each state component: ``rtol`` of the approach or contact speed that the component can make.
 
     In a slow bearing the contact speed is at most the method's share of the speed of the faster race, and the approach

@@ -36,9 +36,7 @@ def differences(scene: Scene, bearing: RollerBearing) -> Differences:
     """Storage for the Jacobian of a scene."""
     layout = layout_of(scene)
     gradients = np.zeros((POWERS, layout.size))
-    return Differences(
-        arrow_matrix(layout), gradients, increments(scene, bearing), one_roller(bearing, layout.size)
-    )
+    return Differences(arrow_matrix(layout), gradients, increments(scene, bearing), one_roller(bearing, layout.size))
 
 
 def increments(scene: Scene, bearing: RollerBearing) -> NDArray[np.float64]:

@@ -130,9 +130,7 @@ def standing_race_load(
         sector = np.minimum((turn * positions).astype(np.int64), positions - 1)
         visits = np.bincount(sector.ravel(), minlength=positions)
         if not np.all(visits):
-            raise ValueError(
-                f"no roller came by some of the {positions} sectors; give more samples or fewer sectors"
-            )
+            raise ValueError(f"no roller came by some of the {positions} sectors; give more samples or fewer sectors")
         damage = np.zeros((positions, loads.shape[2]))
         np.add.at(damage, sector, powers)
         damage /= visits[:, None]
@@ -176,9 +174,7 @@ def reference_life(
     inner_load = equivalent(inner, turning != "outer")
     outer_load = equivalent(outer, turning != "inner")
     inner_capacity, outer_capacity = race_capacities(capacity, rollers, gamma)
-    damage = (inner_load / inner_capacity) ** LAMINA_EXPONENT + (
-        outer_load / outer_capacity
-    ) ** LAMINA_EXPONENT
+    damage = (inner_load / inner_capacity) ** LAMINA_EXPONENT + (outer_load / outer_capacity) ** LAMINA_EXPONENT
     life = damage ** (-1.0 / WEIBULL) if damage > 0.0 else math.inf
     return ReferenceLife(
         million_turns=life,

@@ -167,13 +167,9 @@ def roller_relief(scene: Scene, slices: int) -> NDArray[np.float64]:
     if drawing.crown_radius_mm is not None:
         return profile.crowned_relief(position, drawing.crown_radius_mm * 1e-3)
     if drawing.lundberg_load_N is not None:
-        return profile.lundberg_relief(
-            position, length, drawing.lundberg_load_N, _modulus(scene, "roller", "rings")
-        )
+        return profile.lundberg_relief(position, length, drawing.lundberg_load_N, _modulus(scene, "roller", "rings"))
     if drawing.profile_table_mm_um is not None:
-        return profile.table_relief(
-            position, [(x * 1e-3, drop * 1e-6) for x, drop in drawing.profile_table_mm_um]
-        )
+        return profile.table_relief(position, [(x * 1e-3, drop * 1e-6) for x, drop in drawing.profile_table_mm_um])
     if drawing.roller_profile == "logarithmic":
         return profile.logarithmic_relief(position, drawing.roller_diameter_mm * 1e-3, length)
     return np.zeros(slices)
@@ -210,9 +206,7 @@ def rolling_law(scene: Scene, oil: Oil, reduced_radius: float) -> Any:
     distance = scene.lubricant.inlet_distance
     if distance is None:
         return flooded
-    return starved(
-        flooded, oil.viscosity, oil.pressure_coefficient, modulus, reduced_radius, length, distance
-    )
+    return starved(flooded, oil.viscosity, oil.pressure_coefficient, modulus, reduced_radius, length, distance)
 
 
 def _pocket(scene: Scene, oil: Oil) -> Any:
@@ -292,9 +286,7 @@ def _outer_ring(scene: Scene) -> HeldRing | SupportedRing:
         return HeldRing()
     from rbdyn.dynamics.support import SupportedRing
 
-    return SupportedRing(
-        start, support.outer_ring_mass_kg, float(support.stiffness_N_m), float(support.damping_N_s_m)
-    )
+    return SupportedRing(start, support.outer_ring_mass_kg, float(support.stiffness_N_m), float(support.damping_N_s_m))
 
 
 def _gravity(scene: Scene) -> NoGravity | Gravity:

@@ -165,12 +165,8 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
     offset, height = dy * ex - dx * ey, dx * ex + dy * ey
     across, along = dvy * ex - dvx * ey, dvx * ex + dvy * ey
     play = clearance_of(pocket, radius)
-    front = film_on_wall(
-        pocket.film, 1.0, play, radius, offset, height, across, along, roller_spin, cage_speed
-    )
-    rear = film_on_wall(
-        pocket.film, -1.0, play, radius, offset, height, across, along, roller_spin, cage_speed
-    )
+    front = film_on_wall(pocket.film, 1.0, play, radius, offset, height, across, along, roller_spin, cage_speed)
+    rear = film_on_wall(pocket.film, -1.0, play, radius, offset, height, across, along, roller_spin, cage_speed)
     tangential, normal = front[0] + rear[0], front[1] + rear[1]
     fx, fy = tangential * ex - normal * ey, tangential * ey + normal * ex
     moment, cage_moment = front[2] + rear[2], front[3] + rear[3]

@@ -22,9 +22,7 @@ class WavyRace(NamedTuple):
     sine: NDArray[np.float64]  # b_n [m]
 
 
-def wavy_race(
-    order: NDArray[np.int64], amplitude: NDArray[np.float64], phase: NDArray[np.float64]
-) -> WavyRace:
+def wavy_race(order: NDArray[np.int64], amplitude: NDArray[np.float64], phase: NDArray[np.float64]) -> WavyRace:
     """Harmonics of the radius: amplitude [m] cos(order (phi - phase)), so a lobe of the ring stands at ``phase`` [rad]."""
     return WavyRace(order, amplitude * np.cos(order * phase), amplitude * np.sin(order * phase))
 

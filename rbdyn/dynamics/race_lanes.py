@@ -105,9 +105,7 @@ def _(parameters):
 
 
 # Loops within, table look-ups and calls of the C library keep a contact to itself.
-@in_vectors.body(
-    SlicedLineContact, TiltedLineContact, WavyRace, CoulombTraction, TractionSurface, MixedTraction
-)
+@in_vectors.body(SlicedLineContact, TiltedLineContact, WavyRace, CoulombTraction, TractionSurface, MixedTraction)
 def _(parameters):
     return False
 

@@ -65,9 +65,7 @@ def race_traction(
         key = f"model = '{table.model}'" if table.model in RHEOLOGIES else "friction = 'mixed'"
         raise InputError([f"traction.{key}: needs a film, but the races do not roll; choose another"])
     contact = RollingContact(reduced_radius, length, equivalent_modulus, entrainment_speed)
-    law = (
-        _surface(scene, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)
-    )
+    law = _surface(scene, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)
     return _mixed(scene, law, contact, oil) if table.friction == "mixed" else law
 
 
@@ -156,9 +154,7 @@ def _rheology(scene: Scene, oil: Oil) -> Rheology:
     table = scene.traction
     if table.model == "thermal_newtonian":
         name = table.rheology_oil or scene.lubricant.oil
-        return thermal_newtonian(
-            name, scene.lubricant.temperature_C, oil.conductivity, table.largest_shear_ratio
-        )
+        return thermal_newtonian(name, scene.lubricant.temperature_C, oil.conductivity, table.largest_shear_ratio)
     if table.model == "eyring":
         stress = table.eyring_stress_MPa * 1e6
         return Eyring(oil.viscosity, oil.pressure_coefficient, stress, table.largest_shear_ratio)

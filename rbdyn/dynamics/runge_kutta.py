@@ -107,9 +107,7 @@ class Carry(NamedTuple):
     scratch: Scratch
     clock: NDArray[np.float64]  # time, next step, previous error, next sample time, rate of the frame
     counts: NDArray[np.int64]  # accepted, rejected, right-hand sides, worst component
-    stiffness: NDArray[
-        np.float64
-    ]  # steps looked at, those held by stability, sum of their |eigenvalue| [1/s]
+    stiffness: NDArray[np.float64]  # steps looked at, those held by stability, sum of their |eigenvalue| [1/s]
     pair: Any = DORMAND_PRINCE
 
 
@@ -355,9 +353,7 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
         if error <= 1.0:
             if counts[0] % LOOK_EVERY == 0:
                 look_at_stiffness(pair, k, carry.stiffness, h, inverse_tolerance)
-            if keep(
-                pair, 5 * z, y, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step
-            ):
+            if keep(pair, 5 * z, y, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step):
                 refine_peak(bearing, carry, h, tally)
                 counts[2] += PEAK_POINTS
             counts[0] += 1

@@ -76,9 +76,7 @@ def _(schedule, time):
     i = segment(schedule.time, time)
     if i < 0 or i == schedule.time.size - 1:
         return schedule.value[max(i, 0)]
-    return schedule.value[i] + share_of_segment(schedule.time, i, time) * (
-        schedule.value[i + 1] - schedule.value[i]
-    )
+    return schedule.value[i] + share_of_segment(schedule.time, i, time) * (schedule.value[i + 1] - schedule.value[i])
 
 
 @value_at.body(SmoothRamps)

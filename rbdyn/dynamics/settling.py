@@ -65,9 +65,7 @@ def run_until_settled(
     Raises RunError when a replicate cannot go on, KeyboardInterrupt.
     """
     numerics = scene.numerics
-    team = Team(
-        start, range(numerics.replicates), numerics.rtol, workers, stop, progress, numerics.companions
-    )
+    team = Team(start, range(numerics.replicates), numerics.rtol, workers, stop, progress, numerics.companions)
     extends = numerics.extend and scene.operation.schedule is None
     stage = Stage(-1, whole_windows(scene) if extends else numerics.turns)
     begin = None
@@ -129,9 +127,7 @@ class Team:
             if self._progress is not None:
                 self._progress(self.done, total)
 
-        run_all(
-            [partial(go_on, replicate) for replicate in self._replicates], self._workers, self._stop, ended
-        )
+        run_all([partial(go_on, replicate) for replicate in self._replicates], self._workers, self._stop, ended)
         return [runs[place] for place in range(len(self._replicates))]
 
 
@@ -176,11 +172,7 @@ def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, extends:
             "(numerics.extend = false forbids it)"
         )
     if scene.operation.schedule is None and drifting(runs):
-        mend = (
-            "raise numerics.extend_limit"
-            if extends
-            else "lengthen numerics.turns or set numerics.extend = true"
-        )
+        mend = "raise numerics.extend_limit" if extends else "lengthen numerics.turns or set numerics.extend = true"
         notes.append(
             f"transient: figures still drift over the {counted:.4g} turns counted; their errors hold what the drift shows, "
             f"yet it may go farther; {mend}"

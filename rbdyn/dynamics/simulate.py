@@ -226,11 +226,7 @@ def run_series(
 ) -> list[list[Replicate]]:
     """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""
     replicates = range(scene.numerics.replicates)
-    tasks = [
-        partial(run_replicate, scene, bearing, index, rtol, stop)
-        for rtol in tolerances
-        for index in replicates
-    ]
+    tasks = [partial(run_replicate, scene, bearing, index, rtol, stop) for rtol in tolerances for index in replicates]
     runs: dict[int, Replicate] = {}
 
     def ended(one: Ended[Replicate]) -> None:
@@ -239,9 +235,7 @@ def run_series(
             progress(len(runs), len(tasks))
 
     run_all(tasks, workers, stop, ended)
-    return [
-        [runs[place * len(replicates) + index] for index in replicates] for place in range(len(tolerances))
-    ]
+    return [[runs[place * len(replicates) + index] for index in replicates] for place in range(len(tolerances))]
 
 
 def _gather(
@@ -254,9 +248,7 @@ def _gather(
     everything = [*runs, *companions]
     figures = quantities(scene, runs, companions, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
-    inner_load, outer_load = (
-        max(getattr(run, f"max_{race}_load") for run in runs) for race in ("inner", "outer")
-    )
+    inner_load, outer_load = (max(getattr(run, f"max_{race}_load") for run in runs) for race in ("inner", "outer"))
     return SimulationResult(
         status="ok",
         impact_force=figures["impact_force_N"],

@@ -211,9 +211,7 @@ def measure(
     return model, spent
 
 
-def choose(
-    model: Model, scene: Scene, target: float, shortest: float = 0.0, longest: float = MOST_TURNS
-) -> Choice:
+def choose(model: Model, scene: Scene, target: float, shortest: float = 0.0, longest: float = MOST_TURNS) -> Choice:
     """The cheapest choice that meets the target with counted turns, in all, between ``shortest`` and ``longest``; where
     none does, the one that comes closest."""
     able = []
@@ -323,9 +321,7 @@ def _along(rtol: float, ladder: Array, values: Array) -> float:
     return math.exp(float(y[end] + slope * (place - x[end])))
 
 
-def _shortfall(
-    target: float, errors: dict[str, float | None], result: SimulationResult, choice: Choice
-) -> str:
+def _shortfall(target: float, errors: dict[str, float | None], result: SimulationResult, choice: Choice) -> str:
     """Which figure missed the target, by how much, and what limits it."""
     unknown = [name for name, error in errors.items() if error is None]
     if unknown:

@@ -146,9 +146,7 @@ def _outputs(
     marks where that hides it."""
     ends: list[Named] = []
     for name, colour in COLOURS.items():
-        points = [
-            (max(abs(row.bias[name]), SMALLEST_BIAS), time) for row, time in zip(rows, times, strict=True)
-        ]
+        points = [(max(abs(row.bias[name]), SMALLEST_BIAS), time) for row, time in zip(rows, times, strict=True)]
         for point, row in zip(points[:-1], rows, strict=False):
             filled = row.verdict_of(name, sought) != "undecided"
             reach = [point[0], point[0] + row.bias_error[name]]
@@ -158,9 +156,7 @@ def _outputs(
     return ends
 
 
-def _marked(
-    axis: Axes, name: str, errors: Sequence[float], times: Sequence[float], marks: Sequence[str]
-) -> Named:
+def _marked(axis: Axes, name: str, errors: Sequence[float], times: Sequence[float], marks: Sequence[str]) -> Named:
     """A black line whose points bear marks."""
     errors = [max(error, SMALLEST_BIAS) for error in errors]
     axis.plot(errors, times, "k^-", linewidth=1.2, markersize=5)

@@ -83,9 +83,7 @@ def angles(rows: Mapping[str, Balls], path: Path) -> None:
     """Contact angles against azimuth; a ball without an inner contact leaves a gap in the inner line."""
     figure, axes = plt.subplots(1, len(rows), figsize=(5.8 * len(rows), 3.8), squeeze=False)
     for axis, (title, balls) in zip(axes[0], rows.items(), strict=True):
-        angles_on(
-            axis, balls, {"inner": INNER, "outer": OUTER}, {"inner": "inner race", "outer": "outer race"}
-        )
+        angles_on(axis, balls, {"inner": INNER, "outer": OUTER}, {"inner": "inner race", "outer": "outer race"})
         axis.set_title(title, fontsize=10)
         axis.legend(frameon=False, fontsize=8)
     save(figure, path)
@@ -146,14 +144,10 @@ def _section_on(axis: Axes, ball: Mapping[str, float], drawing: Mapping[str, Any
             _contact(axis, ball, race, angle, side, colour)
         axis.plot(*centre, "+", color=colour, markersize=8, zorder=5)
     turn = np.linspace(0.0, 2.0 * math.pi, 200)
-    axis.fill(
-        0.5 * np.sin(turn), 0.5 * np.cos(turn), facecolor="white", edgecolor="black", linewidth=1.2, zorder=1
-    )
+    axis.fill(0.5 * np.sin(turn), 0.5 * np.cos(turn), facecolor="white", edgecolor="black", linewidth=1.2, zorder=1)
     axis.plot([0.0, 0.0], [-0.72, 0.72], color=GREY, linewidth=0.8, linestyle=(0, (8, 3, 2, 3)), zorder=2)
     axis.annotate("", (0.0, 0.19), (0.0, 0.0), arrowprops={"arrowstyle": "->", "color": GREY}, zorder=4)
-    axis.text(
-        -0.015, 0.2, f"{ball['centrifugal_force_N']:.3g} N\ncentrifugal", color=GREY, fontsize=8, ha="right"
-    )
+    axis.text(-0.015, 0.2, f"{ball['centrifugal_force_N']:.3g} N\ncentrifugal", color=GREY, fontsize=8, ha="right")
     axis.set_xlim(-0.78, 0.78)
     axis.set_ylim(-0.74, 0.74)
     axis.set_aspect("equal")
@@ -176,9 +170,7 @@ def _groove(axis: Axes, centre: Vector, radius: float, side: float) -> None:
     axis.plot(ring_x[:-2], ring_y[:-2], color="black", linewidth=1.0, zorder=2)
 
 
-def _contact(
-    axis: Axes, ball: Mapping[str, float], race: str, angle: float, side: float, colour: str
-) -> None:
+def _contact(axis: Axes, ball: Mapping[str, float], race: str, angle: float, side: float, colour: str) -> None:
     """Contact line from the ball's centre to the race, its angle from the radial line, and the load."""
     reach = side * _along(angle)
     axis.plot([0.0, 0.62 * reach[0]], [0.0, 0.62 * reach[1]], color=colour, linewidth=1.4, zorder=3)

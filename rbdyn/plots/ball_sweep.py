@@ -85,9 +85,7 @@ def angles(result: SweepResult, path: Path) -> None:
                 low, high = (pick(f"{prefix}{race}_angle_{end}_deg") for end in ("min", "max"))
                 axis.fill_between(x, low, high, color=colour, alpha=0.12, linewidth=0.0)
                 axis.plot(x, low, color=colour, linewidth=1.1, linestyle=style)
-                axis.plot(
-                    x, high, color=colour, linewidth=1.1, linestyle=style, label=_once(axis, f"{race} race")
-                )
+                axis.plot(x, high, color=colour, linewidth=1.1, linestyle=style, label=_once(axis, f"{race} race"))
         _finish(axis, result, "contact angles, least and largest [°]", title)
     save(figure, path)
 
@@ -142,9 +140,7 @@ def azimuth(result: SweepResult, path: Path) -> None:
             axis.set_ylabel(f"{race} contact angle [°]")
         pair[0].set_xlabel("")
         pair[0].set_title(title, fontsize=10)
-    axes[0, 0].legend(
-        frameon=True, framealpha=0.8, edgecolor="none", fontsize=8, title=label(key), title_fontsize=8
-    )
+    axes[0, 0].legend(frameon=True, framealpha=0.8, edgecolor="none", fontsize=8, title=label(key), title_fontsize=8)
     save(figure, path)
 
 
@@ -204,9 +200,7 @@ def _lines(
     head = label(keys[0][0])
     text, _, unit = head.partition(" [")
     unit = unit.rstrip("]")
-    return [
-        (x, STYLES[i], f"{text} {value:.5g} {unit}".rstrip(), picker(i)) for i, value in enumerate(keys[0][1])
-    ]
+    return [(x, STYLES[i], f"{text} {value:.5g} {unit}".rstrip(), picker(i)) for i, value in enumerate(keys[0][1])]
 
 
 def _once(axis: Axes, name: str) -> str:
@@ -244,11 +238,7 @@ def _finish(axis: Axes, result: SweepResult, ylabel: str, title: str) -> None:
     axis.set_ylabel(ylabel)
     axis.set_title(title, fontsize=10)
     handles, _ = axis.get_legend_handles_labels()
-    handles += [
-        Line2D([], [], color=GREY, linestyle=style, label=name)
-        for _, style, name, _ in _lines(result)
-        if name
-    ]
+    handles += [Line2D([], [], color=GREY, linestyle=style, label=name) for _, style, name, _ in _lines(result) if name]
     if len(handles) > 1:
         axis.legend(handles=handles, frameon=True, framealpha=0.8, edgecolor="none", fontsize=8)
     plain(axis)

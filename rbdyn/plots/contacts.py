@@ -22,9 +22,7 @@ SMALLEST_SHARE = 1e-4
 def _around(axis: Axes, history: History, values: np.ndarray, factor: float, colour: str, label: str) -> None:
     profile = orbit.against_azimuth(history, values)
     degrees = np.degrees(profile.azimuth)
-    axis.fill_between(
-        degrees, factor * profile.low, factor * profile.high, color=colour, alpha=0.2, linewidth=0
-    )
+    axis.fill_between(degrees, factor * profile.low, factor * profile.high, color=colour, alpha=0.2, linewidth=0)
     axis.plot(degrees, factor * profile.mean, color=colour, linewidth=1.4, label=label)
     axis.set_xlim(-180.0, 180.0)
     axis.set_xticks(range(-180, 181, 60))

@@ -243,9 +243,7 @@ def _land_arrow(d: Drawing, frame: int, cage: tuple[float, float], ring: tuple[f
     angle = math.atan2(cage[1] - middle[1], cage[0] - middle[0]) + (math.pi if d.guide_side < 0.0 else 0.0)
     touch = d.pitch + d.guide_side * d.cage_half
     tail = touch + d.guide_side * float(d.land_load[frame]) / d.cage_scale
-    return Shape(
-        "arrow", "cage_force", [_paper(_polar(cage, tail, angle)), _paper(_polar(cage, touch, angle))]
-    )
+    return Shape("arrow", "cage_force", [_paper(_polar(cage, tail, angle)), _paper(_polar(cage, touch, angle))])
 
 
 def _bars(d: Drawing, frame: int, m: float, cage: tuple[float, float]) -> list[list[tuple[float, float]]]:

@@ -85,9 +85,7 @@ def pocket_forces(histories: Mapping[str, History], path: Path) -> None:
 def forces(history: History, path: Path) -> None:
     """Wall forces of the pockets with the largest forces, and the land's dry load, over time; the largest marked."""
     touched = bool(history.land_load.any())
-    figure, axes = plt.subplots(
-        1 + touched, 1, figsize=(9.0, 3.4 + 2.2 * touched), squeeze=False, sharex=True
-    )
+    figure, axes = plt.subplots(1 + touched, 1, figsize=(9.0, 3.4 + 2.2 * touched), squeeze=False, sharex=True)
     pockets = axes[0, 0]
     _draw_pockets(pockets, history)
     hit = orbit.largest(history, history.pocket_load)
@@ -142,9 +140,7 @@ def section(history: History, path: Path) -> None:
     for axis, turn_of in zip(axes, turns, strict=True):
         place_x, place_y = orbit.poincare(history, turn_of)
         axis.plot(x, y, linewidth=0.4, color=SKY, alpha=0.7, label="orbit")
-        marks = axis.scatter(
-            place_x * 1e6, place_y * 1e6, c=np.arange(len(place_x)), cmap="viridis", s=22, zorder=3
-        )
+        marks = axis.scatter(place_x * 1e6, place_y * 1e6, c=np.arange(len(place_x)), cmap="viridis", s=22, zorder=3)
         _plane(axis)
         axis.set_title(f"once a {turn_of} turn: {len(place_x)} points", fontsize=10)
         figure.colorbar(marks, ax=axis, label=f"{turn_of} turn", orientation="horizontal", shrink=0.9)

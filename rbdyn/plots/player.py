@@ -85,9 +85,7 @@ def _svg(d: Drawing) -> str:
     for each in d.references:
         body += _element(each.arrow)
         body += f'<text x="{each.u:.2f}" y="{each.v + 0.018 * side:.2f}">{html.escape(each.words)}</text>'
-    words = html.escape(
-        f"First frame; clearances magnified {d.magnification:g} times, rollers drawn smaller."
-    )
+    words = html.escape(f"First frame; clearances magnified {d.magnification:g} times, rollers drawn smaller.")
     return (
         f'<svg viewBox="{-side:.2f} {-side:.2f} {2 * side:.2f} {2 * side:.2f}" style="--unit:{side / 33:.4f}px" role="img" aria-label="{words}">'
         '<defs><marker id="tip" viewBox="0 0 6 6" refX="5" refY="3" markerWidth="3" markerHeight="3" orient="auto">'

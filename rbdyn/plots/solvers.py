@@ -50,9 +50,7 @@ def solved_in_time(times_us: Mapping[str, Sequence[float | None]], path: Path) -
         if solved.size:
             share = 100.0 * np.arange(1, solved.size + 1) / len(times)
             axis.step(solved, share, where="post", color=colour, linewidth=2.0 if colour == "black" else 1.2)
-            ends.append(
-                ([(float(solved[0]), float(share[0])), (float(solved[-1]), float(share[-1]))], name, colour)
-            )
+            ends.append(([(float(solved[0]), float(share[0])), (float(solved[-1]), float(share[-1]))], name, colour))
     axis.margins(x=0.15)
     label_ends(axis, ends)
     save(figure, path)

@@ -30,9 +30,7 @@ SIDES: tuple[tuple[float, Literal["left", "center", "right"]], ...] = (
     (7.0, "left"),
     (-7.0, "right"),
 )
-PLACES = [
-    ((right, up), side) for up in (9.0, 0.0, -9.0, 14.0, -14.0, 20.0, -20.0, 27.0) for right, side in SIDES
-]
+PLACES = [((right, up), side) for up in (9.0, 0.0, -9.0, 14.0, -14.0, 20.0, -20.0, 27.0) for right, side in SIDES]
 
 
 def plain(axis: Axes) -> None:
@@ -69,13 +67,7 @@ def label_ends(axis: Axes, lines: Sequence[tuple[Sequence[tuple[float, float]], 
             note.set_horizontalalignment(side)
             box = note.get_window_extent()
             free = not any(box.overlaps(other) for other in taken) and box.count_contains(drawn) == 0
-            if (
-                free
-                and inside.x0 < box.x0
-                and box.x1 < inside.x1
-                and inside.y0 < box.y0
-                and box.y1 < inside.y1
-            ):
+            if free and inside.x0 < box.x0 and box.x1 < inside.x1 and inside.y0 < box.y0 and box.y1 < inside.y1:
                 break
         taken.append(box)
 

@@ -85,9 +85,7 @@ def _fixed(control: Any, inner_deflection: float, outer_deflection: float) -> tu
 
 
 @spin_share.body(FrictionShare)
-def _by_friction(
-    control: Any, inner_deflection: float, outer_deflection: float
-) -> tuple[float, float, float]:
+def _by_friction(control: Any, inner_deflection: float, outer_deflection: float) -> tuple[float, float, float]:
     inner = control.inner_weight * inner_deflection * inner_deflection
     outer = outer_deflection * outer_deflection
     share = inner / (inner + outer)
@@ -134,9 +132,7 @@ def ball_forces(
 
 
 @kernel
-def elastic_forces(
-    row: Any, a_axial: float, a_radial: float, x: float, y: float, di: float, do: float
-) -> Any:
+def elastic_forces(row: Any, a_axial: float, a_radial: float, x: float, y: float, di: float, do: float) -> Any:
     """What ``ball_forces`` returns for a ball that goes with the cage: springs and the common centrifugal force."""
     one_i, si, ci = line(a_axial - x, a_radial - y)
     one_o, so, co = line(x, y)

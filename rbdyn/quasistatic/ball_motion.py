@@ -19,9 +19,7 @@ from rbdyn.kernel import kernel
 
 
 @kernel
-def orbit_and_spin(
-    spinning: Any, share: float, ci: float, si: float, co: float, so: float
-) -> tuple[Any, Any]:
+def orbit_and_spin(spinning: Any, share: float, ci: float, si: float, co: float, so: float) -> tuple[Any, Any]:
     """F_c [N] and M_g [N m] of a ball, each with its derivatives by inner angle, outer angle and inner ``share``.
 
     Contact angles are given by cosine and sine. Returns ((F_c, by a_i, by a_o, by share), (M_g, ...)).

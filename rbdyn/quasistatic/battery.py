@@ -102,9 +102,7 @@ def _case(draw: np.random.Generator, number: int, model: dict[str, Any]) -> Case
         if draw.random() < 0.5:
             tilt_x, tilt_y = (float(tilt) for tilt in draw.uniform(-TILT_MRAD, TILT_MRAD, 2))
             operation["prescribed"] = {"tilt_x_mrad": tilt_x, "tilt_y_mrad": tilt_y}
-    return Case(
-        number, kind, bearing, operation, {**model, "raceway_control": CONTROLS[number % len(CONTROLS)]}
-    )
+    return Case(number, kind, bearing, operation, {**model, "raceway_control": CONTROLS[number % len(CONTROLS)]})
 
 
 def _bearing(draw: np.random.Generator) -> dict[str, Any]:

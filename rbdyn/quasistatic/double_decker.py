@@ -132,9 +132,7 @@ def load_on_middle_ring(stack: Stack, solution: Solution) -> Vector:
     axial = solution.outer_load * s - friction * c
     radial = solution.outer_load * c + friction * s
     turn = stack.outer_lever * axial - stack.outer_groove_radius * friction
-    at_groove = np.array(
-        [radial @ row.cosine, radial @ row.sine, axial.sum(), turn @ row.sine, -(turn @ row.cosine)]
-    )
+    at_groove = np.array([radial @ row.cosine, radial @ row.sine, axial.sum(), turn @ row.sine, -(turn @ row.cosine)])
     return carried(stack.arm_1).T @ at_groove
 
 
@@ -207,9 +205,7 @@ def _follow(
     held = ~np.isnan(given)
     unit = component_lengths(stack.outer.row.lever)
 
-    def rows(
-        middle: Vector, inner: Solution | None, outer: Solution | None
-    ) -> tuple[Solution, Solution, Vector]:
+    def rows(middle: Vector, inner: Solution | None, outer: Solution | None) -> tuple[Solution, Solution, Vector]:
         inner = solve(*stack.inner, load, np.where(held, given - to_inner @ middle, np.nan), inner)
         outer = solve(*stack.outer, np.zeros(5), middle, outer)
         return inner, outer, (load_on_middle_ring(stack, inner) - outer.reaction) / unit
@@ -220,9 +216,7 @@ def _follow(
     inner, outer, left = rows(middle, start.inner if start else None, start.outer if start else None)
     size, steps = length(left, inner, outer), 0
     while steps < STEPS and size > AIM * _largest(inner, outer) and np.isfinite(size):
-        onto_by_middle = _onto_by_relative(stack, inner) @ _relative_by_middle(
-            inner.stiffness, held, to_inner
-        )
+        onto_by_middle = _onto_by_relative(stack, inner) @ _relative_by_middle(inner.stiffness, held, to_inner)
         matrix = ((outer.stiffness - onto_by_middle) / np.outer(unit, unit))[np.ix_(free, free)]
         # Where both rows stand open there is no stiffness: the least step of least squares.
         move = np.zeros(5)

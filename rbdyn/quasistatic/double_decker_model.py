@@ -62,9 +62,7 @@ def double_decker_of(scene: DoubleDeckerScene) -> DoubleDeckerModel:
     # Planes of groove centres, from the ball plane of the outer row.
     plane_0 = offset + (below.inner_groove_factor - 0.5) * diameter * math.sin(below.contact_angle)
     plane_1 = offset - back * math.sin(below.contact_angle)
-    plane_2 = (
-        (above.inner_groove_factor - 0.5) * 1e-3 * above.ball_diameter_mm * math.sin(above.contact_angle)
-    )
+    plane_2 = (above.inner_groove_factor - 0.5) * 1e-3 * above.ball_diameter_mm * math.sin(above.contact_angle)
     stack = Stack(
         inner=Layer(inner.row, inner.control),
         outer=Layer(outer.row, outer.control),
@@ -104,9 +102,7 @@ def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFrict
     middle = scene.bearing.middle
     rows = ("inner", "middle", scene.bearing.inner), ("middle", "outer", scene.bearing.outer)
     frictions = []
-    for (under, over, row), factor in zip(
-        rows, (middle.inner_oil_factor, middle.outer_oil_factor), strict=True
-    ):
+    for (under, over, row), factor in zip(rows, (middle.inner_oil_factor, middle.outer_oil_factor), strict=True):
         materials = (scene.material(part) for part in ("ball", f"{under}_ring", f"{over}_ring"))
         torque = load_torque(
             math.hypot(x, y),

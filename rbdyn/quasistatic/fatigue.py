@@ -65,8 +65,6 @@ def turning_rings(inner_speed: float, outer_speed: float) -> Turning:
     return "outer" if inner_speed == 0.0 else "both"
 
 
-def solution_life(
-    solution: Solution, capacities: tuple[float, float], turning: Turning = "inner"
-) -> BallLife:
+def solution_life(solution: Solution, capacities: tuple[float, float], turning: Turning = "inner") -> BallLife:
     """Life of a row in equilibrium."""
     return row_life(solution.inner_load, solution.outer_load, capacities, turning)

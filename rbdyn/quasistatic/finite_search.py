@@ -151,12 +151,6 @@ def solve(
         points = np.concatenate((start.balls[np.newaxis, :, :2], points))
     u = np.zeros(system.size)
     most = damping.iterations * len(points) if limit is None else limit
-    outcome, searches, iterations, evaluations, residual = _search(
-        control, system, damping, points, most, strict, u
-    )
-    status = (
-        OK
-        if outcome == CONVERGED
-        else f"none of {searches} searches converged; the last {SENTENCES[outcome]}"
-    )
+    outcome, searches, iterations, evaluations, residual = _search(control, system, damping, points, most, strict, u)
+    status = OK if outcome == CONVERGED else f"none of {searches} searches converged; the last {SENTENCES[outcome]}"
     return solution_at(control, system, u, status, iterations, evaluations, residual, searches)

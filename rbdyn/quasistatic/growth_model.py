@@ -134,15 +134,11 @@ def _pair(scene: BallScene) -> RingPair:
     if operation.outer_speed_rpm != 0.0:
         assert above.outside_diameter_mm is not None
         speed = operation.outer_speed_rpm * RPM
-        outer = Ring(
-            outer_race, 0.5e-3 * above.outside_diameter_mm, scene.material("outer_ring"), speed=speed
-        )
+        outer = Ring(outer_race, 0.5e-3 * above.outside_diameter_mm, scene.material("outer_ring"), speed=speed)
     return RingPair(inner, outer)
 
 
-def _between(
-    scene: BallScene, row: BallRow, inner: Ring | None, outer: Ring | None, rings: RingPair
-) -> GrooveChange:
+def _between(scene: BallScene, row: BallRow, inner: Ring | None, outer: Ring | None, rings: RingPair) -> GrooveChange:
     return groove_change(
         inner,
         outer,

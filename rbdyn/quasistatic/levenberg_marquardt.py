@@ -38,9 +38,7 @@ class Damping(NamedTuple):
 
 
 @routine
-def levenberg_marquardt(
-    control: Any, system: Any, damping: Any, limit: int, u: Any
-) -> tuple[int, int, int, float]:
+def levenberg_marquardt(control: Any, system: Any, damping: Any, limit: int, u: Any) -> tuple[int, int, int, float]:
     """Minimise ||F|| from ``u``, which is left at the best point, in at most ``limit`` iterations.
 
     Returns the outcome, the iterations, the evaluations and the largest residual [N].

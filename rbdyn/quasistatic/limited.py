@@ -29,9 +29,7 @@ from rbdyn.quasistatic.start import along_the_load, settle_all
 
 
 @entry
-def _within(
-    control: Any, row: Any, load: Any, free: Any, limit: int, q: Any, balls: Any, at: Any, counts: Any
-) -> bool:
+def _within(control: Any, row: Any, load: Any, free: Any, limit: int, q: Any, balls: Any, at: Any, counts: Any) -> bool:
     """The usual way of ``newton.find`` in ``limit`` steps; whether they were enough."""
     along_the_load(row, load, free, q, at.step, at.base)
     settle_all(row, q, balls, at.work)

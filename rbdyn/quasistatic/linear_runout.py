@@ -42,9 +42,7 @@ def linear_response(row: Row, control: Control, load: Array, given: Array | None
     with the reason where there is no equilibrium.
     """
     if np.any(np.delete(load, 2)):
-        raise ValueError(
-            "load: runout answers in proportion only under a purely axial load; set the rest to 0"
-        )
+        raise ValueError("load: runout answers in proportion only under a purely axial load; set the rest to 0")
     if any(np.ptp(getattr(row, name)) > 0.0 for name in CHANGES):
         raise ValueError("row: balls differ already; give the nominal row")
     middle = _settled(solve(row, control, load, given))

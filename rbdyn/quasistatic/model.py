@@ -31,9 +31,7 @@ class RowModel(NamedTuple):
     outer_contact: PointContact
 
 
-def contacts(
-    drawing: BallRow, ball: Material, inner: Material, outer: Material
-) -> tuple[PointContact, PointContact]:
+def contacts(drawing: BallRow, ball: Material, inner: Material, outer: Material) -> tuple[PointContact, PointContact]:
     """Hertz contacts of a ball with the inner and the outer race."""
     diameter = 1e-3 * drawing.ball_diameter_mm
     gamma = drawing.ball_diameter_mm * math.cos(drawing.contact_angle) / drawing.pitch_diameter_mm

@@ -325,9 +325,7 @@ def bring_in(control: Any, row: Any, load: Any, free: Any, q: Any, balls: Any, a
 
 
 @entry
-def find(
-    control: Any, row: Any, load: Any, free: Any, warm: bool, q: Any, balls: Any, at: Any, counts: Any
-) -> int:
+def find(control: Any, row: Any, load: Any, free: Any, warm: bool, q: Any, balls: Any, at: Any, counts: Any) -> int:
     """Equilibrium of one row. ``q`` and ``balls`` hold the start where ``warm``, and the prescribed displacements always.
 
     Returns an outcome.
@@ -345,9 +343,9 @@ def find(
     start_q, start = q.copy(), balls.copy()
     if rules(control):
         # Most often a rough minimum is start enough.
-        if march(
-            control, 0.0, roughly(load, free), CONVEX_MARCH, row, load, free, q, balls, at, counts
-        ) and march(control, 1.0, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts):
+        if march(control, 0.0, roughly(load, free), CONVEX_MARCH, row, load, free, q, balls, at, counts) and march(
+            control, 1.0, 0.0, FULL_STEPS, row, load, free, q, balls, at, counts
+        ):
             return CONVERGED
         go_back(q, balls, start_q, start)
     if not march(control, 0.0, 0.0, CONVEX_MARCH, row, load, free, q, balls, at, counts):

@@ -117,9 +117,7 @@ def settle(row: Any, j: int, a_axial: float, a_radial: float, settled: float, ba
         dr = ((aa + damping) * fr - ar * fa) * one
         scale, moved = 1.0, False
         while scale > SHORTEST and not moved:
-            trial, held_, fa_, fr_, aa_, ar_, rr_ = balance(
-                row, j, a_axial, a_radial, x + scale * da, y + scale * dr
-            )
+            trial, held_, fa_, fr_, aa_, ar_, rr_ = balance(row, j, a_axial, a_radial, x + scale * da, y + scale * dr)
             # Near the bottom the energy no longer tells better from worse, the forces still do.
             if trial < energy or abs(fa_) + abs(fr_) < 0.5 * lacking:
                 x, y, moved = x + scale * da, y + scale * dr, True

@@ -173,9 +173,7 @@ def sweep(
     return Sweep(name, unit, tuple(points), least, longest, notes)
 
 
-def _notes(
-    found: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float
-) -> tuple[str, ...]:
+def _notes(found: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float) -> tuple[str, ...]:
     notes = []
     span = found[-1].value - found[0].value
     for goal, point in (("least peak stress", least), ("longest life", longest)):
@@ -230,9 +228,7 @@ def over_clearance(
     return sweep(scene, case_at, clearances, "a clearance of", "um", 1e6)
 
 
-def over_wear(
-    scene: SingleRowScene, wears: Sequence[float], capacities: Capacities = reference_capacities
-) -> Sweep:
+def over_wear(scene: SingleRowScene, wears: Sequence[float], capacities: Capacities = reference_capacities) -> Sweep:
     """Sweep of the diameter that every ball has lost [m]; raises ValueError as ``sweep`` and ``worn``."""
 
     def case_at(wear: float) -> Case:

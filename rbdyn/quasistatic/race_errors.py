@@ -69,9 +69,7 @@ def waviness(*harmonics: tuple[int, float, float]) -> Waviness:
 PERFECT = waviness()
 
 
-def random_waviness(
-    lowest: int, highest: int, height: float, decay: float, draw: np.random.Generator
-) -> Waviness:
+def random_waviness(lowest: int, highest: int, height: float, decay: float, draw: np.random.Generator) -> Waviness:
     """Orders ``lowest`` to ``highest`` in random phases, together ``height`` [m] from peak to valley.
 
     Amplitudes fall as order^-decay on the average; each is spread as the radius of a normal cloud (Rayleigh).
@@ -127,9 +125,7 @@ def rolling(ball_diameter: float, pitch_diameter: float, contact_angle: float, o
     Raises ValueError unless 0 < D < dm.
     """
     if not 0.0 < ball_diameter < pitch_diameter:
-        raise ValueError(
-            f"a ball of {ball_diameter:g} m on a pitch circle of {pitch_diameter:g} m: it must be smaller"
-        )
+        raise ValueError(f"a ball of {ball_diameter:g} m on a pitch circle of {pitch_diameter:g} m: it must be smaller")
     gamma = ball_diameter * math.cos(contact_angle) / pitch_diameter
     cage = 0.5 * ((1.0 + outer) * (1.0 - gamma) + outer * (1.0 + gamma))
     spin = 0.5 * pitch_diameter / ball_diameter * (1.0 - gamma**2)
@@ -151,9 +147,7 @@ class BallPath(NamedTuple):
     outer_reach: Array
 
 
-def ball_path(
-    errors: RaceErrors, turning: Turning, steps: int, turns: int = 1, start: float = 0.0
-) -> BallPath:
+def ball_path(errors: RaceErrors, turning: Turning, steps: int, turns: int = 1, start: float = 0.0) -> BallPath:
     """Follow the balls through ``turns`` turns of the inner ring against the outer, ``steps`` to a turn.
 
     ``start``: azimuth of the first ball at the first step [rad]. Raises ValueError unless steps and turns are positive.
@@ -177,10 +171,7 @@ def ball_path(
         ring_angle=turning.inner * turn[:, 0],
         azimuth=azimuth,
         axial=errors.inner_sway.at(on_inner) - errors.outer_sway.at(on_outer),
-        radial=errors.inner_roundness.at(on_inner)
-        - errors.outer_roundness.at(on_outer)
-        + wider_inner
-        + wider_outer,
+        radial=errors.inner_roundness.at(on_inner) - errors.outer_roundness.at(on_outer) + wider_inner + wider_outer,
         inner_reach=wider_inner - inner_contact - larger,
         outer_reach=wider_outer - outer_contact - larger,
     )

@@ -76,9 +76,7 @@ def ball_size_term(ball_diameter: float) -> float:
     return millimetres**1.8 if millimetres <= LARGEST_PLAIN_BALL else 3.647 * millimetres**1.4
 
 
-def capacity_factor(
-    gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.52
-) -> float:
+def capacity_factor(gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.52) -> float:
     """f_c of a radial or angular contact ball bearing (ISO 281, in N and mm), gamma = D cos(alpha)/d_m.
 
     The standard's own table holds for 0.52; it grants a closer groove no more. Raises ValueError unless
@@ -114,17 +112,10 @@ def dynamic_capacity(
     """
     gamma = ball_diameter * math.cos(contact_angle) / pitch_diameter
     factor = rating_factor * capacity_factor(gamma, inner_groove_factor, outer_groove_factor)
-    return (
-        factor
-        * (rows * math.cos(contact_angle)) ** 0.7
-        * balls ** (2.0 / 3.0)
-        * ball_size_term(ball_diameter)
-    )
+    return factor * (rows * math.cos(contact_angle)) ** 0.7 * balls ** (2.0 / 3.0) * ball_size_term(ball_diameter)
 
 
-def static_factor(
-    gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.53
-) -> float:
+def static_factor(gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.53) -> float:
     """f_0 of ISO 76 [N/mm^2]: C_0 = f_0 i Z D^2 cos(alpha), at gamma = D cos(alpha)/d_m, by exact Hertz.
 
     The load that makes 4200 MPa on the weaker race of the most loaded ball, which bears 5 F_r/(Z cos alpha).

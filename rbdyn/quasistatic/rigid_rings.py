@@ -111,9 +111,7 @@ def distribution(
     applied = np.array([radial_load, axial_load, moment / (0.5 * row.pitch_diameter)])
     free = np.array([True, True, tilts])
     if not np.any(applied[free]):
-        raise ValueError(
-            "a row without a load rests anywhere in its play; give a radial or an axial load or a moment"
-        )
+        raise ValueError("a row without a load rests anywhere in its play; give a radial or an axial load or a moment")
 
     def state(place: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         axial, radial = axial_free + place @ axial_part, radial_free + place @ radial_part
@@ -128,9 +126,7 @@ def distribution(
     scale = (np.abs(applied).max() / row.spring) ** (2.0 / 3.0)
     # Off the axis of symmetry, where a row without clearance has no axial stiffness.
     place = np.array([scale, math.copysign(scale, axial_load) if axial_load else 0.0, 0.0])
-    place[1] += (
-        math.copysign(math.sqrt(scale * row.groove_distance), axial_load) if axial_load else -axial_free
-    )
+    place[1] += math.copysign(math.sqrt(scale * row.groove_distance), axial_load) if axial_load else -axial_free
     residual = math.inf
     for _ in range(most_steps):
         axial, radial, span, approach = state(place)

@@ -116,15 +116,9 @@ def assemble(
             ia, ir, oa, or_ = gap_i * si, gap_i * ci, gap_o * so, gap_o * co
             ra += by_a[0] * ia + by_a[1] * ir + (by_x[0] + by_a[0]) * oa + (by_x[1] + by_a[1]) * or_
             rr += by_a[2] * ia + by_a[3] * ir + (by_x[2] + by_a[2]) * oa + (by_x[3] + by_a[3]) * or_
-            fa += (
-                ring_a[0] * ia + ring_a[1] * ir + (ring_x[0] + ring_a[0]) * oa + (ring_x[1] + ring_a[1]) * or_
-            )
-            fr += (
-                ring_a[2] * ia + ring_a[3] * ir + (ring_x[2] + ring_a[2]) * oa + (ring_x[3] + ring_a[3]) * or_
-            )
-            fm += (
-                ring_a[4] * ia + ring_a[5] * ir + (ring_x[4] + ring_a[4]) * oa + (ring_x[5] + ring_a[5]) * or_
-            )
+            fa += ring_a[0] * ia + ring_a[1] * ir + (ring_x[0] + ring_a[0]) * oa + (ring_x[1] + ring_a[1]) * or_
+            fr += ring_a[2] * ia + ring_a[3] * ir + (ring_x[2] + ring_a[2]) * oa + (ring_x[3] + ring_a[3]) * or_
+            fm += ring_a[4] * ia + ring_a[5] * ir + (ring_x[4] + ring_a[4]) * oa + (ring_x[5] + ring_a[5]) * or_
         determinant = by_x[0] * by_x[3] - by_x[1] * by_x[2]
         if determinant == 0.0:
             # Squeezed by less than the spacing of numbers: as good as lifted.
@@ -198,11 +192,7 @@ def follow(row: Any, step: Any, scale: float, work: Any, start: Any, balls: Any)
             y = work[j, 1] + work[j, 4] * axial + work[j, 5] * radial
             balls[j, AXIAL] += scale * x
             balls[j, RADIAL] += scale * y
-            inner = (
-                work[j, INNER_GAP]
-                + work[j, INNER_LINE] * (axial - x)
-                + work[j, INNER_LINE + 1] * (radial - y)
-            )
+            inner = work[j, INNER_GAP] + work[j, INNER_LINE] * (axial - x) + work[j, INNER_LINE + 1] * (radial - y)
             outer = work[j, OUTER_GAP] + work[j, OUTER_LINE] * x + work[j, OUTER_LINE + 1] * y
             balls[j, INNER_DEPTH] = max(start[j, INNER_DEPTH] + scale * inner, LEFT * start[j, INNER_DEPTH])
             balls[j, OUTER_DEPTH] = max(start[j, OUTER_DEPTH] + scale * outer, LEFT * start[j, OUTER_DEPTH])

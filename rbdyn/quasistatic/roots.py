@@ -43,16 +43,12 @@ def _starts(
     for factor in SPEEDS:
         neighbours.append((row, control._replace(spinning=_turning(control.spinning, factor))))
     # The sign of the moment that many texts have leads to the other side.
-    neighbours.append(
-        (row, control._replace(spinning=control.spinning._replace(turning=-control.spinning.turning)))
-    )
+    neighbours.append((row, control._replace(spinning=control.spinning._replace(turning=-control.spinning.turning))))
     return [start for start in (solve(a, b, load, given) for a, b in neighbours) if start.found]
 
 
 def _turning(spinning: Spinning, factor: float) -> Spinning:
-    return spinning._replace(
-        inner_speed=factor * spinning.inner_speed, outer_speed=factor * spinning.outer_speed
-    )
+    return spinning._replace(inner_speed=factor * spinning.inner_speed, outer_speed=factor * spinning.outer_speed)
 
 
 def _differ(one: Solution, other: Solution) -> bool:

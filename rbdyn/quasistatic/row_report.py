@@ -42,9 +42,7 @@ def row_record(
     return {
         **displacement_record(solution.displacement),
         "balls": ball_records(solution),
-        "max_stress_MPa": {
-            race: 1e-6 * float(np.max(peak_pressure(contacts[race], loads[race]))) for race in contacts
-        },
+        "max_stress_MPa": {race: 1e-6 * float(np.max(peak_pressure(contacts[race], loads[race]))) for race in contacts},
         "contacts": {
             race: {**contact_record(contacts[race], float(loads[race].max())), **(film or {}).get(race, {})}
             for race in contacts
@@ -184,9 +182,7 @@ def notes(drawing: BallRow, model: RowModel, solution: Solution, name: str = "")
 
 def beyond_hertz(drawing: BallRow, model: RowModel, solution: Solution) -> str | None:
     """Why the loads are none that contacts could carry, or None."""
-    return overload(
-        drawing, model.inner_contact, model.outer_contact, solution.inner_load, solution.outer_load
-    )
+    return overload(drawing, model.inner_contact, model.outer_contact, solution.inner_load, solution.outer_load)
 
 
 def overload(

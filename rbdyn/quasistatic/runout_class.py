@@ -78,9 +78,7 @@ def running_accuracy(
     Raises ValueError for a class or a bore that the tables do not hold.
     """
     if tolerance_class not in _INNER:
-        raise ValueError(
-            f"tolerance class {tolerance_class!r} is not known; choose one of {', '.join(_INNER)}"
-        )
+        raise ValueError(f"tolerance class {tolerance_class!r} is not known; choose one of {', '.join(_INNER)}")
     table, bore_mm = _INNER[tolerance_class], 1e3 * bore
     row = next((limits for upper, limits in table.items() if bore_mm <= upper * (1.0 + 1e-12)), None)
     if row is None or bore_mm <= SMALLEST_BORE_MM:
@@ -91,8 +89,6 @@ def running_accuracy(
     outer = None
     lowest, outer_table = _OUTER.get(tolerance_class, (0.0, {}))
     if outside_diameter is not None and 1e3 * outside_diameter > lowest:
-        reached = (
-            limit for upper, limit in outer_table.items() if 1e3 * outside_diameter <= upper * (1.0 + 1e-12)
-        )
+        reached = (limit for upper, limit in outer_table.items() if 1e3 * outside_diameter <= upper * (1.0 + 1e-12))
         outer = next(reached, None)
     return RunningAccuracy(*(None if limit is None else 1e-6 * limit for limit in (*row, outer)))  # type: ignore[arg-type]

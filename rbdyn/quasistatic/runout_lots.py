@@ -58,9 +58,7 @@ def draw_parts(lot: Lot, balls: int, bearings: int, seed: int) -> Parts:
     draw = np.random.default_rng(seed)
     order = np.arange(lot.lowest_order, lot.highest_order + 1)
     shape = (len(RACES), bearings, order.size)
-    races = order.astype(float) ** -lot.decay * (
-        draw.standard_normal(shape) + 1j * draw.standard_normal(shape)
-    )
+    races = order.astype(float) ** -lot.decay * (draw.standard_normal(shape) + 1j * draw.standard_normal(shape))
     angle = np.linspace(0.0, 2.0 * math.pi, max(16 * lot.highest_order, 360), endpoint=False)
     wave = np.exp(1j * order[:, np.newaxis] * angle)
     heights = np.stack([np.ptp((kind @ wave).real, axis=1) for kind in races])

@@ -34,9 +34,7 @@ def follow_ring(scene: BallScene) -> Followed:
     if row.errors is None:
         raise InputError(["errors: missing; a bearing without form errors has no runout, add the table"])
     test = bench_of(row)
-    path = ball_path(
-        errors_of(row.errors, row.bearing.balls), test.turning, row.errors.steps, row.errors.turns
-    )
+    path = ball_path(errors_of(row.errors, row.bearing.balls), test.turning, row.errors.steps, row.errors.turns)
     return follow(test.row, test.control, test.load, path, row.errors.turns, test.given)
 
 
@@ -64,9 +62,7 @@ def bench_of(scene: BallScene, face_radius: float | None = None, steps: int = 12
 def single_row(scene: BallScene) -> SingleRowScene:
     """The scene, if of one row. Raises InputError."""
     if not isinstance(scene, SingleRowScene):
-        raise InputError(
-            ["bearing.kind = 'double_decker_ball': runout is followed for one row of balls only"]
-        )
+        raise InputError(["bearing.kind = 'double_decker_ball': runout is followed for one row of balls only"])
     return scene
 
 

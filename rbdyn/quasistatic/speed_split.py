@@ -25,9 +25,7 @@ SLOWEST_TERM = 160.0
 HALVINGS = 200
 
 RPM = math.pi / 30.0
-Status = Literal[
-    "given", "shared", "inner layer stands", "outer layer stands", "undetermined", "no relative speed"
-]
+Status = Literal["given", "shared", "inner layer stands", "outer layer stands", "undetermined", "no relative speed"]
 
 
 class LayerFriction(NamedTuple):
@@ -44,9 +42,7 @@ class LayerFriction(NamedTuple):
 
     def torque(self, speed: float) -> float:
         """Friction torque [N m] at a speed of race against race [rad/s], its breakaway torque at 0."""
-        return self.load_torque + oil_torque(
-            speed, self.pitch_diameter, self.kinematic_viscosity, self.oil_factor
-        )
+        return self.load_torque + oil_torque(speed, self.pitch_diameter, self.kinematic_viscosity, self.oil_factor)
 
 
 class SpeedSplit(NamedTuple):
@@ -62,9 +58,7 @@ class SpeedSplit(NamedTuple):
     status: Status
 
 
-def oil_torque(
-    speed: float, pitch_diameter: float, kinematic_viscosity: float, oil_factor: float = OIL_BATH
-) -> float:
+def oil_torque(speed: float, pitch_diameter: float, kinematic_viscosity: float, oil_factor: float = OIL_BATH) -> float:
     """Palmgren's torque of the oil [N m] at a speed [rad/s] of either sense.
 
     M0 = 1e-7 f0 (nu n)^(2/3) dm^3 above nu n = 2000 and 160e-7 f0 dm^3 below, in N mm. The printed limit leaves a step

@@ -67,9 +67,7 @@ def sweep(
     axes = axes_of(scene, keys)
     order = snake(axes)
     began = time.perf_counter()
-    compiled = (
-        isinstance(scene, SingleRowScene) and scene.model.solver == "convex" and "bearing.balls" not in keys
-    )
+    compiled = isinstance(scene, SingleRowScene) and scene.model.solver == "convex" and "bearing.balls" not in keys
     walked = (_march if compiled else _one_by_one)(scene, axes, order, progress or (lambda done, total: None))
     shape = tuple(len(axis.values) for axis in axes)
     # From the order of the snake to that of the table.
@@ -98,14 +96,10 @@ def _sorted(balls: Sequence[Vector] | Vector, back: NDArray[np.int64]) -> list[G
     sizes: dict[int, list[int]] = {}
     for place, index in enumerate(back):
         sizes.setdefault(len(balls[index]), []).append(place)
-    return [
-        (np.array(places), np.array([balls[back[place]] for place in places])) for places in sizes.values()
-    ]
+    return [(np.array(places), np.array([balls[back[place]] for place in places])) for places in sizes.values()]
 
 
-def _march(
-    scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress
-) -> Walked:
+def _march(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress) -> Walked:
     """A single row through the compiled loop."""
     assert isinstance(scene, SingleRowScene)
     model, points, ratings = _packed(scene, axes, order)
@@ -119,9 +113,7 @@ def _march(
         )
         progress(last, count)
     columns = _columns(points, found, ratings)
-    statuses = [
-        OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST) for outcome in found.outcome.tolist()
-    ]
+    statuses = [OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST) for outcome in found.outcome.tolist()]
     for k, why in overloads(found.told, ratings).items():
         if statuses[k] == OK:
             statuses[k] = why
@@ -206,9 +198,7 @@ def _columns(points: Points, found: Found, ratings: Sequence[Rating]) -> Columns
     }
 
 
-def _one_by_one(
-    scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress
-) -> Walked:
+def _one_by_one(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress) -> Walked:
     """Any bearing, through ``rbdyn.equilibrium``."""
     rows: list[dict[str, float]] = []
     statuses: list[str] = []
@@ -231,9 +221,7 @@ def _one_by_one(
             rows[-1], told_rows = _figures(point, result)
         for name in ("row",) if isinstance(point, SingleRowScene) else ("inner", "outer"):
             size = count or getattr(point.bearing, name).balls
-            told_of.setdefault(name, []).append(
-                told_rows[name] if result.found else np.full((size, 6), np.nan)
-            )
+            told_of.setdefault(name, []).append(told_rows[name] if result.found else np.full((size, 6), np.nan))
         before = result if result.found else None
         progress(place + 1, len(order))
     names = dict.fromkeys(name for row in rows for name in row)
@@ -255,9 +243,7 @@ def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], di
     for (name, rating), solution in zip(_ratings(scene).items(), result.rows, strict=True):
         balls[name] = told(solution)
         prefix = "" if name == "row" else f"{name}_row_"
-        columns |= {
-            f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()
-        }
+        columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
     figures = {name: float(value[0]) for name, value in columns.items()}
     if "middle_ring" in record:
         figures["middle_ring_speed_rpm"] = record["middle_ring"]["speed_rpm"]
@@ -275,9 +261,7 @@ def _ratings(scene: BallScene) -> dict[str, Rating]:
         }
     else:
         assert isinstance(scene, SingleRowScene)
-        rows = {
-            "row": (scene.bearing, "inner_ring", "outer_ring", speed.inner_speed_rpm, speed.outer_speed_rpm)
-        }
+        rows = {"row": (scene.bearing, "inner_ring", "outer_ring", speed.inner_speed_rpm, speed.outer_speed_rpm)}
     ball = scene.material("ball")
     return {
         name: Rating(

@@ -83,9 +83,7 @@ def _axis(data: dict[str, Any], key: str, values: Sequence[float]) -> Axis:
     if len(values) == 0 or not np.all(np.isfinite(values)):
         raise InputError([f"{key}: the values {_shown(values)} are not all finite; write plain numbers"])
     if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
-        raise InputError(
-            [f"{key}: the values {_shown(values)} must rise or fall from each to the next; sort them"]
-        )
+        raise InputError([f"{key}: the values {_shown(values)} must rise or fall from each to the next; sort them"])
     path = _path(key)
     now = _now(data, path, key)
     if isinstance(now, int):
@@ -101,9 +99,7 @@ def _path(key: str) -> Path:
     for part in key.split("."):
         match = re.fullmatch(r"(\w+)((?:\[[1-9]\d*\])*)", part)
         if match is None:
-            raise InputError(
-                [f"{key}: not a key; write it as operation.inner_speed_rpm or operation.load_N[3]"]
-            )
+            raise InputError([f"{key}: not a key; write it as operation.inner_speed_rpm or operation.load_N[3]"])
         path.append(match[1])
         path += [int(index) - 1 for index in re.findall(r"\d+", match[2])]
     return tuple(path)
@@ -126,15 +122,11 @@ def _now(data: Any, path: Path, key: str) -> Any:
             raise InputError([f"{key}: {place} = {data!r} is not a table; {mend}"])
         data = data[step] if isinstance(step, int) else (data or {}).get(step)
     if isinstance(data, dict):
-        raise InputError(
-            [f"{key}: is a table, not a number; name one of its keys: {', '.join(sorted(data))}"]
-        )
+        raise InputError([f"{key}: is a table, not a number; name one of its keys: {', '.join(sorted(data))}"])
     if isinstance(data, list):
         raise InputError([f"{key}: is a list, not a number; name one item, such as {key}[1]"])
     if isinstance(data, str | bool):
-        raise InputError(
-            [f"{key} = {data!r}: is not a number and cannot be swept; compare scenes with --set"]
-        )
+        raise InputError([f"{key} = {data!r}: is not a number and cannot be swept; compare scenes with --set"])
     return data
 
 

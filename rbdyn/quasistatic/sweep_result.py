@@ -37,9 +37,7 @@ class SweepResult:
     cold: int
     wall_s: float
     scene: dict[str, Any]
-    told: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = field(
-        default_factory=dict, repr=False
-    )
+    told: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = field(default_factory=dict, repr=False)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -67,9 +65,7 @@ class SweepResult:
     def at(self, place: int) -> dict[str, float]:
         """Values of the keys at a point."""
         indices = np.unravel_index(place, self.shape)
-        return {
-            key: values[int(index)] for (key, values), index in zip(self.keys.items(), indices, strict=True)
-        }
+        return {key: values[int(index)] for (key, values), index in zip(self.keys.items(), indices, strict=True)}
 
     def grid(self, column: str) -> NDArray[np.float64]:
         """A column over the grid, one axis a key. Raises KeyError for an unknown one."""
@@ -112,9 +108,7 @@ class SweepResult:
         for name, groups in self.told.items():
             told = next(balls[points == place] for points, balls in groups if place in points)
             columns = {key: values[0] for key, values in ball_columns(told).items()}
-            found[name] = [
-                {key: float(values[j]) for key, values in columns.items()} for j in range(told.shape[1])
-            ]
+            found[name] = [{key: float(values[j]) for key, values in columns.items()} for j in range(told.shape[1])]
         return found
 
     def as_dict(self) -> dict[str, Any]:
@@ -126,11 +120,7 @@ class SweepResult:
             {
                 **dict(zip(places, (column[place] for column in keys), strict=True)),
                 "status": status,
-                **(
-                    dict(zip(names, (column[place] for column in values), strict=True))
-                    if status == OK
-                    else {}
-                ),
+                **(dict(zip(names, (column[place] for column in values), strict=True)) if status == OK else {}),
             }
             for place, status in enumerate(self.statuses)
         ]
@@ -165,9 +155,7 @@ class SweepResult:
             keys = {key: tuple(values) for key, values in data["keys"].items()}
             points = data["points"]
             names = dict.fromkeys(name for point in points for name in point if name not in (*keys, "status"))
-            columns = {
-                name: np.array([_number(point, name) for point in points], dtype=np.float64) for name in names
-            }
+            columns = {name: np.array([_number(point, name) for point in points], dtype=np.float64) for name in names}
             cost = data["cost"]
             statuses = tuple(point["status"] for point in points)
             return cls(keys, columns, statuses, cost["cold_starts"], cost["wall_s"], data["scene"])

@@ -187,9 +187,7 @@ def full_lot(bench: Bench, parts: Parts, limits: Array, count: int) -> Array:
     return np.array([full_runouts(bench, parts, limits, bearing) for bearing in range(count)])
 
 
-def _lot(
-    bench: Bench, lot: Lot, response: LinearResponse, bearings: int, seed: int
-) -> tuple[Parts, Readings]:
+def _lot(bench: Bench, lot: Lot, response: LinearResponse, bearings: int, seed: int) -> tuple[Parts, Readings]:
     parts = draw_parts(lot, len(bench.row.axial), bearings, seed)
     return parts, readings(parts, response, bench.turning, bench.steps, bench.turns, bench.face_radius)
 
@@ -209,9 +207,7 @@ def _widest(passes: Callable[[float], bool], scale: float) -> float:
     return low
 
 
-def compare(
-    bench: Bench, parts: Parts, read: Readings, limits: Array, allowed: Array, count: int
-) -> FullCheck:
+def compare(bench: Bench, parts: Parts, read: Readings, limits: Array, allowed: Array, count: int) -> FullCheck:
     """Solve the first ``count`` bearings of a lot in full; ``allowed``: radial and face runout of the class [m]."""
     full = full_lot(bench, parts, limits, count)
     proportional = np.column_stack(runouts(read, limits))[:count]

@@ -112,9 +112,7 @@ class Scene(SceneFile):
         from rbdyn.contact.hertz_line import palmgren
         from rbdyn.materials import equivalent_modulus
 
-        stiffness = palmgren(
-            equivalent_modulus(self.material("roller"), self.material("rings")), length
-        ).stiffness
+        stiffness = palmgren(equivalent_modulus(self.material("roller"), self.material("rings")), length).stiffness
         # Q = K/l int_0^c (tilt x)^(10/9) dx = (9/19) K/l tilt^(10/9) c^(19/9)
         touching = (19.0 / 9.0 * load * length / (stiffness * tilt ** (10.0 / 9.0))) ** (9.0 / 19.0)
         if touching >= length / (self.model.slices or PROFILE_SLICES):

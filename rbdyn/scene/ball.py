@@ -101,10 +101,7 @@ class BallRow(Strict):
                 f"bore_mm = {self.bore_mm:g}: leaves no inner ring under a raceway of "
                 f"{self.pitch_diameter_mm - reach:.4g} mm; make it smaller"
             )
-        if (
-            self.outside_diameter_mm is not None
-            and self.outside_diameter_mm <= self.pitch_diameter_mm + reach
-        ):
+        if self.outside_diameter_mm is not None and self.outside_diameter_mm <= self.pitch_diameter_mm + reach:
             faults.append(
                 f"outside_diameter_mm = {self.outside_diameter_mm:g}: leaves no outer ring over a raceway of "
                 f"{self.pitch_diameter_mm + reach:.4g} mm; make it larger"
@@ -357,7 +354,5 @@ class DoubleDeckerScene(BallScene):
         if self.errors is not None:
             found.append("errors: form errors are followed for one row of balls only; take the table away")
         if self.model.solver != "convex":
-            found.append(
-                f"model.solver = {self.model.solver!r}: solves one row of balls only; leave it out for two"
-            )
+            found.append(f"model.solver = {self.model.solver!r}: solves one row of balls only; leave it out for two")
         return or_refuse(self, found)

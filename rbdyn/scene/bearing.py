@@ -135,9 +135,7 @@ class Bearing(Strict):
     def _points(self, faults: list[str]) -> list[list[float]]:
         points = self.profile_table_mm_um or []
         if any(len(point) != 2 for point in points):
-            faults.append(
-                "bearing.profile_table_mm_um: each point is [position in mm, drop in um]; mend the list"
-            )
+            faults.append("bearing.profile_table_mm_um: each point is [position in mm, drop in um]; mend the list")
             return []
         if any(b[0] <= a[0] for a, b in pairwise(points)):
             faults.append("bearing.profile_table_mm_um: positions must rise from point to point; sort them")

@@ -112,9 +112,7 @@ def faults(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diamet
     found = []
     given = errors.ball_diameter_errors_um
     if given is not None and len(given) != balls:
-        found.append(
-            f"errors.ball_diameter_errors_um: {len(given)} values for {balls} balls; give one a ball"
-        )
+        found.append(f"errors.ball_diameter_errors_um: {len(given)} values for {balls} balls; give one a ball")
     limit = LARGEST_ERROR * ball_diameter_mm * 1e3
     if any(abs(error) > limit for error in given or []) or errors.ball_diameter_spread_um > limit:
         found.append(f"errors: ball diameters beyond {limit:g} um, a hundredth of the ball; give micrometres")
@@ -125,9 +123,7 @@ def faults(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diamet
                 f"errors.ball_sphericity[{number}].balls: ball {alien[0]} of {balls}; balls count from 1 to {balls}"
             )
     # A ball spins dm/(2 D) times a turn, or a little less.
-    fastest = (
-        max((wave.order for wave in errors.ball_sphericity), default=0) * pitch_diameter_mm / ball_diameter_mm
-    )
+    fastest = max((wave.order for wave in errors.ball_sphericity), default=0) * pitch_diameter_mm / ball_diameter_mm
     if fastest >= errors.steps:
         found.append(
             f"errors.steps = {errors.steps}: too few to show errors.ball_sphericity on balls that spin "

@@ -12,9 +12,7 @@ from rbdyn.faults import Strict
 from rbdyn.lubricants import Oil, oil_at
 from rbdyn.scene.fields import Fraction, NonNegative, Positive, or_refuse
 
-RheologyOil = Literal[
-    "MIL-L-7808", "MIL-L-23699", "MIL-L-27502", "Santotrac 30", "Santotrac 50", "Mobil DTE SAE30"
-]
+RheologyOil = Literal["MIL-L-7808", "MIL-L-23699", "MIL-L-27502", "Santotrac 30", "Santotrac 50", "Mobil DTE SAE30"]
 # Models whose traction follows pressure and temperature.
 RHEOLOGIES = ("thermal_newtonian", "eyring", "limiting_shear")
 
@@ -64,9 +62,7 @@ class Traction(Strict):
     ``thermal_newtonian``, ``eyring`` and ``limiting_shear`` follow the pressure and the temperature instead.
     """
 
-    model: Literal["four_constant", "thermal_newtonian", "eyring", "limiting_shear", "coulomb", "off"] = (
-        "four_constant"
-    )
+    model: Literal["four_constant", "thermal_newtonian", "eyring", "limiting_shear", "coulomb", "off"] = "four_constant"
     mu_0: NonNegative = 0.0
     mu_m: NonNegative = 0.050
     mu_inf: NonNegative = 0.036
@@ -113,9 +109,7 @@ class Traction(Strict):
         shown = f"traction.constants = [{a:g}, {b:g}, {c:g}, {d:g}]"
         faults = []
         fields = type(self).model_fields
-        rivals = [
-            key for key in ("mu_0", "mu_m", "mu_inf", "u_m_m_s") if getattr(self, key) != fields[key].default
-        ]
+        rivals = [key for key in ("mu_0", "mu_m", "mu_inf", "u_m_m_s") if getattr(self, key) != fields[key].default]
         if rivals:
             keys = " and ".join(f"traction.{key} = {getattr(self, key):g}" for key in rivals)
             faults.append(f"{shown}: contradicts {keys}; give the constants or the peak, not both")

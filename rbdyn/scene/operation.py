@@ -40,9 +40,7 @@ class Schedule(Strict):
         for key in ("inner_speed_rpm", "radial_load_N"):
             values = getattr(self, key)
             if values is not None and len(values) != len(times):
-                faults.append(
-                    f"operation.schedule.{key}: {len(values)} values for {len(times)} times; give one a time"
-                )
+                faults.append(f"operation.schedule.{key}: {len(values)} values for {len(times)} times; give one a time")
         if self.inner_speed_rpm is None and self.radial_load_N is None:
             faults.append("operation.schedule: schedules nothing; give inner_speed_rpm or radial_load_N")
         return or_refuse(self, faults)

@@ -51,9 +51,7 @@ def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
     beneath = []
     if tolerance := tolerance_of(summary, factor):
         beneath.append(f"± {rounded_down(tolerance)} {factor.unit}".strip())
-    baseline = part(summary, "confirmation", "baseline", "factors") or part(
-        summary, "front", "baseline", "factors"
-    )
+    baseline = part(summary, "confirmation", "baseline", "factors") or part(summary, "front", "baseline", "factors")
     if baseline and factor.name in baseline:
         beneath.append(f"baseline {factor.text(baseline[factor.name])}")
     return Tile(factor.words, factor.text(pick[factor.name]), factor.unit, beneath)
@@ -72,9 +70,7 @@ def statement(summary: Record) -> str:
     if not verdicts:
         return ""
     counts = [f"{verdicts.count(verdict)} {verdict}" for verdict in VERDICTS if verdict in verdicts]
-    return (
-        f"Of {len(verdicts)} responses, by more than their 95 % errors or within them: {', '.join(counts)}."
-    )
+    return f"Of {len(verdicts)} responses, by more than their 95 % errors or within them: {', '.join(counts)}."
 
 
 def _gains(summary: Record) -> Table | None:
@@ -251,9 +247,7 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(Table(caption, ["point", *(quantity(each)[0] for each in names)], rows, note))
     if table := limits(summary):
         blocks.append(table)
-    reasons = [
-        (name.replace("_", " "), point["reason"]) for name, point in points.items() if point.get("reason")
-    ]
+    reasons = [(name.replace("_", " "), point["reason"]) for name, point in points.items() if point.get("reason")]
     if reasons:
         blocks.append(Table("Why these points", ("point", "reason"), reasons, text_columns=(1,)))
     return Section("confirmation", "Confirmation", blocks)

@@ -24,10 +24,7 @@ def power(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     terms = [term for term in every if any(each.get(term) for each in found.values())]
     first = next(iter(found.values()))
     terms.sort(key=lambda term: -abs(first.get(term) or 0.0))
-    rows = [
-        [term.replace("_", " "), *(_watts(terms_of.get(term)) for terms_of in found.values())]
-        for term in terms
-    ]
+    rows = [[term.replace("_", " "), *(_watts(terms_of.get(term)) for terms_of in found.values())] for term in terms]
     note = "Terms that are nil everywhere are left out." if len(terms) < len(every) else ""
     blocks: list[Block] = []
     compared = {name: found[name] for name in ("baseline", "pick") if name in found}

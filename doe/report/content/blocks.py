@@ -45,9 +45,7 @@ class Table:
 
     def without_empty_columns(self) -> Table:
         """The same table, columns in which no row says anything left out."""
-        kept = [
-            place for place in range(len(self.header)) if place == 0 or any(row[place] for row in self.rows)
-        ]
+        kept = [place for place in range(len(self.header)) if place == 0 or any(row[place] for row in self.rows)]
         return replace(
             self,
             header=[self.header[place] for place in kept],

@@ -59,27 +59,21 @@ def _points(summary: Record, points: Sequence[Record]) -> Table:
 
 
 def _response(value: Record | None) -> str:
-    return (
-        "failed"
-        if value is None or value.get("value") is None
-        else with_error(value["value"], value.get("error"))
-    )
+    return "failed" if value is None or value.get("value") is None else with_error(value["value"], value.get("error"))
 
 
 def _evaluation(evaluation: Record) -> list[Block]:
     """Single figures in one table; figures by term in another."""
     by_term = {
-        key: value
-        for key, value in evaluation.items()
-        if isinstance(value, Mapping) and {"A", "B"} <= set(value)
+        key: value for key, value in evaluation.items() if isinstance(value, Mapping) and {"A", "B"} <= set(value)
     }
-    rest = {
-        key: value for key, value in evaluation.items() if key not in by_term and not isinstance(value, list)
-    }
+    rest = {key: value for key, value in evaluation.items() if key not in by_term and not isinstance(value, list)}
     tables = [record_table("How good the design is for the models asked", rest), _by_term(by_term)]
     blocks: list[Block] = [table for table in tables if table]
     if pictures := evaluation_plots(evaluation):
-        caption = "Scaled prediction variance: least, mean and largest by radius; and what a share of the region stays below."
+        caption = (
+            "Scaled prediction variance: least, mean and largest by radius; and what a share of the region stays below."
+        )
         blocks.append(Figures(pictures, caption))
     return blocks
 
@@ -94,10 +88,7 @@ def _by_term(columns: Mapping[str, Record]) -> Table | None:
                 flat[label(f"{key}" if not kind else f"{kind}_{key}")][term] = each
     if not flat:
         return None
-    rows = [
-        [term, *(shown(column.get(term), 3) for column in flat.values())]
-        for term in next(iter(flat.values()))
-    ]
+    rows = [[term, *(shown(column.get(term), 3) for column in flat.values())] for term in next(iter(flat.values()))]
     return Table("By term", ["term", *flat], rows)
 
 

@@ -72,8 +72,7 @@ def diagnostics(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     if not fitted:
         return None
     rows = [
-        [label(name), *(shown(each.get(key)) for key, _ in STATISTICS), *_lack(each)]
-        for name, each in fitted.items()
+        [label(name), *(shown(each.get(key)) for key, _ in STATISTICS), *_lack(each)] for name, each in fitted.items()
     ]
     header = ["response", *(words for _, words in STATISTICS), "p of lack of fit"]
     blocks: list[Block] = [Table("Quality of the fits", header, rows)]

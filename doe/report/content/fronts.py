@@ -95,18 +95,14 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         drawn = {name: point for name, point in marks.items() if complete(point, summary)}
         blocks.append(Widget("front"))
         pairs = plots.pairs(names, sets, drawn, confirmed, bounds(summary))
-        blocks.append(
-            Figures([*pairs, plots.legend_of(sets, drawn, confirmed, bool(bounds(summary)))], "", "pairs")
-        )
+        blocks.append(Figures([*pairs, plots.legend_of(sets, drawn, confirmed, bool(bounds(summary)))], "", "pairs"))
         caption = "Each line is a point of the front: its clearances to the left, its responses to the right."
         blocks.append(Figures([plots.parallel(factors(summary), names, sets, drawn)], caption, "parallel"))
     if marks:
         blocks.append(_picks(summary, names, marks))
     where = "of the pick without tolerances" if "without tolerances" in marks else "of the pick"
     if gains := record.get("predicted_gains"):
-        rows = [
-            (label(name), percentage(gain), str(gain.get("verdict") or "")) for name, gain in gains.items()
-        ]
+        rows = [(label(name), percentage(gain), str(gain.get("verdict") or "")) for name, gain in gains.items()]
         header = ("response", "gain", "verdict")
         blocks.append(Table(f"Gains on the surfaces {where}", header, rows, text_columns=(2,)))
     if record.get("statement"):
@@ -131,10 +127,7 @@ def _picks(summary: Record, names: Sequence[str], marks: Mapping[str, Record]) -
         [
             name,
             *(each.text(part(point, "factors", each.name), 1) for each in given),
-            *(
-                with_error(part(point, "responses", response), part(point, "errors", response))
-                for response in names
-            ),
+            *(with_error(part(point, "responses", response), part(point, "errors", response)) for response in names),
         ]
         for name, point in marks.items()
     ]
@@ -165,9 +158,7 @@ def _search(record: Record) -> list[Block]:
     blocks: list[Block] = [Words(f"NSGA-II: {', '.join(known)}.", "note")] if known else []
     history = [value for value in record.get("hypervolume_history") or [] if value is not None]
     if len(history) > 2:
-        blocks.append(
-            Figures([plots.hypervolume(history)], "Hypervolume by generation: flat at the end means found.")
-        )
+        blocks.append(Figures([plots.hypervolume(history)], "Hypervolume by generation: flat at the end means found."))
     return blocks
 
 
@@ -189,17 +180,13 @@ def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
     kind = str(aware.get("kind") or "").replace("_", " ")
     level = f" {shown(aware['quantile'])}" if aware.get("quantile") is not None and kind == "quantile" else ""
     number = len(aware.get("front") or [])
-    blocks: list[Block] = [
-        Words(f"Front with tolerances: {kind}{level} over the tolerance box, {number} points.")
-    ]
+    blocks: list[Block] = [Words(f"Front with tolerances: {kind}{level} over the tolerance box, {number} points.")]
     points = {
         "baseline": aware.get("baseline_robust"),
         "plain pick": aware.get("plain_pick_robust"),
         "pick with tolerances": part(aware, "pick", "robust"),
     }
-    rows = [
-        (point, *(shown(values.get(name)) for name in names)) for point, values in points.items() if values
-    ]
+    rows = [(point, *(shown(values.get(name)) for name in names)) for point, values in points.items() if values]
     if rows:
         header = ["point", *map(label, names)]
         blocks.append(Table("What manufacture leaves of the responses", header, rows))

@@ -84,9 +84,7 @@ def contributions(name: str, shares: Record) -> str:
             u += width
     for number, each in enumerate(shares):
         v = ROW * len(known) + 16.0 + 18.0 * number
-        drawn.append(
-            f'<rect class="share c{number % COLOURS}" x="{LEFT}" y="{v - 9:g}" width="12" height="12"/>'
-        )
+        drawn.append(f'<rect class="share c{number % COLOURS}" x="{LEFT}" y="{v - 9:g}" width="12" height="12"/>')
         drawn.append(f'<text x="{LEFT + 18}" y="{v + 2:g}">{number + 1}: {escape(label(each))}</text>')
     return (
         f'<svg class="plot wide" viewBox="0 0 {WIDE:g} {high:g}" role="img" '

@@ -137,26 +137,18 @@ class Plot:
     def _axes(self) -> str:
         left, right = self.LEFT, self.width - self.RIGHT
         top, bottom = self.TOP, self.height - self.BOTTOM
-        parts = [
-            f'<rect class="frame" x="{left}" y="{top}" width="{right - left:g}" height="{bottom - top:g}"/>'
-        ]
+        parts = [f'<rect class="frame" x="{left}" y="{top}" width="{right - left:g}" height="{bottom - top:g}"/>']
         for value in (across := ticks(*self.x)):
             u, _ = self.place(value, self.y[0])
             parts.append(f'<line class="grid" x1="{u:.1f}" x2="{u:.1f}" y1="{top}" y2="{bottom}"/>')
-            parts.append(
-                f'<text x="{u:.1f}" y="{bottom + 15}" text-anchor="middle">{tick_text(value, across)}</text>'
-            )
+            parts.append(f'<text x="{u:.1f}" y="{bottom + 15}" text-anchor="middle">{tick_text(value, across)}</text>')
         for value in (upward := ticks(*self.y)):
             _, v = self.place(self.x[0], value)
             parts.append(f'<line class="grid" y1="{v:.1f}" y2="{v:.1f}" x1="{left}" x2="{right}"/>')
-            parts.append(
-                f'<text x="{left - 5}" y="{v + 4:.1f}" text-anchor="end">{tick_text(value, upward)}</text>'
-            )
+            parts.append(f'<text x="{left - 5}" y="{v + 4:.1f}" text-anchor="end">{tick_text(value, upward)}</text>')
         middle, height = 0.5 * (left + right), 0.5 * (top + bottom)
         below, beside = (escape(words) for words in self.labels)
-        parts.append(
-            f'<text class="axis" x="{middle:g}" y="{self.height - 8:g}" text-anchor="middle">{below}</text>'
-        )
+        parts.append(f'<text class="axis" x="{middle:g}" y="{self.height - 8:g}" text-anchor="middle">{below}</text>')
         parts.append(
             f'<text class="axis" transform="translate(13 {height:g}) rotate(-90)" text-anchor="middle">{beside}</text>'
         )

@@ -22,9 +22,7 @@ def diagnostic_plots(name: str, runs: Sequence[Record]) -> list[str]:
 def _known(runs: Sequence[Record], across: str, up: str) -> tuple[list[Point], list[str]]:
     kept = [run for run in runs if run.get(across) is not None and run.get(up) is not None]
     points = [(float(run[across]), float(run[up])) for run in kept]
-    return points, [
-        f"run {run.get('run')}: {shown(p[0])}, {shown(p[1])}" for run, p in zip(kept, points, strict=True)
-    ]
+    return points, [f"run {run.get('run')}: {shown(p[0])}, {shown(p[1])}" for run, p in zip(kept, points, strict=True)]
 
 
 def _predicted(name: str, runs: Sequence[Record]) -> str:
@@ -43,9 +41,7 @@ def _residuals(name: str, runs: Sequence[Record]) -> str:
     if not points:
         return ""
     reach = max(SUSPECT * 1.1, *(abs(y) * 1.06 for _, y in points))
-    plot = Plot(
-        span(x for x, _ in points), (-reach, reach), (f"predicted {label(name)}", "studentized residual")
-    )
+    plot = Plot(span(x for x, _ in points), (-reach, reach), (f"predicted {label(name)}", "studentized residual"))
     for level in (-SUSPECT, 0.0, SUSPECT):
         plot.line([(plot.x[0], level), (plot.x[1], level)], "guide")
     plot.dots(points, "front", radius=3.4, titles=titles)
@@ -53,9 +49,7 @@ def _residuals(name: str, runs: Sequence[Record]) -> str:
 
 
 def _normal(name: str, runs: Sequence[Record]) -> str:
-    kept = sorted(
-        (float(run["studentized"]), run.get("run")) for run in runs if run.get("studentized") is not None
-    )
+    kept = sorted((float(run["studentized"]), run.get("run")) for run in runs if run.get("studentized") is not None)
     if len(kept) < 3:
         return ""
     # Blom's plotting positions.
@@ -83,14 +77,9 @@ def evaluation_plots(evaluation: Record) -> list[str]:
     """Variance dispersion graph and fraction of design space, as far as they are there."""
     drawn = []
     if shells := evaluation.get("by_radius"):
-        curves = {
-            key: [(float(each["radius"]), float(each[key])) for each in shells]
-            for key in ("min", "mean", "max")
-        }
+        curves = {key: [(float(each["radius"]), float(each[key])) for each in shells] for key in ("min", "mean", "max")}
         top = span([0.0, *(y for curve in curves.values() for _, y in curve)])
-        plot = Plot(
-            span(x for x, _ in curves["mean"]), (0.0, top[1]), ("coded radius", "scaled prediction variance")
-        )
+        plot = Plot(span(x for x, _ in curves["mean"]), (0.0, top[1]), ("coded radius", "scaled prediction variance"))
         for key, curve in curves.items():
             plot.line(curve, "front" if key == "mean" else "guide")
         drawn.append(plot.svg("Scaled prediction variance by radius: least, mean, largest"))

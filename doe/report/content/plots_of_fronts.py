@@ -37,12 +37,8 @@ def pairs(
     """A picture for every pair of responses, with the ``bounds`` of either; points are numbered through all sets."""
     drawn = []
     for one, two in combinations(names, 2):
-        simulated = {
-            name: found for name, point in confirmed.items() if (found := _simulated(point, one, two))
-        }
-        whole = [
-            _pair(point, one, two) for point in [*marks.values(), *(p for each in sets for p in each.points)]
-        ]
+        simulated = {name: found for name, point in confirmed.items() if (found := _simulated(point, one, two))}
+        whole = [_pair(point, one, two) for point in [*marks.values(), *(p for each in sets for p in each.points)]]
         whole += [place for place, _ in simulated.values()]
         across, up = bounds.get(one, ()), bounds.get(two, ())
         plot = Plot(
@@ -90,21 +86,15 @@ def legend_of(
     """What the symbols of the pictures mean."""
     entries = [("dot", each.role, f"front {each.words}") for each in sets]
     entries += [(_shape(name), _role(name), name) for name in marks]
-    entries += [
-        (_shape(name), f"hollow {_role(name)}", f"{name.replace('_', ' ')}, simulated") for name in confirmed
-    ]
+    entries += [(_shape(name), f"hollow {_role(name)}", f"{name.replace('_', ' ')}, simulated") for name in confirmed]
     return legend(entries + [("line", "limit", "limit")] * limited)
 
 
-def parallel(
-    given: Sequence[Factor], names: Sequence[str], sets: Sequence[Front], marks: Mapping[str, Record]
-) -> str:
+def parallel(given: Sequence[Factor], names: Sequence[str], sets: Sequence[Front], marks: Mapping[str, Record]) -> str:
     """Parallel coordinates: an axis for each factor and response, a line for each point."""
     keys = [("factors", each.name) for each in given] + [("responses", name) for name in names]
     points = [point for each in sets for point in each.points]
-    axes = [
-        (kind, name, span((p[kind][name] for p in [*points, *marks.values()]), 0.02)) for kind, name in keys
-    ]
+    axes = [(kind, name, span((p[kind][name] for p in [*points, *marks.values()]), 0.02)) for kind, name in keys]
     parts = []
     for each in sets:
         for number, point in enumerate(each.points):
@@ -142,9 +132,7 @@ def _axis(number: int, axes: int, name: str, limits: Range) -> str:
     # Names in two lines by turns, so that long ones keep apart.
     line = 14 + 18 * (number % 2)
     parts = [f'<line class="frame" x1="{u:.1f}" x2="{u:.1f}" y1="{TOP}" y2="{HIGH - BOTTOM}"/>']
-    parts.append(
-        f'<text class="axis" x="{u:.1f}" y="{line}" text-anchor="middle">{escape(label(name))}</text>'
-    )
+    parts.append(f'<text class="axis" x="{u:.1f}" y="{line}" text-anchor="middle">{escape(label(name))}</text>')
     values = ticks(*limits, 4)
     for value in values:
         v = TOP + (HIGH - TOP - BOTTOM) * (limits[1] - value) / (limits[1] - limits[0])
@@ -155,10 +143,6 @@ def _axis(number: int, axes: int, name: str, limits: Range) -> str:
 
 def hypervolume(history: Sequence[float]) -> str:
     """Hypervolume by generation."""
-    plot = Plot(
-        (0.0, float(len(history))), span(history), ("generation", "hypervolume"), width=420.0, height=220.0
-    )
+    plot = Plot((0.0, float(len(history))), span(history), ("generation", "hypervolume"), width=420.0, height=220.0)
     plot.line([(float(number), value) for number, value in enumerate(history, 1)], "front")
-    return plot.svg(
-        f"Hypervolume rises from {shown(history[0])} to {shown(history[-1])} in {len(history)} generations"
-    )
+    return plot.svg(f"Hypervolume rises from {shown(history[0])} to {shown(history[-1])} in {len(history)} generations")

@@ -51,15 +51,11 @@ def power_bars(terms: Sequence[str], found: Mapping[str, Record]) -> str:
             u, v = across(min(value, 0.0)), ROW * row + 4.0 + thick * place
             width = abs(across(value) - across(0.0))
             drawn.append(f'<rect class="bar {escape(name)}" x="{u:.1f}" y="{v:.1f}" width="{width:.1f}" height="{thick - 1:.1f}"/>')  # fmt: skip
-            drawn.append(
-                f'<text class="small" x="{u + width + 4:.1f}" y="{v + thick - 3:.1f}">{value:.4g}</text>'
-            )
+            drawn.append(f'<text class="small" x="{u + width + 4:.1f}" y="{v + thick - 3:.1f}">{value:.4g}</text>')
     drawn.append(f'<text class="axis" x="{across(0.5 * (low + high)):.0f}" y="{bottom + 30:g}" text-anchor="middle">power loss [W]</text>')  # fmt: skip
     for place, name in enumerate(found):
         u = WIDE - RIGHT - 150.0 + 80.0 * place
-        drawn.append(
-            f'<rect class="bar {escape(name)}" x="{u:g}" y="{bottom + 21:g}" width="11" height="11"/>'
-        )
+        drawn.append(f'<rect class="bar {escape(name)}" x="{u:g}" y="{bottom + 21:g}" width="11" height="11"/>')
         drawn.append(f'<text x="{u + 15:g}" y="{bottom + 31:g}">{escape(name)}</text>')
     return (
         f'<svg class="plot wide" viewBox="0 0 {WIDE:g} {bottom + 38:g}" role="img" '

@@ -82,9 +82,7 @@ def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
         name = prefix + label(key)
         if isinstance(value, Mapping):
             yield from scalars(value, f"{name}, ")
-        elif value is not None and not (
-            isinstance(value, list) and value and isinstance(value[0], dict | list)
-        ):
+        elif value is not None and not (isinstance(value, list) and value and isinstance(value[0], dict | list)):
             yield EFFICIENCY.sub(lambda found: f"{found[1].upper()}-efficiency [%]", name), shown(value)
 
 

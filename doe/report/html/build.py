@@ -57,12 +57,8 @@ def text(name: str) -> str:
 def _section(section: Section) -> str:
     body = []
     # Small tables that follow each other stand beside each other where there is room.
-    for together, blocks in groupby(
-        section.blocks, lambda block: isinstance(block, Table) and not block.folded
-    ):
-        parts = [
-            text(f"{block.name}.html") if isinstance(block, Widget) else render(block) for block in blocks
-        ]
+    for together, blocks in groupby(section.blocks, lambda block: isinstance(block, Table) and not block.folded):
+        parts = [text(f"{block.name}.html") if isinstance(block, Widget) else render(block) for block in blocks]
         body += [f'<div class="tables">{"".join(parts)}</div>'] if together else parts
     return (
         f'<section id="{section.key}" aria-labelledby="{section.key}_title">\n'

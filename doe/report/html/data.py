@@ -71,9 +71,7 @@ def _surfaces(summary: Record) -> list[dict[str, Any]]:
     for name, fitted in fits(summary).items():
         coefficients = fitted["coefficients"]
         covariance, missed = fitted.get("covariance"), fitted.get("model_error") or {}
-        residual = next(
-            (row["df"] for row in fitted.get("anova") or [] if row.get("source") == "residual"), None
-        )
+        residual = next((row["df"] for row in fitted.get("anova") or [] if row.get("source") == "residual"), None)
         found.append(
             {
                 "name": name,

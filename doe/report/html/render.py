@@ -46,9 +46,7 @@ def _table(table: Table) -> str:
     )
     rows = []
     for name, *cells in table.rows:
-        columns = "".join(
-            f"<td{_kind(place, words)}>{_cell(cell)}</td>" for place, cell in enumerate(cells, 1)
-        )
+        columns = "".join(f"<td{_kind(place, words)}>{_cell(cell)}</td>" for place, cell in enumerate(cells, 1))
         rows.append(f"<tr><th scope='row'>{escape(name)}</th>{columns}</tr>")
     note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
     caption, sort = escape(table.caption), ' class="sortable"' if table.sortable else ""
@@ -57,9 +55,7 @@ def _table(table: Table) -> str:
         f"<thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>{note}"
     )
     return (
-        f"<details><summary>{caption}</summary>{body}</details>"
-        if table.folded
-        else f'<div class="table">{body}</div>'
+        f"<details><summary>{caption}</summary>{body}</details>" if table.folded else f'<div class="table">{body}</div>'
     )
 
 
