@@ -4,7 +4,7 @@ Where an equation stands: ``row`` (geometry of a row of balls), ``control`` (rac
 (orbit, spin, centrifugal force, gyroscopic moment), ``ball`` (forces on one ball and their derivatives), ``ring``
 (forces on the inner ring, balls eliminated), ``start`` (first guess), ``newton`` (convex start and full equations),
 ``equilibrium`` (what Python calls), ``preload`` (least stress and longest life), ``life`` (fatigue from ball loads),
-``rating`` (ISO 281 and ISO 76 from dimensions), ``rigid_rings`` (rest by ISO/TS 16281). Of the turning ring:
+``rating`` (ISO 281 and ISO 76 from dimensions). Of the turning ring:
 ``race_errors`` (form errors of grooves and balls, as each ball meets them), ``walk`` and ``turn`` (equilibrium step by step),
 ``roundness`` and ``runout`` (measures of the path), ``runout_class`` (limits by tolerance class), ``linear_runout`` and
 ``runout_lots`` (small errors in proportion, many bearings at once), ``tolerance_design`` (race errors that meet a class). Two

@@ -142,11 +142,6 @@ def row_life(
     )
 
 
-def reference_load(capacity: float, million_turns: float) -> float:
-    """Radial load P_ref [N] of equal life by ISO 281: C/L^(1/3)."""
-    return capacity * million_turns ** (-1.0 / LOAD_LIFE)
-
-
 def _loads(loads: NDArray[np.float64], race: str) -> NDArray[np.float64]:
     array = np.atleast_2d(np.asarray(loads, dtype=np.float64))
     if array.ndim != 2 or array.size == 0:
