@@ -199,7 +199,7 @@ def test_unit_battery_poses_what_its_scenes_pose():
     drawn = cases(120, seed=7)
     assert {case.control for case in drawn} == set(CONTROLS) and {case.load for case in drawn} == set(LOADS)
     for case in drawn:
-        scene = BallScene.from_dict(case.as_scene())
+        scene = BallScene.from_dict({"bearing": case.bearing, "operation": case.operation, "model": case.model})
         model, fast = row_of(scene), posed(case)
         assert all(np.array_equal(a, b) for a, b in zip(model.row, fast.row, strict=True))
         assert model.control == fast.control

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from four_constants import fit_four_constants
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
@@ -82,7 +83,7 @@ def test_oracle_four_constants_of_the_thermal_curve():
         film = films.film_in_service(contact, oil, load)
         law = rheology.thermal_newtonian(name, celsius, oil.conductivity)
         curve = rheology.traction_coefficient(law, contact, slip, load, film)
-        fit = rheology.fit_four_constants(slip, curve)
+        fit = fit_four_constants(slip, curve)
         assert fit.a == -fit.d and min(fit.b, fit.c, fit.d) >= 0.0
         assert fit.rms == pytest.approx(rms, abs=6e-5)
         assert curve.max() == pytest.approx(peak, rel=0.01)
@@ -95,7 +96,7 @@ def test_oracle_four_constants_of_the_thermal_curve():
 def test_oracle_fit_finds_the_constants_of_its_own_law():
     """Oracle: constants that made a curve come back, to 1e-6, and the curve to 1e-9."""
     slip = np.linspace(0.0, 10.0, 101)
-    fit = rheology.fit_four_constants(slip, (0.10178 * slip - 0.036) * np.exp(-1.54727 * slip) + 0.036)
+    fit = fit_four_constants(slip, (0.10178 * slip - 0.036) * np.exp(-1.54727 * slip) + 0.036)
     assert (fit.a, fit.b, fit.c, fit.d) == pytest.approx((-0.036, 0.10178, 1.54727, 0.036), rel=1e-6)
     assert fit.rms < 1e-9
 

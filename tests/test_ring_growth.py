@@ -15,12 +15,18 @@ from rbdyn import BallScene, equilibrium
 from rbdyn.faults import InputError
 from rbdyn.materials import MATERIALS
 from rbdyn.quasistatic.growth_model import layer_changes, mounted_of, row_change
-from rbdyn.quasistatic.ring_growth import groove_change, printed_growth, race_radii
+from rbdyn.quasistatic.ring_growth import groove_change, printed_growth
 from rbdyn.ring_expansion import Ring, interface_pressure, loosening_speed
 
 STEEL, CERAMIC = MATERIALS["bearing_steel"], MATERIALS["silicon_nitride"]
 SPEED = 40000.0 * math.pi / 30.0
 ANGLE = math.radians(15.0)
+
+
+def race_radii(pitch_diameter, ball_diameter, contact_angle):
+    """Radii [m] of the circles on which balls touch inner and outer race: (dm -+ D cos alpha0)/2."""
+    reach = ball_diameter * math.cos(contact_angle)
+    return 0.5 * (pitch_diameter - reach), 0.5 * (pitch_diameter + reach)
 
 
 def inner_ring(material=STEEL, speed=SPEED, rise=0.0):

@@ -11,7 +11,7 @@ import pytest
 
 from rbdyn.faults import InputError, RunError
 from rbdyn.quasistatic.equilibrium import solve
-from rbdyn.quasistatic.linear_runout import linear_response, respond
+from rbdyn.quasistatic.linear_runout import CHANGES, linear_response
 from rbdyn.quasistatic.race_errors import ball_path, perfect, waviness
 from rbdyn.quasistatic.runout_lots import RACES, Lot, bearing_errors, draw_parts, readings
 from rbdyn.quasistatic.runout_model import bench_of, follow_ring
@@ -35,6 +35,23 @@ def bench():
 def response(bench):
     """What one ball's error does to the ring."""
     return linear_response(bench.row, bench.control, bench.load)
+
+
+def respond(response, path):
+    """Path of the ring (steps, 5) in proportion to the errors of a path of balls."""
+    changes = np.stack([getattr(path, name) for name in CHANGES])
+    cosine, sine = np.cos(path.azimuth), np.sin(path.azimuth)
+    towards = np.tensordot(response.radial, changes, 1)
+    leaning = np.tensordot(response.tilt, changes, 1)
+    return np.column_stack(
+        (
+            (towards * cosine).sum(axis=1),
+            (towards * sine).sum(axis=1),
+            np.tensordot(response.axial, changes, 1).sum(axis=1),
+            -(leaning * sine).sum(axis=1),
+            (leaning * cosine).sum(axis=1),
+        )
+    )
 
 
 def followed(bench, steps=STEPS, turns=1, balls=Z, **errors):

@@ -11,12 +11,20 @@ from scipy.special import ndtri
 from scipy.stats import truncnorm
 
 from doe.dimension_chain import solve
+from doe.dimension_chain.distributions import share_below
 from doe.dimension_chain.parts import given_parts
-from doe.dimension_chain.selective_assembly import class_edges, class_shares
+from doe.dimension_chain.selective_assembly import class_edges
 from rbdyn.faults import InputError
 
 EQUAL = [(1, 9.3, 0.0, -0.012), (-1, 9.0, 0.012, 0.0)]
 SAMPLES = 200_000
+
+
+def class_shares(part, edges):
+    """Share of a part's production in each class."""
+    below = share_below(part, part.distribution, edges - part.nominal_mm)
+    below[[0, -1]] = 0.0, 1.0
+    return np.diff(below)
 
 
 def matched(links, limits, **wish):

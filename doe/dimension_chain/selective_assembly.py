@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doe.dimension_chain.closing import ClosingFunction, middle
-from doe.dimension_chain.distributions import quantile, share_below
+from doe.dimension_chain.distributions import quantile
 from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.links import DIGITS, SLACK, Array, ClosingLink, Interval, Part, Selective
 from doe.dimension_chain.yields import standard_error
@@ -107,13 +107,6 @@ def class_edges(part: Part, classes: int, by: str) -> Array:
         deviations = np.clip(quantile(part, part.distribution, places), part.lower_mm, part.upper_mm)
         deviations[[0, -1]] = part.lower_mm, part.upper_mm
     return part.nominal_mm + deviations
-
-
-def class_shares(part: Part, edges: Array) -> Array:
-    """Share of a part's production in each class."""
-    below = share_below(part, part.distribution, edges - part.nominal_mm)
-    below[[0, -1]] = 0.0, 1.0
-    return np.diff(below)
 
 
 def class_worst_case(function: ClosingFunction, parts: Sequence[Part], wish: Selective) -> Interval:

@@ -140,19 +140,3 @@ def ball_on_race(ball_diameter: float, groove_factor: float, gamma: float, equiv
 def peak_pressure(contact: PointContact, load: Any) -> Any:
     """Largest Hertz pressure [Pa], 3 Q/(2 pi a b), under loads [N]."""
     return 1.5 * np.cbrt(load) / (math.pi * contact.semi_major * contact.semi_minor)
-
-
-def contact_area(contact: PointContact, load: Any) -> Any:
-    """Area of the contact ellipse [m^2], pi a b, under loads [N]."""
-    return math.pi * contact.semi_major * contact.semi_minor * np.cbrt(load) ** 2
-
-
-def hamrock_brewe(curvature_sum: float, curvature_difference: float, equivalent_modulus: float) -> PointContact:
-    """The same contact by fits, to cross-check only: k = 1.0339 (R_y/R_x)^0.636 (Brewe and Hamrock 1977).
-
-    E = 1.0003 + 0.5968 R_x/R_y and K = 1.5277 + 0.6023 ln(R_y/R_x), made for R_y/R_x from 1 to 100.
-    """
-    ratio = (1.0 + curvature_difference) / (1.0 - curvature_difference)
-    ellipticity = 1.0339 * ratio**0.636
-    first, second = 1.5277 + 0.6023 * math.log(ratio), 1.0003 + 0.5968 / ratio
-    return _contact(curvature_sum, equivalent_modulus, ellipticity, first, second)

@@ -186,11 +186,6 @@ def reference_life(
     )
 
 
-def basic_life(capacity: float, load: float) -> float:
-    """L10 = (C/P)^(10/3) in 1e6 turns by ISO 281, for a radial load [N] on an aligned bearing."""
-    return (capacity / load) ** (10.0 / 3.0)
-
-
 def _lamina_loads(loads: NDArray[np.float64], race: str) -> NDArray[np.float64]:
     array = np.asarray(loads, dtype=np.float64)
     if array.ndim == 2:

@@ -52,10 +52,6 @@ class Case(NamedTuple):
         """Raceway control."""
         return str(self.model["raceway_control"])
 
-    def as_scene(self) -> dict[str, Any]:
-        """What ``BallScene.from_dict`` reads."""
-        return {"bearing": self.bearing, "operation": self.operation, "model": self.model}
-
 
 class Problem(NamedTuple):
     """What a solver takes: ``solver(*problem)``."""

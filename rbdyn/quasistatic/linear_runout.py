@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rbdyn.faults import RunError
 from rbdyn.quasistatic.control import Control
 from rbdyn.quasistatic.equilibrium import Solution, solve
-from rbdyn.quasistatic.race_errors import BallPath
 from rbdyn.quasistatic.row import Row
 
 Array = NDArray[np.float64]
@@ -63,20 +62,3 @@ def _settled(solution: Solution) -> Solution:
     if not solution.found:
         raise RunError(f"runout of the nominal bearing: {solution.status}")
     return solution
-
-
-def respond(response: LinearResponse, path: BallPath) -> Array:
-    """Path of the ring (steps, 5) in proportion to the errors of a path of balls."""
-    changes = np.stack([getattr(path, name) for name in CHANGES])
-    cosine, sine = np.cos(path.azimuth), np.sin(path.azimuth)
-    towards = np.tensordot(response.radial, changes, 1)
-    leaning = np.tensordot(response.tilt, changes, 1)
-    return np.column_stack(
-        (
-            (towards * cosine).sum(axis=1),
-            (towards * sine).sum(axis=1),
-            np.tensordot(response.axial, changes, 1).sum(axis=1),
-            -(leaning * sine).sum(axis=1),
-            (leaning * cosine).sum(axis=1),
-        )
-    )

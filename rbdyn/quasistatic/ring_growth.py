@@ -33,12 +33,6 @@ class GrooveChange(NamedTuple):
 UNCHANGED = GrooveChange(0.0, 0.0, 0.0)
 
 
-def race_radii(pitch_diameter: float, ball_diameter: float, contact_angle: float) -> tuple[float, float]:
-    """Radii [m] of the circles on which balls touch inner and outer race: (dm -+ D cos alpha0)/2."""
-    reach = ball_diameter * math.cos(contact_angle)
-    return 0.5 * (pitch_diameter - reach), 0.5 * (pitch_diameter + reach)
-
-
 def printed_growth(pitch_diameter: float, bore_diameter: float, material: Material, speed: float) -> float:
     """Growth of a race as Hu et al. print it (eq 4) with the missing 1/(32 E) [m].
 

@@ -112,11 +112,6 @@ def oil_share(inner_pitch: float, outer_pitch: float) -> float:
     return 1.0 / (1.0 + (outer_pitch / inner_pitch) ** 4.5)
 
 
-def oil_split(inner_pitch: float, outer_pitch: float, inner_speed: float, outer_speed: float = 0.0) -> float:
-    """Speed of the middle ring [rad/s] by ``oil_share``, whichever rings turn and in whichever sense."""
-    return outer_speed + oil_share(inner_pitch, outer_pitch) * (inner_speed - outer_speed)
-
-
 def balanced_split(
     inner: LayerFriction, outer: LayerFriction, inner_speed: float, outer_speed: float = 0.0
 ) -> SpeedSplit:
