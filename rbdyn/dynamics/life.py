@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.turns import hours
+from rbdyn.turns import Life
 
 # Life of a race falls with the fourth power of its load; 9/8 is the slope of the Weibull line.
 LOAD_LIFE = 4.0
@@ -28,7 +28,7 @@ Turning = Literal["inner", "outer", "both"]
 
 
 @dataclass(frozen=True)
-class ReferenceLife:
+class ReferenceLife(Life):
     """Life that nine bearings in ten reach.
 
     ``million_turns``: L10r in 1e6 turns of the inner ring against the outer; infinite without a load.
@@ -36,16 +36,11 @@ class ReferenceLife:
     load on every roller that would do as much [N], against the ``inner_capacity, outer_capacity`` of the races [N].
     """
 
-    million_turns: float
     equivalent_load: float
     inner_load: float
     outer_load: float
     inner_capacity: float
     outer_capacity: float
-
-    def hours(self, inner_speed: float, outer_speed: float = 0.0) -> float:
-        """Life in hours at ring speeds [rad/s]; infinite where they do not turn against each other."""
-        return hours(self.million_turns, inner_speed, outer_speed)
 
 
 def capacity_factor(gamma: float) -> float:

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 SHOWN_POCKETS = 3
 POCKET_COLOURS = (BLUE, ORANGE, GREEN)
-SHOWN_PEAKS = 3
 # Above this many times the cage speed a whirl spectrum holds only noise.
 SHOWN_ORDERS = 30.0
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.quasistatic.rating import ball_size_term, groove_ratio
-from rbdyn.turns import hours
+from rbdyn.turns import Life
 
 LOAD_LIFE = 3.0
 WEIBULL = 10.0 / 9.0
@@ -29,7 +29,7 @@ Turning = Literal["inner", "outer", "both"]
 
 
 @dataclass(frozen=True)
-class BallLife:
+class BallLife(Life):
     """Life that nine rows in ten reach.
 
     ``million_turns``: L10 in 1e6 turns of the inner ring against the outer; infinite without a load.
@@ -37,15 +37,10 @@ class BallLife:
     ``inner_capacity, outer_capacity`` of the races [N].
     """
 
-    million_turns: float
     inner_load: float
     outer_load: float
     inner_capacity: float
     outer_capacity: float
-
-    def hours(self, inner_speed: float, outer_speed: float = 0.0) -> float:
-        """Life in hours at ring speeds [rad/s]; infinite where they do not turn against each other."""
-        return hours(self.million_turns, inner_speed, outer_speed)
 
 
 def lundberg_palmgren_capacities(
