@@ -13,7 +13,7 @@ from rbdyn.accuracy import coverage
 from rbdyn.dynamics.drift import drift_of, drifting, slow_change, unseen_regime
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
-from rbdyn.dynamics.geometry import CAGE_SHARES, absolute_tolerance
+from rbdyn.dynamics.geometry import CAGE_SHARES, absolute_tolerance, roller_radii
 from rbdyn.dynamics.method import explicit_method
 from rbdyn.dynamics.metrics import CAGE_SPEED, POWER_LOSS, Replicate
 from rbdyn.dynamics.model import roller_bearing
@@ -230,6 +230,15 @@ def test_unit_coverage_counts(outer_result):
     assert coverage.pooled(rows) == pytest.approx(0.95)
     narrow = [replace(row, covered=0.8) if row.figure == "power_loss_W" else row for row in rows]
     assert "too narrow (below 0.90): power_loss_W 0.80" in coverage.conclusion(narrow, 200)
+
+
+def test_unit_repeats_are_of_one_bearing(make_scene):
+    """Unit: rollers drawn from a spread stay those of the scene whatever the seed of a repeat."""
+    drawn = make_scene("bearing.roller_diameter_spread_um=0.5")
+    fixed = coverage.with_numerics(coverage.one_bearing(drawn), seed=77)
+    assert roller_radii(fixed) == pytest.approx(roller_radii(drawn), rel=1e-12)
+    plain = make_scene()
+    assert coverage.one_bearing(plain) is plain
 
 
 def test_command_line_coverage(command, monkeypatch):

@@ -15,6 +15,7 @@ from typing import Any
 
 from rbdyn.accuracy.report import Progress, Report, Table, record
 from rbdyn.dynamics.error_bars import FIGURES
+from rbdyn.dynamics.geometry import roller_radii
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
@@ -49,6 +50,7 @@ class Row:
 
 def study(scene: Scene, progress: Callable[[int, int], None] | None = None, repeats: int = REPEATS) -> Report:
     """``rbdyn accuracy --coverage``. Raises RunError, KeyboardInterrupt."""
+    scene = one_bearing(scene)
     counted = Progress(progress, repeats + 1)
     truth = simulate(truth_of(scene))
     counted.step()
@@ -94,6 +96,16 @@ def study(scene: Scene, progress: Callable[[int, int], None] | None = None, repe
         sentences=sentences,
         sheets={"coverage": [one.as_dict() for one in rows]},
     )
+
+
+def one_bearing(scene: Scene) -> Scene:
+    """The scene with the rollers that its seed draws: another seed would be another bearing, not a repeat."""
+    radii = roller_radii(scene)
+    if radii is None:
+        return scene
+    errors_um = (1e6 * radii - 500.0 * scene.bearing.roller_diameter_mm) / 0.5
+    rollers = {"roller_diameter_spread_um": 0.0, "roller_diameter_errors_um": errors_um.tolist()}
+    return scene.model_copy(update={"bearing": scene.bearing.model_copy(update=rollers)})
 
 
 def with_numerics(scene: Scene, **changes: Any) -> Scene:
