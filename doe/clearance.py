@@ -109,11 +109,7 @@ def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
     As long as a design run unless the study says otherwise.
     """
     data, direct = read_scene(study), study.file.direct
-    overrides = [
-        *study.file.scene.set,
-        f"numerics.replicates={direct.replicates}",
-        "numerics.companion=false",
-    ]
+    overrides = [*study.file.scene.set, f"numerics.replicates={direct.replicates}", "numerics.companion=false"]
     if direct.discard_turns is not None:
         overrides.append(f"numerics.discard_turns={direct.discard_turns!r}")
     if direct.turns is not None:
@@ -322,10 +318,7 @@ def motion_record(motions: Mapping[str, History]) -> dict[str, Any]:
         picture = drawing(motion, PLAYED_TURNS, round(FRAMES / PLAYED_TURNS), FRAMES)
         record[name] = {
             "t_s": np.round(motion.time[kept], 8).tolist(),
-            "cage_orbit_um": {
-                "x": np.round(1e6 * x[kept], 2).tolist(),
-                "y": np.round(1e6 * y[kept], 2).tolist(),
-            },
+            "cage_orbit_um": {"x": np.round(1e6 * x[kept], 2).tolist(), "y": np.round(1e6 * y[kept], 2).tolist()},
             "guide_radius_um": None if clearance is None else round(1e6 * clearance, 3),
             "moving": frames(motion, picture),
         }

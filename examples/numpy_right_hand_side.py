@@ -173,12 +173,7 @@ class NumpyRightHandSide:
         b = self.bearing
         z = b.rollers
         place, velocity, spin = y[: 2 * z].reshape(2, z), y[2 * z : 4 * z].reshape(2, z), y[4 * z : 5 * z]
-        cage, cage_velocity, ring, ring_velocity = (
-            y[5 * z : 5 * z + 2],
-            y[5 * z + 3 : 5 * z + 5],
-            y[-4:-2],
-            y[-2:],
-        )
+        cage, cage_velocity, ring, ring_velocity = (y[5 * z : 5 * z + 2], y[5 * z + 3 : 5 * z + 5], y[-4:-2], y[-2:])
         angle, cage_speed = y[5 * z + 2], y[5 * z + 5]
         cosine, sine = np.cos(angle), np.sin(angle)
         ex, ey = cosine * b.pocket_cos - sine * b.pocket_sin, sine * b.pocket_cos + cosine * b.pocket_sin

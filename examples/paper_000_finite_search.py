@@ -182,14 +182,7 @@ def table_4() -> pd.DataFrame:
     for axial, speed, their_searches, their_seconds in TABLE_4:
         loads = (f"operation.axial_load_N={axial}", f"operation.inner_speed_rpm={speed}")
         # Nothing pulls across: y is free and stays 0.
-        rigid = BallScene.load(
-            DOUBLE_DECKER,
-            [
-                *loads,
-                "model.gyroscopic=unsigned",
-                "model.ring_expansion=false",
-            ],
-        )
+        rigid = BallScene.load(DOUBLE_DECKER, [*loads, "model.gyroscopic=unsigned", "model.ring_expansion=false"])
         results = [solve_scene(rigid).as_dict() for _ in range(REPEATS + 1)]
         angles = {
             f"{layer}_layer_deg": max(ball["inner_angle_deg"] for ball in results[0][layer]["balls"])
@@ -300,10 +293,7 @@ def draw_figure_7(found: dict[str, Any], path: Path) -> None:
             axis.plot(azimuth, both[1], "--", color=colour)
         axes[0].plot(azimuth, curves["newton"][speed].T, ".", color=colour, markersize=4)
         axes[1].plot(azimuth, curves["signed"][speed].T, "x", color=colour, markersize=4)
-    titles = (
-        "finite search (lines), plain Newton (dots)",
-        "moment without (lines) and with its sign (crosses)",
-    )
+    titles = ("finite search (lines), plain Newton (dots)", "moment without (lines) and with its sign (crosses)")
     for axis, title in zip(axes, titles, strict=True):
         plain(axis)
         axis.set_xlabel("azimuth of the ball [deg]")
@@ -343,9 +333,7 @@ def _show(table: pd.DataFrame) -> None:
     print_table("Table 3", header, rows)
 
 
-def main(
-    out: Annotated[Path | None, typer.Option(help="Write both tables and figures 7, 8, 9 here.")] = None,
-) -> None:
+def main(out: Annotated[Path | None, typer.Option(help="Write both tables and figures 7, 8, 9 here.")] = None) -> None:
     """Print the tables; write the figures."""
     outcomes = table_3()
     table, found = frame(outcomes), figure_7()

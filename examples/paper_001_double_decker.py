@@ -222,9 +222,7 @@ def draw(frame: pd.DataFrame, path: Path) -> None:
     save(figure, path.with_name(f"{path.stem}_materials{path.suffix}"))
 
 
-def main(
-    out: Annotated[Path | None, typer.Option(help="Folder for the numbers and pictures.")] = None,
-) -> None:
+def main(out: Annotated[Path | None, typer.Option(help="Folder for the numbers and pictures.")] = None) -> None:
     """Regenerate the figures and print what the paper states beside ours."""
     tell(paper_001(), out, "paper_001")
 

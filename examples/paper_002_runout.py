@@ -179,19 +179,9 @@ def designs(bearings: int = 4000, solved: int = 100) -> dict[tuple[str, str], Ra
     """Race errors for K_ia and S_ia of class P2, and for their 1.3 um, at 95 % yield and outer races as good as inner."""
     limits = running_accuracy("P2", BORE, OUTSIDE)
     assert limits.axial is not None
-    targets = {
-        "P2: 2.5 and 2.5 um": (limits.radial, limits.axial),
-        "theirs: 1.3 and 1.3 um": (1.3e-6, 1.3e-6),
-    }
+    targets = {"P2: 2.5 and 2.5 um": (limits.radial, limits.axial), "theirs: 1.3 and 1.3 um": (1.3e-6, 1.3e-6)}
     return {
-        (target, name): design(
-            bench(),
-            lot,
-            radial_limit=radial,
-            axial_limit=axial,
-            bearings=bearings,
-            solved=solved,
-        )
+        (target, name): design(bench(), lot, radial_limit=radial, axial_limit=axial, bearings=bearings, solved=solved)
         for target, (radial, axial) in targets.items()
         for name, lot in LOTS.items()
     }
@@ -242,11 +232,7 @@ def case_table(frame: pd.DataFrame) -> Table:
         "asynchronous_radial_um": "{:.2f}".format,
     }  # fmt: skip
     rows = tuple(
-        (
-            f"{line['case']} {line['errors']}",
-            line["reading"],
-            *(form(line[name]) for name, form in shown.items()),
-        )
+        (f"{line['case']} {line['errors']}", line["reading"], *(form(line[name]) for name, form in shown.items()))
         for line in frame.to_dict("records")
     )
     return Table("Six cases [um]", ("case", "reading", *(name.removesuffix("_um") for name in shown)), rows)
@@ -322,9 +308,7 @@ def draw_bars(frame: pd.DataFrame, file: Path) -> None:
     save(figure, file)
 
 
-def main(
-    out: Annotated[Path | None, typer.Option(help="Folder for tables and pictures.")] = None,
-) -> None:
+def main(out: Annotated[Path | None, typer.Option(help="Folder for tables and pictures.")] = None) -> None:
     """Regenerate the six cases, the coefficients and the P2 design of Zhou et al. 2024."""
     frame, paths = simulated()
     tables = (case_table(frame), made_table(as_made()), design_table(designs()))

@@ -73,11 +73,7 @@ TABLE_3 = (
     (20.9, 18.1, 34323),
 )
 # How the bearing is modelled: speed [rpm] and whether the inner ring is held parallel.
-MODELS = {
-    "at rest": (0.0, "fixed"),
-    "63000 rpm": (SPEED_RPM, "fixed"),
-    "63000 rpm, tilting": (SPEED_RPM, "free"),
-}
+MODELS = {"at rest": (0.0, "fixed"), "63000 rpm": (SPEED_RPM, "fixed"), "63000 rpm, tilting": (SPEED_RPM, "free")}
 # Misalignments of Fig. 13 [mrad], and none; its radial load.
 TILTS_MRAD, TILTED_RADIAL_N = (0.0, 1.3, 1.9, 2.8), 200.0
 
@@ -286,14 +282,7 @@ def _optimum_table() -> Table:
                 percent(longest.peak_pressure / least.peak_pressure - 1.0),
             )
         )
-    header = (
-        "",
-        "preload for stress [N]",
-        "stress [MPa]",
-        "for life [N]",
-        "life at the first",
-        "stress at the second",
-    )
+    header = ("", "preload for stress [N]", "stress [MPa]", "for life [N]", "life at the first", "stress at the second")
     return Table("Best preload on top of the working 40 N (the paper: 30 N)", header, tuple(rows))
 
 
@@ -365,9 +354,7 @@ def _draw(path: Path) -> None:
     save(figure, path)
 
 
-def main(
-    out: Annotated[Path | None, typer.Option(help="Folder for the numbers and pictures.")] = None,
-) -> None:
+def main(out: Annotated[Path | None, typer.Option(help="Folder for the numbers and pictures.")] = None) -> None:
     """Regenerate both tables and print what they belong to."""
     tell(preload_and_clearance(), out, "paper_003")
 

@@ -78,11 +78,7 @@ def main(
         for table in check.tables:
             table.show()
         typer.echo(check.conclusion)
-        report += [
-            f"## {check.title}\n",
-            *(table.markdown() for table in check.tables),
-            check.conclusion + "\n",
-        ]
+        report += [f"## {check.title}\n", *(table.markdown() for table in check.tables), check.conclusion + "\n"]
         if out is not None:
             check.frame.to_csv(out / f"{name}.csv")
             check.draw(out / f"{name}.png")

@@ -33,13 +33,11 @@ def ball(
         str | None, typer.Option(metavar="UM", help="The same over the diameter that balls lose, instead.")
     ] = None,
     race_limits: Annotated[
-        str | None,
-        typer.Option(metavar="CLASS", help="Race errors with which bearings meet P2, P4 or P5, instead."),
+        str | None, typer.Option(metavar="CLASS", help="Race errors with which bearings meet P2, P4 or P5, instead.")
     ] = None,
     wanted: Annotated[float, typer.Option("--yield", help="Share of bearings that must meet it.")] = 0.95,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Write result.json and tables, with pictures, here."),
+        Path | None, typer.Option(metavar="DIR", help="Write result.json and tables, with pictures, here.")
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,

@@ -65,22 +65,8 @@ def write(result: BallResult, folder: Path, path: pd.DataFrame | None = None) ->
 
 def _print_row(title: str, record: dict[str, Any], verbose: bool) -> None:
     place, tilt, stiffness = record["displacement_mm"], record["tilt_mrad"], record["stiffness"]
-    header = (
-        "azimuth [deg]",
-        "inner angle [deg]",
-        "outer angle",
-        "inner load [N]",
-        "outer load",
-        "centrifugal [N]",
-    )
-    keys = (
-        "azimuth_deg",
-        "inner_angle_deg",
-        "outer_angle_deg",
-        "inner_load_N",
-        "outer_load_N",
-        "centrifugal_force_N",
-    )
+    header = ("azimuth [deg]", "inner angle [deg]", "outer angle", "inner load [N]", "outer load", "centrifugal [N]")
+    keys = ("azimuth_deg", "inner_angle_deg", "outer_angle_deg", "inner_load_N", "outer_load_N", "centrifugal_force_N")
     rows = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in record["balls"]]
     print_table(title, header, rows)
     print(

@@ -73,11 +73,7 @@ def _point(found: Sweep, place: int, si: float) -> dict[str, Any]:
 
 def _best(found: Sweep, which: str, si: float) -> dict[str, float]:
     point = getattr(found, which)
-    return {
-        "value": point.value / si,
-        "max_stress_MPa": 1e-6 * point.peak_pressure,
-        "L10_Mrev": point.million_turns,
-    }
+    return {"value": point.value / si, "max_stress_MPa": 1e-6 * point.peak_pressure, "L10_Mrev": point.million_turns}
 
 
 def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int = 1) -> dict[str, Any]:
@@ -113,14 +109,7 @@ def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int
 
 
 def _limits(found: RaceLimits) -> dict[str, Any]:
-    lengths = (
-        "inner_roundness",
-        "outer_roundness",
-        "inner_sway",
-        "outer_sway",
-        "radial_limit",
-        "axial_limit",
-    )
+    lengths = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "radial_limit", "axial_limit")
     return {
         **{f"{name}_um": 1e6 * getattr(found, name) for name in lengths},
         "yield": found.yielded,

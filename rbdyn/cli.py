@@ -101,8 +101,7 @@ def accuracy(
         int | None, typer.Option(min=1, metavar="N", help="Scenes of the battery; 5000 unless given.")
     ] = None,
     trajectory: Annotated[
-        float | None,
-        typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25."),
+        float | None, typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25.")
     ] = None,
     sought: Annotated[
         float | None,
@@ -206,10 +205,7 @@ def _overrides(
     assignments: list[str] | None, turns: float | None, replicates: int | None, seed: int | None
 ) -> list[str]:
     shorthand = {"turns": turns, "replicates": replicates, "seed": seed}
-    return [
-        *(assignments or []),
-        *(f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None),
-    ]
+    return [*(assignments or []), *(f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None)]
 
 
 def _aim(target: str, turns: float | None, replicates: int | None) -> float:

@@ -22,10 +22,7 @@ ROUND = 6755399441055744.0  # 1.5 * 2^52: adding it leaves the rounded integer i
 SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
 BIAS = 1023
 EXPONENT_MASK = -(1 << 52)
-TWO_52, TWO_52_BITS = (
-    4503599627370496.0,
-    0x4330000000000000,
-)  # an integer below 2^52 in its low bits reads as a float
+TWO_52, TWO_52_BITS = (4503599627370496.0, 0x4330000000000000)  # an integer below 2^52 in its low bits reads as a float
 
 
 @intrinsic

@@ -5,13 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rbdyn.materials import Material
-from rbdyn.ring_expansion import (
-    MountedClearance,
-    Ring,
-    interface_pressure,
-    loosening_speed,
-    mounted_clearance,
-)
+from rbdyn.ring_expansion import MountedClearance, Ring, interface_pressure, loosening_speed, mounted_clearance
 from rbdyn.scene.bearing import Bearing, Materials
 from rbdyn.scene.mounting import Mounting, Raceways, material_of
 
@@ -89,11 +83,7 @@ def mounted_rings(
 
 
 def operating_clearance(
-    mounting: Mounting,
-    bearing: Bearing,
-    materials: Materials,
-    inner_speed: float,
-    outer_speed: float = 0.0,
+    mounting: Mounting, bearing: Bearing, materials: Materials, inner_speed: float, outer_speed: float = 0.0
 ) -> MountedClearance:
     """Diametral clearance of a scene's roller bearing as mounted, at speeds [rad/s] of shaft and housing.
 

@@ -93,9 +93,7 @@ class OptionCost:
 
 
 def option_costs(
-    scene: Scene,
-    options: Mapping[str, Sequence[str]] = OPTIONS,
-    progress: Callable[[int, int], None] | None = None,
+    scene: Scene, options: Mapping[str, Sequence[str]] = OPTIONS, progress: Callable[[int, int], None] | None = None
 ) -> list[OptionCost]:
     """A row an option that the scene allows. Raises RunError, KeyboardInterrupt."""
     plain = with_options(scene, (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}"))
@@ -141,9 +139,7 @@ def with_options(scene: Scene, assignments: Sequence[str]) -> Scene:
 
 
 def study(
-    scene: Scene,
-    progress: Callable[[int, int], None] | None = None,
-    options: Mapping[str, Sequence[str]] = OPTIONS,
+    scene: Scene, progress: Callable[[int, int], None] | None = None, options: Mapping[str, Sequence[str]] = OPTIONS
 ) -> Report:
     """``rbdyn accuracy --options``. Raises RunError, KeyboardInterrupt."""
     rows = [row.as_dict() for row in option_costs(scene, options, progress)]

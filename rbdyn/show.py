@@ -216,10 +216,7 @@ def print_record(record: dict[str, Any], folder: Path, quiet: bool, verbose: boo
     of = "" if away["guide_clearance"] is None else f" of {away['guide_clearance']:.4g}"
     rows = [
         ("whirl speed over cage speed, mean", f"{record['whirl_ratio']:.4g}"),
-        (
-            "  median, and 5 % to 95 %",
-            f"{quantiles['50%']:.3g}, {quantiles['5%']:.3g} to {quantiles['95%']:.3g}",
-        ),
+        ("  median, and 5 % to 95 %", f"{quantiles['50%']:.3g}, {quantiles['5%']:.3g} to {quantiles['95%']:.3g}"),
         ("eccentricity of the cage [µm]", f"{away['mean']:.4g} ± {away['standard_deviation']:.2g}{of}"),
     ]
     for name, hit in record["largest"].items():

@@ -87,10 +87,7 @@ class SlipMap:
 
         rows = []
         for point in self.points:
-            row: dict[str, Any] = {
-                "inner_speed_rpm": point.inner_speed_rpm,
-                "radial_load_N": point.radial_load_N,
-            }
+            row: dict[str, Any] = {"inner_speed_rpm": point.inner_speed_rpm, "radial_load_N": point.radial_load_N}
             for name, figure in point.figures.items():
                 row |= {
                     name: figure.value,
@@ -123,10 +120,7 @@ def slip_map(
     bearings = [roller_bearing(point) for point in scenes]
     prepare(scenes[0], bearings[0])
     numerics = scene.numerics
-    series = (
-        (numerics.rtol, numerics.replicates),
-        (companion_tolerance(numerics.rtol), numerics.companions),
-    )
+    series = ((numerics.rtol, numerics.replicates), (companion_tolerance(numerics.rtol), numerics.companions))
     stop = Stop()
     tasks = [
         (place, rtol, replicate) for place in range(len(scenes)) for rtol, count in series for replicate in range(count)

@@ -117,10 +117,7 @@ def cases(scene: Scene) -> dict[str, tuple[str, ...]]:
         "cage of 0.1 g": ("cage.mass_g=0.1",),
         "cage of 5 kg": ("cage.mass_g=5000.0",),
         "ceramic rollers": ('materials.roller="silicon_nitride"',),
-        "traction slope of 10 s/m": (
-            'traction.model="four_constant"',
-            "traction.constants=[-0.05,5.0,100.0,0.05]",
-        ),
+        "traction slope of 10 s/m": ('traction.model="four_constant"', "traction.constants=[-0.05,5.0,100.0,0.05]"),
         "dry friction": ('traction.model="coulomb"',),
         "2 rollers": ("bearing.rollers=2",),
         "100 rollers": ("bearing.rollers=100", f"bearing.pitch_diameter_mm={pitch!r}"),
@@ -144,9 +141,7 @@ def cases(scene: Scene) -> dict[str, tuple[str, ...]]:
 
 
 def battery(
-    scene: Scene,
-    chosen: Mapping[str, Sequence[str]] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    scene: Scene, chosen: Mapping[str, Sequence[str]] | None = None, progress: Callable[[int, int], None] | None = None
 ) -> list[Ending]:
     """A row a case; all cases unless some are ``chosen``. Raises KeyboardInterrupt."""
     listed = cases(scene) if chosen is None else chosen
@@ -160,11 +155,7 @@ def battery(
 
 def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
     """Run one case."""
-    short = (
-        f"numerics.turns={TURNS}",
-        f"numerics.discard_turns={DISCARDED}",
-        "numerics.impact_window_turns=1e9",
-    )
+    short = (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}", "numerics.impact_window_turns=1e9")
     told = tuple(assignments)
     try:
         varied = with_options(scene, (*short, *told))

@@ -142,10 +142,7 @@ class Bearing:
     def ball(self, a_axial, a_radial, x, y, reach_i=None, reach_o=None):
         """(residual axial, radial), (ring axial, radial, couple), loads, F_c and M_g of a ball at (x, y)."""
         context = self.context
-        reach_i, reach_o = (
-            self.reach_i if reach_i is None else reach_i,
-            self.reach_o if reach_o is None else reach_o,
-        )
+        reach_i, reach_o = (self.reach_i if reach_i is None else reach_i, self.reach_o if reach_o is None else reach_o)
         u, v = a_axial - x, a_radial - y
         length_i, length_o = context.sqrt(u * u + v * v), context.sqrt(x * x + y * y)
         si, ci, so, co = u / length_i, v / length_i, x / length_o, y / length_o

@@ -120,10 +120,7 @@ def state_near_contact(scene: Scene, seed: int) -> NDArray[np.float64]:
         cage_xy += ring_xy
     cage_angle = draw.uniform(0.0, 2.0 * np.pi)
     angles = cage_angle + 2.0 * np.pi * np.arange(z) / z
-    radial, ahead = (
-        np.array([np.cos(angles), np.sin(angles)]),
-        np.array([-np.sin(angles), np.cos(angles)]),
-    )
+    radial, ahead = (np.array([np.cos(angles), np.sin(angles)]), np.array([-np.sin(angles), np.cos(angles)]))
     # Distance ahead of the pocket's middle, measured from the cage: half way to a wall, or 0.2 to 4 um into it.
     wall = draw.choice([-1.0, 1.0], z)
     into = np.where(draw.random(z) < 0.6, draw.uniform(0.2e-6, 4e-6, z), -0.5 * half_pocket)

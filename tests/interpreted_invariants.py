@@ -254,11 +254,7 @@ def test_unit_a_clock_that_changes_nothing():
         y = state_near_contact(scene, seed)
         plain = right_hand_side(bearing, y)
         clocked = right_hand_side(bearing._replace(drive=drive), np.append(y, (0.01, 2.0, 0.0)))
-        assert (clocked.dy[:60] == plain.dy).all() and clocked.dy[60:].tolist() == [
-            1.0,
-            steady.inner_speed,
-            0.0,
-        ]
+        assert (clocked.dy[:60] == plain.dy).all() and clocked.dy[60:].tolist() == [1.0, steady.inner_speed, 0.0]
         assert (clocked.power[:LOAD] == plain.power[:LOAD]).all()
         assert plain.power[LOAD] == 0.0 and clocked.power[LOAD] == steady.load_x * y[58]
 

@@ -17,11 +17,7 @@ from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.film import ShortJournalFilm
 from rbdyn.contact.hertz_line import LineContact, LineContactOnBar, PowerLineContact
 from rbdyn.contact.pocket_film import PocketFilm
-from rbdyn.contact.rolling_resistance import (
-    NoRollingResistance,
-    RollingResistance,
-    StarvedRollingResistance,
-)
+from rbdyn.contact.rolling_resistance import NoRollingResistance, RollingResistance, StarvedRollingResistance
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
     CoulombTraction,

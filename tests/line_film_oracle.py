@@ -81,10 +81,7 @@ class Contact:
         """Gap, density and its derivative, and the mobility rho h^3/(eta reynolds) between the places."""
         h = h0 + 0.5 * self.x**2 + self.influence @ p
         s = self.stiffness * np.maximum(p, 0.0)
-        density, change = (
-            (1.0 + 1.34 * s) / (1.0 + s),
-            np.where(p > 0.0, 0.34 * self.stiffness / (1.0 + s) ** 2, 0.0),
-        )
+        density, change = ((1.0 + 1.34 * s) / (1.0 + s), np.where(p > 0.0, 0.34 * self.stiffness / (1.0 + s) ** 2, 0.0))
         middle = 0.5 * (p[1:] + p[:-1])
         mobility = (0.5 * (h[1:] + h[:-1])) ** 3 / self.reynolds * np.exp(-alpha * np.maximum(middle, 0.0))
         return h, density, change, mobility * 0.5 * (density[1:] + density[:-1]), middle > 0.0

@@ -249,11 +249,7 @@ def rolling_resistance(scene, encloses, load, speed):
     share where the oil begins at a distance."""
     if scene.model.rolling_resistance == "off" or load == 0.0:
         return 0.0
-    oil, length, radius = (
-        oil_of(scene),
-        scene.bearing.effective_length_mm * 1e-3,
-        reduced_radius(scene, encloses),
-    )
+    oil, length, radius = (oil_of(scene), scene.bearing.effective_length_mm * 1e-3, reduced_radius(scene, encloses))
     e = modulus(scene, "roller", "rings")
     u, w = 2.0 * oil.viscosity * speed / (e * radius), load / (length * e * radius)
     heating = oil.viscosity_slope * nominal_entrainment(scene) ** 2 / oil.conductivity

@@ -51,12 +51,7 @@ def fitted(name: str, runs: list[list[float]]) -> dict[str, Any]:
         "pure_error": {"ss": 1.0, "df": 5, "ms": 0.2},
         **{"r2": 0.98, "adjusted_r2": 0.97, "predicted_r2": 0.9, "press": 3.0},
         **{"cv_percent": 1.2, "adequate_precision": 20.0},
-        "stationary_point": {
-            "coded": [0.0] * 3,
-            "actual": CENTRE,
-            "eigenvalues": [1.0] * 3,
-            "nature": "minimum",
-        },
+        "stationary_point": {"coded": [0.0] * 3, "actual": CENTRE, "eigenvalues": [1.0] * 3, "nature": "minimum"},
         "diagnostics": {
             "runs": [
                 {
@@ -190,10 +185,5 @@ def motion(rollers: int = 6, frames: int = 40) -> dict[str, Any]:
         "pocket_load_N": [20.0] * len(each), "land_load_N": still,
     }  # fmt: skip
     orbit = {axis: [20.0 * trig(0.1 * k) for k in range(60)] for axis, trig in (("x", math.cos), ("y", math.sin))}
-    one = {
-        "t_s": [1e-5 * k for k in range(60)],
-        "cage_orbit_um": orbit,
-        "guide_radius_um": 75.0,
-        "moving": moving,
-    }
+    one = {"t_s": [1e-5 * k for k in range(60)], "cage_orbit_um": orbit, "guide_radius_um": 75.0, "moving": moving}
     return {"baseline": one, "pick": one}

@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 
 from rbdyn.accuracy import ball_solvers, method_bias, replication, slicing, tolerances
-from rbdyn.accuracy.judgement import (
-    about,
-    check_replicates,
-    judged,
-    overall,
-    replicates_needed,
-    turns_needed,
-)
+from rbdyn.accuracy.judgement import about, check_replicates, judged, overall, replicates_needed, turns_needed
 from rbdyn.accuracy.tolerances import OUTPUTS, Bias
 from rbdyn.dynamics.batch_means import student_factor, student_half_width
 from rbdyn.faults import InputError
@@ -138,12 +131,7 @@ def test_unit_slices_conclude_only_what_errors_allow(outer):
     def rows(error):
         return [
             slicing.Row(*bias(size, error), slices, load, 1000.0)
-            for slices, load, size in (
-                (9, 0.02, 0.0),
-                (31, 0.004, 0.003),
-                (61, 0.001, 0.001),
-                (241, 1e-4, 0.0),
-            )
+            for slices, load, size in ((9, 0.02, 0.0), (31, 0.004, 0.003), (61, 0.001, 0.001), (241, 1e-4, 0.0))
         ]
 
     noisy, sharp = slicing.conclusion(rows(0.2), outer), slicing.conclusion(rows(0.003), outer)

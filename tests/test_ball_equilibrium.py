@@ -149,11 +149,7 @@ CASES = {
     "209": model_of(DEEP),
     "209 cage": model_of(DEEP, model=CAGE),
 }
-LOADS = {
-    "71808": np.array([150.0, -40.0, 260.0, 0.6, -0.9]),
-    "218": load_of(scene(LARGE)),
-    "209": load_of(scene(DEEP)),
-}
+LOADS = {"71808": np.array([150.0, -40.0, 260.0, 0.6, -0.9]), "218": load_of(scene(LARGE)), "209": load_of(scene(DEEP))}
 
 
 def case(name):
@@ -213,8 +209,7 @@ def test_rate_a_near_start_takes_few_steps(name):
     assert solve(row, control, load, start=found).steps == 0
     for away, most in ((1e-10, 2), (1e-7, 4)):
         start = found._replace(
-            displacement=found.displacement + np.array([away, -away, away, 0.0, 0.0]),
-            balls=found.balls + 0.3 * away,
+            displacement=found.displacement + np.array([away, -away, away, 0.0, 0.0]), balls=found.balls + 0.3 * away
         )
         again = balanced(row, control, load, start=start)
         assert 1 <= again.steps <= most
@@ -315,12 +310,7 @@ def test_invariant_preload_by_force_and_by_displacement():
     by_force = balanced(row, control, load_of(apart), given_of(apart))
     assert np.array_equal(by_force.displacement, balanced(row, control, load_of(together)).displacement)
     nut = scene(
-        LARGE,
-        operation={
-            "load_N": None,
-            "radial_load_N": 3000.0,
-            "preload_um": 1e6 * float(by_force.displacement[2]),
-        },
+        LARGE, operation={"load_N": None, "radial_load_N": 3000.0, "preload_um": 1e6 * float(by_force.displacement[2])}
     )
     by_nut = balanced(row, control, load_of(nut), given_of(nut))
     assert by_nut.reaction == pytest.approx(by_force.reaction, rel=1e-8, abs=1e-5)

@@ -34,15 +34,7 @@ def compiled_motion(spinning, share, ci, si, co, so):
 def spinning_of(inner_speed, outer_speed=0.0, turning=-1.0):
     """What orbit and spin of a half-inch steel ball depend on."""
     return Spinning(
-        DIAMETER / PITCH,
-        DIAMETER,
-        0.5 * MASS * PITCH,
-        INERTIA,
-        turning,
-        inner_speed,
-        outer_speed,
-        1e-200,
-        1e9,
+        DIAMETER / PITCH, DIAMETER, 0.5 * MASS * PITCH, INERTIA, turning, inner_speed, outer_speed, 1e-200, 1e9
     )
 
 

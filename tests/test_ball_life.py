@@ -202,10 +202,7 @@ def test_closed_form_even_loads():
 
 
 @settings(max_examples=40, deadline=None)
-@given(
-    st.lists(st.floats(0.0, 1e3), min_size=12, max_size=12).filter(lambda q: max(q) > 1.0),
-    st.floats(0.1, 10.0),
-)
+@given(st.lists(st.floats(0.0, 1e3), min_size=12, max_size=12).filter(lambda q: max(q) > 1.0), st.floats(0.1, 10.0))
 def test_invariants_of_life(loads, factor):
     """Invariant: cube law; order of the balls is nothing; standing races suffer more; samples of balls that go round
     make both races alike."""

@@ -242,10 +242,7 @@ def test_unit_a_file_tells_what_bearing_it_is():
 
 def test_command_line_the_wrong_kind_of_bearing():
     """Command line: ``simulate`` of balls and ``ball`` of rollers exit with 2 and name the other command; bad keys too."""
-    for command, file, word in (
-        ("simulate", BALLS, "use rbdyn ball"),
-        ("ball", ROLLERS, "use rbdyn simulate"),
-    ):
+    for command, file, word in (("simulate", BALLS, "use rbdyn ball"), ("ball", ROLLERS, "use rbdyn simulate")):
         told = CliRunner().invoke(app, [command, str(file)])
         assert told.exit_code == 2 and word in told.output and "Traceback" not in told.output
     told = CliRunner().invoke(app, ["ball", str(BALLS), "--set", "bearing.balls=60", "--set", "model.solver=guess"])

@@ -242,10 +242,7 @@ def test_unit_a_double_decker_goes_point_by_point(tmp_path):
         ({SPEED: ["fast"]}, "are not numbers"),
         ({SPEED: np.linspace(0.0, 1.0, 600), LOAD: np.linspace(0.0, 1.0, 600)}, "360000 points"),
         ({"bearing.inner_groove_factor": [0.4, 0.52]}, "(bearing.inner_groove_factor = 0.4)"),
-        (
-            {LOAD: [1.0, 2.0], "bearing.ball_diameter_mm": [3.0, 6.0]},
-            "ball_diameter_mm = 6): bearing.balls = 29",
-        ),
+        ({LOAD: [1.0, 2.0], "bearing.ball_diameter_mm": [3.0, 6.0]}, "ball_diameter_mm = 6): bearing.balls = 29"),
     ],
 )
 def test_unit_bad_sweeps_are_refused_in_a_sentence(keys, sentence):

@@ -74,10 +74,7 @@ def test_an_exact_fit_keeps_the_response():
     assert box_cox(np.column_stack([np.ones(9), x]), 5.0 + x)["recommended"] == 1.0
 
 
-@given(
-    st.lists(st.floats(1e-3, 1e3), min_size=1, max_size=5),
-    st.sampled_from([-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0]),
-)
+@given(st.lists(st.floats(1e-3, 1e3), min_size=1, max_size=5), st.sampled_from([-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0]))
 def test_there_and_back(values, exponent):
     assert backward(forward(values, exponent), exponent) == pytest.approx(values, rel=1e-6)
 

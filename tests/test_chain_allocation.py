@@ -137,10 +137,7 @@ def test_slack_after_snapping_widens_the_finest_grade_that_still_fits():
 def test_slack_goes_where_it_saves_most():
     links, limits = [costly(1, 9.0, 1.0), costly(-1, 8.0, 3.0)], (0.9, 0.938)
     wish = {"grades": True, "spend_slack": True, "method": "equal"}
-    assert [part.grade for part in solve(chain(links, limits, **wish), samples=10).allocation] == [
-        "IT7",
-        "IT8",
-    ]
+    assert [part.grade for part in solve(chain(links, limits, **wish), samples=10).allocation] == ["IT7", "IT8"]
 
 
 @pytest.mark.parametrize("mode", ["rss", "yield"])
@@ -158,11 +155,7 @@ def test_spent_slack_still_keeps_the_limits(mode):
 
 
 def test_positions_by_letter_and_on_both_sides():
-    links = [
-        (1, 25.1, {"position": "F"}),
-        (-1, 25.0, {"position": "g"}),
-        (-0.001, 4.0, {"position": "symmetric"}),
-    ]
+    links = [(1, 25.1, {"position": "F"}), (-1, 25.0, {"position": "g"}), (-0.001, 4.0, {"position": "symmetric"})]
     part = by_name(solve(chain(links, (0.05, 0.15)), samples=10))
     width = part["a"].tolerance_mm
     assert (part["a"].lower_mm, part["a"].upper_mm) == pytest.approx((0.020, 0.020 + width))
@@ -171,11 +164,7 @@ def test_positions_by_letter_and_on_both_sides():
 
 
 def test_a_code_of_the_standard_gives_the_deviations():
-    coded = [
-        (1, 60.0, {"fit": "K6", "fixed": True}),
-        (-1, 60.0, {"fit": "P5 outside", "fixed": True}),
-        (1, 5.0),
-    ]
+    coded = [(1, 60.0, {"fit": "K6", "fixed": True}), (-1, 60.0, {"fit": "P5 outside", "fixed": True}), (1, 5.0)]
     part = by_name(solve(chain(coded, (4.9, 5.1)), samples=10))
     assert (part["a"].lower_mm, part["a"].upper_mm) == (-0.015, 0.004)
     assert (part["b"].lower_mm, part["b"].upper_mm) == (-0.009, 0.0)
@@ -186,8 +175,7 @@ def test_limits_that_fixed_links_consume_come_with_the_nearest_that_can_be_met()
     with pytest.raises(InputError, match=r"nearest that can be met are wider than 0\.9950 to 1\.0250 mm"):
         solve(chain(links, (1.0, 1.02)), samples=10)
     with pytest.raises(
-        InputError,
-        match=r"yield = 0\.9973: the fixed links alone give 0\.9545.* wider than 0\.99\d+ to 1\.02\d+ mm",
+        InputError, match=r"yield = 0\.9973: the fixed links alone give 0\.9545.* wider than 0\.99\d+ to 1\.02\d+ mm"
     ):
         solve(chain(links, (1.0, 1.02), mode="yield"), samples=10)
 

@@ -33,12 +33,7 @@ def test_solid_shaft_in_a_ring_of_its_steel_keeps_the_ratio_of_diameters():
 
 def test_ring_in_a_rigid_housing_shrinks_at_its_raceway_as_lame_says():
     factor = press_fit_factor(
-        fit_mm=60,
-        raceway_mm=52.5,
-        shaft_bore_mm=52.5,
-        outside_mm=120,
-        bore_modulus_GPa=1e9,
-        shaft_poisson=0.3,
+        fit_mm=60, raceway_mm=52.5, shaft_bore_mm=52.5, outside_mm=120, bore_modulus_GPa=1e9, shaft_poisson=0.3
     )
     # u(a)/u(b) of a ring under outer pressure: 2 a b/((1 - nu) b^2 + (1 + nu) a^2), all the interference at b.
     a, b, nu = 52.5, 60.0, 0.3
@@ -150,17 +145,7 @@ def test_a_part_that_cannot_bring_the_closing_link_to_its_limits_is_refused():
 def test_expressions_read_arithmetic_and_nothing_else():
     assert evaluate("max(a, 2*b, 0) - abs(-b)/2 + cos(0)*pi**2", {"a": 1.0, "b": 3.0}) == pytest.approx(4.5 + np.pi**2)
     assert names_in("min(a, b) + a*sqrt(c)") == ["a", "b", "c"]
-    for text in (
-        "__import__('os')",
-        "a.real",
-        "[a]",
-        "a if b else c",
-        "open(a)",
-        "sqrt(a, b)",
-        "a <",
-        "'a'",
-        "True",
-    ):
+    for text in ("__import__('os')", "a.real", "[a]", "a if b else c", "open(a)", "sqrt(a, b)", "a <", "'a'", "True"):
         with pytest.raises(ValueError, match=r"holds|no arithmetic"):
             names_in(text)
 
@@ -192,30 +177,17 @@ def test_threads_change_no_bit_of_a_bent_chain():
     [
         ({"press_fit": {"shaft": "c", "bore": "x", "raceway_mm": 30.0}}, 'uses "x", which no link before it'),
         ({"press_fit": {"shaft": "c", "bore": "d", "raceway_mm": 25.0}}, "outside_mm is missing"),
-        (
-            {"press_fit": {"shaft": "c", "bore": "d", "raceway_mm": 27.0, "outside_mm": 30.0}},
-            "lies on neither part",
-        ),
+        ({"press_fit": {"shaft": "c", "bore": "d", "raceway_mm": 27.0, "outside_mm": 30.0}}, "lies on neither part"),
         ({"expression": "a +"}, 'expression = "a +": is no arithmetic expression'),
         ({"expression": "open(a)"}, "only + - * / **"),
         (
-            {
-                "thermal_growth": {
-                    "of": "a",
-                    "expansion_per_K": 1e-5,
-                    "temperature_rise_K": 9.0,
-                    "lower_K": 5.0,
-                }
-            },
+            {"thermal_growth": {"of": "a", "expansion_per_K": 1e-5, "temperature_rise_K": 9.0, "lower_K": 5.0}},
             "lower_K = 5: exceeds upper_K = 0; swap them",
         ),
         ({"expression": "later + a"}, 'uses "later"'),
         ({"expression": "a", "nominal_mm": 3.0}, "nominal_mm = 3.0: a link of kind expression has none"),
         (
-            {
-                "expression": "a",
-                "thermal_growth": {"of": "a", "expansion_per_K": 1e-5, "temperature_rise_K": 9.0},
-            },
+            {"expression": "a", "thermal_growth": {"of": "a", "expansion_per_K": 1e-5, "temperature_rise_K": 9.0}},
             "thermal_growth and expression stand together",
         ),
     ],

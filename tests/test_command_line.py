@@ -58,13 +58,7 @@ def test_command_line_table_and_options(command):
     options = ("--turns", "2", "--replicates", "1", "--seed", "5")
     shown = command("simulate", EXAMPLE, *QUICK, *options, "-v")
     assert shown.returncode == 0
-    for words in (
-        "power loss [W]",
-        "not estimated",
-        "1 replicates, seed 5",
-        "rolling resistance",
-        "effective samples",
-    ):
+    for words in ("power loss [W]", "not estimated", "1 replicates, seed 5", "rolling resistance", "effective samples"):
         assert words in shown.stdout
     quiet = command("simulate", EXAMPLE, *QUICK, *options, "-q")
     assert quiet.returncode == 0 and "note:" not in quiet.stdout
@@ -100,14 +94,7 @@ def refused(shown, *words):
 
 def test_command_line_bad_input(command, tmp_path):
     """Command line: every fault is a line that names file, key, value and mend; exit code 2."""
-    faulty = (
-        "--set",
-        "bearing.rollers=1",
-        "--set",
-        "cage.guidence=outer",
-        "--set",
-        "operation.radial_load_N=-3.0",
-    )
+    faulty = ("--set", "bearing.rollers=1", "--set", "cage.guidence=outer", "--set", "operation.radial_load_N=-3.0")
     shown = refused(command("simulate", EXAMPLE, *faulty), "bearing.rollers = 1", "guidance?", "radial_load_N = -3.0")
     assert shown.stdout == ""
     assert len(shown.stderr.splitlines()) == 3
@@ -135,13 +122,7 @@ def test_command_line_failing_run(command):
     shown = command(*arguments)
     assert (shown.returncode, shown.stdout) == (1, "")
     (sentence,) = shown.stderr.splitlines()
-    for words in (
-        "replicate ",
-        "seed 1",
-        "shaft turn ",
-        "step budget of 600 used up",
-        "raise numerics.step_budget",
-    ):
+    for words in ("replicate ", "seed 1", "shaft turn ", "step budget of 600 used up", "raise numerics.step_budget"):
         assert words in sentence
     again = command(*arguments, "--json")
     assert again.returncode == 1

@@ -14,15 +14,7 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 from rbdyn.contact import damping, film, hertz_line, rolling_resistance, traction
-from rbdyn.elementary import (
-    eighteenth_root,
-    fast_atan,
-    fast_cos_sin,
-    fast_exp,
-    fast_expm1,
-    fast_log,
-    tenth_root,
-)
+from rbdyn.elementary import eighteenth_root, fast_atan, fast_cos_sin, fast_exp, fast_expm1, fast_log, tenth_root
 from rbdyn.lubricants import oil_at
 from rbdyn.materials import MATERIALS, equivalent_modulus
 
@@ -149,12 +141,7 @@ def test_literature_four_constants():
     assert constants == pytest.approx((-0.036, 0.10178, 1.54727, 0.036), abs=5e-6)
 
 
-@given(
-    mu_0=st.floats(0.0, 0.1),
-    mu_inf=st.floats(0.0, 0.1),
-    above=st.floats(1e-3, 0.1),
-    u_m=st.floats(0.05, 20.0),
-)
+@given(mu_0=st.floats(0.0, 0.1), mu_inf=st.floats(0.0, 0.1), above=st.floats(1e-3, 0.1), u_m=st.floats(0.05, 20.0))
 @settings(max_examples=200, deadline=None)
 def test_oracle_traction_peaks_where_asked(mu_0, mu_inf, above, u_m):
     """Oracle: the peak lies at u_m and is mu_m high; rest and infinity are as given."""
@@ -314,11 +301,7 @@ def test_literature_ocvirk_half_film(eccentricity, sense):
     assert across == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-@given(
-    eccentricity=st.floats(0.0, 0.97),
-    direction=st.floats(0.0, 2.0 * math.pi),
-    size=st.floats(1e-3, 1e5),
-)
+@given(eccentricity=st.floats(0.0, 0.97), direction=st.floats(0.0, 2.0 * math.pi), size=st.floats(1e-3, 1e5))
 @settings(max_examples=200, deadline=None)
 def test_oracle_film_against_quadrature(eccentricity, direction, size):
     """Oracle: any mixture of squeeze and wedge equals the integral of the positive pressure, to 1e-9."""
@@ -330,11 +313,7 @@ def test_oracle_film_against_quadrature(eccentricity, direction, size):
     assert np.abs(force - interpreted).max() < 1e-11 * np.abs(expected).max()
 
 
-@given(
-    eccentricity=st.floats(0.0, 0.97),
-    radial_rate=st.floats(-1e4, 1e4),
-    whirl_rate=st.floats(-1e4, 1e4),
-)
+@given(eccentricity=st.floats(0.0, 0.97), radial_rate=st.floats(-1e4, 1e4), whirl_rate=st.floats(-1e4, 1e4))
 @settings(max_examples=200, deadline=None)
 def test_invariant_film_resists_motion(eccentricity, radial_rate, whirl_rate):
     """Invariant: without spin, the film takes power from any motion of the journal; at rest it gives no force."""

@@ -7,14 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from doe.designs import (
-    axial_distance,
-    box_behnken,
-    central_composite,
-    central_composite_design,
-    to_actual,
-    to_coded,
-)
+from doe.designs import axial_distance, box_behnken, central_composite, central_composite_design, to_actual, to_coded
 from doe.designs.central_composite import centre_shares
 from doe.designs.cube import RESOLUTION_V, corner_blocks, cube_points
 from doe.designs.evaluation import block_contrasts
@@ -113,12 +106,7 @@ def test_literature_three_factors_in_three_blocks():
 )  # fmt: skip
 def test_blocks_disturb_no_term(factors, cube, cube_blocks, centres):
     design = central_composite_design(
-        factors,
-        alpha="orthogonal_blocks",
-        cube=cube,
-        centre_replicates=centres,
-        blocks=True,
-        cube_blocks=cube_blocks,
+        factors, alpha="orthogonal_blocks", cube=cube, centre_replicates=centres, blocks=True, cube_blocks=cube_blocks
     )
     assert design.blocks == cube_blocks + 1
     assert cosines_of_blocks(design) < 1e-12

@@ -10,14 +10,7 @@ from scipy import stats
 from scipy.stats import qmc
 from statsmodels.stats.outliers_influence import variance_inflation_factor
 
-from doe.designs import (
-    box_behnken,
-    central_composite,
-    central_composite_design,
-    full_factorial,
-    latin_hypercube,
-    sobol,
-)
+from doe.designs import box_behnken, central_composite, central_composite_design, full_factorial, latin_hypercube, sobol
 from doe.designs.evaluation import evaluate, untold_terms
 from doe.designs.model import model_terms, term_columns
 from doe.designs.region import moment_matrix, sample

@@ -25,13 +25,7 @@ def study_file(folder: Path, design: str, factors: int = 3, model: str = "quadra
     """A study of some factors with the given lines under [design]."""
     lines = ["[scene]", 'file = "scene.toml"', "[design]", design]
     for number in range(factors):
-        lines += [
-            "[[factor]]",
-            f'name = "f{number}"',
-            f'key = "table.f{number}"',
-            "centre = 10.0",
-            "step = 2.0",
-        ]
+        lines += ["[[factor]]", f'name = "f{number}"', f'key = "table.f{number}"', "centre = 10.0", "step = 2.0"]
     for name in ("one", "two"):
         lines += ["[[response]]", f'name = "{name}"', f'model = "{model}"']
     path = folder / "study.toml"
@@ -114,17 +108,9 @@ def test_impossible_settings_are_named(tmp_path, lines, factors, words):
 @pytest.mark.parametrize(
     ("lines", "model", "words"),
     [
-        (
-            'kind = "sobol"\nruns = 10',
-            "quadratic",
-            "the 10 runs of the design are too few; it needs 11 (10 terms and",
-        ),
+        ('kind = "sobol"\nruns = 10', "quadratic", "the 10 runs of the design are too few; it needs 11 (10 terms and"),
         ('kind = "sobol"\nruns = 4', "linear", "it needs 5 (4 terms and one to judge the fit)"),
-        (
-            'kind = "full_factorial"\nlevels = 2\ncentre_replicates = 4',
-            "reduced",
-            "cannot tell B^2, C^2 from",
-        ),
+        ('kind = "full_factorial"\nlevels = 2\ncentre_replicates = 4', "reduced", "cannot tell B^2, C^2 from"),
         ('alpha = "spherical"\ncentre_replicates = 0', "quadratic", "cannot tell C^2 from the other terms"),
     ],
 )
@@ -141,15 +127,7 @@ def test_runs_that_do_not_suffice_are_named_for_every_response(tmp_path, lines, 
 def test_command_prints_blocks_and_what_the_design_can_tell(tmp_path):
     path = study_file(tmp_path, 'alpha = "orthogonal_blocks"\nblocks = true\norder = "random"')
     text = shown(path, "--verbose")
-    for words in (
-        "block",
-        "seed",
-        "D 13.7",
-        "orthogonal to the terms",
-        "VIF",
-        "power for 2 sigma",
-        "lack of fit 5",
-    ):
+    for words in ("block", "seed", "D 13.7", "orthogonal to the terms", "VIF", "power for 2 sigma", "lack of fit 5"):
         assert words in text
     assert "VIF" not in shown(path, "--quiet")
     rows = shown(path, "--csv").splitlines()

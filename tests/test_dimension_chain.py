@@ -199,17 +199,7 @@ def test_grades_follow_the_standard():
     assert list(grades)[-1] == "IT18"
     assert list(grades.values()) == sorted(grades.values())
     # ISO 286-1 lists rounded values for 6 to 10 mm; the formula at 9 mm lies within a tenth of them.
-    listed = {
-        "IT1": 1,
-        "IT2": 1.5,
-        "IT3": 2.5,
-        "IT4": 4,
-        "IT5": 6,
-        "IT6": 9,
-        "IT7": 15,
-        "IT8": 22,
-        "IT11": 90,
-    }
+    listed = {"IT1": 1, "IT2": 1.5, "IT3": 2.5, "IT4": 4, "IT5": 6, "IT6": 9, "IT7": 15, "IT8": 22, "IT11": 90}
     for grade, micrometres in listed.items():
         assert 1e3 * grades[grade] == pytest.approx(micrometres, rel=0.11)
 
@@ -251,33 +241,17 @@ FREE = [(1, 9.0), (-1, 8.0)]
         ([(0, 9.0), (1, 8.0)], {}, 'link "a": coefficient = 0: must not be zero'),
         ([(1, 9.0, {"name": "b"}), (1, 8.0)], {}, 'link.name = "b": used 2 times'),
         (FREE, {"adjust": "c"}, 'allocate.adjust = "c": is no link; name one of a, b'),
-        (
-            [(1, 9.0, 0.1, 0.0, {"fixed": True}), (1, 8.0)],
-            {"adjust": "a"},
-            'adjust = "a": is fixed; name one of b',
-        ),
+        ([(1, 9.0, 0.1, 0.0, {"fixed": True}), (1, 8.0)], {"adjust": "a"}, 'adjust = "a": is fixed; name one of b'),
         ([(1, 9.0, {"fixed": True}), (1, 8.0)], {}, 'link "a": fixed = true without deviations; give'),
-        (
-            [(1, 9.0, 1.0, 0.0, {"fixed": True}), (1, 8.0)],
-            {},
-            "consume 1.0000 mm of the closing link's 1.0000 mm",
-        ),
+        ([(1, 9.0, 1.0, 0.0, {"fixed": True}), (1, 8.0)], {}, "consume 1.0000 mm of the closing link's 1.0000 mm"),
         ([(1, 9.0, 0.1, 0.0, {"fixed": True})], {}, "fixed = true on every link"),
         ([(1, 9.0, 0.1), (1, 8.0, 0.1, 0.0)], {}, 'link "a": only one of upper_mm and lower_mm'),
         ([(1, 9.0, 0.1, 0.2)], {}, 'link "a": lower_mm = 0.2: exceeds upper_mm = 0.1'),
         ([(1, 9.0, 0.1, 0.0), (1, 8.0)], {}, 'link "b": no deviations, while other links'),
         ([(1, 9.0), (1, -8.0)], {"method": "iso286"}, 'link "b": nominal_mm = -8: ISO 286'),
         ([(1, 9.0, {"mean_mm": 0.1})], {}, 'link "a": mean_mm = 0.1: needs deviations'),
-        (
-            [(1, 9.0, 0.1, 0.0, {"mean_mm": 0.2})],
-            {},
-            'link "a": mean_mm = 0.2: is a deviation from the nominal',
-        ),
-        (
-            [(1, 9.0, 0.1, 0.0, {"mean_mm": 0.05, "distribution": "uniform"})],
-            {},
-            'mean_mm = 0.05: not for "uniform"',
-        ),
+        ([(1, 9.0, 0.1, 0.0, {"mean_mm": 0.2})], {}, 'link "a": mean_mm = 0.2: is a deviation from the nominal'),
+        ([(1, 9.0, 0.1, 0.0, {"mean_mm": 0.05, "distribution": "uniform"})], {}, 'mean_mm = 0.05: not for "uniform"'),
     ],
 )
 def test_wrong_chains_are_refused_with_key_value_and_mend(links, settings, words):
@@ -299,10 +273,7 @@ def test_all_faults_of_a_file_come_at_once_with_its_name(tmp_path):
 def test_unknown_keys_and_missing_links_are_named():
     with pytest.raises(InputError, match=r"link\[1\]\.nominal: unknown key; did you mean nominal_mm"):
         chain_from(
-            {
-                "closing_link": {"lower_mm": 0, "upper_mm": 1},
-                "link": [{"name": "a", "coefficient": 1, "nominal": 2}],
-            },
+            {"closing_link": {"lower_mm": 0, "upper_mm": 1}, "link": [{"name": "a", "coefficient": 1, "nominal": 2}]},
             "x.toml",
         )
     with pytest.raises(InputError, match=r"x\.toml: link"):

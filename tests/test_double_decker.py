@@ -234,8 +234,7 @@ def test_unit_a_start_nearby_saves_steps():
     """Unit: a result nearby as a start leads to the same place with fewer steps."""
     cold = equilibrium(scene_of("operation.inner_speed_rpm=20100.0"))
     warm = equilibrium(
-        scene_of("operation.inner_speed_rpm=20100.0"),
-        equilibrium(scene_of("operation.inner_speed_rpm=20000.0")),
+        scene_of("operation.inner_speed_rpm=20100.0"), equilibrium(scene_of("operation.inner_speed_rpm=20000.0"))
     )
     assert warm.displacement == pytest.approx(cold.displacement, abs=1e-13)
     assert warm.record["iterations"] < cold.record["iterations"]

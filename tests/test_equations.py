@@ -163,10 +163,7 @@ def twin_errors(scene, bearing, y, outcome):
     and of the single forces that act on that body.
     """
     expected = twin(scene, y)
-    blocks, (wall, at_outer, at_inner, land, _) = (
-        Blocks(bearing.rollers, scene.support is not None),
-        expected.loads,
-    )
+    blocks, (wall, at_outer, at_inner, land, _) = (Blocks(bearing.rollers, scene.support is not None), expected.loads)
     lever = np.hypot(y[0], y[bearing.rollers])
     support = scene.support.outer_ring_mass_kg if scene.support else np.inf
     acting = {

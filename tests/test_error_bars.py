@@ -215,10 +215,7 @@ def test_unit_total_error_and_target_option():
     assert Quantity(50.0, 1.5, 2.0, 9.0).error == 2.5 and Quantity(50.0, 1.5, None, 9.0).error == 1.5
     assert Quantity(50.0, None, None, 9.0).error is None
     assert total_error(Quantity(50.0, None, 1.5, 9.0)) is None
-    assert (total_error(Quantity(0.0, 0.0, 0.0, 9.0)), total_error(Quantity(0.0, 0.1, 0.0, 9.0))) == (
-        0.0,
-        None,
-    )
+    assert (total_error(Quantity(0.0, 0.0, 0.0, 9.0)), total_error(Quantity(0.0, 0.1, 0.0, 9.0))) == (0.0, None)
     assert target_of("2%") == target_of(" 0.02 ") == checked(0.02)
     for text in ("0", "-1%", "nan", "60%", "much", "", "%", "inf"):
         with pytest.raises(InputError, match=r"write it as 2% or 0\.02"):

@@ -119,11 +119,7 @@ HEADER = ",".join(TABLE.columns)
         (TABLE.drop(columns="power_loss_W"), ("", ""), "column 'power_loss_W' is missing; add it"),
         (TABLE.head(4), ("", ""), "4 runs are too few for the linear model; give at least 5"),
         (TABLE.assign(guide_clearance_mm=0.15), ("", ""), "cannot tell B from the other terms"),
-        (
-            TABLE.assign(power_loss_W=9.0),
-            ("", ""),
-            "power_loss_W: all 20 values are 9, so there is nothing to fit",
-        ),
+        (TABLE.assign(power_loss_W=9.0), ("", ""), "power_loss_W: all 20 values are 9, so there is nothing to fit"),
         (TABLE, (MODEL, f"weighting = 'replicates'\n{MODEL}"), 'weighting = "replicates" needs'),
         (
             with_errors().assign(impact_force_N_error=-1.0),
@@ -135,18 +131,10 @@ HEADER = ",".join(TABLE.columns)
             (MODEL, f"transform = 'box_cox'\n{MODEL}"),
             "a power transform needs positive values",
         ),
-        (
-            TABLE,
-            (MODEL, f"transform = 'log'\n{MODEL}"),
-            "transform = 'log': choose one of 'none' or 'box_cox', or",
-        ),
+        (TABLE, (MODEL, f"transform = 'log'\n{MODEL}"), "transform = 'log': choose one of 'none' or 'box_cox', or"),
         (TABLE, (MODEL, f"weighting = 'none'\n{MODEL}"), "choose one of 'equal' or 'replicates'"),
         (TABLE.assign(block=0.5), ("", ""), "block in row 1 = 0.5: is not a whole number; mend it"),
-        (
-            TABLE.assign(power_loss_W_error="wide"),
-            ("", ""),
-            "power_loss_W_error in row 1 = 'wide': is not a finite",
-        ),
+        (TABLE.assign(power_loss_W_error="wide"), ("", ""), "power_loss_W_error in row 1 = 'wide': is not a finite"),
         (
             TABLE.to_csv(index=False).replace(HEADER, HEADER.replace("power_loss_W", "impact_force_N"), 1),
             ("", ""),

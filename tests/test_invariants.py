@@ -30,15 +30,7 @@ SCENES = pytest.mark.parametrize("fixture", ["outer", "inner", "everything"])
 def test_invariant_over_scenes_of_every_make():
     """Invariant: ``interpreted_invariants``, in a process where nothing is compiled."""
     found = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-q",
-            "-p",
-            "no:cacheprovider",
-            FOLDER / "interpreted_invariants.py",
-        ],
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", FOLDER / "interpreted_invariants.py"],
         cwd=FOLDER.parent,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
         capture_output=True,
@@ -173,10 +165,7 @@ def mirror(scene):
         speeds = [-speed for speed in operation.schedule.inner_speed_rpm]
         turned["schedule"] = operation.schedule.model_copy(update={"inner_speed_rpm": speeds})
     return scene.model_copy(
-        update={
-            "bearing": bearing.model_copy(update=changes),
-            "operation": operation.model_copy(update=turned),
-        }
+        update={"bearing": bearing.model_copy(update=changes), "operation": operation.model_copy(update=turned)}
     )
 
 

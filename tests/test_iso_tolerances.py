@@ -103,11 +103,7 @@ def test_unlisted_classes_are_refused(nominal, code, words):
 
 @pytest.mark.parametrize(
     ("nominal", "code", "words"),
-    [
-        (27, "P3 bore", "is no ring class"),
-        (27, "P5 raceway", "is no ring class"),
-        (200, "P4 bore", "0 to 180 mm"),
-    ],
+    [(27, "P3 bore", "is no ring class"), (27, "P5 raceway", "is no ring class"), (200, "P4 bore", "0 to 180 mm")],
 )
 def test_unlisted_ring_classes_are_refused(nominal, code, words):
     with pytest.raises(ValueError, match=words):

@@ -258,15 +258,7 @@ def test_unit_an_option_loads_its_own_modules(outer):
 
 def test_command_line_imports_what_the_scene_needs():
     """Import: the whole command, interpreted (compiling, numba itself loads scipy.linalg)."""
-    arguments = [
-        "rbdyn",
-        "simulate",
-        "examples/cylindrical_roller.toml",
-        "--turns",
-        "0.01",
-        "--replicates",
-        "2",
-    ]
+    arguments = ["rbdyn", "simulate", "examples/cylindrical_roller.toml", "--turns", "0.01", "--replicates", "2"]
     arguments += ["--set", "numerics.discard_turns=0.01", "--workers", "1", "--json"]
     program = f"import sys; sys.argv = {arguments!r}\nfrom rbdyn.cli import run\ntry:\n    run()\n"
     program += "except SystemExit:\n    print(*sys.modules, file=sys.stdout)"

@@ -174,11 +174,7 @@ def test_unit_rollers_that_travel():
         life.standing_race_load(at(angle[:3])[:, :, None], angle[:3], 720)
 
 
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    scale=st.floats(0.1, 10.0),
-    turning=st.sampled_from(["inner", "outer", "both"]),
-)
+@given(seed=st.integers(0, 2**32 - 1), scale=st.floats(0.1, 10.0), turning=st.sampled_from(["inner", "outer", "both"]))
 @settings(max_examples=60, deadline=None)
 def test_invariant_scaling_and_order(seed, scale, turning):
     """Invariant: life falls with the fourth power of all loads; the order of samples and rollers does not matter."""

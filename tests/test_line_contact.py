@@ -182,16 +182,10 @@ def test_unit_slices_of_a_cylinder_sum_to_one(name, slices):
     level = hertz_line.sliced(PLAIN[name], np.zeros(slices), positions, 0.0, 0.0)
     tilted = hertz_line.sliced(PLAIN[name], np.zeros(slices), positions, 1e-3, 0.0)
     for overlap in (1e-9, 1e-6, 1e-5):
-        whole = (
-            *compiled_line(PLAIN[name], overlap, 1.0, 0.0),
-            compiled_whole_energy(PLAIN[name], overlap),
-        )
+        whole = (*compiled_line(PLAIN[name], overlap, 1.0, 0.0), compiled_whole_energy(PLAIN[name], overlap))
         # Ninety degrees from where the tilt is largest, the rings are parallel.
         for contact, nx, ny in ((level, 1.0, 0.0), (tilted, 0.0, 1.0)):
-            found = (
-                *compiled_line(contact, overlap, nx, ny),
-                compiled_line_energy(contact, overlap, nx, ny),
-            )
+            found = (*compiled_line(contact, overlap, nx, ny), compiled_line_energy(contact, overlap, nx, ny))
             assert found == pytest.approx(whole, rel=4.0 * ULP * max(slices, 4))
 
 
@@ -244,10 +238,7 @@ def test_oracle_energy_is_the_integral_of_load(name):
     contact = (PLAIN | CUT).get(name)
     for overlap in (3e-7, 2e-6, 2e-5):
         if contact is None:
-            load, energy = (
-                lambda d: compiled_whole(ON_BAR, max(d, 1e-18))[0],
-                compiled_whole_energy(ON_BAR, overlap),
-            )
+            load, energy = (lambda d: compiled_whole(ON_BAR, max(d, 1e-18))[0], compiled_whole_energy(ON_BAR, overlap))
         else:
             load, energy = (
                 lambda d: compiled_line(contact, d, 0.6, 0.8)[0],

@@ -83,16 +83,7 @@ def test_unit_map_refuses_a_schedule(make_scene):
 
 def test_command_map(command, tmp_path):
     """Command line: JSON alone on standard output; an impossible load is refused by name."""
-    arguments = (
-        "map",
-        "examples/cylindrical_roller.toml",
-        "--speed",
-        "24000",
-        "--turns",
-        "2",
-        "--replicates",
-        "1",
-    )
+    arguments = ("map", "examples/cylindrical_roller.toml", "--speed", "24000", "--turns", "2", "--replicates", "1")
     short = ("--set", "numerics.discard_turns=1", "--set", "numerics.companion=false")
     good = command(*arguments, *short, "--load", "300,1300", "--json")
     assert good.returncode == 0, good.stderr

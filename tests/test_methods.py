@@ -15,15 +15,7 @@ from rbdyn.accuracy import comparison, method_bias, methods
 from rbdyn.accuracy.comparison import attempt, attempts_of, curve
 from rbdyn.accuracy.equal_error import front, times_faster
 from rbdyn.accuracy.fixed_step import runge_kutta_4, steps_of, velocity_of
-from rbdyn.accuracy.methods import (
-    METHODS,
-    OURS,
-    RUNGE_KUTTA_4,
-    SCIPY_RK45,
-    VELOCITY_VERLET,
-    Method,
-    fixed_step,
-)
+from rbdyn.accuracy.methods import METHODS, OURS, RUNGE_KUTTA_4, SCIPY_RK45, VELOCITY_VERLET, Method, fixed_step
 from rbdyn.accuracy.right_hand_side import BudgetSpent, RightHandSide
 from rbdyn.accuracy.trajectory import Error, Reference, difference, end_of, reference, settled
 from rbdyn.dynamics.ensemble import Stop
@@ -190,12 +182,7 @@ def test_unit_study_of_methods(outer, tmp_path):
     ]
     steps = []
     report = comparison.study(outer, lambda done, total: steps.append((done, total)), 0.1, few)
-    assert accuracy.write(report, tmp_path) == [
-        "methods.json",
-        "methods.csv",
-        "statistics.csv",
-        "methods.png",
-    ]
+    assert accuracy.write(report, tmp_path) == ["methods.json", "methods.csv", "statistics.csv", "methods.png"]
     record = report.record
     assert [row["status"] for row in record["rows"]] == ["ok"] * 4 and record["format"] == "rbdyn.methods/1"
     assert set(record["times_faster"]) == {"SciPy RK45"}

@@ -22,17 +22,7 @@ def made(scene, **given):
     time = np.arange(TURNS * PER_TURN) * scene.turn_s / PER_TURN
     shaft = 2.0 * np.pi / scene.turn_s
     z = scene.bearing.rollers
-    rollers = (
-        "roller_",
-        "azimuth",
-        "outer_l",
-        "inner_l",
-        "pocket_",
-        "outer_s",
-        "inner_s",
-        "outer_h",
-        "inner_h",
-    )
+    rollers = ("roller_", "azimuth", "outer_l", "inner_l", "pocket_", "outer_s", "inner_s", "outer_h", "inner_h")
     fields = {}
     for field in dataclasses.fields(History):
         shape = (len(time), z) if field.name.startswith(rollers) else len(time)

@@ -133,10 +133,7 @@ def test_worst_case_front_of_two_bowls_is_known():
     assert x.min() == pytest.approx(0.0, abs=0.01) and x.max() == pytest.approx(1.0, abs=0.01)
     middle = np.abs(found.points[:, 1])
     exact = np.column_stack(
-        [
-            (np.abs(x) + half) ** 2 + (middle + half) ** 2,
-            (np.abs(1 - x) + half) ** 2 + 8 * (middle + half) ** 2,
-        ]
+        [(np.abs(x) + half) ** 2 + (middle + half) ** 2, (np.abs(1 - x) + half) ** 2 + 8 * (middle + half) ** 2]
     )
     assert found.costs == pytest.approx(exact, abs=1e-12)
     assert found.pick_survives == 1.0 and "even after manufacture" in found.pick_reason
@@ -169,14 +166,7 @@ def first_factor(points):
 def test_widest_tolerance_of_one_linear_limit_is_the_closed_form(distribution):
     # Parts at h u keep the limit 1 while u <= 1/h: at 95 % for a uniform u where 1/h = 0.9.
     found = widest_tolerances(
-        first_factor,
-        [0.0, 0.0],
-        [1.0],
-        [1.0, 1.0],
-        names=["x"],
-        distribution=distribution,
-        samples=40000,
-        **BOX,
+        first_factor, [0.0, 0.0], [1.0], [1.0, 1.0], names=["x"], distribution=distribution, samples=40000, **BOX
     )
     outside = norm.cdf(-3)
     at = 0.9 if distribution == "uniform" else norm.ppf(outside + 0.95 * (1 - 2 * outside)) / 3
@@ -231,8 +221,7 @@ def test_uncertain_surfaces_leave_less():
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
-    [({"ratios": [0.0, 1.0]}, "must be positive"), ({"pick": [11.0, 0.0]}, "outside the region")],
+    ("change", "words"), [({"ratios": [0.0, 1.0]}, "must be positive"), ({"pick": [11.0, 0.0]}, "outside the region")]
 )
 def test_widest_tolerances_refuse_what_makes_no_sense(change, words):
     arguments = {"pick": [0.0, 0.0], "limits": [1.0], "ratios": [1.0, 1.0]} | change

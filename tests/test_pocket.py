@@ -73,10 +73,7 @@ def test_literature_squeeze_and_shear(gap):
     far = 1000.0 * math.sqrt(2.0 * RADIUS * gap)
     slope, couette = (
         quad(function, -far, far, points=[0.0], limit=500)[0]
-        for function in (
-            lambda x: 12.0 * VISCOSITY * 0.3 * x * x / film(x) ** 3,
-            lambda x: VISCOSITY / film(x),
-        )
+        for function in (lambda x: 12.0 * VISCOSITY * 0.3 * x * x / film(x) ** 3, lambda x: VISCOSITY / film(x))
     )
     assert push == pytest.approx(slope * LENGTH, rel=5e-5)
     # Beyond a thousand half-widths a share of 2/(pi 1000) of the shear is left.
@@ -141,10 +138,7 @@ def test_unit_film_force_is_smooth():
 
 
 @given(
-    gap=st.floats(1e-7, 3e-4),
-    closing=st.floats(-3.0, 3.0),
-    roller=st.floats(-60.0, 60.0),
-    wall=st.floats(-60.0, 60.0),
+    gap=st.floats(1e-7, 3e-4), closing=st.floats(-3.0, 3.0), roller=st.floats(-60.0, 60.0), wall=st.floats(-60.0, 60.0)
 )
 @settings(max_examples=300, deadline=None)
 def test_invariant_film_costs_power(gap, closing, roller, wall):

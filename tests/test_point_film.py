@@ -44,11 +44,7 @@ def test_literature_form_of_the_stiffness(ball):
     """Literature: Chang, Hu and Cao 2024, eq 15, 10/1.8023 E' R_x [U^0.67 G^0.53 W^-1.067 (1 - 0.61 e^(-0.73 k))]^-1."""
     load = 200.0
     stiffness = STEEL * ball.radius
-    u, g, w = (
-        OIL.viscosity * SPEED / stiffness,
-        OIL.pressure_coefficient * STEEL,
-        load / (stiffness * ball.radius),
-    )
+    u, g, w = (OIL.viscosity * SPEED / stiffness, OIL.pressure_coefficient * STEEL, load / (stiffness * ball.radius))
     shape = 1.0 - 0.61 * math.exp(-0.73 * ball.contact.ellipticity)
     printed = 10.0 / 1.8023 * stiffness / (u**0.67 * g**0.53 * w**-1.067 * shape)
     assert films.film_stiffness(ball, OIL, load) == pytest.approx(printed, rel=2e-5)

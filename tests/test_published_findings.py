@@ -137,12 +137,7 @@ def test_unit_other_checks_name_their_kinds():
 
     names = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
     points = [
-        {
-            "law": "law",
-            "design": design,
-            **dict.fromkeys(names, value),
-            **{f"{name}_error": 1.0 for name in names},
-        }
+        {"law": "law", "design": design, **dict.fromkeys(names, value), **{f"{name}_error": 1.0 for name in names}}
         for design, value in (("design", 100.0), ("optimum", 97.0), ("design", 100.0), ("optimum", 97.0))
     ]
     optimum = optimum_findings(pd.DataFrame(points))

@@ -11,13 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbdyn.faults import InputError, validated
-from rbdyn.quasistatic.race_errors import (
-    ball_path,
-    perfect,
-    random_waviness,
-    rolling,
-    waviness,
-)
+from rbdyn.quasistatic.race_errors import ball_path, perfect, random_waviness, rolling, waviness
 from rbdyn.quasistatic.runout_model import errors_of
 from rbdyn.scene.form_errors import FormErrors, faults
 
@@ -107,10 +101,7 @@ TABLE = {
     "inner_roundness": [{"order": 2, "amplitude_um": 0.5, "phase_deg": 90.0}],
     "outer_roundness_random": {"lowest_order": 2, "highest_order": 20, "height_um": 1.6},
     "inner_side_sway": [{"order": 1, "amplitude_um": 0.8}],
-    "ball_sphericity": [
-        {"order": 2, "amplitude_um": 0.1, "balls": [1, 3]},
-        {"order": 4, "amplitude_um": 0.05},
-    ],
+    "ball_sphericity": [{"order": 2, "amplitude_um": 0.1, "balls": [1, 3]}, {"order": 4, "amplitude_um": 0.05}],
     "ball_diameter_spread_um": 0.1,
     "seed": 5,
 }

@@ -56,8 +56,7 @@ def test_oracle_form(order, amplitude, phase, azimuth, turned):
     rise, slope = compiled_form(form, *directions)
     phi = azimuth - turned
     assert rise == pytest.approx(
-        amplitude * math.cos(order * (phi - phase)) + 3e-6 * math.cos(2.0 * (phi - 0.5)),
-        abs=1e-18 * order + 1e-19,
+        amplitude * math.cos(order * (phi - phase)) + 3e-6 * math.cos(2.0 * (phi - 0.5)), abs=1e-18 * order + 1e-19
     )
     expected = -amplitude * order * math.sin(order * (phi - phase)) - 6e-6 * math.sin(2.0 * (phi - 0.5))
     assert slope == pytest.approx(expected, abs=1e-18 * order**2 + 1e-18)
@@ -101,11 +100,7 @@ def test_oracle_force_is_virtual_work(side, contact):
             ]
             return (8.0 * (ends[0] - ends[1]) - ends[2] + ends[3]) / (12.0 * step)
 
-        expected = [
-            -slope((1.0, 0.0), 0.0, 1e-8),
-            -slope((0.0, 1.0), 0.0, 1e-8),
-            -slope((0.0, 0.0), 1.0, 1e-5),
-        ]
+        expected = [-slope((1.0, 0.0), 0.0, 1e-8), -slope((0.0, 1.0), 0.0, 1e-8), -slope((0.0, 0.0), 1.0, 1e-5)]
         found = compiled_contact(race, side, ROLLER, *place, 0.0, 0.0, 0.0, 0.0, math.cos(turned), math.sin(turned))
         assert found[4] > 10.0
         # Round-off of millijoules over the steps.
@@ -152,17 +147,7 @@ def force_on_inner_ring(order, amplitude, angle, phase):
     for j in range(Z):
         azimuth = angle + 2.0 * math.pi * j / Z
         found = compiled_contact(
-            race,
-            -1.0,
-            ROLLER,
-            distance * math.cos(azimuth),
-            distance * math.sin(azimuth),
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            1.0,
-            0.0,
+            race, -1.0, ROLLER, distance * math.cos(azimuth), distance * math.sin(azimuth), 0.0, 0.0, 0.0, 0.0, 1.0, 0.0
         )
         force -= found[:2]
     return force

@@ -144,10 +144,7 @@ def test_pick_is_the_one_that_the_study_stands_by():
     aware = record["front"]["front"][9]
     record["front"]["picks"]["tolerance_aware"] = aware
     record["pick"] = {name: round(x, 3) for name, x in aware["factors"].items()}
-    record["confirmation"]["pick"] |= {
-        "factors": record["pick"],
-        "gains": {RESPONSES[0]: VERDICT | {"percent": 5.5}},
-    }
+    record["confirmation"]["pick"] |= {"factors": record["pick"], "gains": {RESPONSES[0]: VERDICT | {"percent": 5.5}}}
     record["confirmation"]["pick"]["reason"] = "by what manufacture leaves of it"
     record["confirmation"]["without_tolerances"] = record["confirmation"].pop("knee") | {"factors": plain["factors"]}
     text = html_report(record)
@@ -163,7 +160,7 @@ def test_pick_is_the_one_that_the_study_stands_by():
 
 def test_tolerances_are_never_rounded_up():
     assert [rounded_down(x) for x in (0.001875, 0.0125, 0.005, 0.1, 12.9, 0.0)] == [
-        *("0.0018", "0.012", "0.0050", "0.10", "12", "0"),
+        *("0.0018", "0.012", "0.0050", "0.10", "12", "0")
     ]
 
 

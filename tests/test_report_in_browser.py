@@ -153,12 +153,7 @@ def test_scripts_evaluate_terms_transforms_and_contours(browser):
     half = page.execute_script("return model.half_width(arguments[0], [0.5])", line)
     assert half == pytest.approx(2.0 * math.sqrt(7.0))
     cut = page.execute_script("return contours.segments([[0, 0, 0], [1, 1, 1], [2, 2, 2]], 1.25)")
-    assert sorted(place for segment in cut for place in segment) == [
-        [1.25, 0],
-        [1.25, 1],
-        [1.25, 1],
-        [1.25, 2],
-    ]
+    assert sorted(place for segment in cut for place in segment) == [[1.25, 0], [1.25, 1], [1.25, 1], [1.25, 2]]
 
 
 def test_axes_of_a_surface_never_coincide(browser):

@@ -199,8 +199,7 @@ def exact(function, **keywords):
 
 
 @pytest.mark.parametrize(
-    ("curvature", "nature"),
-    [((1, 2, 3), "minimum"), ((-1, -2, -3), "maximum"), ((-1, 2, 3), "saddle")],
+    ("curvature", "nature"), [((1, 2, 3), "minimum"), ((-1, -2, -3), "maximum"), ((-1, 2, 3), "saddle")]
 )
 def test_stationary_point_of_a_known_quadratic(curvature, nature):
     place = np.array([0.3, -0.5, 0.8])

@@ -202,10 +202,7 @@ def test_unit_large_shear():
     limiting = rheology.LimitingShear(2.87e-3, 7.6e-9, 0.07)
     assert rheology.traction_coefficient(limiting, INNER, 1e6, 674.0, FILM) == pytest.approx(0.07, rel=1e-12)
     slips = np.geomspace(1e-6, 1e4, 200)
-    for law in (
-        rheology.Eyring(2.87e-3, 2e-8, 5e6, 0.05),
-        rheology.thermal_newtonian("MIL-L-23699", 40.0, 0.13, 0.05),
-    ):
+    for law in (rheology.Eyring(2.87e-3, 2e-8, 5e6, 0.05), rheology.thermal_newtonian("MIL-L-23699", 40.0, 0.13, 0.05)):
         curve = rheology.traction_coefficient(law, INNER, slips, 3000.0, FILM)
         assert curve.max() < 0.05 and (curve > 0.0).all()
     hot = rheology.thermal_newtonian("MIL-L-7808", 100.0, 0.133)

@@ -248,11 +248,7 @@ def test_unit_rotation_can_be_left_out():
 
 def test_unit_temperatures_left_out():
     """Unit: a shaft follows its ring, a housing its own, rollers the mean; spelling it out changes nothing."""
-    short = {
-        "inner_ring_temperature_C": 120.0,
-        "outer_ring_temperature_C": 90.0,
-        "inner_interference_um": 12.0,
-    }
+    short = {"inner_ring_temperature_C": 120.0, "outer_ring_temperature_C": 90.0, "inner_interference_um": 12.0}
     long = {"shaft_temperature_C": 120.0, "housing_temperature_C": 90.0, "roller_temperature_C": 105.0}
     first = operating_clearance(MOUNTING.model_copy(update=short), BEARING, Materials(), OMEGA)
     assert first == operating_clearance(MOUNTING.model_copy(update=short | long), BEARING, Materials(), OMEGA)

@@ -111,11 +111,7 @@ def test_unit_fits_press_the_races():
     assert change.radial == pytest.approx(inner - outer, rel=1e-12)
 
 
-@given(
-    bore=st.floats(0.0, 0.9),
-    interference=st.floats(0.1e-6, 60e-6),
-    rise=st.floats(-20.0, 5.0),
-)
+@given(bore=st.floats(0.0, 0.9), interference=st.floats(0.1e-6, 60e-6), rise=st.floats(-20.0, 5.0))
 @settings(max_examples=100, deadline=None)
 def test_invariant_pressure_vanishes_at_the_loosening_speed(bore, interference, rise):
     """Invariant: just below that speed the fit presses, just above it does not."""

@@ -191,10 +191,7 @@ def test_unit_design_meets_its_class(bench):
 
 @pytest.mark.parametrize(
     ("lot", "sentence"),
-    [
-        (Lot(ball_diameter_spread=20e-6), "balls alone fail"),
-        (Lot(lowest_order=2, highest_order=9), "more orders"),
-    ],
+    [(Lot(ball_diameter_spread=20e-6), "balls alone fail"), (Lot(lowest_order=2, highest_order=9), "more orders")],
 )
 def test_unit_designs_that_cannot_be(bench, lot, sentence):
     """Unit: balls worse than the class, and races of which nothing reaches the ring, are named."""
@@ -273,12 +270,7 @@ def test_unit_path_of_a_scene():
 
 def test_unit_turning_outer_ring():
     """Unit: with the outer ring turning its eccentricity passes and that of the inner ring does not."""
-    outside = (
-        "operation.inner_speed_rpm=0.0",
-        "operation.outer_speed_rpm=30.0",
-        "errors.steps=24",
-        "errors.turns=1",
-    )
+    outside = ("operation.inner_speed_rpm=0.0", "operation.outer_speed_rpm=30.0", "errors.steps=24", "errors.turns=1")
     still = follow_ring(BallScene.load(SCENE, (ECCENTRIC, *outside)))
     moving = follow_ring(BallScene.load(SCENE, (ECCENTRIC.replace("inner", "outer"), *outside)))
     assert still.runout(FACE).indicator < 1e-10

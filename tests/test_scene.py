@@ -22,12 +22,7 @@ TABLE = {
         "pitch_diameter_mm": 43.5,
         "radial_clearance_mm": 0.020,
     },
-    "cage": {
-        "guidance": "outer",
-        "guide_clearance_mm": 0.15,
-        "pocket_clearance_mm": 0.30,
-        "mass_g": 45.0,
-    },
+    "cage": {"guidance": "outer", "guide_clearance_mm": 0.15, "pocket_clearance_mm": 0.30, "mass_g": 45.0},
     "lubricant": {"oil": "MIL-L-7808", "temperature_C": 100.0},
     "operation": {"inner_speed_rpm": 24000.0, "radial_load_N": 1300.0},
 }
@@ -146,10 +141,7 @@ def test_unit_wrong_types(key, value, mend):
     ("changes", "words"),
     [
         ({"bearing.rollers": 16}, ("bearing.rollers = 16", "do not fit", "take fewer or smaller")),
-        (
-            {"bearing.effective_length_mm": 5.5},
-            ("effective_length_mm = 5.5", "longer than the roller", "5 mm"),
-        ),
+        ({"bearing.effective_length_mm": 5.5}, ("effective_length_mm = 5.5", "longer than the roller", "5 mm")),
         ({"cage.pocket_clearance_mm": 4.5}, ("pocket_clearance_mm = 4.5", "no cross-bar", "smaller")),
         ({"model.land_film_floor_um": 75.0}, ("land_film_floor_um = 75", "75 um", "lower it")),
         ({"cage.land_diameter_mm": 60.0}, ("land_diameter_mm = 60", "raceways of 34.5 and 52.5")),
@@ -242,10 +234,7 @@ ADDED_FAULTS = {
         {"model.pocket_restitution": 0.6, "model.pocket_damping_alpha_s_m": 0.5},
         ("model.pocket_restitution and model.pocket_damping_alpha_s_m contradict", "give one of them"),
     ),
-    "restitution of nothing": (
-        {"model.pocket_restitution": 0.0},
-        ("pocket_restitution = 0.0", "greater than 0"),
-    ),
+    "restitution of nothing": ({"model.pocket_restitution": 0.0}, ("pocket_restitution = 0.0", "greater than 0")),
     "restitution above one": ({"model.land_restitution": 1.2}, ("land_restitution = 1.2", "at most 1")),
     "film in a pocket that is off": (
         {"model.pocket": "off", "model.pocket_film": True},
@@ -253,11 +242,7 @@ ADDED_FAULTS = {
     ),
     "film floor above the pocket's clearance": (
         {"model.pocket_film": True, "model.pocket_film_floor_um": 150.0},
-        (
-            "model.pocket_film_floor_um = 150",
-            "half the pocket clearance of 150 um",
-            "cage.pocket_clearance_mm",
-        ),
+        ("model.pocket_film_floor_um = 150", "half the pocket clearance of 150 um", "cage.pocket_clearance_mm"),
     ),
     "pocket contact longer than the roller": (
         {"cage.pocket_contact_length_mm": 5.5},

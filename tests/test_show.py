@@ -49,11 +49,7 @@ def test_show_writes_pictures_samples_and_figures(saved, shown):
     folder, record = shown
     written = {path.name for path in folder.iterdir()}
     assert written == set(record["files"])
-    assert written - {"bearing.gif", "bearing.mp4"} == PICTURES | {
-        "orbit.json",
-        "history.csv",
-        "bearing.html",
-    }
+    assert written - {"bearing.gif", "bearing.mp4"} == PICTURES | {"orbit.json", "history.csv", "bearing.html"}
     for name in PICTURES:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
     assert json.loads((folder / "orbit.json").read_text()) == record
@@ -63,12 +59,7 @@ def test_show_writes_pictures_samples_and_figures(saved, shown):
 def test_show_figures(shown):
     """Show: the figures that were asked for, in their places and of a sensible size."""
     record = shown[1]
-    assert (record["format"], record["status"], record["turns"], record["replicate"]) == (
-        "rbdyn.orbit/1",
-        "ok",
-        4,
-        1,
-    )
+    assert (record["format"], record["status"], record["turns"], record["replicate"]) == ("rbdyn.orbit/1", "ok", 4, 1)
     assert record["notes"] == []
     assert 9000.0 < record["cage_speed_rpm"] < 10000.0
     quantiles = list(record["whirl_ratio_quantiles"].values())
@@ -101,13 +92,7 @@ def test_show_player_stands_alone(page):
     assert not re.search(r"<(link|img|iframe|object)\b|\bsrc\s*=|url\((?!#)|@import|\bfetch\(|import\(", text)
     assert len(text.encode()) < 3e6
     assert "<svg" in text and text.count('<circle class="roller"') == 10
-    for control in (
-        '<button id="play"',
-        '<input id="frame" type="range"',
-        'id="speed"',
-        'id="magnify"',
-        "keydown",
-    ):
+    for control in ('<button id="play"', '<input id="frame" type="range"', 'id="speed"', 'id="magnify"', "keydown"):
         assert control in text
 
 
@@ -118,15 +103,7 @@ def test_show_player_data_is_the_motion(page, saved):
     assert frames > 300 and rollers == 10
     for name in ("ahead_um", "out_um", "spin", "outer_load_N", "inner_load_N", "pocket_load_N"):
         assert len(data[name]) == frames * rollers
-    for name in (
-        "time_us",
-        "inner_angle",
-        "cage_angle",
-        "cage_x_um",
-        "cage_y_um",
-        "ring_x_um",
-        "land_load_N",
-    ):
+    for name in ("time_us", "inner_angle", "cage_angle", "cage_x_um", "cage_y_um", "ring_x_um", "land_load_N"):
         assert len(data[name]) == frames
     assert 1.0 < data["magnification"] <= data["largest_magnification"]
     out, load = np.array(data["out_um"]), np.array(data["outer_load_N"])
@@ -140,12 +117,7 @@ def test_show_prints_a_table_beside_the_result(command, saved):
     """Show: by default it writes into a folder beside the result, whose file may be named; other turns and replicates."""
     done = command("show", saved / "result.json", "--turns", "1", "--replicate", "2", "-v")
     assert done.returncode == 0, done.stderr
-    for words in (
-        "1 shaft turns of replicate 2, seed 1",
-        "whirl speed over cage speed",
-        "never touched",
-        "peaks [Hz]",
-    ):
+    for words in ("1 shaft turns of replicate 2, seed 1", "whirl speed over cage speed", "never touched", "peaks [Hz]"):
         assert words in done.stdout
     assert {path.name for path in (saved / "show").iterdir()} == PICTURES | {"orbit.json", "history.csv"}
     assert len((saved / "show" / "history.csv").read_text().splitlines()) == 1 + 512

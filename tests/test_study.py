@@ -206,10 +206,7 @@ def test_failed_runs_are_grouped_by_cause_and_too_few_left_end_the_study(tmp_pat
 @pytest.mark.parametrize(
     ("replace", "words"),
     [
-        (
-            ('key = "cage.guide_clearance_mm"', 'key = "cage.guide_clearence_mm"'),
-            ("factor.key", "no such key"),
-        ),
+        (('key = "cage.guide_clearance_mm"', 'key = "cage.guide_clearence_mm"'), ("factor.key", "no such key")),
         (('name = "power_loss_W"', 'name = "power_W"'), ("response.name", "choose one of")),
         (('factor = "pocket_clearance_mm"', 'factor = "pocket"'), ("chain.factor", "no such factor")),
         (("half_width_mm = 0.005", "half_width_mm = -0.005"), ("half_width_mm", "greater than 0")),

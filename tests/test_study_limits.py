@@ -206,8 +206,7 @@ def test_direct_runs_are_as_long_as_design_runs_and_told_in_words(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "design",
-    ['kind = "central_composite"\nalpha = "face_centred"', 'kind = "latin_hypercube"\nruns = 20'],
+    "design", ['kind = "central_composite"\nalpha = "face_centred"', 'kind = "latin_hypercube"\nruns = 20']
 )
 def test_impact_limited_to_90_newtons_of_the_bearing_itself(tmp_path, design):
     """Guide and pocket clearance, the limit pressed upon: what surfaces alone pick simulates beyond or at 90 N."""

@@ -202,13 +202,7 @@ def test_ctrl_c_keeps_what_was_finished_and_gives_back_the_rest(tmp_path):
 def test_full_disk_is_one_sentence_and_the_study_goes_on_later(tmp_path):
     study, out = short_study(tmp_path), tmp_path / "out"
     limit = 250_000
-    full = start(
-        study,
-        out,
-        0.0,
-        2,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
-    )
+    full = start(study, out, 0.0, 2, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
     shown, said = full.communicate(timeout=60)
     assert full.returncode == 1, said
     assert re.fullmatch(

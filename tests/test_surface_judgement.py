@@ -163,11 +163,7 @@ def test_half_widths_become_standard_errors_by_students_t():
 
 @pytest.mark.parametrize(
     ("given", "expected"),
-    [
-        (None, [[0, 0], [0, 0]]),
-        (np.array([8, 9]), [[8, 8], [9, 9]]),
-        (np.array([[1, 2], [3, 4]]), [[1, 2], [3, 4]]),
-    ],
+    [(None, [[0, 0], [0, 0]]), (np.array([8, 9]), [[8, 8], [9, 9]]), (np.array([[1, 2], [3, 4]]), [[1, 2], [3, 4]])],
 )
 def test_independent_values_are_counted_a_run_or_a_response(given, expected):
     none = np.zeros((2, 2))
@@ -246,14 +242,8 @@ def test_blocks_are_told_and_left_out_of_the_surface():
         ({"transform": 0.5}, 'value of run 3 is -2, but a power transform .* use transform = "none"'),
         ({"transform": "box_cox"}, "run 3 is -2"),
         ({"weighting": "replicates"}, "needs the errors of the runs"),
-        (
-            {"weighting": "replicates", "standard_errors": np.where(np.arange(20) == 4, 0.0, 1.0)},
-            "error of run 5 is 0",
-        ),
-        (
-            {"weighting": "replicates", "standard_errors": np.where(np.arange(20) == 4, np.nan, 1.0)},
-            "run 5 is nan",
-        ),
+        ({"weighting": "replicates", "standard_errors": np.where(np.arange(20) == 4, 0.0, 1.0)}, "error of run 5 is 0"),
+        ({"weighting": "replicates", "standard_errors": np.where(np.arange(20) == 4, np.nan, 1.0)}, "run 5 is nan"),
         ({"block": np.arange(20) % 11}, "20 runs are too few .* at least 21 .*10 terms, 10 for the blocks"),
         ({"block": (POINTS[:, 0] > 0).astype(int), "model": "linear"}, None),
         ({"block": np.r_[np.zeros(14, int), np.ones(6, int)]}, None),

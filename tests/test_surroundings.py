@@ -11,13 +11,7 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy.integrate import quad, solve_ivp
 
-from rbdyn.dynamics.cage_body import (
-    BalancedCage,
-    UnbalancedCage,
-    cage_acceleration,
-    cage_kinetic_energy,
-    mass_centre,
-)
+from rbdyn.dynamics.cage_body import BalancedCage, UnbalancedCage, cage_acceleration, cage_kinetic_energy, mass_centre
 from rbdyn.dynamics.clock import ClockedDrive
 from rbdyn.dynamics.drive import SteadyDrive, TwoSpeedDrive, action, load_potential, load_power
 from rbdyn.dynamics.ensemble import Stop
@@ -165,22 +159,14 @@ def test_oracle_unbalanced_cage(force, angle, speed, velocity):
     cage = UnbalancedCage(0.045, 2.2e-5, 80e-6)
     c, s = math.cos(angle), math.sin(angle)
     ax, ay, spin_up = compiled_acceleration(cage, fx, fy, moment, c, s, speed)
-    centre = (
-        ax - 80e-6 * (spin_up * s + speed**2 * c),
-        ay + 80e-6 * (spin_up * c - speed**2 * s),
-    )
+    centre = (ax - 80e-6 * (spin_up * s + speed**2 * c), ay + 80e-6 * (spin_up * c - speed**2 * s))
     assert np.multiply(0.045, centre) == pytest.approx((fx, fy), rel=1e-11, abs=1e-9)
     step = 1e-7
 
     def energy(h):
         turned = angle + h * speed
         return cage_kinetic_energy(
-            cage,
-            velocity[0] + h * ax,
-            velocity[1] + h * ay,
-            math.cos(turned),
-            math.sin(turned),
-            speed + h * spin_up,
+            cage, velocity[0] + h * ax, velocity[1] + h * ay, math.cos(turned), math.sin(turned), speed + h * spin_up
         )
 
     rate = (energy(step) - energy(-step)) / (2.0 * step)

@@ -79,10 +79,7 @@ def test_oracle_surface_against_its_curve(name):
 
 
 @pytest.mark.parametrize("name", MODELS)
-@given(
-    slip=st.floats(-1000.0, 1000.0),
-    load=st.floats(0.0, 1e5),
-)
+@given(slip=st.floats(-1000.0, 1000.0), load=st.floats(0.0, 1e5))
 @settings(max_examples=200, deadline=None)
 def test_invariant_traction_is_odd_and_never_drives(name, slip, load):
     """Invariant: odd, nil at rest, mu u >= 0; compiled equals interpreted to 1e-12."""
@@ -97,10 +94,7 @@ def test_invariant_traction_is_odd_and_never_drives(name, slip, load):
 
 
 @pytest.mark.parametrize("name", [*SURFACES, "mixed surface"])
-@given(
-    slip=st.floats(allow_nan=False, allow_infinity=False),
-    load=st.floats(allow_nan=False, allow_infinity=False),
-)
+@given(slip=st.floats(allow_nan=False, allow_infinity=False), load=st.floats(allow_nan=False, allow_infinity=False))
 @example(slip=4.528728074098563e-10, load=1.0)
 @example(slip=-1e-300, load=5000.0)
 @settings(max_examples=200, deadline=None)

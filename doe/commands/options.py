@@ -11,13 +11,11 @@ StudyPath = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study to 
 Data = Annotated[Path | None, typer.Option(metavar="TABLE.csv", help="Runs of a table instead of simulated ones.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all processors by default.")]
 Scheduler = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="Run on the dask cluster of this scheduler instead of threads."),
+    str | None, typer.Option(metavar="ADDRESS", help="Run on the dask cluster of this scheduler instead of threads.")
 ]
 Retry = Annotated[bool, typer.Option("--retry", help="Run points again that failed before.")]
 Direct = Annotated[
-    bool,
-    typer.Option("--direct", help="Also search the front on the simulator itself and tell what surfaces lose."),
+    bool, typer.Option("--direct", help="Also search the front on the simulator itself and tell what surfaces lose.")
 ]
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of results and of the store of finished runs.")]
 Save = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Also write the JSON record here.")]

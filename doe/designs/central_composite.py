@@ -77,11 +77,7 @@ def central_composite_design(
 
 
 def axial_distance(
-    factors: int,
-    alpha: float | str,
-    *,
-    cube_runs: int | None = None,
-    centres: tuple[int, int] = (0, 0),
+    factors: int, alpha: float | str, *, cube_runs: int | None = None, centres: tuple[int, int] = (0, 0)
 ) -> float:
     """Axial distance in coded units, from a number or a word.
 
@@ -131,10 +127,7 @@ def centre_shares(
     """
     free = ("orthogonal_blocks", "inscribed")
     wanted = axial_distance(
-        factors,
-        "rotatable" if alpha in free else alpha,
-        cube_runs=cube_runs,
-        centres=(0, centre_replicates),
+        factors, "rotatable" if alpha in free else alpha, cube_runs=cube_runs, centres=(0, centre_replicates)
     )
 
     def away(with_cube: int) -> float:

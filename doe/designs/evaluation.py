@@ -108,12 +108,7 @@ def evaluate(
             "box_max": float(variances(lattice(factors, reach if region == "box" else widest)).max()),
         },
         "by_radius": [
-            {
-                "radius": radius,
-                "min": float(shell.min()),
-                "mean": float(shell.mean()),
-                "max": float(shell.max()),
-            }
+            {"radius": radius, "min": float(shell.min()), "mean": float(shell.mean()), "max": float(shell.max())}
             for radius, shell in zip(radii.tolist(), shells, strict=True)
         ],
         "fraction_of_design_space": [

@@ -55,10 +55,7 @@ class SelectiveAssembly:
             "good_of_matched": self.good,
             "random": self.random,
             "standard_error": self.standard_error,
-            "standard_deviation_mm": {
-                "matched": self.matched_deviation_mm,
-                "random": self.random_deviation_mm,
-            },
+            "standard_deviation_mm": {"matched": self.matched_deviation_mm, "random": self.random_deviation_mm},
             "worst_case_mm": list(self.worst_case_mm),
             "class_limits_mm": self.edges_mm,
             "classes_needed": self.classes_needed,

@@ -102,10 +102,7 @@ def _reach(function: ClosingFunction, part: Part, kind: Distribution) -> Interva
 
 
 def _lattice(
-    function: ClosingFunction,
-    parts: Sequence[Part],
-    kinds: dict[str, Distribution],
-    reaches: dict[str, Interval],
+    function: ClosingFunction, parts: Sequence[Part], kinds: dict[str, Distribution], reaches: dict[str, Interval]
 ) -> tuple[Array, Array]:
     """Places, mm, and shares of the sum of coefficient times deviation of the parts."""
     if not parts:

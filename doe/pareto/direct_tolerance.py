@@ -77,12 +77,7 @@ class DirectAware:
 
 
 def direct_aware(
-    box: ToleranceBox,
-    here: Neighbourhood,
-    goals: Goals,
-    baseline: Neighbourhood | None,
-    below: Array,
-    above: Array,
+    box: ToleranceBox, here: Neighbourhood, goals: Goals, baseline: Neighbourhood | None, below: Array, above: Array
 ) -> DirectAware:
     """What tolerances leave of points, whose responses may be lower by ``below`` and higher by ``above`` (n, m) when
     limits are judged."""

@@ -198,11 +198,7 @@ def check_search(low: Array, high: Array, population: int, generations: int, kee
     if wrong.size:
         at = wrong[0]
         raise ValueError(f"factor {at + 1}: lower bound {low[at]:g} must be below upper bound {high[at]:g}")
-    for name, value, least in (
-        ("population", population, 4),
-        ("generations", generations, 1),
-        ("keep", keep, 2),
-    ):
+    for name, value, least in (("population", population, 4), ("generations", generations, 1), ("keep", keep, 2)):
         if value < least:
             raise ValueError(f"{name} = {value}: must be at least {least}")
 

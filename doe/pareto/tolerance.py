@@ -107,9 +107,7 @@ def widest_tolerances(
     if parts.kept(np.zeros(centre.size)) < probability:
         worst = names[int(parts.broken(np.zeros(centre.size)).argmax())]
         return _nothing(
-            parts,
-            worst,
-            f"even the exact pick keeps {worst} with a probability below {100 * probability:g} %",
+            parts, worst, f"even the exact pick keeps {worst} with a probability below {100 * probability:g} %"
         )
     if aim != "ratios":
         usual = np.ones(centre.size) if aim == "product" else 1.0 / share

@@ -119,11 +119,7 @@ def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
 def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:
     columns = (confirmed.values.tolist(), confirmed.statistical, confirmed.numerical)
     return {
-        response: {
-            "value": value,
-            "statistical_error": or_none(statistical),
-            "numerical_error": or_none(numerical),
-        }
+        response: {"value": value, "statistical_error": or_none(statistical), "numerical_error": or_none(numerical)}
         for response, value, statistical, numerical in zip(study.responses, *columns, strict=True)
     }
 

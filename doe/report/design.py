@@ -27,8 +27,7 @@ def design_record(study: Study, design: Design, evaluation: dict[str, Any]) -> d
             "seed": first + place,
         }
         for number, (place, kind, block, coded, values) in enumerate(
-            zip(design.order.tolist(), design.kind, design.block.tolist(), design.coded, actual, strict=True),
-            1,
+            zip(design.order.tolist(), design.kind, design.block.tolist(), design.coded, actual, strict=True), 1
         )
     ]
     return {
@@ -78,10 +77,7 @@ def _print_evaluation(found: dict[str, Any], verbose: bool) -> None:
     size = f"{'radius' if region['shape'] == 'ball' else 'half-width'} {region['reach']:.4g}"
     rows = [
         ["efficiency [%]", ", ".join(f"{letter.upper()} {value:.1f}" for letter, value in letters)],
-        [
-            "scaled prediction variance",
-            ", ".join(f"{name} {variance[name]:.2f}" for name in ("centre", "mean", "max")),
-        ],
+        ["scaled prediction variance", ", ".join(f"{name} {variance[name]:.2f}" for name in ("centre", "mean", "max"))],
         ["its largest in the box of the front", f"{variance['box_max']:.2f}"],
         ["degrees of freedom", ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in freedom.items())],
         ["condition number of the model matrix", f"{found['condition_number']:.2f}"],

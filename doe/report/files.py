@@ -126,9 +126,4 @@ def _confirmation_table(outcome: Outcome) -> list[dict[str, Any]]:
 
 
 def _dimension(part: Part) -> dict[str, Any]:
-    return {
-        "nominal_mm": part.nominal_mm,
-        "upper_mm": part.upper_mm,
-        "lower_mm": part.lower_mm,
-        "grade": part.grade,
-    }
+    return {"nominal_mm": part.nominal_mm, "upper_mm": part.upper_mm, "lower_mm": part.lower_mm, "grade": part.grade}

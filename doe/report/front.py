@@ -30,10 +30,7 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
     assert front.uncertainty is not None
     sure = front.uncertainty
     points = [
-        {
-            **_named(study, point, values, errors),
-            "non_dominated_probability": float(probability),
-        }
+        {**_named(study, point, values, errors), "non_dominated_probability": float(probability)}
         for point, values, errors, probability in zip(
             front.points, front.values, sure.half_widths, sure.non_dominated, strict=True
         )

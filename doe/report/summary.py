@@ -5,13 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from doe.report.asked import asked_record, design_record
-from doe.report.confirmation import (
-    confirmation_record,
-    direct_record,
-    edge_record,
-    gains_record,
-    limits_record,
-)
+from doe.report.confirmation import confirmation_record, direct_record, edge_record, gains_record, limits_record
 from doe.report.fit import fit_record
 from doe.report.front import front_record, point_record
 from doe.study.confirmation import statement
@@ -51,11 +45,7 @@ def summary(outcome: Outcome) -> dict[str, Any]:
         "cost": dict(outcome.cost),
         "versions": versions(),
         "inputs": outcome.inputs,
-        "seeds": {
-            "design": study.file.design.seed,
-            "front": study.file.front.seed,
-            "direct": study.file.direct.seed,
-        },
+        "seeds": {"design": study.file.design.seed, "front": study.file.front.seed, "direct": study.file.direct.seed},
     }
     if outcome.direct is not None:
         record["direct"] = direct_record(study, outcome.direct)

@@ -111,7 +111,4 @@ def _lack_of_fit(response: Array, solution: LeastSquares, groups: NDArray[np.int
         return row("lack_of_fit", None, solution.dof), row("pure_error", None, 0)
     pure = sum_within(response, solution.weights, groups)
     lack = max(solution.residual_sum - pure, 0.0)
-    return (
-        row("lack_of_fit", lack, solution.dof - pure_df, pure / pure_df, pure_df),
-        row("pure_error", pure, pure_df),
-    )
+    return (row("lack_of_fit", lack, solution.dof - pure_df, pure / pure_df, pure_df), row("pure_error", pure, pure_df))

@@ -22,14 +22,7 @@ SEARCHED = (-5.0, 5.0)
 NAMES = {-2.0: "1/y^2", -1.0: "1/y", -0.5: "1/sqrt(y)", 0.0: "ln y", 0.5: "sqrt(y)", 2.0: "y^2"}
 
 BoxCox = TypedDict(
-    "BoxCox",
-    {
-        "lambda": float,
-        "interval": list[float],
-        "searched": list[float],
-        "recommended": float,
-        "sentence": str,
-    },
+    "BoxCox", {"lambda": float, "interval": list[float], "searched": list[float], "recommended": float, "sentence": str}
 )
 
 

@@ -42,20 +42,11 @@ class ModelError:
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
         deviation = float(np.sqrt(self.variance))
-        return {
-            "variance": self.variance,
-            "standard_deviation": deviation,
-            "dof": self.dof,
-            "told_by": self.told_by,
-        }
+        return {"variance": self.variance, "standard_deviation": deviation, "dof": self.dof, "told_by": self.told_by}
 
 
 def model_error(
-    solution: LeastSquares,
-    matrix: Array,
-    groups: NDArray[np.int64],
-    table: list[AnovaRow],
-    known: KnownVariance | None,
+    solution: LeastSquares, matrix: Array, groups: NDArray[np.int64], table: list[AnovaRow], known: KnownVariance | None
 ) -> ModelError | None:
     """The model error of a fit, None where no test at 5 % shows any.
 

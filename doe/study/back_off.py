@@ -42,11 +42,7 @@ class Missed:
 
     def and_at(self, points: Array, misses: Array, errors: Array, stated: Array) -> Missed:
         """With more points."""
-        more = zip(
-            (self.points, self.misses, self.errors, self.stated),
-            (points, misses, errors, stated),
-            strict=True,
-        )
+        more = zip((self.points, self.misses, self.errors, self.stated), (points, misses, errors, stated), strict=True)
         return Missed(*(np.concatenate(pair) for pair in more))
 
 

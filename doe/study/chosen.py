@@ -40,11 +40,7 @@ class Chosen:
 
 
 def choose(
-    study: Study,
-    surfaces: Sequence[Surface],
-    found: ParetoFront,
-    direct: Direct | None,
-    simulations: Simulations,
+    study: Study, surfaces: Sequence[Surface], found: ParetoFront, direct: Direct | None, simulations: Simulations
 ) -> Chosen:
     """Simulate the pick; while a limit is not kept, back off by what was missed and simulate the next best point.
 

@@ -22,10 +22,7 @@ LOOK_S = 1.0
 
 
 def run_on_cluster(
-    address: str,
-    work: Callable[[str], Ran],
-    tasks: Callable[[], Sequence[str]],
-    ended: Callable[[int, Ran], None],
+    address: str, work: Callable[[str], Ran], tasks: Callable[[], Sequence[str]], ended: Callable[[int, Ran], None]
 ) -> None:
     """Run ``work`` on every text of ``tasks()`` and hand over each result, with its place, as it ends.
 

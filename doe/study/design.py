@@ -5,14 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from doe.designs import (
-    Design,
-    box_behnken,
-    central_composite_design,
-    full_factorial,
-    latin_hypercube,
-    sobol,
-)
+from doe.designs import Design, box_behnken, central_composite_design, full_factorial, latin_hypercube, sobol
 from doe.designs.model import model_terms
 from doe.study_file import Study
 from doe.study_file.design_section import Design as DesignSettings

@@ -35,11 +35,7 @@ class DirectPick:
 
 
 def direct_pick(
-    study: Study,
-    surfaces: Sequence[Surface],
-    direct: Direct,
-    simulated: Sequence[Confirmed] = (),
-    failed: int = 0,
+    study: Study, surfaces: Sequence[Surface], direct: Direct, simulated: Sequence[Confirmed] = (), failed: int = 0
 ) -> DirectPick:
     """The point of the direct front by the study's rule, of what tolerances leave where the study asks for that.
 

@@ -153,10 +153,7 @@ def _on_surfaces(
         dof = surface.interval_dof
         student = float(special.stdtrit(dof, 0.975)) if dof > 0 else np.nan
         scale = 1.0 / study.step[index]
-        gains[surface.name] = (
-            -slope * (ends[1] - ends[0]) / STEP * scale,
-            student * float(np.sqrt(variance)) * scale,
-        )
+        gains[surface.name] = (-slope * (ends[1] - ends[0]) / STEP * scale, student * float(np.sqrt(variance)) * scale)
     return gains
 
 

@@ -80,11 +80,7 @@ def find_front(
     if half is None:
         return found
     with _named(study, goals, study.centre, study.step, " after manufacture"):
-        aware = _backed_off(
-            study,
-            lambda share: _tolerance_aware(study, surfaces, found, half, doubt(share)),
-            failed,
-        )
+        aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, half, doubt(share)), failed)
     return replace(found, tolerance_aware=aware)
 
 
@@ -149,11 +145,7 @@ def _tolerance_aware(
     return tolerance_aware_front(
         quadratics(surfaces, len(study.factors)),
         ToleranceBox(
-            half,
-            settings.tolerance_aware,
-            settings.quantile,
-            settings.distribution,
-            settings.tolerance_samples,
+            half, settings.tolerance_aware, settings.quantile, settings.distribution, settings.tolerance_samples
         ),
         -reach,
         reach,

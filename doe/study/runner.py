@@ -40,11 +40,7 @@ Engine = Callable[[Sequence[Point], Take, Give], None]
 
 
 def run_points(
-    points: Sequence[Point],
-    store: Store,
-    engine: Engine,
-    progress: Callable[[int, int], None],
-    retry: bool = False,
+    points: Sequence[Point], store: Store, engine: Engine, progress: Callable[[int, int], None], retry: bool = False
 ) -> dict[str, Outcome]:
     """Results and failures of points, by key. What other live processes are running is waited for, not run again.
 

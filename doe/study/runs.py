@@ -110,14 +110,7 @@ def run_design(
     check_runs(study, design)
     with Store(folder / STORE, study.path.stem) as store:
         results = clearance.run_scenes(
-            asked.scenes,
-            asked.labels,
-            store,
-            workers,
-            progress,
-            scheduler,
-            retry=retry,
-            factors=asked.factors,
+            asked.scenes, asked.labels, store, workers, progress, scheduler, retry=retry, factors=asked.factors
         )
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]

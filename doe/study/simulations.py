@@ -43,12 +43,5 @@ class Simulations:
         from doe import clearance
 
         return clearance.run_scenes(
-            scenes,
-            labels,
-            self.store,
-            self.workers,
-            progress,
-            self.scheduler,
-            retry=self.retry,
-            factors=factors,
+            scenes, labels, self.store, self.workers, progress, self.scheduler, retry=self.retry, factors=factors
         )

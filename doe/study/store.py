@@ -95,11 +95,7 @@ class Store:
         self._beating: threading.Thread | None = None
         with self._faults():
             self._connection = sqlite3.connect(
-                _address(path, read_only),
-                timeout=PATIENCE_S,
-                isolation_level=None,
-                check_same_thread=False,
-                uri=True,
+                _address(path, read_only), timeout=PATIENCE_S, isolation_level=None, check_same_thread=False, uri=True
             )
             try:
                 self._check(read_only)
@@ -361,10 +357,7 @@ def _patiently(connection: sqlite3.Connection, statement: str) -> list[Any]:
         try:
             return connection.execute(statement).fetchall()
         except sqlite3.OperationalError as error:
-            busy = getattr(error, "sqlite_errorcode", 0) & 0xFF in (
-                sqlite3.SQLITE_BUSY,
-                sqlite3.SQLITE_LOCKED,
-            )
+            busy = getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
             if not busy or time.monotonic() > deadline:
                 raise
             time.sleep(0.05)

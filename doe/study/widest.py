@@ -23,11 +23,7 @@ Array = NDArray[np.float64]
 
 
 def widest_of(
-    study: Study,
-    surfaces: Sequence[Surface],
-    point: Array,
-    settings: Tolerances,
-    local: Local | None = None,
+    study: Study, surfaces: Sequence[Surface], point: Array, settings: Tolerances, local: Local | None = None
 ) -> WidestTolerances:
     """Widest half widths, in factor units, about a point (k,) in factor units.
 

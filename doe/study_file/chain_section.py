@@ -52,12 +52,7 @@ def chain_table(chain: StudyChain, folder: Path, value: float, half_width: float
     if chain.file is not None:
         named = _of_file(chain.name, folder / chain.file)
         return {**{key: each for key, each in named.items() if key != "name"}, "closing_link": limits}
-    table = {
-        "closing_link": limits,
-        "link": chain.link,
-        "allocate": chain.allocate,
-        "monte_carlo": chain.monte_carlo,
-    }
+    table = {"closing_link": limits, "link": chain.link, "allocate": chain.allocate, "monte_carlo": chain.monte_carlo}
     return table if chain.selective is None else table | {"selective": chain.selective}
 
 

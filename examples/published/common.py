@@ -19,11 +19,7 @@ from rbdyn.terminal import print_table
 EXAMPLES = Path(__file__).parent.parent
 CHEN = EXAMPLES / "cylindrical_roller.toml"
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
-PLAIN = {
-    "impact_force_N": "impact force",
-    "whirl_deviation_ratio": "whirl ratio",
-    "power_loss_W": "power loss",
-}
+PLAIN = {"impact_force_N": "impact force", "whirl_deviation_ratio": "whirl ratio", "power_loss_W": "power loss"}
 LAWS = ("four_constant", "thermal_newtonian")
 
 Kind = Literal["measured", "trend", "model against model", "cross-check"]

@@ -34,10 +34,7 @@ from rbdyn import Scene
 from rbdyn.lubricants import oil_at
 
 # Table 8: as designed, and the paper's optimum.
-DESIGNS = {
-    "design": (0.020, 0.150, 0.300),
-    "optimum": (0.017, 0.187, 0.285),
-}
+DESIGNS = {"design": (0.020, 0.150, 0.300), "optimum": (0.017, 0.187, 0.285)}
 KEYS = ("bearing.radial_clearance_mm", "cage.guide_clearance_mm", "cage.pocket_clearance_mm")
 # Table 2.
 SPEEDS_RPM = (24000, 26000, 28000, 30000)
@@ -58,19 +55,13 @@ CROSS_CHECK = 0.25
 
 
 def figure14(
-    effort: Effort,
-    laws: Sequence[str] = LAWS,
-    speeds: Sequence[int] = SPEEDS_RPM,
-    loads: Sequence[int] = LOADS_N,
+    effort: Effort, laws: Sequence[str] = LAWS, speeds: Sequence[int] = SPEEDS_RPM, loads: Sequence[int] = LOADS_N
 ) -> Check:
     """Trends with speed at 1300 N and with load at 24000 rpm, for the paper's design and optimum."""
     records = []
     for law in laws:
         for design, clearances in DESIGNS.items():
-            fixed = (
-                f"traction.model={law}",
-                *(f"{key}={mm}" for key, mm in zip(KEYS, clearances, strict=True)),
-            )
+            fixed = (f"traction.model={law}", *(f"{key}={mm}" for key, mm in zip(KEYS, clearances, strict=True)))
             for sweep, conditions in (
                 ("speed", [(speed, 1300) for speed in speeds]),
                 ("load", [(24000, load) for load in loads]),
@@ -78,13 +69,7 @@ def figure14(
                 for speed, load in conditions:
                     point = (f"operation.inner_speed_rpm={speed}", f"operation.radial_load_N={load}")
                     result = simulated(CHEN, effort, (*fixed, *point))
-                    record = {
-                        "law": law,
-                        "design": design,
-                        "sweep": sweep,
-                        "speed_rpm": speed,
-                        "load_N": load,
-                    }
+                    record = {"law": law, "design": design, "sweep": sweep, "speed_rpm": speed, "load_N": load}
                     for response in RESPONSES:
                         record[response] = quantity(result, response).value
                         record[f"{response}_error"] = error(quantity(result, response))
@@ -190,16 +175,7 @@ def optimum_table(frame: pd.DataFrame) -> Table:
             ))  # fmt: skip
     return Table(
         "their optimum against their design over all these operating points",
-        (
-            "response",
-            "traction law",
-            "our mean change",
-            "theirs (Table 8)",
-            "better",
-            "worse",
-            "points",
-            "kind",
-        ),
+        ("response", "traction law", "our mean change", "theirs (Table 8)", "better", "worse", "points", "kind"),
         tuple(rows),
     )
 

@@ -110,11 +110,7 @@ def sensitivity(effort: Effort, names: Sequence[str] | None = None, whole_design
         rows,
     )
     return Check(
-        "Sensitivity of the Table 4 levels to what the paper leaves out",
-        (table,),
-        conclusion(frame),
-        frame,
-        draw,
+        "Sensitivity of the Table 4 levels to what the paper leaves out", (table,), conclusion(frame), frame, draw
     )
 
 

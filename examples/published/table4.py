@@ -37,11 +37,7 @@ FACTORS = {
     "guide_clearance_mm": ("cage.guide_clearance_mm", 0.15, 0.05),
     "pocket_clearance_mm": ("cage.pocket_clearance_mm", 0.30, 0.05),
 }
-SHORT = {
-    "radial_clearance_mm": "A radial",
-    "guide_clearance_mm": "B guide",
-    "pocket_clearance_mm": "C pocket",
-}
+SHORT = {"radial_clearance_mm": "A radial", "guide_clearance_mm": "B guide", "pocket_clearance_mm": "C pocket"}
 DRAWS = 1000
 
 
@@ -68,10 +64,7 @@ def theirs() -> Theirs:
     student = stdtrit(len(centre) - 1, 0.975)
     spread = {name: student * centre[name].std(ddof=1) / np.sqrt(counts.to_numpy()) for name in RESPONSES}
     return Theirs(
-        counts.reset_index()[list(FACTORS)],
-        counts.to_numpy(),
-        values.reset_index(drop=True),
-        pd.DataFrame(spread),
+        counts.reset_index()[list(FACTORS)], counts.to_numpy(), values.reset_index(drop=True), pd.DataFrame(spread)
     )
 
 

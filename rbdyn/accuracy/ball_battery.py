@@ -194,6 +194,5 @@ def _draw(runs: dict[str, list[Run]], path: Any) -> None:
     from rbdyn.plots.solvers import solved_in_time
 
     solved_in_time(
-        {name: [r.solve_us if r.solution.found else None for r in found] for name, found in runs.items()},
-        path,
+        {name: [r.solve_us if r.solution.found else None for r in found] for name, found in runs.items()}, path
     )

@@ -130,11 +130,7 @@ def work_precision(problem: Problem, limits: Sequence[int], counted: Progress) -
     reference = equilibrium.solve(*problem)
     if not reference.found:
         raise RunError(f"there is nothing to compare: {reference.status}")
-    scale = max(
-        float(reference.inner_load.max()),
-        float(reference.outer_load.max()),
-        float(np.abs(problem.load).max()),
-    )
+    scale = max(float(reference.inner_load.max()), float(reference.outer_load.max()), float(np.abs(problem.load).max()))
     attempts = []
     for name, solver in LIMITED.items():
         for limit in limits:

@@ -35,13 +35,7 @@ from rbdyn.dynamics.state import (
 )
 from rbdyn.kernel import entry, kernel
 
-BODY_PAIRS = (
-    (CAGE_X, CAGE_VX),
-    (CAGE_Y, CAGE_VY),
-    (CAGE_ANGLE, CAGE_SPEED),
-    (RING_X, RING_VX),
-    (RING_Y, RING_VY),
-)
+BODY_PAIRS = ((CAGE_X, CAGE_VX), (CAGE_Y, CAGE_VY), (CAGE_ANGLE, CAGE_SPEED), (RING_X, RING_VX), (RING_Y, RING_VY))
 
 
 def velocity_of(layout: Layout) -> NDArray[np.int64]:

@@ -13,14 +13,7 @@ from typing import Any
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
-from rbdyn.accuracy.methods import (
-    OURS,
-    RUNGE_KUTTA_4,
-    VELOCITY_VERLET,
-    FixedStepRun,
-    Method,
-    fixed_step,
-)
+from rbdyn.accuracy.methods import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
 from rbdyn.accuracy.report import Progress, Table
 from rbdyn.accuracy.tolerances import NEGLIGIBLE, OUTPUTS, Bias, bias_cells, bias_of
 from rbdyn.dynamics.ensemble import Stop
@@ -32,11 +25,7 @@ from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 
 REFERENCE_RTOL = 1e-4
-SETTINGS = (
-    (OURS, (1e-1, 1e-2, 1e-3)),
-    (RUNGE_KUTTA_4, (2.0, 1.0, 0.5)),
-    (VELOCITY_VERLET, (1.0, 0.5, 0.25, 0.125)),
-)
+SETTINGS = ((OURS, (1e-1, 1e-2, 1e-3)), (RUNGE_KUTTA_4, (2.0, 1.0, 0.5)), (VELOCITY_VERLET, (1.0, 0.5, 0.25, 0.125)))
 
 
 @dataclass(frozen=True)

@@ -62,12 +62,7 @@ class Method(NamedTuple):
 
 def ready_ours(stretch: Stretch, rtol: float) -> Callable[[], Arrived]:
     """As in a simulation, with everything that one keeps: works, largest loads, whirl."""
-    limits = {
-        "turns": stretch.turns,
-        "discard_turns": 0.0,
-        "step_budget_per_turn": BUDGET_PER_TURN,
-        "method": "rk45",
-    }
+    limits = {"turns": stretch.turns, "discard_turns": 0.0, "step_budget_per_turn": BUDGET_PER_TURN, "method": "rk45"}
     numerics = stretch.scene.numerics.model_copy(update=limits)
     scene = stretch.scene.model_copy(update={"numerics": numerics})
     run = Run(scene, stretch.bearing, 0, rtol, Stop())

@@ -127,10 +127,7 @@ def load_errors(scene: Scene, counts: Sequence[int]) -> dict[int, float]:
     directions = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)] if scene.bearing.tilt_mrad else [(1.0, 0.0)]
     errors = dict.fromkeys(counts, 0.0)
     for race in ("outer", "inner"):
-        fine, laws = (
-            contact_law(scene, race, FINE),
-            {count: contact_law(scene, race, count) for count in counts},
-        )
+        fine, laws = (contact_law(scene, race, FINE), {count: contact_law(scene, race, count) for count in counts})
         overlaps = np.geomspace(1e-3, 1.0, LOADS) * overlap_at(fine, largest)
         for direction in directions:
             for overlap in overlaps:

@@ -14,16 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rbdyn.accuracy.judgement import (
-    SOUGHT,
-    Difference,
-    Verdict,
-    check_replicates,
-    judged,
-    overall,
-    percent,
-    undecided,
-)
+from rbdyn.accuracy.judgement import SOUGHT, Difference, Verdict, check_replicates, judged, overall, percent, undecided
 from rbdyn.accuracy.report import Progress, Table
 from rbdyn.dynamics.batch_means import student_half_width
 from rbdyn.dynamics.ensemble import Stop

@@ -105,10 +105,7 @@ def reference(stretches: Sequence[Stretch], step: Callable[[], None] = lambda: N
         for span in SPANS:
             ours, theirs = (
                 end_of(method, replace(stretch, start=y, turns=span - before), rtol)
-                for method, y, rtol in (
-                    (OURS, ours, OUR_REFERENCE_RTOL),
-                    (DOP853, theirs, THEIR_REFERENCE_RTOL),
-                )
+                for method, y, rtol in ((OURS, ours, OUR_REFERENCE_RTOL), (DOP853, theirs, THEIR_REFERENCE_RTOL))
             )
             apart[span].append(difference(stretch, ours, theirs))
             before = span

@@ -50,14 +50,8 @@ def study(
             *(f"rtol {rtol:g} failed: {why}" for rtol, why in found.failures.items()),
             f"{numerics.replicates} replicates of {numerics.turns:g} turns",
         ),
-        sheets={
-            "accuracy": [tolerances.flat(row) for row in found.rows],
-            "trajectory": motion.record["rows"],
-        },
-        pictures={
-            "accuracy": lambda path: _draw(found.rows, path, sought),
-            "trajectory": motion.pictures["methods"],
-        },
+        sheets={"accuracy": [tolerances.flat(row) for row in found.rows], "trajectory": motion.record["rows"]},
+        pictures={"accuracy": lambda path: _draw(found.rows, path, sought), "trajectory": motion.pictures["methods"]},
     )
 
 

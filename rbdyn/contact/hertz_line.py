@@ -95,8 +95,7 @@ def dowson_higginson(equivalent_modulus: float, length: float, gamma: float) -> 
     Positive gamma for the outer race, negative for the inner (Harris, Rolling Bearing Analysis).
     """
     return LogarithmicLineContact(
-        2.0 / (math.pi * equivalent_modulus * length),
-        math.pi * equivalent_modulus * length**2 / (1.0 + gamma),
+        2.0 / (math.pi * equivalent_modulus * length), math.pi * equivalent_modulus * length**2 / (1.0 + gamma)
     )
 
 

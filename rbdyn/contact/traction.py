@@ -194,11 +194,7 @@ class SurfaceFit(NamedTuple):
 
 
 def traction_surface(
-    coefficient: Coefficient,
-    largest_load: float,
-    smallest_load: float,
-    largest_slip: float,
-    tolerance: float = 5e-4,
+    coefficient: Coefficient, largest_load: float, smallest_load: float, largest_slip: float, tolerance: float = 5e-4
 ) -> SurfaceFit:
     """Table of ``coefficient(slip, load)``, refined until its error is below ``tolerance`` of the largest value.
 

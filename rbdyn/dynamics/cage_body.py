@@ -40,11 +40,7 @@ def _(cage, fx, fy, moment, cosine, sine, speed):
 def _(cage, fx, fy, moment, cosine, sine, speed):
     spin_up = (moment - cage.offset * (cosine * fy - sine * fx)) / cage.inertia
     inward, ahead = cage.offset * speed * speed, cage.offset * spin_up
-    return (
-        fx / cage.mass + inward * cosine + ahead * sine,
-        fy / cage.mass + inward * sine - ahead * cosine,
-        spin_up,
-    )
+    return (fx / cage.mass + inward * cosine + ahead * sine, fy / cage.mass + inward * sine - ahead * cosine, spin_up)
 
 
 @law

@@ -50,8 +50,7 @@ def _mean(sums: Array) -> Array:
 def _largest(force: int) -> Figure:
     """Mean of the largest load of each batch: of impact windows a run may hold one or two."""
     return Figure(
-        lambda run: np.column_stack((run.durations, run.durations * run.largest[:, force]))[run.first :],
-        _mean,
+        lambda run: np.column_stack((run.durations, run.durations * run.largest[:, force]))[run.first :], _mean
     )
 
 
@@ -96,10 +95,7 @@ def drift_of(figure: Figure, runs: Sequence[Replicate]) -> Drift | None:
     if half == 0:
         return None
     size = abs(float(figure.of_sums(np.sum([part.sum(axis=0) for part in moments], axis=0))))
-    early, late = (
-        [part[rows - 2 * half : rows - half] for part in moments],
-        [part[-half:] for part in moments],
-    )
+    early, late = ([part[rows - 2 * half : rows - half] for part in moments], [part[-half:] for part in moments])
     if len(runs) >= FEWEST_REPLICATES:
         change = np.array(
             [figure.of_sums(b.sum(axis=0)) - figure.of_sums(a.sum(axis=0)) for a, b in zip(early, late, strict=True)]

@@ -57,10 +57,7 @@ class Ended(Generic[T]):
 
 
 def run_all(
-    runs: Iterable[Callable[[], T]],
-    workers: int | None,
-    stop: Stop,
-    ended: Callable[[Ended[T]], None],
+    runs: Iterable[Callable[[], T]], workers: int | None, stop: Stop, ended: Callable[[Ended[T]], None]
 ) -> None:
     """Run all on ``workers`` threads (all processors by default) and hand over each as it ends.
 

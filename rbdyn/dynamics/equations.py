@@ -99,13 +99,7 @@ def cage_motion(y, body):
     """Motion of the cage, whose coordinates stand from ``body`` on; its mark is the mid-line of the first pocket."""
     cosine, sine = fast_cos_sin(y[body + CAGE_ANGLE])
     return RingMotion(
-        y[body + CAGE_X],
-        y[body + CAGE_Y],
-        y[body + CAGE_VX],
-        y[body + CAGE_VY],
-        y[body + CAGE_SPEED],
-        cosine,
-        sine,
+        y[body + CAGE_X], y[body + CAGE_Y], y[body + CAGE_VX], y[body + CAGE_VY], y[body + CAGE_SPEED], cosine, sine
     )
 
 
@@ -214,13 +208,7 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     dy[row, body + RING_VY] = (on_inner[1] + land.inner_y + acting.load_y) / bearing.inner_ring_mass
     add_weight(bearing.gravity, body + RING_VX, 1, row, dy)
     support_loss = support_motion(
-        bearing.outer_ring,
-        bearing.gravity,
-        on_outer[0] + land.outer_x,
-        on_outer[1] + land.outer_y,
-        y,
-        row,
-        dy,
+        bearing.outer_ring, bearing.gravity, on_outer[0] + land.outer_x, on_outer[1] + land.outer_y, y, row, dy
     )
     power[row, 0] = on_outer[4]
     power[row, 1] = on_inner[4]

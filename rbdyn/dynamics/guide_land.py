@@ -122,16 +122,7 @@ def journal_wrench(guide, dx, dy, dvx, dvy, journal_speed, bearing_speed):
     ex, ey = (dx * inverse, dy * inverse) if e > 0.0 else (1.0, 0.0)
     film = film_wrench(guide.film, ex, ey, e, dvx, dvy, journal_speed, bearing_speed)
     dry = dry_wrench(guide.dry, guide.radius, ex, ey, e, dvx, dvy, journal_speed, bearing_speed)
-    return (
-        film[0] + dry[0],
-        film[1] + dry[1],
-        film[2] + dry[2],
-        film[3] + dry[3],
-        dry[4],
-        film[4],
-        dry[5],
-        dry[6],
-    )
+    return (film[0] + dry[0], film[1] + dry[1], film[2] + dry[2], film[3] + dry[3], dry[4], film[4], dry[5], dry[6])
 
 
 class LandForces(NamedTuple):

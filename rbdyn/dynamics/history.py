@@ -94,11 +94,7 @@ class History:
 
 
 def history(
-    scene: Scene,
-    turns: float,
-    replicate: int = 0,
-    samples_per_turn: int | None = None,
-    stop: Stop | None = None,
+    scene: Scene, turns: float, replicate: int = 0, samples_per_turn: int | None = None, stop: Stop | None = None
 ) -> History:
     """History of one replicate over the first ``turns`` counted turns. Raises RunError."""
     bearing = roller_bearing(scene)

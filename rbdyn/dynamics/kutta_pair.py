@@ -11,14 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.dynamics.embedded_pair import (
-    mean_rate,
-    quartic_rate,
-    rate_error,
-    stage_state,
-    stage_time,
-    stage_weight,
-)
+from rbdyn.dynamics.embedded_pair import mean_rate, quartic_rate, rate_error, stage_state, stage_time, stage_weight
 from rbdyn.elementary import fma
 
 A = np.array([[0, 0, 0, 0], [1 / 3, 0, 0, 0], [-1 / 3, 1, 0, 0], [1, -1, 1, 0], [1 / 8, 3 / 8, 3 / 8, 1 / 8]])

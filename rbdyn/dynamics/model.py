@@ -13,20 +13,8 @@ from numpy.typing import NDArray
 
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.film import short_journal_film
-from rbdyn.contact.hertz_line import (
-    LineContactOnBar,
-    dowson_higginson,
-    houpert,
-    iso_16281,
-    palmgren,
-    sliced,
-)
-from rbdyn.contact.rolling_resistance import (
-    NoRollingResistance,
-    aihara_thermal_factor,
-    biboulet_houpert,
-    starved,
-)
+from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, sliced
+from rbdyn.contact.rolling_resistance import NoRollingResistance, aihara_thermal_factor, biboulet_houpert, starved
 from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.cage_body import BalancedCage, UnbalancedCage
 from rbdyn.dynamics.drag import NoDrag, cylinder_drag

@@ -49,10 +49,7 @@ class Scratch(NamedTuple):
 def scratch(rollers: int) -> Scratch:
     """Work space for the contacts of so many rollers."""
     return Scratch(
-        np.ones((COORDINATES + 2) * LANES),
-        np.empty(OUTPUTS * LANES),
-        np.zeros(LANES, np.int64),
-        np.empty(rollers),
+        np.ones((COORDINATES + 2) * LANES), np.empty(OUTPUTS * LANES), np.zeros(LANES, np.int64), np.empty(rollers)
     )
 
 

@@ -21,15 +21,7 @@ from rbdyn.dynamics.arrow_matrix import PARTS, ArrowMatrix, factor, shifted, sol
 from rbdyn.dynamics.booking import PEAK_POINTS, book_peaks, book_point, book_whirl
 from rbdyn.dynamics.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS, derivative_once
 from rbdyn.dynamics.jacobian import Differences, jacobian
-from rbdyn.dynamics.runge_kutta import (
-    FINISHED,
-    GROW,
-    NOT_FINITE,
-    SAFETY,
-    SHRINK,
-    STEP_BUDGET,
-    STEP_UNDERFLOW,
-)
+from rbdyn.dynamics.runge_kutta import FINISHED, GROW, NOT_FINITE, SAFETY, SHRINK, STEP_BUDGET, STEP_UNDERFLOW
 from rbdyn.dynamics.state import CAGE_VX, CAGE_VY
 from rbdyn.kernel import entry, kernel, routine
 
@@ -194,10 +186,7 @@ def keep(bearing, carry, work, h, tally, sample_step):
     body = PARTS * bearing.rollers
     while carry.clock[3] <= time + h:
         theta = (carry.clock[3] - time) / h
-        vx, vy = (
-            interpolate(carry, work, theta, body + CAGE_VX),
-            interpolate(carry, work, theta, body + CAGE_VY),
-        )
+        vx, vy = (interpolate(carry, work, theta, body + CAGE_VX), interpolate(carry, work, theta, body + CAGE_VY))
         book_whirl(tally.whirl, vx, vy)
         carry.clock[3] += sample_step
     return on_wall > tally.largest[POCKET_LOAD] or contact > tally.largest[POCKET_CONTACT_LOAD]
@@ -217,17 +206,7 @@ def advance_implicit(bearing, control, carry, tally, work, t_end, sample_step):
         if counts[0] + counts[1] >= control.step_budget:
             return STEP_BUDGET
         if not fresh:
-            jacobian(
-                bearing,
-                y,
-                carry.stage,
-                carry.k,
-                NEXT_ROW,
-                carry.power,
-                carry.loads,
-                carry.scratch,
-                work.found,
-            )
+            jacobian(bearing, y, carry.stage, carry.k, NEXT_ROW, carry.power, carry.loads, carry.scratch, work.found)
             counts[2] += PARTS + 1 + work.factors.bodies.shape[0]
             fresh = True
         remaining = t_end - clock[0]

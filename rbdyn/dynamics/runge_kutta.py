@@ -17,14 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.booking import PEAK_POINTS, book_peaks, book_point, book_whirl
-from rbdyn.dynamics.embedded_pair import (
-    mean_rate,
-    quartic_rate,
-    rate_error,
-    stage_state,
-    stage_time,
-    stage_weight,
-)
+from rbdyn.dynamics.embedded_pair import mean_rate, quartic_rate, rate_error, stage_state, stage_time, stage_weight
 from rbdyn.dynamics.equations import (
     LOADS,
     POCKET_CONTACT_LOAD,
@@ -34,13 +27,7 @@ from rbdyn.dynamics.equations import (
     derivative_once,
     roller_count,
 )
-from rbdyn.dynamics.orbit_frame import (
-    mean_orbit_rate,
-    rates_to_fixed_axes,
-    rates_to_frame,
-    to_fixed_axes,
-    turn_of,
-)
+from rbdyn.dynamics.orbit_frame import mean_orbit_rate, rates_to_fixed_axes, rates_to_frame, to_fixed_axes, turn_of
 from rbdyn.dynamics.race_lanes import Scratch
 from rbdyn.dynamics.state import CAGE_VX, CAGE_VY
 from rbdyn.elementary import fma
@@ -174,14 +161,8 @@ def error_norm(pair, k, h, inverse_tolerance):
     whole = n // 4 * 4
     sum_0 = sum_1 = sum_2 = sum_3 = 0.0
     for i in range(0, whole, 4):
-        e_0, e_1 = (
-            scaled_error(pair, k, i, inverse_tolerance),
-            scaled_error(pair, k, i + 1, inverse_tolerance),
-        )
-        e_2, e_3 = (
-            scaled_error(pair, k, i + 2, inverse_tolerance),
-            scaled_error(pair, k, i + 3, inverse_tolerance),
-        )
+        e_0, e_1 = (scaled_error(pair, k, i, inverse_tolerance), scaled_error(pair, k, i + 1, inverse_tolerance))
+        e_2, e_3 = (scaled_error(pair, k, i + 2, inverse_tolerance), scaled_error(pair, k, i + 3, inverse_tolerance))
         sum_0 += e_0 * e_0
         sum_1 += e_1 * e_1
         sum_2 += e_2 * e_2

@@ -54,11 +54,7 @@ Start = Callable[[int, float, Stop], Recording]
 
 
 def run_until_settled(
-    scene: Scene,
-    start: Start,
-    workers: int | None,
-    progress: Callable[[int, int], None] | None,
-    stop: Stop,
+    scene: Scene, start: Start, workers: int | None, progress: Callable[[int, int], None] | None, stop: Stop
 ) -> Ensemble:
     """Run the replicates of a scene, as far as it takes, then their companions just as far.
 

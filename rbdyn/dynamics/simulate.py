@@ -31,15 +31,7 @@ from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_lanes import scratch
 from rbdyn.dynamics.race_report import race_report
 from rbdyn.dynamics.recording import Recording, record
-from rbdyn.dynamics.runge_kutta import (
-    FINISHED,
-    NOT_FINITE,
-    STEP_BUDGET,
-    STEP_UNDERFLOW,
-    Carry,
-    Control,
-    Tally,
-)
+from rbdyn.dynamics.runge_kutta import FINISHED, NOT_FINITE, STEP_BUDGET, STEP_UNDERFLOW, Carry, Control, Tally
 from rbdyn.dynamics.settling import Ensemble, run_until_settled
 from rbdyn.dynamics.start import start_state
 from rbdyn.dynamics.state import INNER_ANGLE, OUTER_ANGLE, name
@@ -238,12 +230,7 @@ def run_series(
     return [[runs[place * len(replicates) + index] for index in replicates] for place in range(len(tolerances))]
 
 
-def _gather(
-    scene: Scene,
-    ensemble: Ensemble,
-    wall_s: float,
-    compile_s: float,
-) -> SimulationResult:
+def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -> SimulationResult:
     runs, companions = ensemble.runs, ensemble.companions
     everything = [*runs, *companions]
     figures = quantities(scene, runs, companions, ensemble.since)

@@ -173,10 +173,7 @@ def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
 
 
 def measure(
-    scene: Scene,
-    workers: int | None,
-    progress: Callable[[int, int], None] | None,
-    stop: Stop | None,
+    scene: Scene, workers: int | None, progress: Callable[[int, int], None] | None, stop: Stop | None
 ) -> tuple[Model, Mapping[str, float]]:
     """Pilots over the ladder of tolerances: what they tell, and what they cost (``ADDED``). Raises RunError."""
     turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)

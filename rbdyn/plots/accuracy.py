@@ -18,11 +18,7 @@ if TYPE_CHECKING:
     from rbdyn.accuracy.tolerances import Row
 
 COLOURS = {"impact_force_N": VERMILION, "whirl_deviation_ratio": ORANGE, "power_loss_W": BLUE}
-NAMES = {
-    "impact_force_N": "impact force",
-    "whirl_deviation_ratio": "whirl ratio",
-    "power_loss_W": "power loss",
-}
+NAMES = {"impact_force_N": "impact force", "whirl_deviation_ratio": "whirl ratio", "power_loss_W": "power loss"}
 # Ours stands out; the others share a colour a family and differ by mark.
 MARKS = ("o", "s", "D", "^", "v", "P", "X", "<", ">", "h")
 METHOD_COLOURS = ("black", GREEN, SKY, BLUE, PURPLE, VERMILION, ORANGE, "#8C510A", GREY, "#7A6BB0")

@@ -180,9 +180,7 @@ def _rows(result: SweepResult) -> dict[str, str]:
     return {f"{name} row": f"{name}_row_" for name in ("inner", "outer")}
 
 
-def _lines(
-    result: SweepResult,
-) -> list[tuple[NDArray[np.float64], Any, str, Callable[[str], NDArray[np.float64]]]]:
+def _lines(result: SweepResult) -> list[tuple[NDArray[np.float64], Any, str, Callable[[str], NDArray[np.float64]]]]:
     """The last key's values, and for each value of the first of two: style, name, and what picks a column."""
     keys = list(result.keys.items())
     x = np.array(keys[-1][1], dtype=np.float64)

@@ -25,11 +25,7 @@ GREY = "#555555"
 OUTER, INNER, POCKET = BLUE, VERMILION, GREEN
 
 # Where a label may stand beside the end of its line: offset [points] and alignment, best first.
-SIDES: tuple[tuple[float, Literal["left", "center", "right"]], ...] = (
-    (0.0, "center"),
-    (7.0, "left"),
-    (-7.0, "right"),
-)
+SIDES: tuple[tuple[float, Literal["left", "center", "right"]], ...] = ((0.0, "center"), (7.0, "left"), (-7.0, "right"))
 PLACES = [((right, up), side) for up in (9.0, 0.0, -9.0, 14.0, -14.0, 20.0, -20.0, 27.0) for right, side in SIDES]
 
 

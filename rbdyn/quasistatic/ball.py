@@ -110,15 +110,7 @@ def _always(control: Any) -> bool:
 
 @law
 def ball_forces(
-    control: Any,
-    strength: float,
-    row: Any,
-    a_axial: float,
-    a_radial: float,
-    x: float,
-    y: float,
-    di: float,
-    do: float,
+    control: Any, strength: float, row: Any, a_axial: float, a_radial: float, x: float, y: float, di: float, do: float
 ) -> Any:
     """A ball with its centre at (x, y), the inner groove centre at (a_axial, a_radial), contacts ``di`` and ``do`` deep [m].
 
@@ -198,20 +190,8 @@ def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
     held_i, slope_i, by_load_i = held(ti, spinning.friction * qi)
     held_o, slope_o, by_load_o = held(to, spinning.friction * qo)
     by_load_i, by_load_o = by_load_i * spinning.friction * ki, by_load_o * spinning.friction * ko
-    ti, ti_1, ti_2, ti_3, ti_4 = (
-        held_i,
-        slope_i * ti_1,
-        slope_i * ti_2,
-        slope_i * ti_3 + by_load_i,
-        slope_i * ti_4,
-    )
-    to, to_1, to_2, to_3, to_4 = (
-        held_o,
-        slope_o * to_1,
-        slope_o * to_2,
-        slope_o * to_3,
-        slope_o * to_4 + by_load_o,
-    )
+    ti, ti_1, ti_2, ti_3, ti_4 = (held_i, slope_i * ti_1, slope_i * ti_2, slope_i * ti_3 + by_load_i, slope_i * ti_4)
+    to, to_1, to_2, to_3, to_4 = (held_o, slope_o * to_1, slope_o * to_2, slope_o * to_3, slope_o * to_4 + by_load_o)
     # Down to the places: an angle turns with (c, -s)/length, a deflection grows along (s, c).
     ic, is_ = ci * one_i, si * one_i
     oc, os_ = co * one_o, so * one_o

@@ -6,22 +6,11 @@ import time
 from typing import Any
 
 from rbdyn.quasistatic.double_decker import Start, solve_double_decker
-from rbdyn.quasistatic.double_decker_model import (
-    DoubleDeckerModel,
-    double_decker_of,
-    load_record,
-    middle_record,
-)
+from rbdyn.quasistatic.double_decker_model import DoubleDeckerModel, double_decker_of, load_record, middle_record
 from rbdyn.quasistatic.equilibrium import Solution
 from rbdyn.quasistatic.growth_model import growth_record, row_change
 from rbdyn.quasistatic.model import RPM, RowModel, given_of, load_of, row_of
-from rbdyn.quasistatic.result import (
-    FORMAT,
-    BallResult,
-    ball_records,
-    displacement_record,
-    stiffness_record,
-)
+from rbdyn.quasistatic.result import FORMAT, BallResult, ball_records, displacement_record, stiffness_record
 from rbdyn.quasistatic.roots import other_roots
 from rbdyn.quasistatic.row_report import beyond_hertz, film_record, notes, row_record
 from rbdyn.quasistatic.solvers import SOLVERS
@@ -139,10 +128,7 @@ def _layers(
     scene: DoubleDeckerScene, model: DoubleDeckerModel, rows: tuple[Solution, Solution]
 ) -> tuple[tuple[str, BallRow, RowModel, Solution], ...]:
     """Name, drawing, parameters and equilibrium of the inner and the outer row."""
-    return (
-        ("inner", scene.bearing.inner, model.inner, rows[0]),
-        ("outer", scene.bearing.outer, model.outer, rows[1]),
-    )
+    return (("inner", scene.bearing.inner, model.inner, rows[0]), ("outer", scene.bearing.outer, model.outer, rows[1]))
 
 
 def _frame(scene: BallScene, status: str, took: float) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -153,9 +139,5 @@ def _frame(scene: BallScene, status: str, took: float) -> tuple[dict[str, Any], 
         "raceway_control": scene.model.raceway_control,
         "solver": scene.model.solver,
     }
-    tail = {
-        "cost": {"solve_us": 1e6 * took},
-        "versions": versions(),
-        "scene": scene.model_dump(mode="json"),
-    }
+    tail = {"cost": {"solve_us": 1e6 * took}, "versions": versions(), "scene": scene.model_dump(mode="json")}
     return head, tail

@@ -266,12 +266,7 @@ def _onto_by_relative(stack: Stack, inner: Solution) -> Vector:
 
 
 def _result(
-    stack: Stack,
-    free: NDArray[np.bool_],
-    inner: Solution,
-    outer: Solution,
-    onto: Vector,
-    steps: int,
+    stack: Stack, free: NDArray[np.bool_], inner: Solution, outer: Solution, onto: Vector, steps: int
 ) -> DoubleDeckerSolution:
     to_inner = carried(stack.arm_0)
     left = (onto - outer.reaction)[free & (np.arange(5) < 3)]

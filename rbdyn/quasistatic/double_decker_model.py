@@ -14,14 +14,7 @@ from rbdyn.quasistatic.growth_model import layer_changes
 from rbdyn.quasistatic.model import RPM, RowModel, contacts, row_model
 from rbdyn.quasistatic.result import displacement_record
 from rbdyn.quasistatic.ring_growth import GrooveChange
-from rbdyn.quasistatic.speed_split import (
-    LayerFriction,
-    SpeedSplit,
-    Status,
-    balanced_split,
-    load_torque,
-    oil_share,
-)
+from rbdyn.quasistatic.speed_split import LayerFriction, SpeedSplit, Status, balanced_split, load_torque, oil_share
 from rbdyn.scene.ball import BallRow, DoubleDeckerScene
 
 # ISO 76: pressure under the static capacity, and its most loaded ball, 5 C0/(Z cos a_0).

@@ -19,9 +19,7 @@ from rbdyn.quasistatic.row import Row, component_lengths
 # What ``tell`` leaves of a ball.
 INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, TOLD = range(7)
 OK = "ok"
-SENTENCES = {
-    NOT_CONVEX_MINIMUM: "no equilibrium was found even with one common cage speed",
-}
+SENTENCES = {NOT_CONVEX_MINIMUM: "no equilibrium was found even with one common cage speed"}
 LOST = (
     "no equilibrium was found with this raceway control, only with one common cage speed: the control or friction leaves the "
     "balls none, or several; raise model.light_load_share or set model.raceway_control = 'common_cage'"
@@ -85,16 +83,7 @@ def tell(control: Any, row: Any, q: Any, balls: Any, work: Any, told: Any) -> No
 
 @entry
 def solve_row(
-    control: Any,
-    row: Any,
-    load: Any,
-    free: Any,
-    warm: bool,
-    q: Any,
-    balls: Any,
-    at: Any,
-    counts: Any,
-    told: Any,
+    control: Any, row: Any, load: Any, free: Any, warm: bool, q: Any, balls: Any, at: Any, counts: Any, told: Any
 ) -> tuple[int, float]:
     """Find the equilibrium and fill ``told`` (Z, TOLD); see ``newton.find``. Returns the outcome and the residual [N]."""
     counts[:] = 0
@@ -127,16 +116,7 @@ def solve(
         balls[:] = np.hstack((start.balls, start.depths))
     at, counts, told = space(size), np.zeros(COUNTERS, np.int64), np.zeros((size, TOLD))
     outcome, worst = solve_row(
-        control,
-        row,
-        np.asarray(load, float) / unit,
-        free,
-        start is not None,
-        q,
-        balls,
-        at,
-        counts,
-        told,
+        control, row, np.asarray(load, float) / unit, free, start is not None, q, balls, at, counts, told
     )
     return told_solution(row, at, q, balls, counts, told, outcome, worst)
 

@@ -5,13 +5,7 @@ from __future__ import annotations
 import math
 
 from rbdyn.quasistatic.equilibrium import Solution
-from rbdyn.quasistatic.life import (
-    BallLife,
-    Turning,
-    lundberg_palmgren_capacities,
-    rated_capacities,
-    row_life,
-)
+from rbdyn.quasistatic.life import BallLife, Turning, lundberg_palmgren_capacities, rated_capacities, row_life
 from rbdyn.quasistatic.rating import dynamic_capacity
 from rbdyn.scene.ball import BallRow
 

@@ -45,10 +45,7 @@ def system_of(row: Row, load: NDArray[np.float64], given: NDArray[np.float64] | 
     unit = component_lengths(row.lever)
     held = np.full(RING, np.nan) if given is None else np.asarray(given, float)
     return System(
-        row,
-        np.asarray(load, float) / unit,
-        np.where(np.isnan(held), 0.0, held) * unit,
-        np.flatnonzero(np.isnan(held)),
+        row, np.asarray(load, float) / unit, np.where(np.isnan(held), 0.0, held) * unit, np.flatnonzero(np.isnan(held))
     )
 
 
@@ -83,11 +80,7 @@ def forces(control: Any, system: Any, u: Any, residual: Any, jacobian: Any) -> t
     for j in range(row.cosine.size):
         c, s = row.cosine[j], row.sine[j]
         # What a ball's axial force, radial force and couple are worth along each component.
-        axial, radial, couple = (
-            (0.0, 0.0, 1.0, s, -c),
-            (c, s, 0.0, 0.0, 0.0),
-            (0.0, 0.0, 0.0, s * one, -c * one),
-        )
+        axial, radial, couple = ((0.0, 0.0, 1.0, s, -c), (c, s, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, s * one, -c * one))
         a_axial, a_radial = groove_centre(row, q, j)
         x, y = u[2 * j], u[2 * j + 1]
         inner = deflection(a_axial - x, a_radial - y, row.inner_reach[j])

@@ -97,9 +97,7 @@ def growth_record(scene: BallScene, names: dict[str, GrooveChange]) -> dict[str,
     """What is reported of growth and fits; empty where the scene asks for none."""
     if not changes(scene):
         return {}
-    record: dict[str, Any] = {
-        "ring_growth_um": {name: 1e6 * change.radial for name, change in names.items()},
-    }
+    record: dict[str, Any] = {"ring_growth_um": {name: 1e6 * change.radial for name, change in names.items()}}
     rings = mounted_of(scene)
     if rings is not None:
         loosens = rings.loosening_speed / RPM

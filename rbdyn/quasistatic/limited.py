@@ -12,17 +12,7 @@ from rbdyn.quasistatic.ball import rules
 from rbdyn.quasistatic.control import Control
 from rbdyn.quasistatic.equilibrium import OK, Solution
 from rbdyn.quasistatic.full_system import evaluate, solution_at, system_of, unknowns
-from rbdyn.quasistatic.newton import (
-    ASSEMBLIES,
-    CONVEX_MARCH,
-    COUNTERS,
-    STEPS,
-    descend,
-    go_back,
-    march,
-    roughly,
-    space,
-)
+from rbdyn.quasistatic.newton import ASSEMBLIES, CONVEX_MARCH, COUNTERS, STEPS, descend, go_back, march, roughly, space
 from rbdyn.quasistatic.ring import BALL, RING
 from rbdyn.quasistatic.row import Row
 from rbdyn.quasistatic.start import along_the_load, settle_all

@@ -158,10 +158,7 @@ def ball_path(errors: RaceErrors, turning: Turning, steps: int, turns: int = 1, 
     turn = 2.0 * math.pi * np.arange(steps * turns)[:, np.newaxis] / steps
     azimuth = start + turning.cage * turn + 2.0 * math.pi * np.arange(z) / z
     on_inner, on_outer = azimuth - turning.inner * turn, azimuth - turning.outer * turn
-    wider_inner, wider_outer = (
-        errors.inner_groove_radius.at(on_inner),
-        errors.outer_groove_radius.at(on_outer),
-    )
+    wider_inner, wider_outer = (errors.inner_groove_radius.at(on_inner), errors.outer_groove_radius.at(on_outer))
     # Contacts: the inner one at the angle that the ball has spun, the outer one opposite.
     spun = turning.spin * turn[:, 0]
     inner_contact = np.stack([form.at(spun) for form in errors.sphericity], axis=1)

@@ -117,10 +117,7 @@ def readings(
         face.append((races[kind] @ (sign * on_face)).real)
     coefficients, (shift, tilt), lift = _ball_waves(parts, response, turning.spin * turn, cage)
     return Readings(
-        np.array(radial),
-        np.array(face),
-        (coefficients @ shift).real,
-        (coefficients @ (lift - face_radius * tilt)).real,
+        np.array(radial), np.array(face), (coefficients @ shift).real, (coefficients @ (lift - face_radius * tilt)).real
     )
 
 
@@ -154,11 +151,7 @@ def _ball_waves(
         opposite = -np.array([1.0, (-1.0) ** order])
         shift, tilt, lift = (gain[2:] @ opposite for gain in (response.radial, response.tilt, response.axial))
         coefficients += [0.5 * (amplitude @ around), 0.5 * (amplitude @ around.conj()), amplitude.sum(axis=1)]
-        waves += [
-            np.exp(1j * (order * spun + cage)),
-            np.exp(1j * (order * spun - cage)),
-            np.exp(1j * order * spun),
-        ]
+        waves += [np.exp(1j * (order * spun + cage)), np.exp(1j * (order * spun - cage)), np.exp(1j * order * spun)]
         gains += [(shift, tilt, 0.0), (shift, tilt, 0.0), (0.0, 0.0, lift)]
     shift, tilt, lift = np.array(gains).T[..., np.newaxis] * np.array(waves)
     return np.array(coefficients).T, (shift, tilt), lift

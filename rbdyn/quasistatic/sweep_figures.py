@@ -10,16 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
-from rbdyn.quasistatic.equilibrium import (
-    INNER_ANGLE,
-    INNER_LOAD,
-    MOMENT,
-    OUTER_ANGLE,
-    OUTER_LOAD,
-    PULL,
-    TOLD,
-    Solution,
-)
+from rbdyn.quasistatic.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, TOLD, Solution
 from rbdyn.quasistatic.life import LOAD_LIFE, RACE_EXPONENT, WEIBULL, Turning
 from rbdyn.quasistatic.row_report import overload
 from rbdyn.scene.ball import BallRow
@@ -87,10 +78,7 @@ def row_columns(balls: Vector, ratings: Sequence[Rating]) -> Columns:
     millions = lives(inner_load, outer_load, ratings)
     speed = np.array([abs(rating.relative_speed) for rating in ratings])
     with np.errstate(divide="ignore"):
-        return columns | {
-            "L10_Mrev": millions,
-            "L10_h": np.where(speed > 0.0, 1e6 * millions / (60.0 * speed), np.inf),
-        }
+        return columns | {"L10_Mrev": millions, "L10_h": np.where(speed > 0.0, 1e6 * millions / (60.0 * speed), np.inf)}
 
 
 def lives(inner_load: Vector, outer_load: Vector, ratings: Sequence[Rating]) -> Vector:

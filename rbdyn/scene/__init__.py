@@ -135,10 +135,7 @@ class Scene(SceneFile):
             return None
         from rbdyn.mounting import operating_clearance
 
-        speeds = (
-            self.operation.inner_speed_rpm * math.pi / 30.0,
-            self.operation.outer_speed_rpm * math.pi / 30.0,
-        )
+        speeds = (self.operation.inner_speed_rpm * math.pi / 30.0, self.operation.outer_speed_rpm * math.pi / 30.0)
         return operating_clearance(self.mounting, self.bearing, self.materials, *speeds)
 
     @property

@@ -69,10 +69,7 @@ class Bearing(Strict):
 
         Their share of the clearance is left out: it would change a ring's growth by some 1e-3 of itself.
         """
-        return (
-            self.pitch_diameter_mm - self.roller_diameter_mm,
-            self.pitch_diameter_mm + self.roller_diameter_mm,
-        )
+        return (self.pitch_diameter_mm - self.roller_diameter_mm, self.pitch_diameter_mm + self.roller_diameter_mm)
 
     @model_validator(mode="after")
     def _fits(self) -> Bearing:

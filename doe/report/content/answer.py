@@ -7,16 +7,7 @@ from typing import Any
 
 from doe.report.content.blocks import Block, Section, Table, Tile, Tiles, Words
 from doe.report.content.record import Factor, Record, factors, nearest, part, responses, scalars
-from doe.report.words import (
-    dimension,
-    half_width,
-    label,
-    percentage,
-    quantity,
-    rounded_down,
-    shown,
-    with_error,
-)
+from doe.report.words import dimension, half_width, label, percentage, quantity, rounded_down, shown, with_error
 
 # Characters above which a value is a sentence, to be broken.
 LONG = 40

@@ -21,21 +21,12 @@ def reference(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     for name, each in beside.items():
         for whose in ("ours", "theirs"):
             levels.append(
-                (
-                    f"{label(name)}, {whose}",
-                    *(shown(x) for x in each.get(f"{whose}_min_mean_max") or ("",) * 3),
-                )
+                (f"{label(name)}, {whose}", *(shown(x) for x in each.get(f"{whose}_min_mean_max") or ("",) * 3))
             )
         for factor, effect in (each.get("linear_effects") or {}).items():
             sign = "same" if effect.get("same_sign") else "opposite"
             effects.append(
-                (
-                    label(name),
-                    label(factor),
-                    shown(effect.get("ours"), 3),
-                    shown(effect.get("theirs"), 3),
-                    sign,
-                )
+                (label(name), label(factor), shown(effect.get("ours"), 3), shown(effect.get("theirs"), 3), sign)
             )
         words.append(" ".join(filter(None, (each.get("verdict"), each.get("why")))))
     blocks: list[Block] = [Bullets([text for text in words if text])]

@@ -36,13 +36,7 @@ def _points(summary: Record, points: Sequence[Record]) -> Table:
     given = factors(summary)
     names = [each["name"] for each in responses(summary)]
     blocked = len({point.get("block") for point in points}) > 1
-    header = [
-        "run",
-        "kind",
-        *(["block"] if blocked else []),
-        *(label(each.name) for each in given),
-        *map(label, names),
-    ]
+    header = ["run", "kind", *(["block"] if blocked else []), *(label(each.name) for each in given), *map(label, names)]
     rows = [
         [
             shown(point.get("run")),

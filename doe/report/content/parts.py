@@ -39,10 +39,7 @@ def _chain(name: str, chain: Record) -> list[Block]:
         blocks.append(Table(f"Parts of the chain {label(name)}", header, rows, text_columns=(2,)))
     if shares:
         blocks.append(
-            Figures(
-                [contributions(name, shares)],
-                "What each part contributes to the scatter of the closing link.",
-            )
+            Figures([contributions(name, shares)], "What each part contributes to the scatter of the closing link.")
         )
     if closing := chain.get("closing_link"):
         rows = [

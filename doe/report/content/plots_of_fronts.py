@@ -42,9 +42,7 @@ def pairs(
         whole += [place for place, _ in simulated.values()]
         across, up = bounds.get(one, ()), bounds.get(two, ())
         plot = Plot(
-            span([*(x for x, _ in whole), *across]),
-            span([*(y for _, y in whole), *up]),
-            (label(one), label(two)),
+            span([*(x for x, _ in whole), *across]), span([*(y for _, y in whole), *up]), (label(one), label(two))
         )
         for bound in across:
             plot.line([(bound, plot.y[0]), (bound, plot.y[1])], "limit")
