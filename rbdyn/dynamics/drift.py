@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from rbdyn.dynamics.batch_means import estimate, student_factor
 from rbdyn.dynamics.equations import POCKET_CONTACT_LOAD, POCKET_LOAD
-from rbdyn.dynamics.metrics import CAGE_SLIP, CAGE_SPEED, POWER_LOSS, WHIRL_DEVIATION_RATIO, Figure, Replicate
+from rbdyn.dynamics.metrics import CAGE_SLIP, CAGE_SPEED, POWER_LOSS, WHIRL_DEVIATION_RATIO, Figure, Replicate, mean
 
 Array = NDArray[np.float64]
 
@@ -43,18 +43,14 @@ STRETCH = 2
 BIAS_OF_DRIFT = 1.5
 
 
-def _mean(sums: Array) -> Array:
-    return sums[..., 1] / sums[..., 0]
-
-
 def _largest(force: int) -> Figure:
     """Mean of the largest load of each batch: of impact windows a run may hold one or two."""
     return Figure(
-        lambda run: np.column_stack((run.durations, run.durations * run.largest[:, force]))[run.first :], _mean
+        lambda run: np.column_stack((run.durations, run.durations * run.largest[:, force]))[run.first :], mean
     )
 
 
-WHIRL_SPEED = Figure(lambda run: run.whirl[run.first :, :2], _mean)
+WHIRL_SPEED = Figure(lambda run: run.whirl[run.first :, :2], mean)
 TESTED = {
     "impact_force_N": _largest(POCKET_LOAD),
     "impact_contact_force_N": _largest(POCKET_CONTACT_LOAD),

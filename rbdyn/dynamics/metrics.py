@@ -160,7 +160,8 @@ class Figure(NamedTuple):
     of_sums: Callable[[Array], Array]
 
 
-def _mean(sums: Array) -> Array:
+def mean(sums: Array) -> Array:
+    """Mean of what was summed, weighted by the first sum."""
     return sums[..., 1] / sums[..., 0]
 
 
@@ -189,11 +190,11 @@ def _timed(values: Callable[[Replicate], Array]) -> Callable[[Replicate], Array]
     return lambda run: np.column_stack((run.durations, values(run)))[run.first :]
 
 
-IMPACT_FORCE = Figure(lambda run: _counted(run.impact_windows), _mean)
-IMPACT_CONTACT_FORCE = Figure(lambda run: _counted(run.contact_windows), _mean)
+IMPACT_FORCE = Figure(lambda run: _counted(run.impact_windows), mean)
+IMPACT_CONTACT_FORCE = Figure(lambda run: _counted(run.contact_windows), mean)
 WHIRL_DEVIATION_RATIO = Figure(lambda run: run.whirl[run.first :], _deviation_ratio)
-POWER_LOSS = Figure(_timed(lambda run: run.work[:, :SHAFT].sum(axis=1)), _mean)
-CAGE_SPEED = Figure(_timed(lambda run: run.cage_angle), _mean)
+POWER_LOSS = Figure(_timed(lambda run: run.work[:, :SHAFT].sum(axis=1)), mean)
+CAGE_SPEED = Figure(_timed(lambda run: run.cage_angle), mean)
 CAGE_SLIP = Figure(_timed(lambda run: np.column_stack((run.kinematic_angle, run.cage_angle))), _slip)
 
 

@@ -28,19 +28,10 @@ GROUP = 5
 FEWEST_GROUPS = 8
 # Standard errors by which the mean of a head must differ: the head is the worst of many, so more than the usual two or three.
 SIGNIFICANT = 4.0
-FEWEST_MEMORIES = 4.0
 
 
-class Transient(NamedTuple):
-    """Batches of the transient, a multiple of five; ``settled`` is False where the rest is no longer than the
-    transient or drifts, so that it may not be the whole of it."""
-
-    batches: int
-    settled: bool
-
-
-def find_transient(series: Array) -> Transient | None:
-    """Transient of one series of batches; None where it is too short to tell."""
+def find_transient(series: Array) -> int | None:
+    """Batches of the transient of one series, a multiple of five; None where it is too short to tell."""
     groups = len(series) // GROUP
     if groups < FEWEST_GROUPS:
         return None
@@ -53,17 +44,10 @@ def find_transient(series: Array) -> Transient | None:
     half = (groups + 1) // 2
     dropped = half - int(np.argmin(spread[::-1][: half + 1][::-1]))
     head, rest = means[:dropped], means[dropped:]
-    memory = autocorrelation_time([rest])
-    if dropped == 0 or not _differs(head, rest, memory):
-        # A rest that remembers most of itself drifts, and no head can stand out from it.
-        return Transient(0, dropped < half or len(rest) >= FEWEST_MEMORIES * memory)
-    return Transient(dropped * GROUP, dropped < half)
-
-
-def _differs(head: Array, rest: Array, memory: float) -> bool:
-    """Whether the mean of the head lies beyond the scatter of the rest."""
-    error = math.sqrt(rest.var(ddof=1) * memory * (1.0 / len(head) + 1.0 / len(rest)))
-    return abs(float(head.mean() - rest.mean())) > SIGNIFICANT * error
+    if dropped == 0:
+        return 0
+    error = math.sqrt(rest.var(ddof=1) * autocorrelation_time([rest]) * (1.0 / len(head) + 1.0 / len(rest)))
+    return dropped * GROUP if abs(float(head.mean() - rest.mean())) > SIGNIFICANT * error else 0
 
 
 def series_of(runs: Sequence[Replicate]) -> dict[str, Array]:
@@ -81,14 +65,10 @@ def series_of(runs: Sequence[Replicate]) -> dict[str, Array]:
     }
 
 
-def transient_of(runs: Sequence[Replicate], begin: int = 0) -> Transient | None:
-    """The longest transient of impact force, whirl and power loss from the batch ``begin`` on; None where the rest is
-    too short to tell."""
-    found = [find_transient(series[begin:]) for series in series_of(runs).values()]
-    known = [each for each in found if each is not None]
-    if not known:
-        return None
-    return Transient(max(each.batches for each in known), all(each.settled for each in known))
+def transient_of(runs: Sequence[Replicate]) -> int | None:
+    """Batches of the longest transient of impact force, whirl and power loss; None where the run is too short to tell."""
+    known = [batches for series in series_of(runs).values() if (batches := find_transient(series)) is not None]
+    return max(known, default=None)
 
 
 class Start(NamedTuple):
@@ -105,14 +85,14 @@ def start_of_counting(scene: Scene, runs: Sequence[Replicate]) -> Start:
     numerics, run = scene.numerics, runs[0]
     if scene.operation.schedule is not None:
         return Start(run.first, None, ())
-    found = transient_of(runs)
-    if found is None:
+    transient = transient_of(runs)
+    if transient is None:
         fewest = GROUP * FEWEST_GROUPS * run.durations[0] / scene.turn_s
         note = f"the run is too short to show its transient: {fewest:g} shaft turns are needed; lengthen numerics.turns"
         return Start(run.first, None, (note,))
-    turns = round(float(run.durations[: found.batches].sum()) / scene.turn_s, 6)
+    turns = round(float(run.durations[:transient].sum()) / scene.turn_s, 6)
     if numerics.discard_turns == "auto":
         # An impact window at least must be left to count.
-        first = min(found.batches, len(run.durations) - run.per_window)
+        first = min(transient, len(run.durations) - run.per_window)
         return Start(first, turns, ())
     return Start(run.first, turns, ())
