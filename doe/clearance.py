@@ -192,9 +192,9 @@ def points_of(
 
 
 def code_version() -> str:
-    """Version of everything that the bits of a run depend on, the source code included."""
+    """Version of everything that the bits of a run depend on, the source code that computes them included."""
     packages = {name: version for name, version in versions().items() if name != "python"}
-    return json.dumps({**packages, "sources": source_digest()}, sort_keys=True)
+    return json.dumps({**packages, "sources": source_digest("rbdyn.dynamics.simulate")}, sort_keys=True)
 
 
 def _result(point: Point, found: Outcome) -> SimulationResult | Failure:

@@ -4,8 +4,8 @@
 - ``@law``: a function whose body is chosen, at compile time, by the type of its first argument (a
   NamedTuple of parameters). A law that a scene leaves out is thus not compiled at all.
 - ``@entry``: the few functions called from Python, and large ones that several of these share. Their machine code is
-  kept on disk, in a folder named by a hash of every source file of the package, so that an edit anywhere can never
-  bring back stale code.
+  kept on disk, in a folder named by a hash of every module that kernels are made of (``sources``), so that an edit can
+  never bring back stale code.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from llvmlite.binding import get_host_cpu_features
 from numba import njit
 from numba.core import types
 
-from rbdyn.sources import source_digest
+from rbdyn.sources import compiled_digest
 
 # No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
 # arrays happen to lie: only when every operation is rounded by itself do both give the same bits. And NaN stays a signal.
@@ -149,8 +149,8 @@ def entry(function: Callable[..., Any]) -> Any:
 
 @functools.cache
 def cache_folder() -> Path:
-    """Folder of the compiled code of exactly these sources; a temporary one where the home is read-only."""
-    digest = hashlib.sha256((numba.__version__ + source_digest()).encode())
+    """Folder of the compiled code of exactly these kernels; a temporary one where the home is read-only."""
+    digest = hashlib.sha256((numba.__version__ + compiled_digest()).encode())
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     folder = Path(base) / "rbdyn" / digest.hexdigest()[:16]
     try:

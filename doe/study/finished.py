@@ -21,8 +21,7 @@ def inputs_digest(study: Study, direct: bool) -> str:
         study.path.name,
         study.file.model_dump_json(),
         json.dumps([direct, versions()], sort_keys=True),
-        source_digest(),
-        source_digest(Path(__file__).parent.parent),
+        source_digest("rbdyn.dynamics.simulate", "doe.study"),
     ):
         digest.update(text.encode())
     for name in named:

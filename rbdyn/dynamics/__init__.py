@@ -4,7 +4,7 @@ From the scene:
 - ``geometry``: radii, masses, kinematic speeds, the sizes by which errors are measured
 - ``model``, ``race_traction``: the parameters and laws that the compiled code reads, built once
 - ``state``: the layout of the state vector and its units
-- ``start``: static load share, kinematic speeds, seeded pocket offsets
+- ``start``: kinematic speeds, seeded places in the pockets and the static load share (``static_load``)
 
 Compiled:
 - ``races``, ``race_form``, ``pocket``, ``guide_land``, ``drag``, ``gravity``: one interaction each
