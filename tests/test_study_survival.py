@@ -147,7 +147,7 @@ def test_other_code_runs_everything_again_also_what_failed(tmp_path, monkeypatch
     study = Study.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, faulty=(6,))
     assert run_design(study, tmp_path, 2, silent).failures
-    monkeypatch.setattr(clearance, "source_digest", lambda: "edited")
+    monkeypatch.setattr(clearance, "source_digest", lambda *roots: "edited")
     ran = instantly(monkeypatch.setattr)
     assert not run_design(study, tmp_path, 2, silent).failures
     assert sorted(ran) == list(range(1, 21))
