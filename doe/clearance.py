@@ -209,7 +209,7 @@ def _in_threads(
     """Engine of this process. A point is claimed when a thread is free for it, so that processes share the work."""
     from rbdyn.dynamics.ensemble import Stop, run_all
     from rbdyn.dynamics.model import roller_bearing
-    from rbdyn.dynamics.simulate import prepare
+    from rbdyn.dynamics.run import prepare
 
     stop, taken = Stop(), list[Point]()
 

@@ -17,7 +17,8 @@ import numpy as np
 from rbdyn.accuracy.report import Report, Table, record
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import prepare, run_replicate
+from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError, set_key
 from rbdyn.footprint import Footprint, added_modules, footprint
 from rbdyn.scene import Scene

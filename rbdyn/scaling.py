@@ -21,7 +21,8 @@ from rbdyn.accuracy.report import Report, Table, record
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import prepare, run_replicate
+from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError, RunError
 from rbdyn.footprint import last_line
 from rbdyn.option_cost import with_options

@@ -20,7 +20,8 @@ from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.error_bars import quantities, settled
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import prepare, run_replicate
+from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene

@@ -16,7 +16,8 @@ from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.method import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import prepare, run_replicate
+from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError, RunError
 from rbdyn.option_cost import with_options
 from rbdyn.scene import Scene

@@ -44,6 +44,7 @@ def instantly(patch: Any, seconds: float = 0.0, faulty: Collection[int] = ()) ->
 
     ``patch(target, name, value)`` replaces an attribute, such as ``monkeypatch.setattr``.
     """
+    from rbdyn.dynamics import run
     from rbdyn.dynamics import simulate as module
 
     ran: list[int] = []
@@ -59,7 +60,7 @@ def instantly(patch: Any, seconds: float = 0.0, faulty: Collection[int] = ()) ->
         return instant_result(scene)
 
     patch(module, "simulate", simulate)
-    patch(module, "prepare", lambda scene, bearing: 0.0)
+    patch(run, "prepare", lambda scene, bearing: 0.0)
     return ran
 
 

@@ -20,8 +20,8 @@ from rbdyn.dynamics.equations import LOAD, SHAFT
 from rbdyn.dynamics.geometry import layout_of
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.races import unequal_rollers
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.schedule import SmoothRamps
-from rbdyn.dynamics.simulate import Run
 
 FOLDER = Path(__file__).parent
 SCENES = pytest.mark.parametrize("fixture", ["outer", "inner", "everything"])

@@ -28,8 +28,9 @@ from rbdyn.dynamics.guide_land import journal_wrench
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.pocket import dry_walls, film_on_wall
 from rbdyn.dynamics.race_form import turned_multiple
+from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.schedule import segment
-from rbdyn.dynamics.simulate import Run, run_replicate
 from rbdyn.footprint import added_modules, instructions, law_types, parameter_bytes
 from rbdyn.option_cost import OPTIONS, with_options
 

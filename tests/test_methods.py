@@ -23,8 +23,8 @@ from rbdyn.dynamics.equations import LOADS, POWERS
 from rbdyn.dynamics.geometry import layout_of
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_lanes import scratch
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.runge_kutta import Tally
-from rbdyn.dynamics.simulate import Run
 from rbdyn.faults import InputError, RunError
 
 CVODE = [method for method in METHODS if method.name.startswith("CVODE")]

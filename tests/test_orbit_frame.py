@@ -9,7 +9,7 @@ from rbdyn.dynamics import orbit_frame
 from rbdyn.dynamics import runge_kutta as rk
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Run
+from rbdyn.dynamics.run import Run
 
 
 @pytest.fixture

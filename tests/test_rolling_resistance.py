@@ -16,7 +16,7 @@ from rbdyn.contact import film_thickness
 from rbdyn.contact import rolling_resistance as rolling
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.model import roller_bearing, rolling_law
-from rbdyn.dynamics.simulate import run_replicate
+from rbdyn.dynamics.recording import run_replicate
 from rbdyn.faults import InputError
 
 MODULUS, RADIUS, LENGTH, VISCOSITY, PRESSURE_COEFFICIENT = 2.264e11, 5e-3, 10e-3, 0.01, 1.5e-8

@@ -20,7 +20,9 @@ from rbdyn.dynamics.jacobian import jacobian
 from rbdyn.dynamics.method import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_lanes import scratch
-from rbdyn.dynamics.simulate import Run, run_replicate, simulate
+from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.run import Run
+from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.state import layout
 from rbdyn.kernel import entry
 

@@ -15,7 +15,7 @@ from rbdyn.dynamics.ensemble import CancelledError, Stop
 from rbdyn.dynamics.equations import POWERS, SHAFT
 from rbdyn.dynamics.geometry import scales
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Run
+from rbdyn.dynamics.run import Run
 from rbdyn.faults import RunError
 
 

@@ -10,7 +10,7 @@ import pytest
 from rbdyn.accuracy import write
 from rbdyn.dynamics.geometry import raceway_radii, shaft_speeds
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import prepare
+from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError
 from rbdyn.scaling import Memory, Point, Scaling, fit, peak_memory, report, scaling, with_rollers, with_slices
 

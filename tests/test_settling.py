@@ -18,8 +18,9 @@ from rbdyn.dynamics.method import explicit_method
 from rbdyn.dynamics.metrics import CAGE_SPEED, POWER_LOSS, Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.recording import Recording, record
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.settling import run_until_settled, whole_windows
-from rbdyn.dynamics.simulate import Run, simulate
+from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.start import start_state
 from rbdyn.dynamics.state import CAGE_ANGLE
 from rbdyn.faults import RunError

@@ -26,7 +26,8 @@ from rbdyn.dynamics.geometry import kinematics
 from rbdyn.dynamics.history import history
 from rbdyn.dynamics.metrics import IMPACT_FORCE, POWER_LOSS, Replicate, quantity
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Run, simulate
+from rbdyn.dynamics.run import Run
+from rbdyn.dynamics.simulate import simulate
 from rbdyn.faults import InputError, RunError
 from rbdyn.result import Quantity, SimulationResult
 

@@ -19,8 +19,8 @@ from rbdyn.dynamics.geometry import layout_of
 from rbdyn.dynamics.gravity import Gravity, NoGravity, height_energy
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.ring_motion import HeldRing, support_energy, support_motion
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.schedule import Constant, Ramps, SmoothRamps, Steps, value_at
-from rbdyn.dynamics.simulate import Run
 from rbdyn.dynamics.support import SupportedRing
 
 TIMES, VALUES = np.array([0.0, 2.0, 3.0, 7.0]), np.array([10.0, -4.0, 6.0, 6.5])

@@ -6,7 +6,8 @@ import time
 
 import pytest
 
-from rbdyn.dynamics.simulate import run_series, simulate
+from rbdyn.dynamics.recording import run_series
+from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.target import LADDER, PILOT_REPLICATES, PILOT_TURNS
 
 
@@ -25,7 +26,7 @@ def test_cost_of_a_run_to_a_target_is_that_of_pilots_and_all_runs(outer, monkeyp
         return results[-1]
 
     monkeypatch.setattr("rbdyn.dynamics.target.run_series", series)
-    monkeypatch.setattr("rbdyn.dynamics.target.simulate", watched)
+    monkeypatch.setattr("rbdyn.dynamics.simulate.simulate", watched)
     numbers = {"impact_window_turns": 10.0, "discard_turns": 5.0}
     scene = outer.model_copy(update={"numerics": outer.numerics.model_copy(update=numbers)})
     started = time.perf_counter()

@@ -27,7 +27,7 @@ from rbdyn.accuracy.trajectory import (
     settled,
     worst,
 )
-from rbdyn.dynamics.simulate import prepare
+from rbdyn.dynamics.run import prepare
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 

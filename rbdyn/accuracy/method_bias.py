@@ -20,7 +20,7 @@ from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.recording import record
-from rbdyn.dynamics.simulate import Run, prepare
+from rbdyn.dynamics.run import Run, prepare
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 

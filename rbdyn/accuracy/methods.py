@@ -20,7 +20,7 @@ from rbdyn.accuracy.stretch import Stretch
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.equations import RollerBearing
 from rbdyn.dynamics.geometry import scales
-from rbdyn.dynamics.simulate import Run
+from rbdyn.dynamics.run import Run
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 

@@ -21,7 +21,8 @@ from rbdyn.accuracy.tolerances import OUTPUTS
 from rbdyn.dynamics.batch_means import student_factor
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import prepare, run_series
+from rbdyn.dynamics.recording import run_series
+from rbdyn.dynamics.run import prepare
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.replicates/1"

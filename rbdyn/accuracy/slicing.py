@@ -19,7 +19,8 @@ from rbdyn.contact.hertz_line import line_load
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import race_contact_law, roller_bearing
-from rbdyn.dynamics.simulate import prepare, run_series
+from rbdyn.dynamics.recording import run_series
+from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError
 from rbdyn.option_cost import with_options
 from rbdyn.scene import Scene

@@ -20,7 +20,8 @@ from rbdyn.dynamics.batch_means import student_half_width
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import prepare, run_series
+from rbdyn.dynamics.recording import run_series
+from rbdyn.dynamics.run import prepare
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 

@@ -19,7 +19,7 @@ from rbdyn.accuracy.stretch import Stretch
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.geometry import absolute_tolerance, layout_of
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Run
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.state import CAGE_X, CAGE_Y, RING_X, RING_Y
 from rbdyn.faults import InputError
 from rbdyn.scene import Scene

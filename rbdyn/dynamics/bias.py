@@ -16,13 +16,8 @@ since integration errors act as one more loss that no law books and leave the in
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from rbdyn.dynamics.batch_means import Estimate
-
-if TYPE_CHECKING:
-    from rbdyn.dynamics.metrics import Replicate
 
 FACTOR = 10.0
 # The loosest tolerance that a scene may have; beyond it the power balance no longer tells anything.
@@ -45,13 +40,3 @@ def companion_error(ours: Estimate, theirs: float, times_fewer: float, rtol: flo
     if ours.half_width is None:
         return None
     return bias_scale(rtol) * math.hypot(ours.value - theirs, ours.half_width * math.sqrt(1.0 + times_fewer))
-
-
-def mean_gap(runs: Sequence[Replicate]) -> float:
-    """Size of the mean relative gap of the power balance: what is left of it when replicates are averaged."""
-    return abs(sum(run.signed_power_gap for run in runs)) / len(runs)
-
-
-def missing_power(runs: Sequence[Replicate]) -> float:
-    """Power [W] that the balance misses on the mean of all replicates."""
-    return abs(sum(run.missing_work for run in runs)) / sum(run.duration for run in runs)

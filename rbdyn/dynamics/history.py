@@ -12,7 +12,7 @@ from rbdyn.dynamics import observe as row
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.observe import OBSERVED, observe
-from rbdyn.dynamics.simulate import Run
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, RING_X, RING_Y
 from rbdyn.scene import Scene
 
@@ -69,7 +69,7 @@ class History:
         """Reference rating life of ISO/TS 16281 from the loads of this history."""
         from rbdyn.dynamics.rating import rating_life
 
-        return rating_life(self)
+        return rating_life(self.scene, self.azimuth, self.inner_load, self.outer_load)
 
     def table(self) -> pd.DataFrame:
         """A row a sample, units in the column names."""

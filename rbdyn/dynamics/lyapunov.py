@@ -18,7 +18,7 @@ from rbdyn.dynamics.batch_means import student_half_width
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.geometry import absolute_tolerance
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import Run
+from rbdyn.dynamics.run import Run
 from rbdyn.scene import Scene
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.batch_means import estimate
-from rbdyn.dynamics.bias import companion_error, missing_power
+from rbdyn.dynamics.bias import companion_error
 from rbdyn.dynamics.equations import (
     INNER_LOAD,
     LAND_LOAD,
@@ -196,6 +196,16 @@ WHIRL_DEVIATION_RATIO = Figure(lambda run: run.whirl[run.first :], _deviation_ra
 POWER_LOSS = Figure(_timed(lambda run: run.work[:, :SHAFT].sum(axis=1)), mean)
 CAGE_SPEED = Figure(_timed(lambda run: run.cage_angle), mean)
 CAGE_SLIP = Figure(_timed(lambda run: np.column_stack((run.kinematic_angle, run.cage_angle))), _slip)
+
+
+def mean_gap(runs: Sequence[Replicate]) -> float:
+    """Size of the mean relative gap of the power balance: what is left of it when replicates are averaged."""
+    return abs(sum(run.signed_power_gap for run in runs)) / len(runs)
+
+
+def missing_power(runs: Sequence[Replicate]) -> float:
+    """Power [W] that the balance misses on the mean of all replicates."""
+    return abs(sum(run.missing_work for run in runs)) / sum(run.duration for run in runs)
 
 
 def quantity(

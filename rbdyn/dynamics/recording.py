@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.energy import mechanical_energy
+from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+from rbdyn.dynamics.equations import RollerBearing
 from rbdyn.dynamics.geometry import raceway_radii, scales
 from rbdyn.dynamics.metrics import Replicate
+from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.state import CAGE_ANGLE
 from rbdyn.scene import Scene
-
-if TYPE_CHECKING:
-    from rbdyn.dynamics.simulate import Run
 
 # Long enough that the step cut at a batch's end costs nothing, short against any memory worth finding.
 BATCH_TURNS = 1.0
@@ -131,6 +132,33 @@ class Recording:
 def record(run: Run) -> Replicate:
     """Run for the turns of its scene. Raises RunError or CancelledError."""
     return Recording(run).to(run.scene.numerics.turns)
+
+
+def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> Replicate:
+    """Run one replicate, the transient included. Raises RunError or CancelledError."""
+    return record(Run(scene, bearing, replicate, rtol, stop))
+
+
+def run_series(
+    scene: Scene,
+    bearing: RollerBearing,
+    tolerances: Sequence[float],
+    workers: int | None,
+    progress: Callable[[int, int], None] | None,
+    stop: Stop,
+) -> list[list[Replicate]]:
+    """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""
+    replicates = range(scene.numerics.replicates)
+    tasks = [partial(run_replicate, scene, bearing, index, rtol, stop) for rtol in tolerances for index in replicates]
+    runs: dict[int, Replicate] = {}
+
+    def ended(one: Ended[Replicate]) -> None:
+        runs[one.place] = one.result()
+        if progress is not None:
+            progress(len(runs), len(tasks))
+
+    run_all(tasks, workers, stop, ended)
+    return [[runs[place * len(replicates) + index] for index in replicates] for place in range(len(tolerances))]
 
 
 def kinematic_cage_angle(scene: Scene, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:

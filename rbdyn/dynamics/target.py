@@ -21,12 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.batch_means import estimate
-from rbdyn.dynamics.bias import bias_scale, companion_tolerance, mean_gap
+from rbdyn.dynamics.bias import bias_scale, companion_tolerance
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.error_bars import FIGURES, settled
-from rbdyn.dynamics.metrics import Replicate
+from rbdyn.dynamics.metrics import Replicate, mean_gap
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.simulate import prepare, run_series, simulate
+from rbdyn.dynamics.recording import run_series
+from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
@@ -117,11 +118,12 @@ class Model:
 def reach(
     scene: Scene,
     target: float,
+    simulate: Callable[..., SimulationResult],
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
     stop: Stop | None = None,
 ) -> SimulationResult:
-    """Simulate until the total relative 95 % error of impact force, whirl ratio and power loss is at most ``target``.
+    """``simulate`` until the total relative 95 % error of impact force, whirl ratio and power loss is at most ``target``.
 
     Tolerance, turns and replicates of the scene are replaced. What was chosen, reached and spent stands under
     ``target`` of the result, and in its notes where the target was not met; ``cost`` sums pilots and all runs. Raises
