@@ -61,7 +61,7 @@ def read_scene(study: Study) -> dict[str, Any]:
     faults = []
     for factor in study.file.factor:
         table, _, key = factor.key.rpartition(".")
-        if table not in data or key not in data[table]:
+        if not isinstance(data.get(table), dict) or key not in data[table]:
             faults.append(
                 f"{study.path}: factor.key = {factor.key!r}: no such key in {path}; write table.key as in that file"
             )

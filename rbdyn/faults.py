@@ -74,7 +74,8 @@ def read_text(path: Path) -> str:
         raise InputError([f"{path}: no such file; check the path"]) from None
     except UnicodeDecodeError as error:
         line, byte = error.object.count(b"\n", 0, error.start) + 1, error.object[error.start]
-        raise InputError([f"{path}: line {line}: byte 0x{byte:02x} is no UTF-8; save the file as UTF-8"]) from None
+        found = f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8)"
+        raise InputError([f"{found}; save the file as UTF-8"]) from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise InputError([f"{path}: cannot be read ({why}); check the path"]) from None
@@ -82,7 +83,7 @@ def read_text(path: Path) -> str:
         raise InputError([f"{path}: larger than {LARGEST_FILE / 1e6:g} MB; check that it is the file meant"])
     if "\0" in text:
         line = _line(text, text.index("\0"))
-        raise InputError([f"{path}: line {line}: a NUL byte is no text; save the file as UTF-8"])
+        raise InputError([f"{path}: cannot be read (line {line}: a NUL byte is no text); save the file as UTF-8"])
     return text
 
 

@@ -7,12 +7,12 @@ import json
 import math
 import os
 import platform
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, bounded, read_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -177,15 +177,30 @@ class SimulationResult:
     @classmethod
     def load(cls, path: Path | str) -> SimulationResult:
         """Read a saved result. Raises InputError when the file is missing or not such a result."""
+        from pydantic import TypeAdapter
+
+        what = "simulation result"
+        data = read_record(path, FORMAT, what)
         try:
-            data = json.loads(Path(path).read_text(encoding="utf-8"))
-            if data["format"] != FORMAT:
-                raise InputError([f"{path}: format is {data['format']}, not {FORMAT}; run the scene again"])
-            return cls.from_dict(data)
-        except OSError as error:
-            raise InputError([f"{path}: cannot be read ({error.strerror}); check the path"]) from None
+            return TypeAdapter(cls).validate_json(json.dumps(asdict(cls.from_dict(data))), strict=True)
         except (ValueError, KeyError, TypeError):
-            raise InputError([f"{path}: not a saved simulation result; check the path"]) from None
+            raise InputError([f"{path}: not a whole {what}; run the scene again"]) from None
+
+
+def read_record(path: Path | str, form: str, what: str) -> dict[str, Any]:
+    """A ``what`` saved as JSON in the format ``form``. Raises InputError when the file is missing or holds no such."""
+    if not Path(path).is_file():
+        raise InputError([f"{path}: cannot be read (no such file); check the path"])
+    text = read_text(Path(path))
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError):
+        data = None
+    if not isinstance(data, dict) or not isinstance(data.get("format"), str):
+        raise InputError([f"{path}: not a saved {what}; check the path"])
+    if data["format"] != form:
+        raise InputError([f"{path}: format is {data['format']}, not {form}; run the scene again"])
+    return bounded(data, str(path))
 
 
 def write_json(path: Path | str, data: dict[str, Any]) -> None:

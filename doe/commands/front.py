@@ -40,9 +40,12 @@ def front(
     with guarded(as_json):
         from doe.report.front import asked_point_record, front_record, print_front
         from doe.study.front import find_front
+        from doe.study.goals import check_goals
         from doe.study_file import Study
 
-        values = None if point is None else _point(Study.load(path), point)
+        asked = Study.load(path)
+        check_goals(asked)
+        values = None if point is None else _point(asked, point)
         loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)
         found = find_front(loaded, surfaces)
         record = front_record(loaded, surfaces, found)

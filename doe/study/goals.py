@@ -32,6 +32,14 @@ def goals_of(study: Study) -> Goals:
     )
 
 
+def check_goals(study: Study) -> None:
+    """Raises InputError where a study has no front: too few goals, or no tolerances for the tolerance-aware one."""
+    if len(goals_of(study).objectives) < 2:
+        raise InputError([f"{study.path}: response: one alone has no front; add a second with a goal"])
+    if study.file.front.tolerance_aware != "none":
+        tolerances_of(study)
+
+
 def region_of(study: Study) -> Array:
     """Half ranges (k,) in coded units, about the centre 0, of the box in which the design searches."""
     return np.full(len(study.factors), design_of(study).reach)
