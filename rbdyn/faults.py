@@ -6,7 +6,7 @@ import difflib
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date, time
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,9 +19,8 @@ Model = TypeVar("Model", bound=BaseModel)
 MOST_FAULTS, LONGEST_SENTENCE, LONGEST_NAME = 50, 1000, 60
 # Bytes of a file, and tables within tables: far more than any input of ours has, and still read in seconds.
 LARGEST_FILE, DEEPEST = 20_000_000, 20
-# What would take the parser of TOML long, or beyond its recursion.
+# What takes the parser of TOML long, and what it cannot convert.
 DOTTED_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}""")
-BRACKETS = re.compile(r"(?:[\[{][^\]\[{}]*+){100}")
 DIGITS = re.compile(r"[0-9][0-9_]{4000}")
 
 
@@ -44,6 +43,23 @@ class InputError(Exception):
         return type(self), (self.faults,)
 
 
+def refuse(faults: Iterable[str]) -> None:
+    """Raises InputError if there are faults."""
+    if found := list(faults):
+        raise InputError(found)
+
+
+def check_all(checks: Iterable[Callable[[], object]]) -> None:
+    """Make all the checks. Raises InputError with the faults of every one that does."""
+    faults: list[str] = []
+    for check in checks:
+        try:
+            check()
+        except InputError as error:
+            faults += error.faults
+    refuse(dict.fromkeys(faults))
+
+
 class RunError(Exception):
     """A run that could not go on; the message says which, where and why. A command exits with 1."""
 
@@ -62,10 +78,7 @@ def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:
 
 
 def read_text(path: Path) -> str:
-    """Text of a file in UTF-8, with or without a byte order mark.
-
-    Raises InputError when the file is missing, unreadable, too large or no such text.
-    """
+    """Text of a file in UTF-8, with or without a byte order mark. Raises InputError for any other."""
     try:
         with path.open("rb") as file:
             data = file.read(LARGEST_FILE + 1)
@@ -81,17 +94,11 @@ def read_text(path: Path) -> str:
         raise InputError([f"{path}: cannot be read ({why}); check the path"]) from None
     if len(data) > LARGEST_FILE:
         raise InputError([f"{path}: larger than {LARGEST_FILE / 1e6:g} MB; check that it is the file meant"])
-    if "\0" in text:
-        line = _line(text, text.index("\0"))
-        raise InputError([f"{path}: cannot be read (line {line}: a NUL byte is no text); save the file as UTF-8"])
     return text
 
 
 def read_toml(path: Path | str) -> dict[str, Any]:
-    """Read a TOML file into a dict.
-
-    Raises InputError when the file is missing, unreadable or not TOML, or as `bounded` does.
-    """
+    """Read a TOML file. Raises InputError when it is missing, unreadable or not TOML, or as `bounded` does."""
     path = Path(path)
     try:
         return _parsed(read_text(path), str(path))
@@ -112,8 +119,7 @@ def bounded(data: dict[str, Any], source: str) -> dict[str, Any]:
             found += [((*place, number), each) for number, each in enumerate(value)]
         elif isinstance(value, int) and value.bit_length() > 63:
             faults.append(f"{source}: {_dotted(place)}: a whole number beyond 64 bits; take a smaller one")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return data
 
 
@@ -121,19 +127,14 @@ def _parsed(text: str, source: str) -> dict[str, Any]:
     """The tables of a TOML text. Raises TOMLDecodeError, and InputError for what is TOML but absurd."""
     for pattern, what in (
         (DOTTED_KEY, f"a key of more than {DEEPEST} parts; keys here have four at most"),
-        (BRACKETS, f"brackets nested more than {DEEPEST} deep; mend them"),
         (DIGITS, "a number of thousands of digits; take a smaller one"),
     ):
         if absurd := pattern.search(text):
-            raise InputError([f"{source}: line {_line(text, absurd.start())}: {what}"])
+            raise InputError([f"{source}: line {text.count(chr(10), 0, absurd.start()) + 1}: {what}"])
     try:
         return bounded(tomllib.loads(text), source)
     except RecursionError:
         raise InputError([f"{source}: brackets nested more than {DEEPEST} deep; mend them"]) from None
-
-
-def _line(text: str, place: int) -> int:
-    return text.count("\n", 0, place) + 1
 
 
 def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model:
@@ -247,8 +248,9 @@ def _mend(kind: str, fault: Any) -> str:
         "model_type": "must be a table of keys",
         "model_attributes_type": "must be a table of keys",
         "list_type": "must be a list",
-        "string_too_short": "must not be empty",
+        "string_too_short": "must have at least {min_length} characters",
         "string_too_long": "must have at most {max_length} characters",
+        "string_pattern_mismatch": "must have no commas, semicolons, quotes, line breaks or spaces about it",
     }
     return bounds[kind].format(**limits) if kind in bounds else str(fault["msg"])
 

@@ -77,7 +77,14 @@ def folder(tmp_path_factory) -> Path:
     for path in (*EXAMPLES.glob("*.toml"), *EXAMPLES.glob("published/*.toml"), EXAMPLES / "ccd_table4.csv"):
         shutil.copy(path, folder)
     quantity = {"value": 1.5, "statistical_error": 0.1, "numerical_error": None, "effective_samples": 4.0}
-    names = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
+    names = (
+        "impact_force_N",
+        "impact_contact_force_N",
+        "whirl_deviation_ratio",
+        "power_loss_W",
+        "cage_speed_rpm",
+        "cage_slip",
+    )
     result = {
         "format": FORMAT, "status": "ok", **dict.fromkeys(names, quantity), "power_balance": {"relative_gap": 1e-3},
         "power_terms_W": {"drag": 2.0}, "loads": {"max_inner_N": 1.0, "max_outer_N": 2.0, "max_land_N": 0.0},

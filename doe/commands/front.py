@@ -8,7 +8,7 @@ import typer
 
 from doe.commands.options import Data, Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import fitted, save, searched
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, refuse
 from rbdyn.terminal import guarded, print_json
 
 if TYPE_CHECKING:
@@ -88,6 +88,5 @@ def _point(study: Study, text: str) -> list[float]:
             continue
         if not isfinite(values[name]):
             faults.append(f"--point {name} = {number}: is not a finite number; write a plain number")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return list(values.values())

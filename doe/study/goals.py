@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from doe.study.design import design_of
 from doe.study_file import Study
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, refuse
 
 if TYPE_CHECKING:
     from doe.pareto import Goals
@@ -90,6 +90,5 @@ def tolerances_of(study: Study) -> Array:
         for name, limit in zip(study.factors, room, strict=True)
         if known.get(name, 0.0) >= limit
     ]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return np.array([known[name] for name in study.factors]) / study.step

@@ -17,7 +17,7 @@ from doe.study.chosen import choose
 from doe.study.confirmation import Confirmed, Gain, gains
 from doe.study.design import design_of
 from doe.study.direct import Direct, find_direct
-from doe.study.direct_pick import DirectPick, Local, local_of
+from doe.study.direct_pick import DirectPick, local_of
 from doe.study.edge import Edge, edge_of
 from doe.study.failure import Failure
 from doe.study.finished import inputs_digest
@@ -110,6 +110,7 @@ def run_study(
     InputError, RunError, KeyboardInterrupt.
     """
     from doe.study.store import Store
+    from doe.study.widest import widest_of
 
     clock = _Clock()
     inputs = inputs_digest(study, direct)
@@ -131,7 +132,9 @@ def run_study(
         clock.lap("confirmation_s")
     pick = confirmed["pick"].point
     local = None if searched is None else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])
-    tolerances = _tolerances(study, surfaces, pick, local)
+    tolerances = (
+        None if study.file.tolerances is None else widest_of(study, surfaces, pick, study.file.tolerances, local)
+    )
     chains, notes = solve_chains(study, pick, tolerances)
     if reference is not None:
         reference = reference.only(runs.places)
@@ -159,13 +162,6 @@ def run_study(
         notes=(*runs.notes, *notes),
         cost=clock.total(),
     )
-
-
-def _tolerances(study: Study, surfaces: list[Surface], point: Array, local: Local | None) -> WidestTolerances | None:
-    from doe.study.widest import widest_of
-
-    settings = study.file.tolerances
-    return None if settings is None else widest_of(study, surfaces, point, settings, local)
 
 
 class _Clock:

@@ -4,22 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
 from rbdyn.scene.fields import LARGEST, Positive, or_refuse
 
-
-def _is_one_field(name: str) -> str:
-    if not name.isprintable() or name != name.strip() or any(mark in name for mark in ",;\"'"):
-        raise ValueError(
-            "stands in tables; write it without commas, semicolons, quotes, line breaks and spaces about it"
-        )
-    return name
-
-
-# A name that heads a column of a table.
-Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_is_one_field)]
+# A name that heads a column of a table: one field whoever writes or reads it.
+Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
 # Steps beside a value, or resolutions within a step, that are finer than this are lost in rounding.
 FINEST = 1e-9
 

@@ -145,11 +145,6 @@ class Study:
         ]
         return np.array(values)
 
-    @property
-    def signs(self) -> Array:
-        """+1 for responses to be small, -1 for those to be large."""
-        return np.array([1.0 if response.goal == "min" else -1.0 for response in self.file.response])
-
     def beside(self, name: str) -> Path:
         """A file named in the study."""
         return self.path.parent / name

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.faults import LONGEST_NAME, InputError, one_line, read_text
+from rbdyn.faults import LONGEST_NAME, InputError, one_line, read_text, refuse
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -63,8 +63,7 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
             place = header.index(name)
             columns[name], bad = _numbers(name, [row[place].strip() for row in rows], optional=name in errors)
             faults += [f"{path}: {fault}" for fault in bad]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     if "run" in columns and len(set(columns["run"].tolist())) < len(rows):
         columns = _means_of_replicates(path, columns, factors, responses)
     size = len(columns[factors[0]])
@@ -106,20 +105,16 @@ def _fields(path: Path) -> tuple[list[str], list[list[str]]]:
             only_commas = len(row) > len(header) and not any(field.strip() for field in row[len(header) :])
             mend = "remove the commas at its end" if only_commas else "give it a field a column, in the header's order"
             faults.append(f"{path}: row {number} has {len(row)} fields and the header {len(header)}; {mend}")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return header, rows
 
 
 def _numbers(name: str, texts: Sequence[str], optional: bool) -> tuple[Array, list[str]]:
     """Numbers of a column (NaN where an ``optional`` one is unknown), and what is wrong with them by row."""
-    values, faults = np.full(len(texts), np.nan), []
-    for place, text in enumerate(texts):
-        if not (optional and text.lower() in ("", "nan")):
-            values[place] = float(text) if NUMBER.fullmatch(text) else math.nan
-            if wrong := _wrong(name, float(values[place]), text, place + 1, optional):
-                faults.append(wrong)
-    return values, faults
+    values = [float(text) if NUMBER.fullmatch(text) else math.nan for text in texts]
+    told = [row for row, text in enumerate(texts, 1) if not (optional and text.lower() in ("", "nan"))]
+    wrong = (_wrong(name, values[row - 1], texts[row - 1], row, optional) for row in told)
+    return np.array(values), [fault for fault in wrong if fault]
 
 
 def _wrong(name: str, value: float, text: str, row: int, is_error: bool) -> str | None:
@@ -133,10 +128,9 @@ def _wrong(name: str, value: float, text: str, row: int, is_error: bool) -> str 
         return f"{given}: is not a {'whole' if whole else 'finite'} number; {mend}"
     if abs(value) > limit:
         return f"{given}: is beyond {limit:g}; check the unit"
-    if is_error and value < 0.0:
-        return f"{where}: the error of run {row} is {value:g}, below zero; write a half width, or nothing if unknown"
-    if name == COUNT and value < 0.0:
-        return f"{given}: counts nothing; write how many values are behind the row, or 0 if unknown"
+    if value < 0.0 and (is_error or name == COUNT):
+        what = "error" if is_error else "number of replicates"
+        return f"{where}: the {what} of run {row} is {value:g}; give none below 0, or leave out what is not known"
     return None
 
 
@@ -147,17 +141,13 @@ def _means_of_replicates(
     from scipy import special
 
     _, first, group, count = np.unique(columns["run"], return_index=True, return_inverse=True, return_counts=True)
-    faults = []
-    for name in (*factors, *(each for each in ("block",) if each in columns)):
-        column = columns[name]
-        for row in np.flatnonzero(column != column[first[group]]):
-            faults.append(
-                f"{path}: {name} of run {columns['run'][row]:g} is {column[row]:g} in one replicate and "
-                f"{column[first[group[row]]]:g} in another; replicates have the same factors and block: mend them, or "
-                "number the runs apart"
-            )
-    if faults:
-        raise InputError(faults)
+    refuse(
+        f"{path}: {name} of run {columns['run'][row]:g} is {columns[name][row]:g} in one replicate and "
+        f"{columns[name][first[group[row]]]:g} in another; replicates have the same factors: mend them, or number the "
+        "runs apart"
+        for name in (*factors, *({"block"} & set(columns)))
+        for row in np.flatnonzero(columns[name] != columns[name][first[group]])
+    )
     order = np.argsort(first)
     joined = {name: column[first[order]] for name, column in columns.items()} | {COUNT: count[order].astype(float)}
     # Student's quantile; a run without replicates has no scatter, and its half width stays unknown.
