@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rbdyn.faults import Strict
-from rbdyn.scene.fields import NonNegative, Positive
+from rbdyn.fields import NonNegative, Positive
 
 Array = NDArray[np.float64]
 Distribution = Literal["normal", "truncated_normal", "uniform", "triangular"]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.scene.fields import LARGEST, Positive, or_refuse
+from rbdyn.fields import LARGEST, Positive, or_refuse
 
 # A name that heads a column of a table: one field whoever writes or reads it.
 Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.scene.fields import or_refuse
+from rbdyn.fields import or_refuse
 
 
 class Goal(Strict):

@@ -17,7 +17,7 @@ from doe.study_file.fit_section import Fitted
 from doe.study_file.front_section import Direct, Front, Goal, Tolerances
 from doe.study_file.table import COUNT, LABELS, Table, read_table
 from rbdyn.faults import Strict, read_toml, validated
-from rbdyn.scene.fields import or_refuse
+from rbdyn.fields import or_refuse
 
 Array = NDArray[np.float64]
 
