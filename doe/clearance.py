@@ -23,7 +23,7 @@ from doe.study.failure import Failure
 from doe.study.runner import Give, Outcome, Ran, Take, run_points
 from doe.study.store import Point, Store, run_key
 from doe.study_file import Study
-from rbdyn.faults import InputError, RunError, read_toml
+from rbdyn.faults import InputError, RunError, read_toml, refuse
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene
 from rbdyn.sources import source_digest
@@ -45,28 +45,23 @@ ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
 def check_responses(study: Study) -> None:
     """Raises InputError for a response that the simulation does not give."""
-    faults = [
+    refuse(
         f"{study.path}: response.name = {name!r}: the simulation does not give it; choose one of {', '.join(RESPONSES)}"
         for name in study.responses
         if name not in RESPONSES
-    ]
-    if faults:
-        raise InputError(faults)
+    )
 
 
 def read_scene(study: Study) -> dict[str, Any]:
     """Tables of the study's scene file. Raises InputError when the file or a factor's key is not there."""
     path = study.beside(study.file.scene.file)
     data = read_toml(path)
-    faults = []
-    for factor in study.file.factor:
-        table, _, key = factor.key.rpartition(".")
-        if table not in data or key not in data[table]:
-            faults.append(
-                f"{study.path}: factor.key = {factor.key!r}: no such key in {path}; write table.key as in that file"
-            )
-    if faults:
-        raise InputError(faults)
+    refuse(
+        f"{study.path}: factor.key = {factor.key!r}: no such key in {path}; write table.key as in that file"
+        for factor in study.file.factor
+        for table, _, key in (factor.key.rpartition("."),)
+        if not isinstance(data.get(table), dict) or key not in data[table]
+    )
     return data
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from datetime import date, time
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,17 +15,49 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 Model = TypeVar("Model", bound=BaseModel)
 
+# Faults told at once, and characters of a sentence and of a name within one: a screen of them can be read.
+MOST_FAULTS, LONGEST_SENTENCE, LONGEST_NAME = 50, 1000, 60
+# Bytes of a file, and tables within tables: far more than any input of ours has, and still read in seconds.
+LARGEST_FILE, DEEPEST = 20_000_000, 20
+# What takes the parser of TOML long, and what it cannot convert.
+DOTTED_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}""")
+DIGITS = re.compile(r"[0-9][0-9_]{4000}")
+
 
 class InputError(Exception):
-    """Bad input. ``faults`` holds one sentence per fault; a command prints them and exits with 2."""
+    """Bad input. ``faults`` holds a sentence a fault, each one line; a command prints them and exits with 2.
+
+    Of more than `MOST_FAULTS` it holds the first ones and how many more there are.
+    """
 
     def __init__(self, faults: Iterable[str]) -> None:
-        self.faults = list(faults)
+        found = list(faults)
+        if len(found) > MOST_FAULTS:
+            more = len(found) - MOST_FAULTS + 1
+            found = [*found[: MOST_FAULTS - 1], f"and {more} more faults; mend these first"]
+        self.faults = [one_line(fault) for fault in found]
         super().__init__("\n".join(self.faults))
 
     def __reduce__(self) -> tuple[type[InputError], tuple[list[str]]]:
         """How it travels between processes: with its faults, not with their text."""
         return type(self), (self.faults,)
+
+
+def refuse(faults: Iterable[str]) -> None:
+    """Raises InputError if there are faults."""
+    if found := list(faults):
+        raise InputError(found)
+
+
+def check_all(checks: Iterable[Callable[[], object]]) -> None:
+    """Make all the checks. Raises InputError with the faults of every one that does."""
+    faults: list[str] = []
+    for check in checks:
+        try:
+            check()
+        except InputError as error:
+            faults += error.faults
+    refuse(dict.fromkeys(faults))
 
 
 class RunError(Exception):
@@ -36,20 +70,71 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
-def read_toml(path: Path | str) -> dict[str, Any]:
-    """Read a TOML file into a dict.
+def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:
+    """Text as one line: control characters escaped, and beyond ``longest`` characters the middle left out."""
+    ends = text if len(text) <= 2 * longest else text[:longest] + text[-longest:]
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in ends.strip())
+    return line if len(line) <= longest else f"{line[: longest - longest // 3 - 3]}...{line[-(longest // 3) :]}"
 
-    Raises InputError when the file is missing, unreadable or not TOML.
-    """
-    path = Path(path)
+
+def read_text(path: Path) -> str:
+    """Text of a file in UTF-8, with or without a byte order mark. Raises InputError for any other."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            data = file.read(LARGEST_FILE + 1)
+        text = data.decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError([f"{path}: no such file; check the path"]) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError([f"{path}: cannot be read ({error}); check the path"]) from None
+    except UnicodeDecodeError as error:
+        line, byte = error.object.count(b"\n", 0, error.start) + 1, error.object[error.start]
+        found = f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8)"
+        raise InputError([f"{found}; save the file as UTF-8"]) from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InputError([f"{path}: cannot be read ({why}); check the path"]) from None
+    if len(data) > LARGEST_FILE:
+        raise InputError([f"{path}: larger than {LARGEST_FILE / 1e6:g} MB; check that it is the file meant"])
+    return text
+
+
+def read_toml(path: Path | str) -> dict[str, Any]:
+    """Read a TOML file. Raises InputError when it is missing, unreadable or not TOML, or as `bounded` does."""
+    path = Path(path)
+    try:
+        return _parsed(read_text(path), str(path))
     except tomllib.TOMLDecodeError as error:
         raise InputError([f"{path}: not valid TOML ({error}); mend that line"]) from None
+
+
+def bounded(data: dict[str, Any], source: str) -> dict[str, Any]:
+    """The data themselves. Raises InputError for tables nested too deep and for integers beyond 64 bits."""
+    found: list[tuple[tuple[int | str, ...], Any]] = [((), data)]
+    faults = []
+    for place, value in found:
+        if len(place) > DEEPEST:
+            raise InputError([f"{source}: {_dotted(place[:3])}...: nested more than {DEEPEST} deep; mend the brackets"])
+        if isinstance(value, Mapping):
+            found += [((*place, key), each) for key, each in value.items()]
+        elif isinstance(value, list):
+            found += [((*place, number), each) for number, each in enumerate(value)]
+        elif isinstance(value, int) and value.bit_length() > 63:
+            faults.append(f"{source}: {_dotted(place)}: a whole number beyond 64 bits; take a smaller one")
+    refuse(faults)
+    return data
+
+
+def _parsed(text: str, source: str) -> dict[str, Any]:
+    """The tables of a TOML text. Raises TOMLDecodeError, and InputError for what is TOML but absurd."""
+    for pattern, what in (
+        (DOTTED_KEY, f"a key of more than {DEEPEST} parts; keys here have four at most"),
+        (DIGITS, "a number of thousands of digits; take a smaller one"),
+    ):
+        if absurd := pattern.search(text):
+            raise InputError([f"{source}: line {text.count(chr(10), 0, absurd.start()) + 1}: {what}"])
+    try:
+        return bounded(tomllib.loads(text), source)
+    except RecursionError:
+        raise InputError([f"{source}: brackets nested more than {DEEPEST} deep; mend them"]) from None
 
 
 def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model:
@@ -60,17 +145,20 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        faults = _sentences(model, error, source)
-        # A table with a bad key is not checked as a whole: without that key it may show more faults.
-        bad = [fault["loc"] for fault in error.errors()]
-        rest = _without(data, bad)
+        found: Sequence[Any] = error.errors(include_url=False)
+    faults = _sentences(model, found, data, source)
+    # A table with a bad key is not checked as a whole: without that key it may show more faults.
+    bad = {fault["loc"] for fault in found}
     try:
-        model.model_validate(rest)
+        model.model_validate(_without(data, bad))
     except ValidationError as error:
-        more = _sentences(model, error, source, only="value_error")
+        rest = [fault for fault in error.errors(include_url=False) if fault["type"] == "value_error"]
+        names = {str(place[-1]) for fault in found[:MOST_FAULTS] if (place := _place(fault, data))}
         # What is bad was not left out, even if it is missed now.
         faults += [
-            fault for fault in more if ": missing; " not in fault or not any(_key(place) in fault for place in bad)
+            fault
+            for fault in _sentences(model, rest, data, source)[:MOST_FAULTS]
+            if ": missing; " not in fault or not any(name in fault for name in names)
         ]
     raise InputError(dict.fromkeys(faults))
 
@@ -78,44 +166,46 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
 def set_key(data: dict[str, Any], assignment: str) -> None:
     """Apply one ``key.path=value`` assignment (the value in TOML syntax, or a bare word) to a nested dict.
 
-    Raises InputError when the assignment has no ``=`` or its path runs through a plain value.
+    Raises InputError when the assignment has no ``=``, its path runs through a plain value, or it is not one value.
     """
     path, found, text = assignment.partition("=")
-    keys = path.strip().split(".")
-    if not found or not all(keys):
-        raise InputError([f"--set {assignment}: write it as key.path=value"])
+    keys, told = [key.strip() for key in path.split(".")], f"--set {one_line(assignment, 2 * LONGEST_NAME)}"
+    if not found or not all(keys) or len(keys) > DEEPEST:
+        raise InputError([f"{told}: write it as key.path=value"])
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
+        given = _parsed(f"value = {text}", told)
     except tomllib.TOMLDecodeError:
-        value = text.strip()
+        given = {"value": text.strip()}
+    if len(given) > 1:
+        raise InputError([f"{told}: more than one value; give each its own --set"])
     table = data
     for key in keys[:-1]:
         table = table.setdefault(key, {})
         if not isinstance(table, dict):
-            raise InputError([f"--set {assignment}: {key} is a value, not a table; check the key path"])
-    table[keys[-1]] = value
+            raise InputError([f"{told}: {one_line(key, LONGEST_NAME)} is a value, not a table; check the key path"])
+    table[keys[-1]] = given["value"]
 
 
-def _without(data: Any, locations: list[tuple[int | str, ...]]) -> Any:
+def _without(data: Any, bad: set[tuple[int | str, ...]], place: tuple[str, ...] = ()) -> Any:
     if not isinstance(data, Mapping):
         return data
-    inner = {key: [place[1:] for place in locations if place[:1] == (key,)] for key in data}
-    return {key: _without(value, inner[key]) for key, value in data.items() if () not in inner[key]}
+    return {key: _without(each, bad, (*place, key)) for key, each in data.items() if (*place, key) not in bad}
 
 
-def _sentences(model: type[BaseModel], error: ValidationError, source: str, only: str | None = None) -> list[str]:
+def _sentences(model: type[BaseModel], found: Sequence[Any], data: Any, source: str) -> list[str]:
     sentences: list[str] = []
     mends: dict[str, list[str]] = {}
-    for fault in error.errors():
-        kind, value = fault["type"], fault["input"]
+    for fault in found:
+        kind, value, place = fault["type"], fault["input"], _place(fault, data)
         # Where a key may be of several kinds, each kind complains: keep what fits the value given.
         alien = "model_type" if isinstance(value, str) else "literal_error" if isinstance(value, Mapping) else ""
-        if (kind == alien and _names_a_kind(str(fault["loc"][-1]))) or (only and kind != only):
+        if kind == alien and place == _place({**fault, "loc": fault["loc"][:-1]}, data):
             continue
-        place = _place(fault["loc"])
         key = _dotted(place)
         if kind == "extra_forbidden":
-            sentences.append(f"{source}: {key}: unknown key; {_nearest(model, place)}")
+            # To look for the nearest key takes a millisecond; beyond what is told nobody reads it.
+            mend = _nearest(model, place) if len(sentences) < MOST_FAULTS else "remove it"
+            sentences.append(f"{source}: {key}: unknown key; {mend}")
         elif kind == "missing":
             sentences.append(f"{source}: {key}: missing; add it")
         elif kind == "value_error":
@@ -132,19 +222,14 @@ def _sentences(model: type[BaseModel], error: ValidationError, source: str, only
     return sentences + [f"{head}: {', or '.join(dict.fromkeys(mend))}" for head, mend in mends.items()]
 
 
-def _place(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
-    """The keys of a location, without the kinds that a key may be of."""
-    return tuple(part for part in location if isinstance(part, int) or not _names_a_kind(part))
-
-
-def _key(location: tuple[int | str, ...]) -> str:
-    """The last key of a location."""
-    return str(_place(location)[-1]) if _place(location) else ""
-
-
-def _names_a_kind(part: str) -> bool:
-    """Whether a part of a location names one of the kinds that a key may be of, not a key."""
-    return part[:1].isupper() or "[" in part or part in ("bool", "float", "int", "str", "constrained-float")
+def _place(fault: Any, data: Any) -> tuple[int | str, ...]:
+    """The keys and numbers on the way to a fault, without the kinds that a key may be of: those stand not in the data."""
+    place: list[int | str] = []
+    for part in fault["loc"]:
+        if (isinstance(data, Mapping) and part in data) or (isinstance(data, list) and isinstance(part, int)):
+            place.append(part)
+            data = data[part]
+    return (*place, fault["loc"][-1]) if fault["type"] == "missing" else tuple(place)
 
 
 def _mend(kind: str, fault: Any) -> str:
@@ -163,6 +248,9 @@ def _mend(kind: str, fault: Any) -> str:
         "model_type": "must be a table of keys",
         "model_attributes_type": "must be a table of keys",
         "list_type": "must be a list",
+        "string_too_short": "must have at least {min_length} characters",
+        "string_too_long": "must have at most {max_length} characters",
+        "string_pattern_mismatch": "must have no commas, semicolons, quotes, line breaks or spaces about it",
     }
     return bounds[kind].format(**limits) if kind in bounds else str(fault["msg"])
 
@@ -170,20 +258,24 @@ def _mend(kind: str, fault: Any) -> str:
 def _dotted(location: tuple[int | str, ...]) -> str:
     text = ""
     for part in location:
-        text += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if text else str(part)
+        name = one_line(str(part), LONGEST_NAME)
+        text += f"[{part + 1}]" if isinstance(part, int) else f".{name}" if text else name
     return text
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    """A value as it is written in TOML, cut where it is long."""
+    text = str(value) if isinstance(value, date | time) else repr(value)
+    text = text.lower() if isinstance(value, bool) else text
+    return text if len(text) <= LONGEST_NAME else text[: LONGEST_NAME - 3] + "..."
 
 
 def _nearest(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
     known = _fields_at(model, location[:-1])
-    close = difflib.get_close_matches(str(location[-1]), known, n=1)
+    lower = {name.lower(): name for name in known}
+    close = difflib.get_close_matches(str(location[-1])[:LONGEST_NAME].lower(), lower, n=1)
     if close:
-        return f"did you mean {close[0]}?"
+        return f"did you mean {lower[close[0]]}?"
     return f"known keys here: {', '.join(sorted(known))}" if known else "remove it"
 
 

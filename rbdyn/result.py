@@ -7,17 +7,31 @@ import json
 import math
 import os
 import platform
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, bounded, read_text
 
 if TYPE_CHECKING:
     import pandas as pd
 
 FORMAT = "rbdyn.simulation/3"
+# Names of the figures with errors in JSON, and here.
+FIGURES = {
+    "impact_force_N": "impact_force",
+    "impact_contact_force_N": "impact_contact_force",
+    "whirl_deviation_ratio": "whirl_deviation_ratio",
+    "power_loss_W": "power_loss",
+    "cage_speed_rpm": "cage_speed_rpm",
+    "cage_slip": "cage_slip",
+}
+# What is named alike in JSON and here.
+PLAIN = (
+    *("races", "impact_window_turns", "transient_turns", "counted_turns", "target", "cost", "replicates", "seed"),
+    *("versions", "scene"),
+)
 
 
 @dataclass(frozen=True)
@@ -43,12 +57,7 @@ class Quantity:
 
     def as_dict(self) -> dict[str, float | None]:
         """JSON form."""
-        return {
-            "value": self.value,
-            "statistical_error": self.statistical_error,
-            "numerical_error": self.numerical_error,
-            "effective_samples": self.effective_samples,
-        }
+        return asdict(self)
 
     def __str__(self) -> str:
         errors = [f"± {self.statistical_error:.2g} (statistical)" if self.statistical_error is not None else ""]
@@ -98,12 +107,7 @@ class SimulationResult:
         return {
             "format": FORMAT,
             "status": self.status,
-            "impact_force_N": self.impact_force.as_dict(),
-            "impact_contact_force_N": self.impact_contact_force.as_dict(),
-            "whirl_deviation_ratio": self.whirl_deviation_ratio.as_dict(),
-            "power_loss_W": self.power_loss.as_dict(),
-            "cage_speed_rpm": self.cage_speed_rpm.as_dict(),
-            "cage_slip": self.cage_slip.as_dict(),
+            **self._figures(),
             "power_balance": {"relative_gap": self.power_gap},
             "power_terms_W": self.power_terms,
             "loads": {
@@ -111,64 +115,37 @@ class SimulationResult:
                 "max_outer_N": self.max_outer_load,
                 "max_land_N": self.max_land_load,
             },
-            "races": self.races,
             "clearance_um": self.clearance,
-            "impact_window_turns": self.impact_window_turns,
-            "transient_turns": self.transient_turns,
-            "counted_turns": self.counted_turns,
-            "target": self.target,
-            "cost": self.cost,
-            "replicates": self.replicates,
-            "seed": self.seed,
             "notes": list(self.notes),
-            "versions": self.versions,
-            "scene": self.scene,
+            **{name: getattr(self, name) for name in PLAIN},
         }
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> SimulationResult:
         """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
+        alike: dict[str, Any] = {name: data[name] for name in PLAIN}
+        alike |= {name: Quantity(**data[key]) for key, name in FIGURES.items()}
         return cls(
             status=data["status"],
-            impact_force=Quantity(**data["impact_force_N"]),
-            impact_contact_force=Quantity(**data["impact_contact_force_N"]),
-            whirl_deviation_ratio=Quantity(**data["whirl_deviation_ratio"]),
-            power_loss=Quantity(**data["power_loss_W"]),
-            cage_speed_rpm=Quantity(**data["cage_speed_rpm"]),
-            cage_slip=Quantity(**data["cage_slip"]),
             power_gap=data["power_balance"]["relative_gap"],
             power_terms=data["power_terms_W"],
             max_inner_load=data["loads"]["max_inner_N"],
             max_outer_load=data["loads"]["max_outer_N"],
             max_land_load=data["loads"]["max_land_N"],
-            races=data["races"],
             clearance=data["clearance_um"],
-            impact_window_turns=data["impact_window_turns"],
-            transient_turns=data["transient_turns"],
-            counted_turns=data["counted_turns"],
-            target=data["target"],
-            cost=data["cost"],
-            replicates=data["replicates"],
-            seed=data["seed"],
             notes=tuple(data["notes"]),
-            versions=data["versions"],
-            scene=data["scene"],
+            **alike,
         )
 
     def table(self) -> pd.DataFrame:
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 
-        figures = {
-            "impact_force_N": self.impact_force,
-            "impact_contact_force_N": self.impact_contact_force,
-            "whirl_deviation_ratio": self.whirl_deviation_ratio,
-            "power_loss_W": self.power_loss,
-            "cage_speed_rpm": self.cage_speed_rpm,
-            "cage_slip": self.cage_slip,
-        }
-        rows = {name: figure.as_dict() for name, figure in figures.items()}
+        rows = {name: figure for name, figure in self._figures().items() if name != "impact_contact_force_N"}
         return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
+
+    def _figures(self) -> dict[str, dict[str, float | None]]:
+        return {key: getattr(self, name).as_dict() for key, name in FIGURES.items()}
 
     def save(self, path: Path | str) -> None:
         """Write JSON, whole or not at all."""
@@ -177,15 +154,30 @@ class SimulationResult:
     @classmethod
     def load(cls, path: Path | str) -> SimulationResult:
         """Read a saved result. Raises InputError when the file is missing or not such a result."""
+        from pydantic import TypeAdapter
+
+        what = "simulation result"
+        data = read_record(path, FORMAT, what)
         try:
-            data = json.loads(Path(path).read_text(encoding="utf-8"))
-            if data["format"] != FORMAT:
-                raise InputError([f"{path}: format is {data['format']}, not {FORMAT}; run the scene again"])
-            return cls.from_dict(data)
-        except OSError as error:
-            raise InputError([f"{path}: cannot be read ({error.strerror}); check the path"]) from None
+            return TypeAdapter(cls).validate_json(json.dumps(asdict(cls.from_dict(data))), strict=True)
         except (ValueError, KeyError, TypeError):
-            raise InputError([f"{path}: not a saved simulation result; check the path"]) from None
+            raise InputError([f"{path}: not a whole {what}; run the scene again"]) from None
+
+
+def read_record(path: Path | str, form: str, what: str) -> dict[str, Any]:
+    """A ``what`` saved as JSON in the format ``form``. Raises InputError when the file is missing or holds no such."""
+    if not Path(path).is_file():
+        raise InputError([f"{path}: cannot be read (no such file); check the path"])
+    text = read_text(Path(path))
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError):
+        data = None
+    found = data.get("format") if isinstance(data, dict) else None
+    if found != form:
+        old = f"format is {found}, not {form}; run the scene again"
+        raise InputError([f"{path}: {old if isinstance(found, str) else f'not a saved {what}; check the path'}"])
+    return bounded(data, str(path))
 
 
 def write_json(path: Path | str, data: dict[str, Any]) -> None:

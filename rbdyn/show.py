@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.faults import InputError
+from rbdyn.faults import refuse
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
 from rbdyn.terminal import print_table
@@ -63,8 +63,7 @@ def ask(path: Path, turns: float | None, replicate: int) -> Asked:
         faults.append(f"--turns {turns:g}: the result counted {numerics.turns:g} turns; choose from {fewest:g} to that")
     if not 1 <= replicate <= numerics.replicates:
         faults.append(f"--replicate {replicate}: the result has {numerics.replicates}; count from 1 to that")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return Asked(result, path, scene, chosen, replicate - 1)
 
 

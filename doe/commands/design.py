@@ -22,10 +22,14 @@ def design(
     """Print the design: every run, and how well the runs can tell what is asked of them."""
     with guarded(as_json):
         from doe.report.design import design_record, print_csv, print_design
+        from doe.study.checked import check_study
         from doe.study.design import design_of, evaluation
         from doe.study_file import Study
 
         loaded = Study.load(path)
+        # Without its scene the runs are made elsewhere, and only the design itself can be judged.
+        if loaded.beside(loaded.file.scene.file).exists():
+            check_study(loaded)
         points = design_of(loaded)
         record = design_record(loaded, points, evaluation(loaded, points))
         save(out, "design.json", record)

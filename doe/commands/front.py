@@ -8,7 +8,7 @@ import typer
 
 from doe.commands.options import Data, Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import fitted, save, searched
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, refuse
 from rbdyn.terminal import guarded, print_json
 
 if TYPE_CHECKING:
@@ -40,9 +40,12 @@ def front(
     with guarded(as_json):
         from doe.report.front import asked_point_record, front_record, print_front
         from doe.study.front import find_front
+        from doe.study.goals import check_goals
         from doe.study_file import Study
 
-        values = None if point is None else _point(Study.load(path), point)
+        asked = Study.load(path)
+        check_goals(asked)
+        values = None if point is None else _point(asked, point)
         loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)
         found = find_front(loaded, surfaces)
         record = front_record(loaded, surfaces, found)
@@ -85,6 +88,5 @@ def _point(study: Study, text: str) -> list[float]:
             continue
         if not isfinite(values[name]):
             faults.append(f"--point {name} = {number}: is not a finite number; write a plain number")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return list(values.values())

@@ -37,6 +37,11 @@ class Design:
         return float(np.linalg.norm(self.coded, axis=1).max()) if self.region == "ball" else self.reach
 
     @property
+    def block_numbers(self) -> list[int]:
+        """Number of the block of each run as everything that is printed or written gives it, from 1."""
+        return [int(number) + 1 for number in self.block]
+
+    @property
     def blocks(self) -> int:
         """Number of blocks."""
         return int(self.block.max()) + 1

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rbdyn.faults import Strict
+from rbdyn.fields import NonNegative, Positive
 
 Array = NDArray[np.float64]
 Distribution = Literal["normal", "truncated_normal", "uniform", "triangular"]
 Mode = Literal["worst_case", "rss", "yield"]
 Interval = tuple[float, float]
-Positive = Annotated[float, Field(gt=0.0)]
 # A kilometre, or a coefficient of a million, is a slip of the pen.
 Bounded = Annotated[float, Field(ge=-1e6, le=1e6)]
 Poisson = Annotated[float, Field(ge=0.0, lt=0.5)]
@@ -32,6 +32,7 @@ Position = Literal[
 
 SLACK = 1e-9  # mm: round-off allowed at a limit
 DIGITS = 12  # decimals in mm kept of an allocated size
+MOST_SAMPLES = 100_000_000  # of a Monte Carlo: minutes, and less than a gigabyte a part
 
 
 class ClosingLink(Strict):
@@ -44,10 +45,10 @@ class ClosingLink(Strict):
 class Cost(Strict):
     """Cost of a tolerance T in mm, a + b/T^k, between the narrowest and the widest that the process gives."""
 
-    a: Annotated[float, Field(ge=0.0)] = 0.0
+    a: NonNegative = 0.0
     b: Positive
     k: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
-    narrowest_mm: Annotated[float, Field(ge=0.0)] = 0.0
+    narrowest_mm: NonNegative = 0.0
     widest_mm: Positive | None = None
 
 
@@ -65,7 +66,7 @@ class PressFit(Strict):
     bore: str
     raceway_mm: Positive
     fit_mm: Positive | None = None
-    shaft_bore_mm: Annotated[float, Field(ge=0.0)] | None = None
+    shaft_bore_mm: NonNegative | None = None
     outside_mm: Positive | None = None
     shaft_modulus_GPa: Positive = 206.0  # noqa: N815
     bore_modulus_GPa: Positive = 206.0  # noqa: N815
@@ -138,7 +139,7 @@ class Allocate(Strict):
 class MonteCarlo(Strict):
     """Size and seed of the Monte Carlo of the assemblies."""
 
-    samples: Annotated[int, Field(ge=1)] = 1_000_000
+    samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1_000_000
     seed: Annotated[int, Field(ge=0)] = 1
 
 
@@ -152,7 +153,7 @@ class Selective(Strict):
     second: str
     classes: Annotated[int, Field(ge=2, le=100)] = 4
     by: Literal["width", "probability"] = "width"
-    samples: Annotated[int, Field(ge=1)] = 200_000
+    samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 200_000
     seed: Annotated[int, Field(ge=0)] = 1
 
 

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from doe.dimension_chain.faults import faults
 from doe.dimension_chain.links import Chain
-from rbdyn.faults import InputError, Strict, read_toml, validated
+from rbdyn.faults import Strict, read_toml, refuse, validated
 
 
 class NamedChain(Chain):
@@ -34,8 +34,7 @@ def read_chain(path: Path | str) -> Chain:
 def chain_from(data: Mapping[str, Any], source: str) -> Chain:
     """Build a chain from a table; ``source`` names the file in the messages of InputError."""
     chain = validated(Chain, data, source)
-    if found := faults(chain):
-        raise InputError(f"{source}: {fault}" for fault in found)
+    refuse(f"{source}: {fault}" for fault in faults(chain))
     return chain
 
 
@@ -57,6 +56,5 @@ def read_chains(path: Path | str) -> dict[str, Chain]:
     counts = Counter(chain.name for chain in chains)
     found = [f'chain.name = "{name}": used {n} times; name each once' for name, n in counts.items() if n > 1]
     found += [f'chain "{chain.name}": {fault}' for chain in chains for fault in faults(chain)]
-    if found:
-        raise InputError(f"{source}: {fault}" for fault in found)
+    refuse(f"{source}: {fault}" for fault in found)
     return {chain.name: chain for chain in chains}

@@ -59,7 +59,7 @@ def design_record(outcome: Outcome) -> dict[str, Any]:
             {
                 "run": place + 1,
                 "kind": str(design.kind[place]),
-                "block": int(design.block[place]),
+                "block": design.block_numbers[place],
                 "coded": dict(zip(study.factors, design.coded[place].tolist(), strict=True)),
                 "factors": dict(zip(study.factors, actual[place].tolist(), strict=True)),
                 "responses": _responses(outcome, rows.get(place)),

@@ -21,13 +21,13 @@ def design_record(study: Study, design: Design, evaluation: dict[str, Any]) -> d
             "run": number,
             "standard": place + 1,
             "kind": kind,
-            "block": block + 1,
+            "block": block,
             "coded": dict(zip(study.factors, coded.tolist(), strict=True)),
             "factors": dict(zip(study.factors, values.tolist(), strict=True)),
             "seed": first + place,
         }
         for number, (place, kind, block, coded, values) in enumerate(
-            zip(design.order.tolist(), design.kind, design.block.tolist(), design.coded, actual, strict=True), 1
+            zip(design.order.tolist(), design.kind, design.block_numbers, design.coded, actual, strict=True), 1
         )
     ]
     return {

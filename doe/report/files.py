@@ -74,7 +74,7 @@ def _runs_table(outcome: Outcome) -> list[dict[str, Any]]:
         {
             "run": place + 1,
             "kind": design.kind[place],
-            "block": design.block[place],
+            "block": design.block_numbers[place],
             **{f"coded_{name}": x for name, x in zip(study.factors, runs.coded[row], strict=True)},
             **dict(zip(study.factors, runs.actual[row], strict=True)),
             **dict(zip(study.responses, runs.values[row], strict=True)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from doe.study.goals import region_of
 from doe.study_file import Study
 from doe.study_file.chain_section import chain_table
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, check_all
 
 if TYPE_CHECKING:
     from doe.dimension_chain import Chain, ChainResult
@@ -26,14 +27,8 @@ def check_chains(study: Study) -> None:
     """
     found_later = study.file.tolerances is not None
     half_widths = region_of(study) * study.step if found_later else np.full(study.step.size, np.nan)
-    faults = []
-    for number in range(len(study.file.chain)):
-        try:
-            _chain(study, number, study.centre, half_widths)
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
+    numbers = range(len(study.file.chain))
+    check_all(partial(_chain, study, number, study.centre, half_widths) for number in numbers)
 
 
 def solve_chains(

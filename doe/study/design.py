@@ -9,7 +9,7 @@ from doe.designs import Design, box_behnken, central_composite_design, full_fact
 from doe.designs.model import model_terms
 from doe.study_file import Study
 from doe.study_file.design_section import Design as DesignSettings
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, refuse
 
 
 def design_of(study: Study) -> Design:
@@ -65,8 +65,7 @@ def check_runs(study: Study, design: Design) -> None:
                 f"{where}: the runs of the design cannot tell {', '.join(lost)} from the other terms; add "
                 "levels or centre points, or choose a simpler model"
             )
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def evaluation(study: Study, design: Design) -> dict[str, Any]:

@@ -44,5 +44,5 @@ def _content(path: Path) -> bytes:
     """Bytes of a file; of one that cannot be read, which the study refuses later, none."""
     try:
         return path.read_bytes()
-    except OSError:
+    except (OSError, ValueError):
         return b""

@@ -14,7 +14,7 @@ from doe.designs import to_actual, to_coded
 from doe.study.back_off import Doubt, surfaces_doubt
 from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
-from doe.study.goals import goals_of, region_of, tolerances_of
+from doe.study.goals import check_goals, goals_of, region_of, tolerances_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
 
@@ -48,8 +48,7 @@ def find_front(
     from doe.pareto import front
 
     goals, settings, reach = goals_of(study), study.file.front, region_of(study)
-    if len(goals.objectives) < 2:
-        raise InputError([f"{study.path}: response: one alone has no front; add a second with a goal"])
+    check_goals(study)
     half = None if settings.tolerance_aware == "none" else tolerances_of(study)
 
     def coded(points: Array) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from doe.study.design import design_of
 from doe.study_file import Study
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, refuse
 
 if TYPE_CHECKING:
     from doe.pareto import Goals
@@ -30,6 +30,14 @@ def goals_of(study: Study) -> Goals:
         weight=[response.weight for response in responses],
         desired=[response.desired for response in responses],
     )
+
+
+def check_goals(study: Study) -> None:
+    """Raises InputError where a study has no front: too few goals, or no tolerances for the tolerance-aware one."""
+    if len(goals_of(study).objectives) < 2:
+        raise InputError([f"{study.path}: response: one alone has no front; add a second with a goal"])
+    if study.file.front.tolerance_aware != "none":
+        tolerances_of(study)
 
 
 def region_of(study: Study) -> Array:
@@ -82,6 +90,5 @@ def tolerances_of(study: Study) -> Array:
         for name, limit in zip(study.factors, room, strict=True)
         if known.get(name, 0.0) >= limit
     ]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return np.array([known[name] for name in study.factors]) / study.step

@@ -124,7 +124,7 @@ def run_design(
     if failures:
         notes.append(f"{len(failures)} design runs failed and are left out: {sentence(failures)}")
     values, errors, independent = clearance.responses(study, found)
-    block = design.block[left] if design.blocks > 1 else None
+    block = np.array(design.block_numbers)[left] if design.blocks > 1 else None
     return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)
 
 

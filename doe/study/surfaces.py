@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from doe.study.runs import Runs
 from doe.study_file import Study
-from rbdyn.faults import InputError
+from rbdyn.faults import refuse
 
 if TYPE_CHECKING:
     from doe.response_surface import Surface
@@ -46,8 +46,7 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
             )
         except ValueError as error_of_fit:
             faults.append(f"{study.path}: {error_of_fit}")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return surfaces
 
 

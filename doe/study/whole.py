@@ -11,19 +11,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.study.chains import check_chains, solve_chains
+from doe.study.chains import solve_chains
+from doe.study.checked import check_study
 from doe.study.chosen import choose
 from doe.study.confirmation import Confirmed, Gain, gains
-from doe.study.design import check_runs, design_of
+from doe.study.design import design_of
 from doe.study.direct import Direct, find_direct
-from doe.study.direct_pick import DirectPick, Local, local_of
+from doe.study.direct_pick import DirectPick, local_of
 from doe.study.edge import Edge, edge_of
 from doe.study.failure import Failure
 from doe.study.finished import inputs_digest
 from doe.study.front import find_front
+from doe.study.goals import check_goals
 from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
-from doe.study.reference import Beside, beside, reference_runs
-from doe.study.runs import STORE, Progress, Runs, ordered_runs, run_design
+from doe.study.reference import Beside, beside
+from doe.study.runs import STORE, Progress, Runs, run_design
 from doe.study.simulations import Simulations
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study_file import Study
@@ -108,10 +110,12 @@ def run_study(
     InputError, RunError, KeyboardInterrupt.
     """
     from doe.study.store import Store
+    from doe.study.widest import widest_of
 
     clock = _Clock()
     inputs = inputs_digest(study, direct)
-    reference = _checked(study)
+    check_goals(study)
+    reference = check_study(study)
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry)
     clock.lap("design_s")
     surfaces = with_rivals(fit_surfaces(study, runs))
@@ -128,7 +132,9 @@ def run_study(
         clock.lap("confirmation_s")
     pick = confirmed["pick"].point
     local = None if searched is None else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])
-    tolerances = _tolerances(study, surfaces, pick, local)
+    tolerances = (
+        None if study.file.tolerances is None else widest_of(study, surfaces, pick, study.file.tolerances, local)
+    )
     chains, notes = solve_chains(study, pick, tolerances)
     if reference is not None:
         reference = reference.only(runs.places)
@@ -156,24 +162,6 @@ def run_study(
         notes=(*runs.notes, *notes),
         cost=clock.total(),
     )
-
-
-def _checked(study: Study) -> Runs | None:
-    """The published runs, if any. Whatever can be refused is refused here, before anything runs. Raises InputError."""
-    from doe import clearance
-
-    check_runs(study, ordered_runs(study).design)
-    clearance.confirmation_scene(study, study.baseline)
-    clearance.check_direct(study)
-    check_chains(study)
-    return reference_runs(study)
-
-
-def _tolerances(study: Study, surfaces: list[Surface], point: Array, local: Local | None) -> WidestTolerances | None:
-    from doe.study.widest import widest_of
-
-    settings = study.file.tolerances
-    return None if settings is None else widest_of(study, surfaces, point, settings, local)
 
 
 class _Clock:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
+from rbdyn.fields import LARGEST, Positive, or_refuse
+
+# A name that heads a column of a table: one field whoever writes or reads it.
+Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
+# Steps beside a value, or resolutions within a step, that are finer than this are lost in rounding.
+FINEST = 1e-9
 
 
 class Factor(Strict):
@@ -16,12 +22,23 @@ class Factor(Strict):
     half width of what manufacture makes of it.
     """
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     key: Annotated[str, Field(min_length=3)]
-    centre: float
-    step: Annotated[float, Field(gt=0.0)]
-    resolution: Annotated[float, Field(gt=0.0)] | None = None
-    tolerance: Annotated[float, Field(gt=0.0)] | None = None
+    centre: Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+    step: Positive
+    resolution: Positive | None = None
+    tolerance: Positive | None = None
+
+    @model_validator(mode="after")
+    def _levels_differ(self) -> Self:
+        faults = []
+        if self.step < FINEST * abs(self.centre):
+            faults.append(f"step = {self.step:g}: is lost in rounding beside centre = {self.centre:g}; widen it")
+        if self.resolution is not None and self.resolution < FINEST * self.step:
+            faults.append(
+                f"resolution = {self.resolution:g}: makes more than {1.0 / FINEST:g} steps of step = {self.step:g}; coarsen it"
+            )
+        return or_refuse(self, faults)
 
 
 Kind = Literal["central_composite", "box_behnken", "full_factorial", "latin_hypercube", "sobol"]
@@ -64,7 +81,7 @@ class Design(Strict):
         return 6 if self.kind in ("central_composite", "box_behnken") else 0
 
     @model_validator(mode="after")
-    def _keys_belong_to_the_kind(self) -> Design:
+    def _keys_belong_to_the_kind(self) -> Self:
         alien = set().union(*KEYS_OF.values()) - KEYS_OF[self.kind]
         faults = [
             f"{key}: kind = {self.kind!r} has no such key; remove it or choose another kind"
@@ -73,6 +90,4 @@ class Design(Strict):
         ]
         if self.cube_blocks > 1 and not self.blocks:
             faults.append(f"cube_blocks = {self.cube_blocks}: needs blocks; write blocks = true beside it")
-        if faults:
-            raise ValueError("\n".join(faults))
-        return self
+        return or_refuse(self, faults)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
+from rbdyn.fields import or_refuse
 
 
 class Goal(Strict):
@@ -25,7 +26,7 @@ class Goal(Strict):
     desired: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
 
     @model_validator(mode="after")
-    def _goal_is_whole(self) -> Goal:
+    def _goal_is_whole(self) -> Self:
         faults = []
         if self.goal == "target" and self.target is None:
             faults.append('target: missing; goal = "target" needs the number to come near to')
@@ -41,9 +42,7 @@ class Goal(Strict):
                 faults.append(f"desired = {self.desired}: must rise; write the lower end first")
             elif self.target is not None and not low < self.target < high:
                 faults.append(f"desired = {self.desired}: must have target = {self.target} between its ends")
-        if faults:
-            raise ValueError("\n".join(faults))
-        return self
+        return or_refuse(self, faults)
 
 
 class Front(Strict):

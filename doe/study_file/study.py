@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from doe.study_file.chain_section import StudyChain
-from doe.study_file.design_section import Design, Factor
+from doe.study_file.design_section import Design, Factor, Name
 from doe.study_file.fit_section import Fitted
 from doe.study_file.front_section import Direct, Front, Goal, Tolerances
-from doe.study_file.table import Table, read_table
+from doe.study_file.table import COUNT, LABELS, Table, read_table
 from rbdyn.faults import Strict, read_toml, validated
+from rbdyn.fields import or_refuse
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ class SceneFile(Strict):
 class Response(Fitted, Goal):
     """A response of the simulation, the surface fitted to it and what is wanted of it."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
 
 
 class Confirmation(Strict):
@@ -73,12 +74,21 @@ class StudyFile(Strict):
     reference: Reference | None = None
 
     @model_validator(mode="after")
-    def _names_agree(self) -> StudyFile:
-        names = [factor.name for factor in self.factor]
+    def _names_agree(self) -> Self:
+        names, responses = [factor.name for factor in self.factor], [response.name for response in self.response]
         faults = []
-        for kind, given in (("factor", names), ("response", [each.name for each in self.response])):
+        for kind, given in (
+            ("factor.name", names),
+            ("factor.key", [factor.key for factor in self.factor]),
+            ("response.name", responses),
+            ("chain.name", [chain.name for chain in self.chain]),
+        ):
             repeated = [name for name, count in Counter(given).items() if count > 1]
-            faults += [f"{kind}.name = {name!r}: used more than once; name each once" for name in repeated]
+            faults += [f"{kind} = {name!r}: used more than once; name each once" for name in repeated]
+        taken = {COUNT, *LABELS, *(f"{name}_error" for name in responses)}
+        for kind, given, others in (("factor", names, taken | set(responses)), ("response", responses, taken)):
+            alike = [name for name in given if name in others]
+            faults += [f"{kind}.name = {name!r}: is another column of a table of runs; rename it" for name in alike]
         known = ", ".join(names)
         faults += [f"baseline.{key}: no such factor; name one of {known}" for key in self.baseline if key not in names]
         faults += [
@@ -86,9 +96,7 @@ class StudyFile(Strict):
             for chain in self.chain
             if chain.factor not in names
         ]
-        if faults:
-            raise ValueError("\n".join(faults))
-        return self
+        return or_refuse(self, faults)
 
 
 @dataclass(frozen=True)
@@ -136,11 +144,6 @@ class Study:
             for factor, x in zip(self.file.factor, point.tolist(), strict=True)
         ]
         return np.array(values)
-
-    @property
-    def signs(self) -> Array:
-        """+1 for responses to be small, -1 for those to be large."""
-        return np.array([1.0 if response.goal == "min" else -1.0 for response in self.file.response])
 
     def beside(self, name: str) -> Path:
         """A file named in the study."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.faults import InputError
 from rbdyn.quasistatic.equilibrium import Solution
-from rbdyn.result import write_json
+from rbdyn.result import read_record, write_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,15 +65,7 @@ class BallResult:
     @classmethod
     def load(cls, path: Path | str) -> BallResult:
         """Read a saved result. Raises InputError when the file is missing or not such a result."""
-        try:
-            data = json.loads(Path(path).read_text(encoding="utf-8"))
-            if data["format"] != FORMAT:
-                raise InputError([f"{path}: format is {data['format']}, not {FORMAT}; run the scene again"])
-            return cls(data)
-        except OSError as error:
-            raise InputError([f"{path}: cannot be read ({error.strerror}); check the path"]) from None
-        except (ValueError, KeyError, TypeError):
-            raise InputError([f"{path}: not a saved equilibrium; check the path"]) from None
+        return cls(read_record(path, FORMAT, "equilibrium"))
 
 
 def displacement_record(displacement: NDArray[np.float64]) -> dict[str, Any]:

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
-from rbdyn.faults import InputError, validated
+from rbdyn.faults import InputError, refuse, validated
+from rbdyn.ranges import numbers
 from rbdyn.scene.ball import BallScene
 
 MOST_POINTS = 100_000
@@ -39,21 +40,12 @@ def parsed(texts: Sequence[str]) -> dict[str, list[float]]:
             raise InputError([f"--sweep {text}: write it as key=start:stop:count or key=a,b,c"])
         if key in keys:
             raise InputError([f"--sweep {text}: {key} is swept twice; give all its values at once"])
-        keys[key] = _numbers(text, values)
+        try:
+            keys[key] = numbers(values, least=2)
+        except ValueError:
+            mend = "write key=start:stop:count with a count from 2 to 100000, or key=a,b,c"
+            raise InputError([f"--sweep {text}: not a list of numbers; {mend}"]) from None
     return keys
-
-
-def _numbers(text: str, values: str) -> list[float]:
-    mend = "write key=start:stop:count with a count of at least 2, or key=a,b,c"
-    try:
-        if ":" not in values:
-            return [float(value) for value in values.split(",")]
-        start, stop, count = values.split(":")
-        if int(count) >= 2:
-            return [float(value) for value in np.linspace(float(start), float(stop), int(count))]
-    except ValueError:
-        pass
-    raise InputError([f"--sweep {text}: not a list of numbers; {mend}"])
 
 
 def axes_of(scene: BallScene, keys: Mapping[str, Sequence[float]]) -> tuple[Axis, ...]:
@@ -70,8 +62,7 @@ def axes_of(scene: BallScene, keys: Mapping[str, Sequence[float]]) -> tuple[Axis
             faults += error.faults
         except (TypeError, ValueError):
             faults.append(f"{key}: the values {_shown(given)} are not numbers; give a list of numbers")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     count = math.prod(len(axis.values) for axis in axes)
     if count > MOST_POINTS:
         raise InputError([f"sweep: {count} points are more than {MOST_POINTS}; take fewer values"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.sweep_figures import ball_columns
-from rbdyn.result import versions, write_json
+from rbdyn.result import read_record, versions, write_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -148,10 +147,8 @@ class SweepResult:
     @classmethod
     def load(cls, path: Path | str) -> SweepResult:
         """Read a sweep saved as JSON. Raises InputError when the file is missing or not such a sweep."""
+        data = read_record(path, FORMAT, "sweep")
         try:
-            data = json.loads(Path(path).read_text(encoding="utf-8"))
-            if data["format"] != FORMAT:
-                raise InputError([f"{path}: format is {data['format']}, not {FORMAT}; sweep again"])
             keys = {key: tuple(values) for key, values in data["keys"].items()}
             points = data["points"]
             names = dict.fromkeys(name for point in points for name in point if name not in (*keys, "status"))
@@ -159,10 +156,8 @@ class SweepResult:
             cost = data["cost"]
             statuses = tuple(point["status"] for point in points)
             return cls(keys, columns, statuses, cost["cold_starts"], cost["wall_s"], data["scene"])
-        except OSError as error:
-            raise InputError([f"{path}: cannot be read ({error.strerror}); check the path"]) from None
-        except (ValueError, KeyError, TypeError):
-            raise InputError([f"{path}: not a saved sweep; check the path"]) from None
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise InputError([f"{path}: not a whole sweep; sweep again"]) from None
 
     def _places(self) -> dict[str, NDArray[Any]]:
         """Values of the keys at every point, a column a key."""

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Self, cast
 from pydantic import model_validator
 
 from rbdyn.faults import InputError
+from rbdyn.fields import or_refuse
 from rbdyn.materials import Material
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
-from rbdyn.scene.fields import or_refuse
 from rbdyn.scene.laws import Laws, Numerics
 from rbdyn.scene.lubricant import Lubricant, Traction
 from rbdyn.scene.mounting import Mounting, faults, material_of

@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal, Self, cast
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
+from rbdyn.fields import Positive, or_refuse
 from rbdyn.materials import Material
 from rbdyn.scene.ball_rings import ring_faults
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
-from rbdyn.scene.fields import Positive, or_refuse
 from rbdyn.scene.form_errors import FormErrors, faults
 from rbdyn.scene.lubricant import Lubricant
 from rbdyn.scene.mounting import Mounting, material_of

@@ -7,8 +7,8 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
+from rbdyn.fields import NonNegative, or_refuse
 from rbdyn.scene.bearing import Harmonic
-from rbdyn.scene.fields import NonNegative, or_refuse
 
 Order = Annotated[int, Field(ge=1, le=2000)]
 # Beyond this share of the ball it is no form error but a slip of the unit.

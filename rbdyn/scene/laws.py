@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.scene.fields import NonNegative, Positive, or_refuse
+from rbdyn.fields import NonNegative, Positive, or_refuse
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
 AUTO_WARM_UP_TURNS = 20.0

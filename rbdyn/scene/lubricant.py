@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from rbdyn.faults import Strict
+from rbdyn.fields import Fraction, NonNegative, Positive, or_refuse
 from rbdyn.lubricants import Oil, oil_at
-from rbdyn.scene.fields import Fraction, NonNegative, Positive, or_refuse
 
 RheologyOil = Literal["MIL-L-7808", "MIL-L-23699", "MIL-L-27502", "Santotrac 30", "Santotrac 50", "Mobil DTE SAE30"]
 # Models whose traction follows pressure and temperature.

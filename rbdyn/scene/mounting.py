@@ -7,9 +7,9 @@ from typing import Annotated, Protocol
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
+from rbdyn.fields import NonNegative, Positive, or_refuse
 from rbdyn.materials import MATERIALS, Material
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
-from rbdyn.scene.fields import NonNegative, Positive, or_refuse
 
 Celsius = Annotated[float, Field(ge=-200.0, le=1000.0)]
 # Beyond this share of its diameter a fit is a slip of the unit: a heavy press fit has a thousandth.

@@ -1,4 +1,4 @@
-"""Number types and helpers of the scene tables."""
+"""Number types and helpers of input tables."""
 
 from __future__ import annotations
 

@@ -1,0 +1,25 @@
+"""What can be told to be wrong with a study before anything runs: one judgement for all commands."""
+
+from __future__ import annotations
+
+from doe.study.chains import check_chains
+from doe.study.design import check_runs
+from doe.study.reference import reference_runs
+from doe.study.runs import Runs, ordered_runs
+from doe.study_file import Study
+from rbdyn.faults import check_all
+
+
+def check_study(study: Study) -> Runs | None:
+    """The published runs, if any. Raises InputError with all faults of keys, responses, scenes, design and chains."""
+    from doe import clearance
+
+    check_all(
+        (
+            lambda: check_runs(study, ordered_runs(study).design),
+            lambda: clearance.confirmation_scene(study, study.baseline),
+            lambda: clearance.check_direct(study),
+            lambda: check_chains(study),
+        )
+    )
+    return reference_runs(study)
