@@ -15,9 +15,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from rbdyn.faults import InputError, validated
+from rbdyn.ranges import listed
 from rbdyn.scene.ball import BallScene
 
 MOST_POINTS = 100_000
+MEND = "write key=start:stop:count with a count of at least 2, or key=a,b,c"
 Path = tuple[str | int, ...]
 
 
@@ -39,21 +41,8 @@ def parsed(texts: Sequence[str]) -> dict[str, list[float]]:
             raise InputError([f"--sweep {text}: write it as key=start:stop:count or key=a,b,c"])
         if key in keys:
             raise InputError([f"--sweep {text}: {key} is swept twice; give all its values at once"])
-        keys[key] = _numbers(text, values)
+        keys[key] = listed(values, f"--sweep {text}", MEND, 2, MOST_POINTS)
     return keys
-
-
-def _numbers(text: str, values: str) -> list[float]:
-    mend = "write key=start:stop:count with a count of at least 2, or key=a,b,c"
-    try:
-        if ":" not in values:
-            return [float(value) for value in values.split(",")]
-        start, stop, count = values.split(":")
-        if int(count) >= 2:
-            return [float(value) for value in np.linspace(float(start), float(stop), int(count))]
-    except ValueError:
-        pass
-    raise InputError([f"--sweep {text}: not a list of numbers; {mend}"])
 
 
 def axes_of(scene: BallScene, keys: Mapping[str, Sequence[float]]) -> tuple[Axis, ...]:
