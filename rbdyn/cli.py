@@ -224,12 +224,13 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
 
 def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:
     from rbdyn import plots
-    from rbdyn.dynamics.history import history
+    from rbdyn.dynamics.history import history, most_turns
 
     result.save(folder / "result.json")
-    shown = history(scene, min(TRACE_TURNS, scene.numerics.turns))
+    turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
+    shown = history(scene, turns)
     shown.table().to_csv(folder / "history.csv", index=False, float_format="%.6g")
-    title = f"first {min(TRACE_TURNS, scene.numerics.turns):g} counted shaft turns"
+    title = f"first {turns:g} counted shaft turns"
     plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
     plots.pocket_forces({title: shown}, folder / "pocket_forces.png")
 

@@ -18,6 +18,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FORMAT = "rbdyn.simulation/3"
+# Figures with errors: their keys in JSON and tables, and their names here.
+FIGURES = {
+    "impact_force_N": "impact_force",
+    "impact_contact_force_N": "impact_contact_force",
+    "whirl_deviation_ratio": "whirl_deviation_ratio",
+    "power_loss_W": "power_loss",
+    "cage_speed_rpm": "cage_speed_rpm",
+    "cage_slip": "cage_slip",
+}
 
 
 @dataclass(frozen=True)
@@ -98,12 +107,7 @@ class SimulationResult:
         return {
             "format": FORMAT,
             "status": self.status,
-            "impact_force_N": self.impact_force.as_dict(),
-            "impact_contact_force_N": self.impact_contact_force.as_dict(),
-            "whirl_deviation_ratio": self.whirl_deviation_ratio.as_dict(),
-            "power_loss_W": self.power_loss.as_dict(),
-            "cage_speed_rpm": self.cage_speed_rpm.as_dict(),
-            "cage_slip": self.cage_slip.as_dict(),
+            **{key: getattr(self, name).as_dict() for key, name in FIGURES.items()},
             "power_balance": {"relative_gap": self.power_gap},
             "power_terms_W": self.power_terms,
             "loads": {
@@ -130,12 +134,7 @@ class SimulationResult:
         """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
         return cls(
             status=data["status"],
-            impact_force=Quantity(**data["impact_force_N"]),
-            impact_contact_force=Quantity(**data["impact_contact_force_N"]),
-            whirl_deviation_ratio=Quantity(**data["whirl_deviation_ratio"]),
-            power_loss=Quantity(**data["power_loss_W"]),
-            cage_speed_rpm=Quantity(**data["cage_speed_rpm"]),
-            cage_slip=Quantity(**data["cage_slip"]),
+            **{name: Quantity(**data[key]) for key, name in FIGURES.items()},
             power_gap=data["power_balance"]["relative_gap"],
             power_terms=data["power_terms_W"],
             max_inner_load=data["loads"]["max_inner_N"],
@@ -159,15 +158,7 @@ class SimulationResult:
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 
-        figures = {
-            "impact_force_N": self.impact_force,
-            "impact_contact_force_N": self.impact_contact_force,
-            "whirl_deviation_ratio": self.whirl_deviation_ratio,
-            "power_loss_W": self.power_loss,
-            "cage_speed_rpm": self.cage_speed_rpm,
-            "cage_slip": self.cage_slip,
-        }
-        rows = {name: figure.as_dict() for name, figure in figures.items()}
+        rows = {key: getattr(self, name).as_dict() for key, name in FIGURES.items()}
         return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
 
     def save(self, path: Path | str) -> None:

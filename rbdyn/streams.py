@@ -6,7 +6,6 @@ on, so that its files stand whole and its exit code is the usual one. A device t
 
 from __future__ import annotations
 
-import _thread
 import codecs
 import errno
 import io
@@ -76,7 +75,7 @@ def _swallowed_interrupts() -> list[object]:
         if lost.exc_type is not KeyboardInterrupt:
             return usual(lost)
         found.append(lost.object)
-        threading.Timer(AGAIN_S, _thread.interrupt_main).start()
+        threading.Timer(AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)).start()
 
     sys.unraisablehook = hook
     return found

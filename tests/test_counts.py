@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import resource
 import subprocess
 import sys
@@ -70,3 +71,20 @@ def test_replicates_of_ten_thousand_runs_take_little_memory():
     few, block = points[:300] // 10, np.arange(300) % 2
     all_at_once = (np.abs(few[:, None] - few[None]).max(axis=2) == 0) & (block[:, None] == block[None])
     assert np.array_equal(replicate_groups(few, block), all_at_once.argmax(axis=1))
+
+
+def test_a_history_or_a_path_beyond_memory_is_refused(outer_result, tmp_path):
+    """Command line: samples of a long motion and places of a turning ring have bounds that the sentence names."""
+    record = outer_result.as_dict()
+    record["scene"]["numerics"] |= {"samples_per_turn": 100_000, "turns": 100.0}
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps(record), encoding="utf-8")
+    found = command("rbdyn", "show", path, "--turns", "100")
+    assert (found.returncode, found.stdout) == (2, "")
+    # 60 of the state and 7 of each of 10 rollers, and 1e8 numbers in all.
+    assert found.stderr == "--turns 100: memory has room for 7.692 turns of this scene; show no more\n"
+    waves = "inner_roundness_random={lowest_order=2,highest_order=3,height_um=1.0}"
+    scene = f"{EXAMPLES}/angular_contact_7014.toml"
+    found = command("rbdyn", "ball", scene, "--set", f"errors={{steps=100000,turns=10000,{waves}}}")
+    assert (found.returncode, found.stdout) == (2, "")
+    assert "18000000000 places, more than the 1000000 that memory has room for" in found.stderr

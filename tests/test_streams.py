@@ -50,7 +50,7 @@ def shell(line, **environment):
     return subprocess.run(["bash", "-c", script], capture_output=True, text=True, env=variables, check=False)
 
 
-@pytest.mark.parametrize(("line", "end"), zip(COMMANDS, 3 * ["| true", ">&-", "2>&-", "<&- >&- 2>&-"], strict=True))
+@pytest.mark.parametrize(("line", "end"), list(zip(COMMANDS, 3 * ["| true", ">&-", "2>&-", "<&- >&- 2>&-"], strict=True)))
 def test_a_reader_that_goes_or_a_closed_stream_changes_no_exit_code(line, end):
     """Command line: | true, >&- and 2>&- end as usual and without a word."""
     found = shell(f"{line} {end}")
@@ -101,17 +101,17 @@ def test_a_closed_error_stream_leaves_standard_output_to_json():
 def test_ctrl_c_leaves_with_130_and_no_traceback(line):
     """Command line: an interrupt at any time from the first import on; what had ended by then ended as usual."""
     name, *arguments = shlex.split(line)
-    # The first line that the process runs tells that Python itself is up.
-    program = f"print(flush=True); from {name}.cli import run; run()"
+    # Its first line tells that Python itself is up.
+    program = f"import rbdyn.loading; print(flush=True); from {name}.cli import run; run()"
     codes = set()
-    for delay in (0.0, 0.1, 0.2, 0.4, 1.0):
+    for delay in (0.05, 0.1, 0.2, 0.4, 1.0):
         process = subprocess.Popen(
             [sys.executable, "-c", program, *arguments],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         )  # fmt: skip
         assert process.stdout.readline() == "\n"
-        time.sleep(0.02 + delay)
+        time.sleep(delay)
         process.send_signal(signal.SIGINT)
         _, told = process.communicate(timeout=60)
         codes.add(process.returncode)

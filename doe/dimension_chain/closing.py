@@ -13,9 +13,7 @@ from doe.dimension_chain.fits import press_fit_factor
 from doe.dimension_chain.links import Link, Part, PressFit
 
 STEP = 1e-5  # mm of the central differences that give sensitivities
-LARGEST = (
-    1e12  # of a function's value: what is larger is a slip of the pen, as of a length, and its square must be finite
-)
+LARGEST = 1e12  # of a function's value: what is larger is a slip of the pen, and squares of slopes must stay finite
 
 Sizes = Mapping[str, Any]
 
@@ -26,22 +24,22 @@ class NoValueError(ValueError):
 
 @dataclass(frozen=True)
 class Function:
-    """A link that follows from others: its name, coefficient, value at their sizes, those it uses, how it is shown."""
+    """A link that follows from others, and its value at their sizes."""
 
-    name: str
-    coefficient: float
+    link: Link
     value: Callable[[Sizes], Any]
-    uses: tuple[str, ...]
-    shown: str
 
     def without_value(self, value: Any, sizes: Sizes) -> NoValueError:
         """Tell the first of the sizes at which the value is not finite."""
-        values = np.atleast_1d(value)
+        link, values = self.link, np.atleast_1d(value)
         lost = np.flatnonzero(~(np.abs(values) <= LARGEST))
-        at = ", ".join(f"{name} = {np.broadcast_to(sizes[name], values.shape)[lost[0]]:.6g}" for name in self.uses)
+        at = ", ".join(
+            f"{name} = {np.broadcast_to(sizes[name], values.shape)[lost[0]]:.6g}" for name in _varies_with(link)
+        )
+        what = f"expression = {shown(link.expression)}" if link.expression else "press_fit or thermal_growth"
         share = f" ({len(lost)} of {len(values)} assemblies tried)" if len(values) > 1 else ""
         return NoValueError(
-            f'link "{self.name}": {self.shown}: is {values[lost[0]]:g} at {at or "any size"}{share}, which gives no finite '
+            f'link "{link.name}": {what}: is {values[lost[0]]:g} at {at or "any size"}{share}, which gives no finite '
             "closing link; give it a value there, as max(x, 0) does, or keep the links it uses away from it"
         )
 
@@ -75,11 +73,11 @@ class ClosingFunction:
         total: Any = 0.0
         with np.errstate(all="ignore"):
             for function in self.functions:
-                known[function.name] = value = function.value(known)
+                known[function.link.name] = value = function.value(known)
                 # Written so that NaN, which is not below anything, is caught too.
                 if not np.max(np.abs(value)) <= LARGEST:
                     raise function.without_value(value, known)
-                total = total + function.coefficient * value
+                total = total + function.link.coefficient * value
         return total
 
     def sensitivities(self, sizes: Sizes) -> dict[str, float]:
@@ -98,11 +96,7 @@ def closing_function(links: Sequence[Link]) -> ClosingFunction:
     Raises ValueError for a press fit whose diameters make no rings.
     """
     by_name = {link.name: link for link in links}
-    functions = [
-        Function(link.name, link.coefficient, _function(link, by_name), _varies_with(link), _shown(link))
-        for link in links
-        if not link.is_dimension
-    ]
+    functions = [Function(link, _function(link, by_name)) for link in links if not link.is_dimension]
     used = [name for link in links for name in _varies_with(link)]
     return ClosingFunction(
         # A thermal growth counts as a function; the part of its name only varies the temperature.
@@ -154,12 +148,6 @@ def middle(parts: Sequence[Part]) -> dict[str, float]:
 
 def _varies_with(link: Link) -> tuple[str, ...]:
     return (*used_links(link), *([link.name] if link.thermal_growth else []))
-
-
-def _shown(link: Link) -> str:
-    if link.expression is not None:
-        return f"expression = {shown(link.expression)}"
-    return "press_fit" if link.press_fit else "thermal_growth"
 
 
 def _function(link: Link, by_name: Mapping[str, Link]) -> Callable[[Sizes], Any]:
