@@ -50,7 +50,9 @@ def shell(line, **environment):
     return subprocess.run(["bash", "-c", script], capture_output=True, text=True, env=variables, check=False)
 
 
-@pytest.mark.parametrize(("line", "end"), list(zip(COMMANDS, 3 * ["| true", ">&-", "2>&-", "<&- >&- 2>&-"], strict=True)))
+@pytest.mark.parametrize(
+    ("line", "end"), list(zip(COMMANDS, 3 * ["| true", ">&-", "2>&-", "<&- >&- 2>&-"], strict=True))
+)
 def test_a_reader_that_goes_or_a_closed_stream_changes_no_exit_code(line, end):
     """Command line: | true, >&- and 2>&- end as usual and without a word."""
     found = shell(f"{line} {end}")
