@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-import typer
+from rbdyn.loading import Loading
 
-from doe.commands.chain import chain
-from doe.commands.design import design
-from doe.commands.fit import fit
-from doe.commands.front import front
-from doe.commands.status import status
-from doe.commands.study import study
+with Loading():
+    import typer
+
+    from doe.commands.chain import chain
+    from doe.commands.design import design
+    from doe.commands.fit import fit
+    from doe.commands.front import front
+    from doe.commands.status import status
+    from doe.commands.study import study
+    from rbdyn import streams
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -24,4 +28,4 @@ def main() -> None:
 
 def run() -> None:
     """Entry point of the command."""
-    app()
+    streams.run(app)

@@ -1,14 +1,12 @@
 """Dynamics of rolling bearings: from a drawing and an operating point to forces, whirl and power loss, with errors.
 
 ``Scene`` reads and checks the input, ``simulate(scene)`` runs it, the result saves itself and ``load`` reads it back.
-Names are fetched when first used: importing the package loads neither numba nor scipy.
+Names are fetched when first used: importing the package loads neither numba nor scipy, nor anything else but itself.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # as type checkers take it, without ``typing``
 if TYPE_CHECKING:
     from rbdyn.dynamics.history import History, history
     from rbdyn.dynamics.simulate import simulate
@@ -53,7 +51,9 @@ def load(path: str) -> SimulationResult:
     return SimulationResult.load(path)
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
+    from importlib import import_module
+
     if name not in _HOMES:
         raise AttributeError(f"module 'rbdyn' has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)

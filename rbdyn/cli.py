@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from rbdyn.loading import Loading
 
-import typer
+with Loading():
+    import sys
+    from pathlib import Path
+    from typing import TYPE_CHECKING, Annotated, Any
 
-from rbdyn.ball_cli import ball
-from rbdyn.command_options import Json, Out, Quiet, Replicates, SceneFile, Seed, Set, Turns, Verbose, Workers
-from rbdyn.terminal import FAILED, guarded, output_folder, print_json, print_table, progress_bar
+    import typer
+
+    from rbdyn import streams
+    from rbdyn.ball_cli import ball
+    from rbdyn.command_options import Json, Out, Quiet, Replicates, SceneFile, Seed, Set, Turns, Verbose, Workers
+    from rbdyn.terminal import FAILED, guarded, output_folder, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from rbdyn.result import SimulationResult
@@ -85,7 +89,7 @@ def accuracy(
         bool, typer.Option("--coverage", help="How often the stated intervals hold the truth, instead.")
     ] = False,
     repeats: Annotated[
-        int | None, typer.Option(min=2, metavar="N", help="Repeats of the coverage; 200 unless given.")
+        int | None, typer.Option(min=2, max=100_000, metavar="N", help="Repeats of the coverage; 200 unless given.")
     ] = None,
     options: Annotated[bool, typer.Option("--options", help="What each option costs, instead.")] = False,
     stability: Annotated[
@@ -98,7 +102,7 @@ def accuracy(
         bool, typer.Option("--battery", help="Solvers over thousands of random ball bearings, instead.")
     ] = False,
     scenes: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Scenes of the battery; 5000 unless given.")
+        int | None, typer.Option(min=1, max=100_000, metavar="N", help="Scenes of the battery; 5000 unless given.")
     ] = None,
     trajectory: Annotated[
         float | None, typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25.")
@@ -220,12 +224,13 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
 
 def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:
     from rbdyn import plots
-    from rbdyn.dynamics.history import history
+    from rbdyn.dynamics.history import history, most_turns
 
     result.save(folder / "result.json")
-    shown = history(scene, min(TRACE_TURNS, scene.numerics.turns))
+    turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
+    shown = history(scene, turns)
     shown.table().to_csv(folder / "history.csv", index=False, float_format="%.6g")
-    title = f"first {min(TRACE_TURNS, scene.numerics.turns):g} counted shaft turns"
+    title = f"first {turns:g} counted shaft turns"
     plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
     plots.pocket_forces({title: shown}, folder / "pocket_forces.png")
 
@@ -325,4 +330,4 @@ def show(
 
 def run() -> None:
     """Entry point of the command."""
-    app()
+    streams.run(app)

@@ -8,27 +8,29 @@ import numpy as np
 
 from rbdyn.faults import InputError
 
-# A list that a command line asks for by its count.
-MOST_VALUES = 100_000
-
-
-def numbers(text: str, least: int = 0) -> list[float]:
-    """Numbers of ``start:stop:count``, from ``least`` to `MOST_VALUES`, or ``a,b,c``. Raises ValueError."""
-    if ":" not in text:
-        return [float(value) for value in text.split(",")]
-    start, stop, count = text.split(":")
-    if not least <= int(count) <= MOST_VALUES:
-        raise ValueError(f"count = {count}: not from {least} to {MOST_VALUES}")
-    return [float(value) for value in np.linspace(float(start), float(stop), int(count))]
+# Each value of an axis is a point that is run and kept whole.
+MOST_VALUES = 10_000
 
 
 def axis_values(text: str, option: str) -> list[float]:
     """Values of ``start:stop:count`` (evenly spaced) or ``a,b,c``. Raises InputError naming ``option``."""
     mend = "write start:stop:count or values with commas, rising"
-    try:
-        values = numbers(text)
-    except ValueError:
-        raise InputError([f"{option} {text}: not a list of numbers; {mend}"]) from None
+    values = listed(text, f"{option} {text}", mend, 0, MOST_VALUES)
     if not values or not np.isfinite(values).all() or any(b <= a for a, b in pairwise(values)):
         raise InputError([f"{option} {text}: the values must rise; {mend}"])
     return values
+
+
+def listed(text: str, named: str, mend: str, fewest: int, most: int) -> list[float]:
+    """The same in any order, from ``fewest`` to ``most`` where they are counted. Raises InputError, nothing made yet."""
+    try:
+        if ":" not in text:
+            return [float(value) for value in text.split(",")]
+        start, stop, count = text.split(":")
+        if int(count) > most:
+            raise InputError([f"{named}: {count} values are more than the {most} that memory has room for; take fewer"])
+        if int(count) >= fewest:
+            return [float(value) for value in np.linspace(float(start), float(stop), int(count))]
+    except ValueError:
+        pass
+    raise InputError([f"{named}: not a list of numbers; {mend}"])

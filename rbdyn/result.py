@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FORMAT = "rbdyn.simulation/3"
-# Names of the figures with errors in JSON, and here.
+# Figures with errors: their keys in JSON and tables, and their names here.
 FIGURES = {
     "impact_force_N": "impact_force",
     "impact_contact_force_N": "impact_contact_force",
@@ -107,7 +107,7 @@ class SimulationResult:
         return {
             "format": FORMAT,
             "status": self.status,
-            **self._figures(),
+            **{key: getattr(self, name).as_dict() for key, name in FIGURES.items()},
             "power_balance": {"relative_gap": self.power_gap},
             "power_terms_W": self.power_terms,
             "loads": {
@@ -141,11 +141,8 @@ class SimulationResult:
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 
-        rows = {name: figure for name, figure in self._figures().items() if name != "impact_contact_force_N"}
+        rows = {key: getattr(self, name).as_dict() for key, name in FIGURES.items()}
         return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
-
-    def _figures(self) -> dict[str, dict[str, float | None]]:
-        return {key: getattr(self, name).as_dict() for key, name in FIGURES.items()}
 
     def save(self, path: Path | str) -> None:
         """Write JSON, whole or not at all."""

@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from rbdyn.faults import refuse
 from rbdyn.result import SimulationResult, versions, write_json
@@ -18,7 +19,7 @@ from rbdyn.terminal import print_table
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.history import History
-    from rbdyn.dynamics.orbit import Largest, Spectrum
+    from rbdyn.dynamics.orbit import Largest, Race, Spectrum
 
 FORMAT = "rbdyn.orbit/1"
 SHOWN_TURNS = 20.0
@@ -54,13 +55,18 @@ def ask(path: Path, turns: float | None, replicate: int) -> Asked:
     """Read a result.json, or that of a folder. Raises InputError with every fault."""
     if path.is_dir():
         path = path / "result.json"
+    from rbdyn.dynamics.history import most_turns
+
     result = SimulationResult.load(path)
     scene = Scene.from_dict(result.scene, f"{path}: scene")
     numerics, faults = scene.numerics, []
     fewest = FEWEST_SAMPLES / numerics.samples_per_turn
-    chosen = min(SHOWN_TURNS, numerics.turns) if turns is None else turns
+    most = min(most_turns(scene), numerics.turns)
+    chosen = min(SHOWN_TURNS, most) if turns is None else turns
     if turns is not None and not fewest <= turns <= numerics.turns:
         faults.append(f"--turns {turns:g}: the result counted {numerics.turns:g} turns; choose from {fewest:g} to that")
+    elif chosen > most:
+        faults.append(f"--turns {turns:g}: memory has room for {most:.4g} turns of this scene; show no more")
     if not 1 <= replicate <= numerics.replicates:
         faults.append(f"--replicate {replicate}: the result has {numerics.replicates}; count from 1 to that")
     refuse(faults)
@@ -106,25 +112,22 @@ def _picture_tasks(asked: Asked, motion: History, folder: Path) -> list[Callable
     from rbdyn import plots
 
     title = f"{asked.turns:g} counted shaft turns, replicate {asked.replicate + 1}"
-    pictures: dict[str, Callable[[Path], None]] = {
-        "cage_orbit.png": lambda path: plots.cage_orbit({title: motion}, path),
-        "forces.png": lambda path: plots.forces(motion, path),
-        "whirl.png": lambda path: plots.whirl(motion, path),
-        "poincare.png": lambda path: plots.section(motion, path),
-        "spectra.png": lambda path: plots.spectra(motion, path),
-        "roller_loads.png": lambda path: plots.roller_loads(motion, path),
-        "sliding.png": lambda path: plots.sliding(motion, path),
-        "power.png": lambda path: plots.power_by_loss(asked.result.power_terms, path),
+    pictures: dict[str, Callable[[Path], object]] = {
+        "cage_orbit.png": partial(plots.cage_orbit, {title: motion}),
+        "forces.png": partial(plots.forces, motion),
+        "whirl.png": partial(plots.whirl, motion),
+        "poincare.png": partial(plots.section, motion),
+        "spectra.png": partial(plots.spectra, motion),
+        "roller_loads.png": partial(plots.roller_loads, motion),
+        "sliding.png": partial(plots.sliding, motion),
+        "power.png": partial(plots.power_by_loss, asked.result.power_terms),
     }
+    return [partial(_picture, folder, name, draw) for name, draw in pictures.items()]
 
-    def task(name: str, draw: Callable[[Path], None]) -> Callable[[], list[str]]:
-        def run() -> list[str]:
-            draw(folder / name)
-            return [name]
 
-        return run
-
-    return [task(name, draw) for name, draw in pictures.items()]
+def _picture(folder: Path, name: str, draw: Callable[[Path], object]) -> list[str]:
+    draw(folder / name)
+    return [name]
 
 
 def _animation(motion: History, folder: Path) -> list[str]:
@@ -164,25 +167,23 @@ def _record(asked: Asked, motion: History) -> dict[str, Any]:
             "outer_race": _largest(orbit.largest(motion, motion.outer_load)),
             "inner_race": _largest(orbit.largest(motion, motion.inner_load)),
         },
-        "races": {
-            "outer": {
-                "pressure_GPa": float(orbit.contact_pressure(motion, "outer").max()) * 1e-9,
-                "pressure_velocity_MPa_m_s": float(orbit.pressure_velocity(motion, "outer").max()) * 1e-6,
-                "slip_m_s": float(np.abs(motion.outer_slip).max()),
-                "mean_heat_W": float(motion.outer_heat.sum(axis=1).mean()),
-            },
-            "inner": {
-                "pressure_GPa": float(orbit.contact_pressure(motion, "inner").max()) * 1e-9,
-                "pressure_velocity_MPa_m_s": float(orbit.pressure_velocity(motion, "inner").max()) * 1e-6,
-                "slip_m_s": float(np.abs(motion.inner_slip).max()),
-                "mean_heat_W": float(motion.inner_heat.sum(axis=1).mean()),
-            },
-        },
+        "races": {race: _race(motion, race) for race in get_args(orbit.Race)},
         "life": _life(motion),
         "spectra": {
             "eccentricity_um": _peaks(orbit.eccentricity_spectrum(motion), 1e6),
             "cage_speed_rpm": _peaks(orbit.cage_speed_spectrum(motion), 30.0 / np.pi),
         },
+    }
+
+
+def _race(motion: History, race: Race) -> dict[str, float]:
+    from rbdyn.dynamics import orbit
+
+    return {
+        "pressure_GPa": float(orbit.contact_pressure(motion, race).max()) * 1e-9,
+        "pressure_velocity_MPa_m_s": float(orbit.pressure_velocity(motion, race).max()) * 1e-6,
+        "slip_m_s": float(abs(getattr(motion, f"{race}_slip")).max()),
+        "mean_heat_W": float(getattr(motion, f"{race}_heat").sum(axis=1).mean()),
     }
 
 

@@ -23,6 +23,7 @@ from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError
+from rbdyn.ranges import MOST_VALUES
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene
 
@@ -117,6 +118,8 @@ def slip_map(
     """
     if scene.operation.schedule is not None:
         raise InputError(["operation.schedule: a map sets speed and load itself; take the schedule away"])
+    if (count := len(speeds_rpm) * len(loads_N)) > MOST_VALUES:
+        raise InputError([f"--speed, --load: {count} points are more than the {MOST_VALUES} kept at once; take fewer"])
     scenes = [_at(scene, speed, load) for load in loads_N for speed in speeds_rpm]
     bearings = [roller_bearing(point) for point in scenes]
     prepare(scenes[0], bearings[0])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import errno
 import json
-import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,8 +13,10 @@ from typing import Any, NoReturn
 import typer
 
 from rbdyn.faults import InputError, RunError
+from rbdyn.loading import INTERRUPTED
+from rbdyn.streams import FAILED
 
-FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+BAD_INPUT = 2
 
 
 @contextmanager
@@ -23,24 +25,26 @@ def guarded(as_json: bool) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        _leave(as_json, BAD_INPUT, {"status": "refused", "faults": error.faults}, error.faults)
+        _leave(as_json, BAD_INPUT, error.faults)
     except RunError as error:
-        _leave(as_json, FAILED, {"status": f"failed: {error}"}, [str(error)])
+        _leave(as_json, FAILED, [str(error)])
     except KeyboardInterrupt:
-        _leave(as_json, INTERRUPTED, {"status": "interrupted"}, ["interrupted; what was finished is kept"])
-    except BrokenPipeError:
-        # The reader of a pipe has seen enough; what is left unwritten goes nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _leave(as_json, INTERRUPTED, ["interrupted; what was finished is kept"])
+    except MemoryError as error:
+        _leave(
+            as_json, FAILED, [f"out of memory: {error or 'no more is left'}; ask for fewer points, samples or turns"]
+        )
     except OSError as error:
         sentence = f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
-        _leave(as_json, BAD_INPUT, {"status": "refused", "faults": [sentence]}, [sentence])
+        _leave(as_json, FAILED if error.errno == errno.ENOSPC else BAD_INPUT, [sentence])
 
 
-def _leave(as_json: bool, code: int, record: dict[str, Any], sentences: Sequence[str]) -> NoReturn:
+def _leave(as_json: bool, code: int, sentences: Sequence[str]) -> NoReturn:
     for sentence in sentences:
         print(sentence, file=sys.stderr)
+    failed = {"status": "interrupted" if code == INTERRUPTED else f"failed: {sentences[0]}"}
     if as_json:
-        print_json(record)
+        print_json({"status": "refused", "faults": sentences} if code == BAD_INPUT else failed)
     raise typer.Exit(code)
 
 

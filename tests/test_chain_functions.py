@@ -198,3 +198,50 @@ def test_wrong_functions_are_refused_with_key_value_and_mend(function, words):
         solve(with_functions(chain(FITTED), used, {"name": "f", "coefficient": 1} | function), samples=10)
     assert len(caught.value.faults) == 1
     assert words in caught.value.faults[0]
+
+
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [
+        ("9**9**9", "is inf at any size"),
+        ("0*9**9**9", "is nan at any size"),
+        ("9" * 400, "is inf at any size"),
+        ("1/0", "is inf at any size"),
+        ("b/0", "is inf at b = 30, which"),
+        ("b**b**b", "is inf at b = "),
+        ("(-b)**0.5", "is nan at b = "),
+        ("exp(b)", "is 1.06865e+13 at b"),
+        ("+".join(["b"] * 5000), "has 9999 characters, more than 1000"),
+        ("-" * 5000 + "b", "has 5001 characters, more than 1000"),
+        ("-" * 101 + "b", "nests deeper than 100 operations"),
+        ("(" * 300 + "b" + ")" * 300, "is no arithmetic expression"),
+    ],
+)
+def test_an_expression_without_a_value_is_told_by_its_own_link(expression, words):
+    """One sentence with link, expression (cut) and mend: no big whole number, no complex one, no traceback."""
+    shape = {"name": "shape", "coefficient": 1, "expression": expression}
+    with pytest.raises(InputError) as caught:
+        solve(with_functions(chain([(1, 2.0, 0.01, 0.0), (1, 30.0, 0.01, 0.0)]), shape), samples=10)
+    (fault,) = caught.value.faults
+    assert fault.startswith('link "shape": expression = "')
+    assert words in fault and "; " in fault and len(fault) < 350
+
+
+@pytest.mark.parametrize(
+    ("expression", "words"), [("1/(a - 0.99)", "is inf at a = 0.99 (1 of 2"), ("sqrt(a - 0.985)", "is nan at a = 0.98")]
+)
+def test_a_corner_or_an_assembly_without_a_value_is_told(expression, words):
+    """The nominal has a value: a corner of the tolerances has none, or an assembly drawn beyond them."""
+    bent = {"name": "bent", "coefficient": 1, "expression": expression}
+    links = [(0, 1.0, 0.01, -0.01, {"fixed": True}), (1, 2.0, 0.01, -0.01)]
+    with pytest.raises(InputError) as caught:
+        solve(with_functions(chain(links, (1.0, 200.0)), bent), samples=1_000_000, source="FILE")
+    (fault,) = caught.value.faults
+    assert f'link "bent": expression = "{expression}": {words}' in fault and "assemblies tried" in fault
+
+
+def test_a_value_at_every_place_is_the_same_as_before():
+    """Floats throughout: whole powers and quotients give what Python gives for floats, over arrays too."""
+    for a in (0.3, 7.0, np.array([0.5, 2.0])):
+        assert np.array_equal(evaluate("2**3/4 - a**2 + 7/a**-1", {"a": a}), 2.0 - a**2 + 7 / a**-1.0)
+    assert evaluate(" +".join(["a"] * 100), {"a": 1.0}) == 100.0

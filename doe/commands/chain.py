@@ -10,6 +10,7 @@ import typer
 
 from doe.commands.options import Json, Save
 from doe.commands.steps import save
+from rbdyn.faults import InputError
 from rbdyn.terminal import BAD_INPUT, guarded, print_json
 
 
@@ -30,7 +31,14 @@ def chain(
         from doe.report.chain import chains_record, print_chain
 
         several = is_several(path)
-        results = {name: solve(each) for name, each in read_chains(path).items()}
+        results, faults = {}, []
+        for name, each in read_chains(path).items():
+            try:
+                results[name] = solve(each, source=f'{path}: chain "{name}"' if several else str(path))
+            except InputError as error:
+                faults += error.faults
+        if faults:
+            raise InputError(faults)
         record = chains_record(results) if several else next(iter(results.values())).as_dict()
         save(out, "chain.json", record)
         if as_json:

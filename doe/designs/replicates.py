@@ -12,8 +12,11 @@ SAME_POINT = 1e-9  # coded units within which two runs are replicates
 
 def replicate_groups(points: Array, block: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
     """For each run (n, k) the first run at the same point, and in the same block where blocks are given, shape (n,)."""
-    same = np.abs(points[:, None, :] - points[None, :, :]).max(axis=2) <= SAME_POINT
-    if block is not None:
-        same &= block[:, None] == block[None, :]
-    first: NDArray[np.int64] = same.argmax(axis=1)
+    first = np.empty(len(points), np.int64)
+    for place, point in enumerate(points):
+        # Run by run: all distances at once would take gigabytes of ten thousand runs.
+        same = np.abs(points[: place + 1] - point).max(axis=1) <= SAME_POINT
+        if block is not None:
+            same &= block[: place + 1] == block[place]
+        first[place] = same.argmax()
     return first

@@ -16,7 +16,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from doe.dimension_chain.closing import ClosingFunction, closing_function, middle
+from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, middle
 from doe.dimension_chain.cost import cheapest
 from doe.dimension_chain.intervals import interval, total
 from doe.dimension_chain.iso286 import grade_tolerances, tolerance_unit
@@ -73,8 +73,14 @@ class Allocation:
         moved, gone = self.adjusted.name, 0.0
         # One step is exact unless a function uses the part that is moved; then these are steps of Newton.
         for _ in range(NEWTON_STEPS):
-            slope = self.function.sensitivities(middle(parts))[moved]
-            step = self._missing(parts) / slope if slope else inf
+            try:
+                slope = self.function.sensitivities(middle(parts))[moved]
+                step = self._missing(parts) / slope if slope else inf
+            except NoValueError:
+                # Where the part was moved to says nothing of where it was given.
+                if gone:
+                    break
+                raise
             parts = [
                 replace(part, nominal_mm=round(part.nominal_mm + step, DIGITS)) if part.name == moved else part
                 for part in parts

@@ -8,26 +8,40 @@ from typing import Any
 
 import numpy as np
 
-from doe.dimension_chain.expressions import evaluate, names_in
+from doe.dimension_chain.expressions import evaluate, names_in, shown
 from doe.dimension_chain.fits import press_fit_factor
 from doe.dimension_chain.links import Link, Part, PressFit
 
 STEP = 1e-5  # mm of the central differences that give sensitivities
+LARGEST = 1e12  # of a function's value: what is larger is a slip of the pen, and squares of slopes must stay finite
 
 Sizes = Mapping[str, Any]
 
 
 class NoValueError(ValueError):
-    """A size at which a function has no finite value."""
+    """Sizes at which a function has no finite value; the message names the link, the sizes and the mend."""
 
 
 @dataclass(frozen=True)
 class Function:
-    """A link that follows from others: its name, coefficient and value at their sizes."""
+    """A link that follows from others, and its value at their sizes."""
 
-    name: str
-    coefficient: float
+    link: Link
     value: Callable[[Sizes], Any]
+
+    def without_value(self, value: Any, sizes: Sizes) -> NoValueError:
+        """Tell the first of the sizes at which the value is not finite."""
+        link, values = self.link, np.atleast_1d(value)
+        lost = np.flatnonzero(~(np.abs(values) <= LARGEST))
+        at = ", ".join(
+            f"{name} = {np.broadcast_to(sizes[name], values.shape)[lost[0]]:.6g}" for name in _varies_with(link)
+        )
+        what = f"expression = {shown(link.expression)}" if link.expression else "press_fit or thermal_growth"
+        share = f" ({len(lost)} of {len(values)} assemblies tried)" if len(values) > 1 else ""
+        return NoValueError(
+            f'link "{link.name}": {what}: is {values[lost[0]]:g} at {at or "any size"}{share}, which gives no finite '
+            "closing link; give it a value there, as max(x, 0) does, or keep the links it uses away from it"
+        )
 
 
 @dataclass(frozen=True)
@@ -59,14 +73,16 @@ class ClosingFunction:
         total: Any = 0.0
         with np.errstate(all="ignore"):
             for function in self.functions:
-                known[function.name] = function.value(known)
-                total = total + function.coefficient * known[function.name]
-        if not np.isfinite(np.sum(total)):
-            raise NoValueError("some sizes that are within reach give no finite closing link; mend the functions")
+                known[function.link.name] = value = function.value(known)
+                # Written so that NaN, which is not below anything, is caught too.
+                if not np.max(np.abs(value)) <= LARGEST:
+                    raise function.without_value(value, known)
+                total = total + function.link.coefficient * value
         return total
 
     def sensitivities(self, sizes: Sizes) -> dict[str, float]:
         """Change of the closing link per change of each part at the given sizes."""
+        self.bent(sizes)  # a place without a value is told as it is, before the steps aside
         found = dict(self.coefficients)
         for name in self.arguments:
             above, below = ({**sizes, name: sizes[name] + sign * STEP} for sign in (1, -1))
@@ -80,10 +96,8 @@ def closing_function(links: Sequence[Link]) -> ClosingFunction:
     Raises ValueError for a press fit whose diameters make no rings.
     """
     by_name = {link.name: link for link in links}
-    functions = [
-        Function(link.name, link.coefficient, _function(link, by_name)) for link in links if not link.is_dimension
-    ]
-    used = [name for link in links for name in (*used_links(link), *([link.name] if link.thermal_growth else []))]
+    functions = [Function(link, _function(link, by_name)) for link in links if not link.is_dimension]
+    used = [name for link in links for name in _varies_with(link)]
     return ClosingFunction(
         # A thermal growth counts as a function; the part of its name only varies the temperature.
         {link.name: link.coefficient * link.is_dimension for link in links if is_part(link)},
@@ -130,6 +144,10 @@ def fit_factor(fit: PressFit, bore_nominal: float) -> float:
 def middle(parts: Sequence[Part]) -> dict[str, float]:
     """Sizes of the parts at mid-tolerance, mm."""
     return {part.name: part.nominal_mm + part.middle_mm for part in parts}
+
+
+def _varies_with(link: Link) -> tuple[str, ...]:
+    return (*used_links(link), *([link.name] if link.thermal_growth else []))
 
 
 def _function(link: Link, by_name: Mapping[str, Link]) -> Callable[[Sizes], Any]:

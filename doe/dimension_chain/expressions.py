@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import operator
 from collections.abc import Callable, Mapping
 from functools import cache, reduce
@@ -17,8 +18,9 @@ BINARY: dict[type[ast.operator], Operator] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
+    # Numpy's rules: what is infinite or undefined is so in the result, and neither raises nor turns complex.
+    ast.Div: np.true_divide,
+    ast.Pow: lambda base, power: np.asarray(base, float) ** power,
 }
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": np.abs,
@@ -34,6 +36,9 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 CONSTANTS = {"pi": pi}
 MANY = ("min", "max")  # the others take one value
+LONGEST = 1000  # characters
+DEEPEST = 100  # operations within each other, which a sum of as many terms has: each is a call within the last
+SHOWN = 60  # characters of an expression in a message
 
 
 def names_in(text: str) -> list[str]:
@@ -45,16 +50,28 @@ def names_in(text: str) -> list[str]:
 
 
 def evaluate(text: str, sizes: Mapping[str, Any]) -> Any:
-    """Value of an expression at the sizes of its links, numbers or arrays of one shape."""
+    """Value of an expression at the sizes of its links, numbers or arrays of one shape; infinite or NaN where it has none."""
     return _value(_parsed(text), sizes)
+
+
+def shown(text: str) -> str:
+    """An expression as messages have it: in quotes, on one line, cut."""
+    return json.dumps(text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}...", ensure_ascii=False)
 
 
 @cache
 def _parsed(text: str) -> ast.expr:
+    if len(text) > LONGEST:
+        raise ValueError(f"has {len(text)} characters, more than {LONGEST}; split it into links of coefficient 0")
     try:
-        tree = ast.parse(text, mode="eval").body
-    except SyntaxError:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ValueError("is no arithmetic expression; write it like 0.5*(bore - shaft)") from None
+    level: list[ast.AST] = [tree]
+    for _ in range(DEEPEST + 1):
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
+    if level:
+        raise ValueError(f"nests deeper than {DEEPEST} operations; split it into links of coefficient 0")
     for node in ast.walk(tree):
         known = (
             isinstance(node, ast.Name | ast.Load | ast.UAdd | ast.USub | ast.UnaryOp)
@@ -71,7 +88,7 @@ def _parsed(text: str) -> ast.expr:
         )
         if not known:
             raise ValueError(
-                f"holds {ast.unparse(node) or type(node).__name__!r}; only + - * / **, numbers, names of links and "
+                f"holds {shown(ast.unparse(node) or type(node).__name__)}; only + - * / **, numbers, names of links and "
                 f"{', '.join(FUNCTIONS)} are read"
             )
     return tree
@@ -79,7 +96,8 @@ def _parsed(text: str) -> ast.expr:
 
 def _value(node: ast.expr, sizes: Mapping[str, Any]) -> Any:
     if isinstance(node, ast.Constant):
-        return node.value
+        # A whole number too long for a float is infinite, as 1e999 is.
+        return float(str(node.value))
     if isinstance(node, ast.Name):
         return CONSTANTS[node.id] if node.id in CONSTANTS else sizes[node.id]
     if isinstance(node, ast.UnaryOp):

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from functools import partial
 
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import fit_factor, is_part, used_links
+from doe.dimension_chain.closing import NoValueError, fit_factor, is_part, used_links
+from doe.dimension_chain.expressions import shown
 from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.iso286 import LARGEST, positioned
 from doe.dimension_chain.links import SLACK, Allocate, Chain, ClosingLink, Link
@@ -33,14 +34,18 @@ def faults(chain: Chain) -> list[str]:
     found += _reference_faults(chain) + _selective_faults(chain)
     found += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient != 0])
     # The width that fixed links leave can only be told of a chain that is otherwise sound.
-    return found or _room_faults(chain)
+    try:
+        return found or _room_faults(chain)
+    except NoValueError as error:
+        return [str(error)]
 
 
 def _used(links: list[Link]) -> set[str]:
     names: set[str] = set()
     for link in links:
-        if _sentence(partial(used_links, link)) is None:
-            names |= set(used_links(link))
+        # An expression that cannot be read may use any link.
+        unread = _sentence(partial(used_links, link)) is not None
+        names |= {each.name for each in links} if unread else set(used_links(link))
     return names
 
 
@@ -103,7 +108,7 @@ def _function_faults(link: Link) -> list[str]:
     if rise and rise.lower_K > rise.upper_K:
         found.append(f"lower_K = {rise.lower_K:g}: exceeds upper_K = {rise.upper_K:g}; swap them")
     if unread := _sentence(lambda: used_links(link)):
-        found.append(f'expression = "{link.expression}": {unread}')
+        found.append(f"expression = {shown(link.expression or '')}: {unread}")
     return [f'link "{link.name}": {sentence}' for sentence in found]
 
 
@@ -189,9 +194,11 @@ def _nearest(limits: ClosingLink, width: float) -> str:
 
 
 def _sentence(attempt: Callable[[], object]) -> str | None:
-    """The message of a ValueError, if one comes."""
+    """The message of a ValueError, if one comes; one that names its link itself passes."""
     try:
         attempt()
+    except NoValueError:
+        raise
     except ValueError as error:
         return str(error)
     return None

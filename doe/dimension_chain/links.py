@@ -32,7 +32,10 @@ Position = Literal[
 
 SLACK = 1e-9  # mm: round-off allowed at a limit
 DIGITS = 12  # decimals in mm kept of an allocated size
-MOST_SAMPLES = 100_000_000  # of a Monte Carlo: minutes, and less than a gigabyte a part
+
+
+# Every assembly drawn is kept, and sorted for quantiles: a hundred million take 2 GB.
+Samples = Annotated[int, Field(ge=1, le=100_000_000)]
 
 
 class ClosingLink(Strict):
@@ -139,7 +142,7 @@ class Allocate(Strict):
 class MonteCarlo(Strict):
     """Size and seed of the Monte Carlo of the assemblies."""
 
-    samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 1_000_000
+    samples: Samples = 1_000_000
     seed: Annotated[int, Field(ge=0)] = 1
 
 
@@ -153,7 +156,8 @@ class Selective(Strict):
     second: str
     classes: Annotated[int, Field(ge=2, le=100)] = 4
     by: Literal["width", "probability"] = "width"
-    samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 200_000
+    # All sizes of all parts are kept.
+    samples: Annotated[int, Field(ge=1, le=10_000_000)] = 200_000
     seed: Annotated[int, Field(ge=0)] = 1
 
 

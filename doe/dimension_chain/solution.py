@@ -126,16 +126,22 @@ class ChainResult:
 
 
 def solve(
-    chain: Chain, *, samples: int | None = None, seed: int | None = None, threads: int | None = None
+    chain: Chain,
+    *,
+    samples: int | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    source: str | None = None,
 ) -> ChainResult:
     """Intervals, yield, contributions and allocation of a chain.
 
     A chain without deviations is judged with the allocated ones (status "ok: deviations allocated"). A chain
     whose given deviations miss the limits, by the interval or yield of its allocation mode, is refused: its status
     starts with "refused: " and names the numbers and the allocation. Otherwise the status is "ok". ``samples`` and
-    ``seed`` are those of the chain unless given; ``threads`` change no bit.
+    ``seed`` are those of the chain unless given; ``threads`` change no bit; ``source`` names the file in messages.
 
-    Raises InputError with every fault of the chain (see `faults`), or for fewer than one sample.
+    Raises InputError with every fault of the chain (see `faults`), for fewer than one sample, or where a function has
+    no finite value within the tolerances or at an assembly drawn.
     """
     samples = chain.monte_carlo.samples if samples is None else samples
     seed = chain.monte_carlo.seed if seed is None else seed
@@ -145,7 +151,7 @@ def solve(
     try:
         return _solved(Allocation(chain), samples, seed, threads)
     except NoValueError as error:
-        raise InputError([f"link: {error}"]) from None
+        raise InputError([f"{source}: {error}" if source else str(error)]) from None
 
 
 def _solved(search: Allocation, samples: int, seed: int, threads: int | None) -> ChainResult:

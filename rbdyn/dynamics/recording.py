@@ -19,11 +19,10 @@ from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.state import CAGE_ANGLE
 from rbdyn.scene import Scene
+from rbdyn.scene.laws import MOST_OF_A_RUN
 
 # Long enough that the step cut at a batch's end costs nothing, short against any memory worth finding.
 BATCH_TURNS = 1.0
-# Bounds what a very long run keeps.
-MOST_BATCHES = 20_000
 
 
 @dataclass(frozen=True)
@@ -58,11 +57,11 @@ class Batches:
 def batches_of(scene: Scene) -> Batches:
     """How the scene's runs are cut."""
     numerics, window = scene.numerics, scene.impact_window_turns
-    shortest = max(BATCH_TURNS, numerics.turns / MOST_BATCHES)
+    shortest = max(BATCH_TURNS, numerics.turns / MOST_OF_A_RUN)
     per_window = max(round(window / shortest), 1)
     length = window / per_window
     warm_up = numerics.warm_up_turns
-    first = math.ceil(warm_up / max(length, warm_up / MOST_BATCHES) - 1e-9) if warm_up else 0
+    first = math.ceil(warm_up / max(length, warm_up / MOST_OF_A_RUN) - 1e-9) if warm_up else 0
     return Batches(warm_up * np.arange(1, first + 1) / max(first, 1), length, per_window)
 
 

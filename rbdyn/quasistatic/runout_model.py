@@ -24,6 +24,9 @@ from rbdyn.scene.ball import BallScene, SingleRowScene
 from rbdyn.scene.bearing import Harmonic
 from rbdyn.scene.form_errors import FormErrors, RandomWaviness
 
+# Steps times balls of a path: 1.4 kB each while it is made.
+MOST_PLACES = 1_000_000
+
 
 def follow_ring(scene: BallScene) -> Followed:
     """Follow the inner ring of a scene over its form errors, as many turns and steps as they say.
@@ -33,9 +36,13 @@ def follow_ring(scene: BallScene) -> Followed:
     row = single_row(scene)
     if row.errors is None:
         raise InputError(["errors: missing; a bearing without form errors has no runout, add the table"])
+    steps, turns, balls = row.errors.steps, row.errors.turns, row.bearing.balls
+    if (places := steps * turns * balls) > MOST_PLACES:
+        told = f"errors.steps = {steps}, errors.turns = {turns}: of {balls} balls these make {places} places"
+        raise InputError([f"{told}, more than the {MOST_PLACES} that memory has room for; take fewer steps or turns"])
     test = bench_of(row)
-    path = ball_path(errors_of(row.errors, row.bearing.balls), test.turning, row.errors.steps, row.errors.turns)
-    return follow(test.row, test.control, test.load, path, row.errors.turns, test.given)
+    path = ball_path(errors_of(row.errors, balls), test.turning, steps, turns)
+    return follow(test.row, test.control, test.load, path, turns, test.given)
 
 
 def bench_of(scene: BallScene, face_radius: float | None = None, steps: int = 120, turns: int = 2) -> Bench:

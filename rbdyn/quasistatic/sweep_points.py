@@ -15,10 +15,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from rbdyn.faults import InputError, refuse, validated
-from rbdyn.ranges import numbers
+from rbdyn.ranges import listed
 from rbdyn.scene.ball import BallScene
 
 MOST_POINTS = 100_000
+MEND = "write key=start:stop:count with a count of at least 2, or key=a,b,c"
 Path = tuple[str | int, ...]
 
 
@@ -40,11 +41,7 @@ def parsed(texts: Sequence[str]) -> dict[str, list[float]]:
             raise InputError([f"--sweep {text}: write it as key=start:stop:count or key=a,b,c"])
         if key in keys:
             raise InputError([f"--sweep {text}: {key} is swept twice; give all its values at once"])
-        try:
-            keys[key] = numbers(values, least=2)
-        except ValueError:
-            mend = "write key=start:stop:count with a count from 2 to 100000, or key=a,b,c"
-            raise InputError([f"--sweep {text}: not a list of numbers; {mend}"]) from None
+        keys[key] = listed(values, f"--sweep {text}", MEND, 2, MOST_POINTS)
     return keys
 
 

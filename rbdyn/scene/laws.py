@@ -12,6 +12,8 @@ from rbdyn.fields import NonNegative, Positive, or_refuse
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
 AUTO_WARM_UP_TURNS = 20.0
+# Batches of a turn that all replicates together may keep, 0.65 kB each; in one run they are longer where there would be more.
+MOST_KEPT, MOST_OF_A_RUN = 4_000_000, 20_000
 Restitution = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
@@ -125,3 +127,14 @@ class Numerics(Strict):
     def companions(self) -> int:
         """How many replicates are repeated."""
         return math.ceil(self.companion_share * self.replicates - 1e-9) if self.companion else 0
+
+    @model_validator(mode="after")
+    def _fits_into_memory(self) -> Numerics:
+        runs = self.replicates + self.companions
+        most = MOST_KEPT // runs
+        if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > most:
+            raise ValueError(
+                f"turns = {self.turns:g}: {runs} replicates and companions have memory for {most} turns each, warm-up "
+                "included; take fewer turns or replicates"
+            )
+        return self

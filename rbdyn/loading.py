@@ -1,0 +1,22 @@
+"""Ctrl-C while a command still loads. Loads nothing itself, so that it stands as early as can be."""
+
+import _signal  # type: ignore[import-not-found]  # ``signal`` makes enumerations, which takes long
+import os
+
+INTERRUPTED = 130
+
+
+class Loading:
+    """Within it Ctrl-C ends the process at once: nothing is there yet to be kept, and imports may swallow an exception."""
+
+    def __enter__(self) -> None:
+        self.ours = _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler
+        try:
+            if self.ours:
+                _signal.signal(_signal.SIGINT, lambda number, frame: os._exit(INTERRUPTED))
+        except ValueError:
+            self.ours = False  # only the main thread may say what a signal does
+
+    def __exit__(self, *error: object) -> None:
+        if self.ours:
+            _signal.signal(_signal.SIGINT, _signal.default_int_handler)

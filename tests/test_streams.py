@@ -1,0 +1,147 @@
+"""Streams that close, fill up or know only ASCII, and Ctrl-C: both commands, in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from conftest import EXAMPLE, ROOT
+
+EXAMPLES = ROOT / "examples"
+BALL = f"rbdyn ball {EXAMPLES}/angular_contact_ball.toml"
+STUDY = f"{EXAMPLES}/clearance_study.toml --data {EXAMPLES}/ccd_table4.csv"
+CHAIN = f"doe chain {EXAMPLES}/pocket_chain.toml"
+COMMANDS = [
+    "rbdyn --help",
+    "rbdyn simulate --help",
+    "doe study --help",
+    BALL,
+    f"{BALL} --preload 10:500:300",
+    f"{BALL} --sweep operation.inner_speed_rpm=1000:2000:3",
+    f"{CHAIN} -v",
+    f"{CHAIN} --json",
+    f"doe design {EXAMPLES}/clearance_study.toml -v",
+    f"doe design {EXAMPLES}/clearance_study.toml --csv",
+    f"doe fit {STUDY} -v",
+    f"doe front {STUDY} -v",
+]
+RUN = (
+    f"rbdyn simulate {EXAMPLE} --turns 2 --replicates 1 --set numerics.discard_turns=1 --set numerics.companion=false "
+    "--set numerics.extend=false -v"
+)
+SIMULATED = [
+    RUN,
+    f"rbdyn map {EXAMPLE} --speed 20000 --load 900 --turns 2 --replicates 1 --set numerics.companion=false",
+    f"rbdyn accuracy {EXAMPLES}/angular_contact_ball.toml",
+]
+
+
+def shell(line, **environment):
+    """Run a line of bash in which ``rbdyn`` and ``doe`` are this checkout's; the code of a pipe is its command's."""
+    functions = "".join(f'{name}() {{ {shlex.quote(sys.executable)} -m {name} "$@"; }}\n' for name in ("rbdyn", "doe"))
+    script = f"set -o pipefail\n{functions}{line}"
+    variables = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
+    return subprocess.run(["bash", "-c", script], capture_output=True, text=True, env=variables, check=False)
+
+
+@pytest.mark.parametrize(
+    ("line", "end"), list(zip(COMMANDS, 3 * ["| true", ">&-", "2>&-", "<&- >&- 2>&-"], strict=True))
+)
+def test_a_reader_that_goes_or_a_closed_stream_changes_no_exit_code(line, end):
+    """Command line: | true, >&- and 2>&- end as usual and without a word."""
+    found = shell(f"{line} {end}")
+    assert (found.returncode, found.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("line", [*COMMANDS[::3], *SIMULATED])
+def test_a_full_device_is_told_in_one_sentence(line):
+    """Command line: > /dev/full is exit code 1 and one sentence."""
+    found = shell(f"{line} > /dev/full")
+    assert found.returncode == 1
+    assert found.stderr == "standard output: No space left on device; make room, or write elsewhere\n"
+
+
+@pytest.mark.parametrize("line", [f"{CHAIN} -v", f"doe fit {STUDY} -v", f"doe front {STUDY} -v", RUN])
+def test_tables_are_written_where_only_ascii_goes(line):
+    """Command line: in the locale C tables come in ASCII, "±" as "+-"."""
+    found = shell(line, LC_ALL="C", **({"PYTHONUTF8": "0"} if line == RUN else {"PYTHONIOENCODING": "ascii"}))
+    assert (found.returncode, found.stderr) == (0, "")
+    assert found.stdout.isascii() and "?" not in found.stdout
+
+
+@pytest.mark.parametrize(
+    ("line", "files"),
+    [
+        (f"{BALL} --preload 10:500:300", {"preload.json"}),
+        (RUN, {"result.json", "history.csv", "cage_orbit.png", "pocket_forces.png"}),
+        (f"doe front {STUDY} -v", {"front.json"}),
+        (CHAIN, {"chain.json"}),
+    ],
+)
+def test_files_stand_whole_where_the_pipe_is_closed_early(line, files, tmp_path):
+    """Command line: --out writes what it writes without a pipe, whoever reads."""
+    found = shell(f"{line} --out {tmp_path} | head -3")
+    assert (found.returncode, found.stderr) == (0, "")
+    assert {path.name for path in tmp_path.iterdir()} == files
+    assert all(json.loads(path.read_text()) for path in tmp_path.glob("*.json"))
+
+
+def test_a_closed_error_stream_leaves_standard_output_to_json():
+    """Command line: sentences do not fall into standard output where standard error is closed."""
+    assert shell("doe chain none.toml 2>&-").stdout == ""
+    assert json.loads(shell("doe chain none.toml --json 2>&-").stdout)["status"] == "refused"
+    assert shell("doe chain none.toml 2>&-").returncode == 2
+
+
+@pytest.mark.parametrize("line", ["rbdyn --help", f"doe front {STUDY}", RUN])
+def test_ctrl_c_leaves_with_130_and_no_traceback(line):
+    """Command line: an interrupt at any time from the first import on; what had ended by then ended as usual."""
+    name, *arguments = shlex.split(line)
+    # Its first line tells that Python itself is up.
+    program = f"import rbdyn.loading; print(flush=True); from {name}.cli import run; run()"
+    codes = set()
+    for delay in (0.05, 0.1, 0.2, 0.4, 1.0):
+        process = subprocess.Popen(
+            [sys.executable, "-c", program, *arguments],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )  # fmt: skip
+        assert process.stdout.readline() == "\n"
+        time.sleep(delay)
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=60)
+        codes.add(process.returncode)
+        assert told in ("", "interrupted; what was finished is kept\n")
+    assert 130 in codes and codes <= {0, 130}
+
+
+def test_an_interrupt_that_a_callback_swallows_comes_again():
+    """Unit: Ctrl-C inside a callback from compiled code, where nothing can be raised, ends the command all the same."""
+    program = (
+        "import ctypes, signal, sys, time\nfrom rbdyn.streams import run\n"
+        "kind = ctypes.CFUNCTYPE(None)\n"
+        "swallowing = kind(lambda: signal.raise_signal(signal.SIGINT))\n"
+        "def app():\n    swallowing()\n    time.sleep(20)\n"
+        "run(app)"
+    )
+    started = time.monotonic()
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (found.returncode, found.stderr) == (130, "") and time.monotonic() - started < 10.0
+
+
+def test_the_guard_loads_nothing_heavy():
+    """Unit: what meets streams and interrupts stands before anything else is loaded."""
+    program = "import sys, rbdyn.loading; print(*{'typing', 'enum', 'threading', 'numpy'} & {*sys.modules})"
+    bare = "import sys; print(*{'typing', 'enum', 'threading', 'numpy'} & {*sys.modules})"
+    loaded, before = (
+        subprocess.run([sys.executable, "-I", "-S", "-c", f"import sys; sys.path.insert(0, {str(ROOT)!r}); {each}"],
+                       capture_output=True, text=True, check=True).stdout
+        for each in (program, bare)
+    )  # fmt: skip
+    assert loaded == before == "\n"
