@@ -7,7 +7,7 @@ import json
 import math
 import os
 import platform
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,23 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FORMAT = "rbdyn.simulation/3"
+# Figures of a simulation in JSON and tables, and their names here.
+FIGURES = {
+    "impact_force_N": "impact_force",
+    "impact_contact_force_N": "impact_contact_force",
+    "whirl_deviation_ratio": "whirl_deviation_ratio",
+    "power_loss_W": "power_loss",
+    "cage_speed_rpm": "cage_speed_rpm",
+    "cage_slip": "cage_slip",
+}
+# The same of what JSON holds as it is.
+PLAIN = {"power_terms_W": "power_terms", "clearance_um": "clearance"} | {
+    name: name
+    for name in (
+        *("status", "races", "impact_window_turns", "transient_turns", "counted_turns", "target"),
+        *("cost", "replicates", "seed", "versions", "scene"),
+    )
+}
 
 
 @dataclass(frozen=True)
@@ -43,12 +60,15 @@ class Quantity:
 
     def as_dict(self) -> dict[str, float | None]:
         """JSON form."""
-        return {
-            "value": self.value,
-            "statistical_error": self.statistical_error,
-            "numerical_error": self.numerical_error,
-            "effective_samples": self.effective_samples,
-        }
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Quantity:
+        """Inverse of ``as_dict``. Raises TypeError for anything else."""
+        errors = ("statistical_error", "numerical_error")
+        if not all(isinstance(x, (int, float)) or (x is None and name in errors) for name, x in dict(data).items()):
+            raise TypeError(data)
+        return cls(**data)
 
     def __str__(self) -> str:
         errors = [f"± {self.statistical_error:.2g} (statistical)" if self.statistical_error is not None else ""]
@@ -97,77 +117,34 @@ class SimulationResult:
         """JSON form."""
         return {
             "format": FORMAT,
-            "status": self.status,
-            "impact_force_N": self.impact_force.as_dict(),
-            "impact_contact_force_N": self.impact_contact_force.as_dict(),
-            "whirl_deviation_ratio": self.whirl_deviation_ratio.as_dict(),
-            "power_loss_W": self.power_loss.as_dict(),
-            "cage_speed_rpm": self.cage_speed_rpm.as_dict(),
-            "cage_slip": self.cage_slip.as_dict(),
+            **{key: getattr(self, name).as_dict() for key, name in FIGURES.items()},
             "power_balance": {"relative_gap": self.power_gap},
-            "power_terms_W": self.power_terms,
             "loads": {
                 "max_inner_N": self.max_inner_load,
                 "max_outer_N": self.max_outer_load,
                 "max_land_N": self.max_land_load,
             },
-            "races": self.races,
-            "clearance_um": self.clearance,
-            "impact_window_turns": self.impact_window_turns,
-            "transient_turns": self.transient_turns,
-            "counted_turns": self.counted_turns,
-            "target": self.target,
-            "cost": self.cost,
-            "replicates": self.replicates,
-            "seed": self.seed,
             "notes": list(self.notes),
-            "versions": self.versions,
-            "scene": self.scene,
+            **{key: getattr(self, name) for key, name in PLAIN.items()},
         }
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> SimulationResult:
         """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
+        figures: dict[str, Any] = {name: Quantity.from_dict(data[key]) for key, name in FIGURES.items()}
         return cls(
-            status=data["status"],
-            impact_force=Quantity(**data["impact_force_N"]),
-            impact_contact_force=Quantity(**data["impact_contact_force_N"]),
-            whirl_deviation_ratio=Quantity(**data["whirl_deviation_ratio"]),
-            power_loss=Quantity(**data["power_loss_W"]),
-            cage_speed_rpm=Quantity(**data["cage_speed_rpm"]),
-            cage_slip=Quantity(**data["cage_slip"]),
+            **figures,
+            **{name: data[key] for key, name in PLAIN.items()},
             power_gap=data["power_balance"]["relative_gap"],
-            power_terms=data["power_terms_W"],
-            max_inner_load=data["loads"]["max_inner_N"],
-            max_outer_load=data["loads"]["max_outer_N"],
-            max_land_load=data["loads"]["max_land_N"],
-            races=data["races"],
-            clearance=data["clearance_um"],
-            impact_window_turns=data["impact_window_turns"],
-            transient_turns=data["transient_turns"],
-            counted_turns=data["counted_turns"],
-            target=data["target"],
-            cost=data["cost"],
-            replicates=data["replicates"],
-            seed=data["seed"],
+            **{f"max_{part}_load": data["loads"][f"max_{part}_N"] for part in ("inner", "outer", "land")},
             notes=tuple(data["notes"]),
-            versions=data["versions"],
-            scene=data["scene"],
         )
 
     def table(self) -> pd.DataFrame:
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 
-        figures = {
-            "impact_force_N": self.impact_force,
-            "impact_contact_force_N": self.impact_contact_force,
-            "whirl_deviation_ratio": self.whirl_deviation_ratio,
-            "power_loss_W": self.power_loss,
-            "cage_speed_rpm": self.cage_speed_rpm,
-            "cage_slip": self.cage_slip,
-        }
-        rows = {name: figure.as_dict() for name, figure in figures.items()}
+        rows = {key: getattr(self, name).as_dict() for key, name in FIGURES.items()}
         return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
 
     def save(self, path: Path | str) -> None:
@@ -189,9 +166,9 @@ class SimulationResult:
 
 
 def write_json(path: Path | str, data: dict[str, Any]) -> None:
-    """Write JSON so that an interruption leaves the old file or the new one, never half of it."""
+    """Write JSON so that an interruption, or another process, leaves the old file or the new one, never half of it."""
     path = Path(path)
-    partial = path.with_name(path.name + ".partial")
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     os.replace(partial, path)
 
