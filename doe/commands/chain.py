@@ -32,7 +32,7 @@ def chain(
         several = is_several(path)
         results = {name: solve(each) for name, each in read_chains(path).items()}
         record = chains_record(results) if several else next(iter(results.values())).as_dict()
-        save(out, "chain.json", record)
+        save(out, path, "chain.json", record)
         if as_json:
             print_json(record)
         else:
