@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from doe.study.failure import Failure
 from doe.study.runner import Give, Outcome, Ran, Take, run_points
-from doe.study.store import Point, Store, run_key
+from doe.study.store import Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
-from rbdyn.result import SimulationResult, versions
+from rbdyn.kept import code_version, run_key
+from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
-from rbdyn.sources import source_digest
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.ensemble import Stop
@@ -168,7 +168,7 @@ def run_scenes(
     else:
         texts = {point.key: scene.model_dump_json() for point, scene in zip(points, scenes, strict=True)}
         engine = partial(_on_cluster, texts, scheduler)
-    found = run_points(points, store, engine, progress, retry)
+    found = run_points(points, store, engine, progress, sound, retry)
     return [_result(point, found[point.key]) for point in points]
 
 
@@ -186,10 +186,11 @@ def points_of(
     ]
 
 
-def code_version() -> str:
-    """Version of everything that the bits of a run depend on, the source code that computes them included."""
-    packages = {name: version for name, version in versions().items() if name != "python"}
-    return json.dumps({**packages, "sources": source_digest("rbdyn.dynamics.simulate")}, sort_keys=True)
+def sound(result: dict[str, Any]) -> bool:
+    """Whether a stored result is one of a simulation."""
+    with suppress(KeyError, TypeError, ValueError):
+        return bool(SimulationResult.from_dict(result))
+    return False
 
 
 def _result(point: Point, found: Outcome) -> SimulationResult | Failure:

@@ -51,13 +51,13 @@ def ball(
         if sweeps:
             from rbdyn.sweep_command import run as run_sweep
 
-            raise typer.Exit(run_sweep(loaded, sweeps, out, as_json, quiet))
+            raise typer.Exit(run_sweep(loaded, sweeps, out, scene, as_json, quiet))
         asked = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
         if any(value is not None for value in asked.values()):
             from rbdyn.ball_studies import run as run_study
 
-            raise typer.Exit(run_study(loaded, asked, wanted, out, as_json))
-        folder = output_folder(out) if out else None
+            raise typer.Exit(run_study(loaded, asked, wanted, out, scene, as_json))
+        folder = output_folder(out, "rbdyn ball", scene) if out else None
         from rbdyn.ball_command import print_result, with_runout, write
         from rbdyn.quasistatic.bearing import equilibrium
 

@@ -129,14 +129,16 @@ def _single(scene: BallScene, option: str) -> SingleRowScene:
         raise InputError([f"--{option}: is a study of one row of balls; a double-decker has two"]) from None
 
 
-def run(scene: BallScene, asked: Mapping[str, str | None], wanted: float, out: Path | None, as_json: bool) -> int:
+def run(
+    scene: BallScene, asked: Mapping[str, str | None], wanted: float, out: Path | None, source: Path, as_json: bool
+) -> int:
     """Carry out the one study asked for, print and write it; returns the exit code. Raises InputError."""
     chosen = {name: value for name, value in asked.items() if value is not None}
     if len(chosen) > 1:
         flags = " and ".join(f"--{name.replace('_', '-')}" for name in chosen)
         raise InputError([f"{flags}: are studies of their own; choose one"])
     ((name, value),) = chosen.items()
-    folder = output_folder(out) if out else None
+    folder = output_folder(out, "rbdyn ball", source) if out else None
     if name == "race_limits":
         record = race_limits(scene, value, wanted)
     else:

@@ -14,7 +14,7 @@ with Loading():
     from rbdyn import streams
     from rbdyn.ball_cli import ball
     from rbdyn.command_options import Json, Out, Quiet, Replicates, SceneFile, Seed, Set, Turns, Verbose, Workers
-    from rbdyn.terminal import FAILED, guarded, output_folder, print_json, print_table, progress_bar
+    from rbdyn.terminal import FAILED, guarded, keeping, output_folder, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from rbdyn.result import SimulationResult
@@ -57,7 +57,7 @@ def simulate(
     with guarded(as_json):
         loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
         aim = None if target is None else _aim(target, turns, replicates)
-        folder = output_folder(out) if out else None
+        folder = output_folder(out, "rbdyn simulate", scene) if out else None
         from rbdyn.dynamics.simulate import simulate as run_scene
 
         with progress_bar("simulating", quiet or as_json) as progress:
@@ -141,7 +141,7 @@ def accuracy(
         }
         limits = {key: value for key, value in given.items() if value is not None}
         name = asked_study(asked, limits, loaded)
-        folder = output_folder(out) if out else None
+        folder = output_folder(out, "rbdyn accuracy", scene) if out else None
         with progress_bar(name, quiet or as_json) as progress:
             found = studies.study(name, loaded, progress, **limits)
         files = studies.write(found, folder) if folder else []
@@ -165,20 +165,24 @@ def slip_map(
     replicates: Replicates = None,
     seed: Seed = None,
     workers: Workers = None,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write map.json, map.csv and map.png here.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write map.json, map.csv and map.png here, and keep finished points."),
+    ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Map cage slip, power loss, impact and whirl over speed and load."""
     with guarded(as_json):
         loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
-        folder = output_folder(out) if out else None
+        folder = output_folder(out, "rbdyn map", scene) if out else None
         from rbdyn import slip_map as study
         from rbdyn.ranges import axis_values
 
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
-        with progress_bar("mapping", quiet or as_json) as progress:
-            found = study.slip_map(loaded, *axes, workers, progress)
+        points = folder / study.POINTS if folder else None
+        with keeping(points), progress_bar("mapping", quiet or as_json) as progress:
+            found = study.slip_map(loaded, *axes, workers, progress, points)
         files = study.write(found, folder) if folder else []
         if as_json:
             print_json(found.as_dict())
@@ -319,7 +323,7 @@ def show(
         from rbdyn import show as motion
 
         asked = motion.ask(result, turns, replicate)
-        folder = output_folder(out or asked.path.parent / "show")
+        folder = output_folder(out or asked.path.parent / "show", "rbdyn show", asked.path)
         with progress_bar("showing", quiet or as_json) as progress:
             record = motion.write(asked, folder, animate, lyapunov, progress)
         if as_json:

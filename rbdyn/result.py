@@ -27,11 +27,14 @@ FIGURES = {
     "cage_speed_rpm": "cage_speed_rpm",
     "cage_slip": "cage_slip",
 }
-# What is named alike in JSON and here.
-PLAIN = (
-    *("races", "impact_window_turns", "transient_turns", "counted_turns", "target", "cost", "replicates", "seed"),
-    *("versions", "scene"),
-)
+# The same of what JSON holds as it is.
+PLAIN = {"power_terms_W": "power_terms", "clearance_um": "clearance"} | {
+    name: name
+    for name in (
+        *("status", "races", "impact_window_turns", "transient_turns", "counted_turns", "target"),
+        *("cost", "replicates", "seed", "versions", "scene"),
+    )
+}
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,14 @@ class Quantity:
     def as_dict(self) -> dict[str, float | None]:
         """JSON form."""
         return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Quantity:
+        """Inverse of ``as_dict``. Raises TypeError for anything else."""
+        errors = ("statistical_error", "numerical_error")
+        if not all(isinstance(x, (int, float)) or (x is None and name in errors) for name, x in dict(data).items()):
+            raise TypeError(data)
+        return cls(**data)
 
     def __str__(self) -> str:
         errors = [f"± {self.statistical_error:.2g} (statistical)" if self.statistical_error is not None else ""]
@@ -106,35 +117,27 @@ class SimulationResult:
         """JSON form."""
         return {
             "format": FORMAT,
-            "status": self.status,
             **{key: getattr(self, name).as_dict() for key, name in FIGURES.items()},
             "power_balance": {"relative_gap": self.power_gap},
-            "power_terms_W": self.power_terms,
             "loads": {
                 "max_inner_N": self.max_inner_load,
                 "max_outer_N": self.max_outer_load,
                 "max_land_N": self.max_land_load,
             },
-            "clearance_um": self.clearance,
             "notes": list(self.notes),
-            **{name: getattr(self, name) for name in PLAIN},
+            **{key: getattr(self, name) for key, name in PLAIN.items()},
         }
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> SimulationResult:
         """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
-        alike: dict[str, Any] = {name: data[name] for name in PLAIN}
-        alike |= {name: Quantity(**data[key]) for key, name in FIGURES.items()}
+        figures: dict[str, Any] = {name: Quantity.from_dict(data[key]) for key, name in FIGURES.items()}
         return cls(
-            status=data["status"],
+            **figures,
+            **{name: data[key] for key, name in PLAIN.items()},
             power_gap=data["power_balance"]["relative_gap"],
-            power_terms=data["power_terms_W"],
-            max_inner_load=data["loads"]["max_inner_N"],
-            max_outer_load=data["loads"]["max_outer_N"],
-            max_land_load=data["loads"]["max_land_N"],
-            clearance=data["clearance_um"],
+            **{f"max_{part}_load": data["loads"][f"max_{part}_N"] for part in ("inner", "outer", "land")},
             notes=tuple(data["notes"]),
-            **alike,
         )
 
     def table(self) -> pd.DataFrame:
@@ -178,9 +181,9 @@ def read_record(path: Path | str, form: str, what: str) -> dict[str, Any]:
 
 
 def write_json(path: Path | str, data: dict[str, Any]) -> None:
-    """Write JSON so that an interruption leaves the old file or the new one, never half of it."""
+    """Write JSON so that an interruption, or another process, leaves the old file or the new one, never half of it."""
     path = Path(path)
-    partial = path.with_name(path.name + ".partial")
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     os.replace(partial, path)
 

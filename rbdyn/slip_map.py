@@ -1,13 +1,14 @@
 """Cage slip, loss, whirl and impact over speed and load: where a bearing skids.
 
 Every point is the same scene at another inner speed and radial load. A point that cannot go on is kept as a record of
-its cause, and the others go on.
+its cause, and the others go on. Finished points may be kept in a file, so that an interrupted map goes on there.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,6 +24,7 @@ from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError
+from rbdyn.kept import Kept, code_version, run_key
 from rbdyn.ranges import MOST_VALUES
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
 
 FORMAT = "rbdyn.map/1"
 FIGURES = ("cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio")
+# Name of the finished points in the folder of a map.
+POINTS = "map_points.jsonl"
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,13 @@ class Point:
             **{name: figure.as_dict() for name, figure in self.figures.items()},
             "power_balance": {"relative_gap": self.power_gap},
         }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Point:
+        """Inverse of ``as_dict``. Raises KeyError for anything else."""
+        figures = {name: Quantity.from_dict(data[name]) for name in FIGURES if name in data}
+        place = (data["inner_speed_rpm"], data["radial_load_N"])
+        return cls(*place, data["status"], figures, data["power_balance"]["relative_gap"])
 
 
 @dataclass(frozen=True)
@@ -111,8 +122,9 @@ def slip_map(
     loads_N: Sequence[float],  # noqa: N803
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
+    kept_in: Path | None = None,
 ) -> SlipMap:
-    """Run the scene at every pair of inner speed and radial load.
+    """Run the scene at every pair of inner speed and radial load; what lies in the file ``kept_in`` is not run again.
 
     Raises InputError where a speed or load is impossible or the scene has a schedule, KeyboardInterrupt on Ctrl-C.
     """
@@ -121,14 +133,17 @@ def slip_map(
     if (count := len(speeds_rpm) * len(loads_N)) > MOST_VALUES:
         raise InputError([f"--speed, --load: {count} points are more than the {MOST_VALUES} kept at once; take fewer"])
     scenes = [_at(scene, speed, load) for load in loads_N for speed in speeds_rpm]
-    bearings = [roller_bearing(point) for point in scenes]
-    prepare(scenes[0], bearings[0])
+    kept, version = Kept(kept_in), code_version(__name__)
+    keys = [run_key(point.model_dump(mode="json"), version) for point in scenes]
+    points = {place: Point.from_dict(record) for place, key in enumerate(keys) if (record := kept.get(key))}
+    bearings = {place: roller_bearing(point) for place, point in enumerate(scenes) if place not in points}
+    for place in list(bearings)[:1]:
+        prepare(scenes[place], bearings[place])
     numerics = scene.numerics
     series = ((numerics.rtol, numerics.replicates), (companion_tolerance(numerics.rtol), numerics.companions))
     stop = Stop()
-    tasks = [
-        (place, rtol, replicate) for place in range(len(scenes)) for rtol, count in series for replicate in range(count)
-    ]
+    tasks = [(place, rtol, replicate) for place in bearings for rtol, count in series for replicate in range(count)]
+    waiting = Counter(place for place, _, _ in tasks)
     runs: dict[tuple[int, float, int], Replicate] = {}
     causes: dict[int, str] = {}
     done = 0
@@ -141,6 +156,14 @@ def slip_map(
             runs[tasks[one.place]] = one.result()
         else:
             causes[place] = min(str(one.fault), causes.get(place, str(one.fault)))
+        waiting[place] -= 1
+        if not waiting[place]:
+            cause = causes.get(place)
+            ours, theirs = (
+                [runs.pop((place, rtol, i)) for i in range(count)] if cause is None else [] for rtol, count in series
+            )
+            points[place] = _point(scenes[place], ours, theirs, cause)
+            kept.put(keys[place], points[place].as_dict())
         if progress is not None:
             progress(done, len(tasks))
 
@@ -150,13 +173,9 @@ def slip_map(
         for place, rtol, replicate in tasks
     ]
     run_all(work, workers, stop, ended)
-    points = []
-    for place, point in enumerate(scenes):
-        cause = causes.get(place)
-        ours, theirs = ([runs[place, rtol, i] for i in range(count)] if cause is None else [] for rtol, count in series)
-        points.append(_point(point, ours, theirs, cause))
     wall_s = time.perf_counter() - started
-    return SlipMap(tuple(speeds_rpm), tuple(loads_N), tuple(points), wall_s, scene.numerics.seed)
+    ordered = tuple(points[place] for place in range(len(scenes)))
+    return SlipMap(tuple(speeds_rpm), tuple(loads_N), ordered, wall_s, scene.numerics.seed)
 
 
 def write(slip_map: SlipMap, folder: Path) -> list[str]:

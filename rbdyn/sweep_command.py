@@ -30,12 +30,12 @@ HEADER = {
 }
 
 
-def run(scene: BallScene, texts: Sequence[str], out: Path | None, as_json: bool, quiet: bool) -> int:
-    """Sweep a scene as ``--sweep`` asks for; returns the exit code. Raises InputError."""
+def run(scene: BallScene, texts: Sequence[str], out: Path | None, source: Path, as_json: bool, quiet: bool) -> int:
+    """Sweep the scene of the file ``source`` as ``--sweep`` asks for; returns the exit code. Raises InputError."""
     from rbdyn.quasistatic.sweep_points import parsed
 
     keys = parsed(texts)
-    folder = output_folder(out) if out else None
+    folder = output_folder(out, "rbdyn ball", source) if out else None
     from rbdyn.quasistatic.sweep import sweep
 
     with progress_bar("sweeping", quiet or as_json) as progress:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,9 +16,12 @@ import typer
 
 from rbdyn.faults import InputError, RunError
 from rbdyn.loading import INTERRUPTED
+from rbdyn.result import write_json
 from rbdyn.streams import FAILED
 
 BAD_INPUT = 2
+# Names what a folder of results was made of.
+MARK = "made_by.json"
 
 
 @contextmanager
@@ -28,8 +33,8 @@ def guarded(as_json: bool) -> Iterator[None]:
         _leave(as_json, BAD_INPUT, error.faults)
     except RunError as error:
         _leave(as_json, FAILED, [str(error)])
-    except KeyboardInterrupt:
-        _leave(as_json, INTERRUPTED, ["interrupted; what was finished is kept"])
+    except KeyboardInterrupt as error:
+        _leave(as_json, INTERRUPTED, [f"interrupted; {str(error) or 'nothing was kept'}"])
     except MemoryError as error:
         _leave(
             as_json, FAILED, [f"out of memory: {error or 'no more is left'}; ask for fewer points, samples or turns"]
@@ -53,12 +58,39 @@ def print_json(record: dict[str, Any]) -> None:
     print(json.dumps(record, indent=1, allow_nan=False))
 
 
-def output_folder(path: Path) -> Path:
-    """Make the folder that ``--out`` names. Raises InputError where that is impossible."""
+@contextmanager
+def keeping(path: Path | None) -> Iterator[None]:
+    """Let Ctrl-C tell that what was finished lies in ``path``, once that is there; elsewhere nothing is kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if path is None or not path.exists():
+            raise
+        raise KeyboardInterrupt(f"what was finished is kept in {path}: start again to go on") from None
+
+
+def output_folder(path: Path, command: str, source: Path) -> Path:
+    """Make the folder that ``--out`` names, for what ``command`` makes of the file ``source``.
+
+    The rule of all commands: a folder belongs to one command and one file, noted in its ``made_by.json``. Results of the
+    same file, by its place or its content, are written over, those of another stay and the folder is refused. All commands
+    of ``doe`` count as one, for those on one study share its store. Raises InputError.
+    """
+    mark, source = path / MARK, source.resolve()
     try:
         path.mkdir(parents=True, exist_ok=True)
+        digest = hashlib.sha256(source.read_bytes()).hexdigest()
+        # From the folder on, so that both can be moved, or mounted elsewhere, together.
+        own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
+        found = json.loads(mark.read_text(encoding="utf-8")) if mark.exists() and len(os.listdir(path)) > 1 else own
+        if found["command"] != command or (own["file"] != found["file"] and digest != found["sha256"]):
+            whose = f"what {found['command']} made of {os.path.normpath(path / found['file'])}"
+            raise InputError([f"--out {path}: holds {whose}; name another folder or remove this one"])
+        write_json(mark, own)
     except OSError as error:
-        raise InputError([f"--out {path}: cannot be made a folder ({error.strerror}); name another"]) from None
+        raise InputError([f"--out {path}: is no folder to write to ({error.strerror}); name another"]) from None
+    except (ValueError, KeyError, TypeError):
+        raise InputError([f"--out {path}: its {MARK} cannot be read; name another folder or remove this one"]) from None
     return path
 
 

@@ -1,11 +1,13 @@
 """Studies whose simulations take no time: results made of the scene alone, for tests of what surrounds them.
 
 As a program: ``python instant_runs.py SECONDS_A_RUN STUDY.toml DIR WORKERS`` runs the design like that, and tells the
-responses or leaves as a command does.
+responses and the seeds that ran or leaves as a command does; with ``--whole`` it is ``doe study``, with the seeds on
+standard error.
 """
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Collection
 from pathlib import Path
@@ -64,16 +66,22 @@ def instantly(patch: Any, seconds: float = 0.0, faulty: Collection[int] = ()) ->
     return ran
 
 
-def main(seconds: float, study: Path, out: Path, workers: int) -> None:
+def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = False) -> None:
     """The program."""
+    from doe.commands.steps import keeping_runs
+    from doe.commands.study import study as doe_study
     from doe.study.runs import run_design
     from doe.study_file import Study
     from rbdyn.terminal import guarded, output_folder, print_json
 
-    instantly(setattr, seconds)
-    with guarded(as_json=True):
-        runs = run_design(Study.load(study), output_folder(out), workers, lambda done, total: None)
-        print_json({"values": runs.values.tolist()})
+    ran = instantly(setattr, seconds)
+    if whole:
+        doe_study(study, out, workers, as_json=True)
+        print(ran, file=sys.stderr)
+        return
+    with guarded(as_json=True), keeping_runs(out):
+        runs = run_design(Study.load(study), output_folder(out, "doe", study), workers, lambda done, total: None)
+        print_json({"values": runs.values.tolist(), "ran": ran})
 
 
 if __name__ == "__main__":

@@ -59,7 +59,15 @@ def test_command_line_writes_results_and_pictures(command, tmp_path):
     done = command("ball", QUIET, "--set", "errors.inner_roundness=[{order=2, amplitude_um=0.5}]", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     written = {path.name for path in tmp_path.iterdir()}
-    assert written == {"result.json", "balls.csv", "loads.png", "angles.png", "section.png", "runout.csv"}
+    assert written == {
+        "result.json",
+        "balls.csv",
+        "loads.png",
+        "angles.png",
+        "section.png",
+        "runout.csv",
+        "made_by.json",
+    }
     assert "runout over" in done.stdout
     record = json.loads((tmp_path / "result.json").read_text())
     assert record["status"] == "ok" and record["runout"]["turns"] >= 1

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -146,7 +148,7 @@ def test_point_that_kills_its_workers_is_told_as_lost_and_the_others_are_kept(tm
 @pytest.mark.slow
 def test_worker_with_other_sources_is_refused(tmp_path, monkeypatch):
     study = Study.load(short_study(tmp_path))
-    monkeypatch.setattr("doe.clearance.source_digest", lambda *roots: "edited")
+    monkeypatch.setattr("rbdyn.kept.source_digest", lambda *roots: "edited")
     with started(tmp_path, 1) as there, pytest.raises(InputError, match="runs another version of rbdyn"):
         run_design(study, tmp_path, None, silent, there.address)
     with Store(tmp_path / STORE, read_only=True) as store:
@@ -160,10 +162,35 @@ def test_scheduler_that_is_not_there_is_one_sentence(tmp_path):
     assert time.monotonic() - before < 60.0
     assert shown.returncode == 2
     assert shown.stderr.strip().splitlines() == json.loads(shown.stdout)["faults"] == [
-        "--scheduler 127.0.0.1:1: no dask scheduler answers there within 4 s; check the address"
+        "--scheduler 127.0.0.1:1: no dask scheduler answers there within 2 s; check the address"
     ]  # fmt: skip
     with Store(tmp_path / STORE, read_only=True) as store:
         assert store.claims() == []
+
+
+@pytest.mark.parametrize("answer", [None, b"", b"HTTP/1.0 400 Bad Request\r\n\r\n", b"SSH-2.0\r\n", b"\0" * 64])
+def test_what_is_no_scheduler_is_one_sentence_within_five_seconds(answer):
+    """None: it never says anything; b"": it hangs up; the others talk and leave the line open."""
+    with socket.create_server(("127.0.0.1", 0)) as server, ExitStack() as open_lines:
+
+        def talk() -> None:
+            with suppress(OSError):
+                while True:
+                    line, _ = server.accept()
+                    if answer == b"":
+                        line.close()
+                        continue
+                    open_lines.enter_context(line)
+                    line.sendall(answer or b"")
+
+        threading.Thread(target=talk, daemon=True).start()
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+        before = time.monotonic()
+        with pytest.raises(
+            InputError, match=f"^--scheduler {address}: no dask scheduler answers there within 2 s; check"
+        ):
+            collected(address, ["0"])
+        assert time.monotonic() - before < 5.0
 
 
 def test_cluster_without_its_package_is_one_sentence(monkeypatch):

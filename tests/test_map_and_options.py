@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +17,9 @@ from rbdyn.faults import InputError
 from rbdyn.option_cost import OPTIONS, option_costs, study, with_options
 from rbdyn.ranges import axis_values
 from rbdyn.scene import Scene
-from rbdyn.slip_map import FIGURES, slip_map, write
+from rbdyn.slip_map import FIGURES, POINTS, slip_map, write
 
+EXAMPLE = Path(__file__).parent.parent / "examples" / "cylindrical_roller.toml"
 SPEEDS, LOADS = (12000.0, 24000.0), (60.0, 1300.0)
 
 
@@ -63,6 +69,100 @@ def test_unit_failed_points_are_records(make_scene):
     assert "step budget" in found.failed[0].status
     assert np.isnan(found.grid("cage_slip")[1, 0]) and np.isfinite(found.grid("cage_slip")[0, 0])
     assert found.as_dict()["status"] == "1 of 2 points failed"
+
+
+def counted(monkeypatch) -> list[float]:
+    """Loads of the runs that a map begins from here on."""
+    from rbdyn import slip_map as module
+
+    ran, usual = [], module.run_replicate
+
+    def run(scene, *rest):
+        ran.append(scene.operation.radial_load_N)
+        return usual(scene, *rest)
+
+    monkeypatch.setattr(module, "run_replicate", run)
+    return ran
+
+
+def interrupt(done: int, total: int) -> None:
+    """Progress that is stopped by Ctrl-C in the middle."""
+    if done == total // 2:
+        raise KeyboardInterrupt
+
+
+def test_unit_interrupted_map_goes_on_with_the_same_bits(outer, found, tmp_path, monkeypatch):
+    """Unit: what was finished is not run again; figures equal those of an uninterrupted map to the last bit."""
+    path = tmp_path / POINTS
+    ran = counted(monkeypatch)
+    with pytest.raises(KeyboardInterrupt):
+        slip_map(outer, SPEEDS, LOADS, 1, interrupt, path)
+    kept = path.read_bytes()
+    assert len(kept.split()) > 2 and lines(path) == 2 and LOADS[1] not in ran[:4]
+    ran.clear()
+    assert slip_map(outer, SPEEDS, LOADS, 1, None, path).points == found.points
+    assert ran == 4 * [LOADS[1]]
+    ran.clear()
+    # A finer map takes over what it shares; of a line cut short nothing is read.
+    path.write_bytes(path.read_bytes()[:-9])
+    finer = slip_map(outer, SPEEDS, (60.0, 600.0, 1300.0), 2, None, path)
+    assert sorted(ran) == 4 * [600.0] + 2 * [1300.0]
+    assert (*finer.points[:2], *finer.points[4:]) == found.points
+
+
+def test_unit_map_of_another_scene_or_code_runs_again(make_scene, tmp_path, monkeypatch):
+    """Unit: a kept point is of its scene and of the code that ran it; a failed one is kept with its cause."""
+    budget = ("numerics.step_budget_per_turn=100", "numerics.method=rk45")
+    place = ((24000.0,), (1300.0,), 1, None, tmp_path / POINTS)
+    ran = counted(monkeypatch)
+    first = slip_map(make_scene(*budget), *place)
+    assert slip_map(make_scene(*budget), *place).points == first.points and len(ran) == 2
+    assert "step budget" in first.failed[0].status
+    slip_map(make_scene(*budget, "numerics.seed=2"), *place)
+    assert len(ran) == 4
+    monkeypatch.setattr("rbdyn.kept.source_digest", lambda: "edited")
+    slip_map(make_scene(*budget), *place)
+    assert len(ran) == 6
+
+
+@pytest.mark.slow
+def test_command_line_killed_map_resumes(command, tmp_path):
+    """Command line: after SIGKILL and after Ctrl-C, which tells what is kept, the map is that of an undisturbed run."""
+    where = ("--speed", "12000,24000", "--load", "200:1300:3", "--workers", "1", "--turns", "60", "--replicates", "2")
+    arguments = ("map", str(EXAMPLE), *where, "--set", "numerics.companion=false")
+    assert command(*arguments, "--out", tmp_path / "whole").returncode == 0
+    out = tmp_path / "out"
+    for count, number in ((1, signal.SIGKILL), (3, signal.SIGINT)):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rbdyn", *arguments, "--out", str(out)],
+            stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )  # fmt: skip
+        deadline = time.monotonic() + 120.0
+        while time.monotonic() < deadline and not ((out / POINTS).exists() and lines(out / POINTS) >= count):
+            time.sleep(0.01)
+        process.send_signal(number)
+        _, said = process.communicate()
+        assert process.returncode == (-signal.SIGKILL if number == signal.SIGKILL else 130), said
+    assert said.strip() == f"interrupted; what was finished is kept in {out / POINTS}: start again to go on"
+    assert 3 <= lines(out / POINTS) < 6
+    assert command(*arguments, "--out", out).returncode == 0
+    one, two = (json.loads((folder / "map.json").read_text()) for folder in (tmp_path / "whole", out))
+    assert one["points"] == two["points"] and lines(out / POINTS) == 6
+    stopped = subprocess.Popen(
+        [sys.executable, "-m", "rbdyn", *arguments, "--json"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    time.sleep(5.0)
+    stopped.send_signal(signal.SIGINT)
+    shown, said = stopped.communicate()
+    assert (stopped.returncode, json.loads(shown)["status"]) == (130, "interrupted")
+    assert said.strip() == "interrupted; nothing was kept"
+
+
+def lines(path: Path) -> int:
+    """Points that a file of them holds."""
+    return sum(bool(line.strip()) for line in path.read_text().splitlines())
 
 
 def test_unit_axis_values():

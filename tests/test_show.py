@@ -48,7 +48,8 @@ def test_show_writes_pictures_samples_and_figures(saved, shown):
     """Show: every file it names is there; orbit.json is what --json prints; the motion is that of simulate, to the bit."""
     folder, record = shown
     written = {path.name for path in folder.iterdir()}
-    assert written == set(record["files"])
+    assert written == {*record["files"], "made_by.json"}
+    written.remove("made_by.json")
     assert written - {"bearing.gif", "bearing.mp4"} == PICTURES | {"orbit.json", "history.csv", "bearing.html"}
     for name in PICTURES:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
@@ -119,7 +120,11 @@ def test_show_prints_a_table_beside_the_result(command, saved):
     assert done.returncode == 0, done.stderr
     for words in ("1 shaft turns of replicate 2, seed 1", "whirl speed over cage speed", "never touched", "peaks [Hz]"):
         assert words in done.stdout
-    assert {path.name for path in (saved / "show").iterdir()} == PICTURES | {"orbit.json", "history.csv"}
+    assert {path.name for path in (saved / "show").iterdir()} == PICTURES | {
+        "orbit.json",
+        "history.csv",
+        "made_by.json",
+    }
     assert len((saved / "show" / "history.csv").read_text().splitlines()) == 1 + 512
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import sqlite3
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +20,7 @@ from doe.study.failure import Failure, grouped
 from doe.study.owner import LEASE_S, this_process
 from doe.study.store import Point, Store
 from rbdyn.faults import InputError, RunError
+from rbdyn.kept import digest_of
 
 POINTS = [Point(f"key {number}", f"design run {number}", number, {"x": 0.5}) for number in range(1, 9)]
 
@@ -67,15 +70,18 @@ def foreign(path: Path, *statements: str) -> None:
 @pytest.mark.parametrize(
     ("statements", "words"),
     [
-        ((), "cannot be used as a store of runs"),
+        ((), "it is no database; move it away or name another folder"),
         (("CREATE TABLE birds (name TEXT)",), "not a store of runs"),
-        (("CREATE TABLE runs (key TEXT PRIMARY KEY, result TEXT)",), "a store of version 1, not 2"),
+        (
+            ("CREATE TABLE runs (key TEXT PRIMARY KEY, result TEXT)",),
+            "a store of version 1, not 2; move it away or name another folder",
+        ),
         (
             (
                 "CREATE TABLE meta (name TEXT, value TEXT)",
                 "INSERT INTO meta VALUES ('format', 'doe.store'), ('version', '3')",
             ),
-            "a store of version 3, not 2",
+            "a store of version 3, not 2; install the newer doe that made it or name",
         ),
     ],
 )
@@ -90,6 +96,44 @@ def test_what_is_no_store_of_this_version_is_refused_and_left_alone(path, statem
     assert len(refused.value.faults) == 1 and str(path) in refused.value.faults[0]
     assert path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]
+
+
+def test_folder_in_place_of_the_file_or_no_folder_is_told_as_such(path):
+    with pytest.raises(InputError, match=r"study\.sqlite: .*see that its folder is there"):
+        Store(path / "nowhere" / path.name)
+    path.mkdir()
+    with pytest.raises(InputError, match=r"study\.sqlite: is a folder where a file of runs belongs; move it away"):
+        Store(path)
+
+
+def test_folder_that_cannot_be_written_is_told_as_such():
+    folder = Path(tempfile.mkdtemp())
+    user, path = os.geteuid(), folder / "study.sqlite"
+    try:
+        for made in (False, True):
+            if made:
+                Store(path).close()
+            folder.chmod(0o555)
+            if user == 0:
+                os.seteuid(65534)
+            try:
+                with pytest.raises(InputError, match=r"study\.sqlite: .*that both can be written, or name") as refused:
+                    Store(path)
+            finally:
+                os.seteuid(user)
+                folder.chmod(0o755)
+            assert len(refused.value.faults) == 1 and "\n" not in str(refused.value)
+    finally:
+        shutil.rmtree(folder)
+
+
+def test_file_that_another_process_holds_is_told_as_such(path, monkeypatch):
+    monkeypatch.setattr("doe.study.database.PATIENCE_S", 0.1)
+    with Store(path) as holder, Store(path) as other:
+        holder._connection.execute("BEGIN EXCLUSIVE")
+        with pytest.raises(InputError, match=r"another process holds it; start again when that has ended$"):
+            other.put("key 1", result(1))
+        holder._connection.execute("ROLLBACK")
 
 
 def test_cut_file_is_refused(path):
@@ -132,15 +176,54 @@ def test_results_are_on_the_disk_when_put_returns_and_claims_need_not_be(path):
     assert settings == ["NORMAL", "FULL"]
 
 
-def test_spoilt_result_is_not_read_but_run_again(path):
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        "result = replace(result, '1 1', '1 7')",
+        "result = NULL",
+        "digest = NULL",
+        "result = x'ff00'",
+        "result = CAST(x'7bff' AS TEXT)",
+        "result = 5",
+        f"result = '{{', digest = '{digest_of('{')}'",
+        f"result = '[]', digest = '{digest_of('[]')}'",
+        f"result = 'null', digest = '{digest_of('null')}'",
+        "status = 'failed', cause = NULL",
+    ],
+)
+def test_spoilt_result_is_told_and_not_read_but_run_again(path, spoilt, capsys):
     with Store(path) as store:
         store.put("key 1", result(1))
-    foreign(path, "UPDATE runs SET result = replace(result, '1 1', '1 7')")
+    foreign(path, f"UPDATE runs SET {spoilt}")
     with Store(path) as store:
-        assert store.get("key 1") is None
+        assert store.outcomes(POINTS[:1]) == store.outcomes(POINTS[:1]) == {}
+        assert capsys.readouterr().err == f"{path}: kept results that cannot be read count as not done: design run 1\n"
         assert store.claim(POINTS[:1]) == {"key 1"}
         store.put("key 1", result(1))
         assert store.get("key 1") == result(1)
+
+
+def test_spoilt_times_and_signs_of_life_stop_nobody(path):
+    with Store(path) as store, Store(path) as other:
+        store.put("key 1", result(1), seconds=2.0)
+        other.claim(POINTS[1:3])
+        times = "started = 'then', ended = CASE key WHEN 'key 1' THEN 'now' END, seconds = NULL"
+        store._connection.execute(f"UPDATE runs SET {times}")
+        assert store.get("key 1") == result(1) and store.ended() == []
+        assert [claim.since for claim in store.claims()] == [0.0, 0.0]
+        for beat in ("NULL", "'soon'"):
+            store._connection.execute(f"UPDATE owners SET beat = {beat}")
+            assert store.claims() == []
+
+
+def test_failure_dated_ahead_by_another_clock_is_tried_again(path):
+    with Store(path) as store:
+        store.claim(POINTS[:1])
+        store.fail("key 1", "it broke")
+    foreign(path, f"UPDATE runs SET ended = {time.time() + 1e5}")
+    with Store(path) as store:
+        store.forget_failures(POINTS)
+        assert store.outcomes(POINTS) == {}
 
 
 def test_full_disk_is_one_sentence_and_keeps_what_was_finished(path):
@@ -208,6 +291,25 @@ def test_claims_of_another_machine_last_as_long_as_the_lease(path):
     elsewhere = replace(this_process(), host="elsewhere", machine="elsewhere")
     assert claimed_by(path, elsewhere, time.time() - 0.5 * LEASE_S) == set()
     assert claimed_by(path, elsewhere, time.time() - 1.1 * LEASE_S) == keys
+
+
+def test_claim_from_the_future_is_told_and_lasts_one_lease_from_when_it_was_first_seen(path, monkeypatch, capsys):
+    monkeypatch.setattr(owner, "LEASE_S", 0.3)
+    elsewhere = replace(this_process(), host="elsewhere", machine="elsewhere")
+    assert claimed_by(path, elsewhere, time.time() + 86400.0) == set()
+    assert re.fullmatch(
+        rf"{path}: process {os.getpid()} on elsewhere gave its last sign of life 86\d\d\d s ahead of this clock; set both "
+        r"clocks right\. Unless it gives another within 60 s, its runs are taken over\n",
+        capsys.readouterr().err,
+    )
+    with Store(path) as store:
+        time.sleep(0.2)
+        store._connection.execute("UPDATE owners SET beat = beat + 5")
+        time.sleep(0.2)
+        # Older than a lease since the first sign, but there was another.
+        assert store.claim(POINTS) == set()
+        time.sleep(0.4)
+        assert store.claim(POINTS) == {point.key for point in POINTS}
 
 
 def test_a_live_process_gives_signs_of_life(path, monkeypatch):

@@ -24,10 +24,10 @@ from doe.study.finished import finished as is_finished
 from doe.study.finished import inputs_digest
 from doe.study.front import find_front
 from doe.study.runs import read_runs, run_design
-from doe.study.store import run_key
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError
+from rbdyn.kept import run_key
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SHORT = "turns=3,discard_turns=1,replicates=2,companion=false,impact_window_turns=1"
@@ -170,6 +170,43 @@ def test_killed_study_loses_no_finished_run(finished, tmp_path):
     finished_rows = rows(store)
     assert len(finished_rows) == 20
     assert survived.items() <= finished_rows.items()
+
+
+@pytest.mark.slow
+def test_direct_front_killed_in_its_search_resumes_with_the_same_bits(tmp_path):
+    short = SHORT.replace("turns=3,", "turns=12,")
+    path = short_study(tmp_path, short)
+    text = path.read_text(encoding="utf-8")
+    direct = text[text.index("[direct]") : text.index("[tolerances]")]
+    brief = "[direct]\nevaluations = 60\npopulation = 8\nreplicates = 2\nturns = 13\ndiscard_turns = 1\n\n"
+    path.write_text(text.replace(direct, brief), encoding="utf-8")
+
+    def begin(out: str) -> subprocess.Popen:
+        command = [sys.executable, "-m", "doe", "study", str(path), "--direct", "--workers", "1", "--out"]
+        return subprocess.Popen([*command, str(tmp_path / out)], stdout=subprocess.DEVNULL)
+
+    assert begin("whole").wait(600) == 0
+    store = tmp_path / "out" / "study.sqlite"
+    for count in (30, 55):
+        process = begin("out")
+        deadline = time.monotonic() + 300.0
+        while stored(store) < count and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.kill()
+        process.wait()
+        survived = rows(store)
+        # In the midst of the search: after the 20 design runs, before the 60 evaluations are done.
+        assert count <= len(survived) < 80
+    assert begin("out").wait(600) == 0
+    ended = rows(store)
+    assert survived.items() <= ended.items() and ended.keys() == rows(tmp_path / "whole" / "study.sqlite").keys()
+    one, two = (json.loads((tmp_path / out / "summary.json").read_text()) for out in ("whole", "out"))
+    assert one.pop("cost") != two.pop("cost")
+    for record in (one, two):
+        del record["direct"]["seconds"], record["direct"]["comparison_seconds"]
+    assert one == two
+    for name in ("front.csv", "confirmation.csv", "design_runs.csv"):
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
 def stored(path: Path) -> int:

@@ -10,6 +10,7 @@ import os
 import re
 import resource
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -30,6 +31,7 @@ from doe.study.status import study_status
 from doe.study.store import Store
 from doe.study_file import Study
 from rbdyn.faults import RunError
+from rbdyn.kept import digest_of
 
 CENTRES = range(15, 21)
 
@@ -41,10 +43,10 @@ def seeds_run(store: Path) -> list[int]:
         return sorted(opened.get(key)["seed"] for key in keys)
 
 
-def start(study: Path, out: Path, seconds: float, workers: int, **how) -> subprocess.Popen:
+def start(study: Path, out: Path, seconds: float, workers: int, *options: str, **how) -> subprocess.Popen:
     """The design in a process of its own, on simulations that take so long."""
     program = Path(__file__).with_name("instant_runs.py")
-    command = [sys.executable, str(program), str(seconds), str(study), str(out), str(workers)]
+    command = [sys.executable, str(program), str(seconds), str(study), str(out), str(workers), *options]
     # Where the tests run in the background of a shell, Ctrl-C is switched off and that is inherited.
     how = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler), **how}
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how)
@@ -147,7 +149,7 @@ def test_other_code_runs_everything_again_also_what_failed(tmp_path, monkeypatch
     study = Study.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, faulty=(6,))
     assert run_design(study, tmp_path, 2, silent).failures
-    monkeypatch.setattr(clearance, "source_digest", lambda *roots: "edited")
+    monkeypatch.setattr("rbdyn.kept.source_digest", lambda *roots: "edited")
     ran = instantly(monkeypatch.setattr)
     assert not run_design(study, tmp_path, 2, silent).failures
     assert sorted(ran) == list(range(1, 21))
@@ -159,10 +161,65 @@ def test_two_processes_share_a_study_and_nothing_runs_twice(tmp_path):
     answers = [process.communicate(timeout=120) for process in both]
     assert [process.returncode for process in both] == [0, 0], answers
     one, two = (json.loads(shown) for shown, _ in answers)
-    assert one == two and len(one["values"]) == 20
+    assert one["values"] == two["values"] and len(one["values"]) == 20
+    assert sorted(one["ran"] + two["ran"]) == list(range(1, 21))
     with Store(out / STORE, read_only=True) as store:
         owners = [run.owner for run in store.ended()]
     assert len(owners) == 20 and len(set(owners)) == 2
+
+
+def test_two_doe_study_on_one_folder_both_get_runs_and_none_runs_twice(tmp_path):
+    study, out = short_study(tmp_path), tmp_path / "out"
+    both = [start(study, out, 0.1, 1, "--whole") for _ in range(2)]
+    answers = [process.communicate(timeout=200) for process in both]
+    assert [process.returncode for process in both] == [0, 0], answers
+    ran = [json.loads(said.splitlines()[-1]) for _, said in answers]
+    together = [seed for seeds in ran for seed in seeds]
+    assert all(ran) and set(range(1, 21)) < set(together)
+    # Baseline and pick are confirmed with one seed, that of no design run.
+    assert max(together.count(seed) for seed in range(1, 21)) == 1
+    with Store(out / STORE, read_only=True) as store:
+        ended = store.ended()
+    assert len(ended) == len(together) and len({run.owner for run in ended if run.seconds is not None}) >= 2
+    one, two = (json.loads(shown) for shown, _ in answers)
+    assert one["pick"] == two["pick"] and json.loads((out / "summary.json").read_text())["pick"] == one["pick"]
+    assert not list(out.glob("*.partial"))
+
+
+def spoil(store: Path, key: str, **values) -> None:
+    """Write something else into the row of a run."""
+    with sqlite3.connect(store) as connection:
+        connection.execute(
+            f"UPDATE runs SET {', '.join(f'{name} = :{name}' for name in values)} WHERE key = :key",
+            {**values, "key": key},
+        )
+
+
+def test_rows_that_are_no_results_run_again_with_one_sentence(tmp_path, monkeypatch, capsys):
+    study = Study.load(short_study(tmp_path))
+    ran = instantly(monkeypatch.setattr)
+    run_design(study, tmp_path, 1, silent)
+    with Store(tmp_path / STORE, read_only=True) as store:
+        by_seed = {store.get(run.key)["seed"]: run.key for run in store.ended()}
+        whole = store.get(by_seed[5])
+    without = {name: part for name, part in whole.items() if name != "power_loss_W"}
+    typed = {**whole, "power_loss_W": {**whole["power_loss_W"], "value": "much"}}
+    faulty: list[object] = [{}, [], None, without, typed, {**whole, "cage_slip": None}, {**whole, "loads": 3}]
+    for seed, record in enumerate(faulty, 1):
+        text = json.dumps(record)
+        spoil(tmp_path / STORE, by_seed[seed], result=text, digest=digest_of(text))
+    spoil(tmp_path / STORE, by_seed[8], result=None)
+    spoil(tmp_path / STORE, by_seed[9], result="{", digest=digest_of("{"))
+    spoil(tmp_path / STORE, by_seed[10], result=b"\xff\x00")
+    ran.clear()
+    capsys.readouterr()
+    assert study_status(study, tmp_path)["points"]["missing"] == 10
+    labels = ", ".join(f"design run {run}" for run in range(1, 11))
+    sentence = f"{tmp_path / STORE}: kept results that cannot be read count as not done: {labels}\n"
+    assert capsys.readouterr().err == sentence
+    runs = run_design(study, tmp_path, 1, silent)
+    assert sorted(ran) == list(range(1, 11)) and not runs.failures
+    assert capsys.readouterr().err == sentence
 
 
 def test_killed_process_is_taken_over_at_once_by_one_that_waits_for_it(tmp_path, monkeypatch):
@@ -193,7 +250,7 @@ def test_ctrl_c_keeps_what_was_finished_and_gives_back_the_rest(tmp_path):
     shown, said = process.communicate(timeout=60)
     assert process.returncode == 130
     assert json.loads(shown) == {"status": "interrupted"}
-    assert said.strip() == "interrupted; what was finished is kept"
+    assert said.strip() == f"interrupted; what was finished is kept in {out / STORE}: start again to go on"
     status = study_status(Study.load(study), out)
     assert status["points"]["running"] == 0 and status["status"] == "unfinished"
     assert 3 <= status["points"]["done"] == len(seeds_run(out / STORE)) < 20

@@ -40,7 +40,7 @@ def chain(
         if faults:
             raise InputError(faults)
         record = chains_record(results) if several else next(iter(results.values())).as_dict()
-        save(out, "chain.json", record)
+        save(out, path, "chain.json", record)
         if as_json:
             print_json(record)
         else:

@@ -32,7 +32,7 @@ def design(
             check_study(loaded)
         points = design_of(loaded)
         record = design_record(loaded, points, evaluation(loaded, points))
-        save(out, "design.json", record)
+        save(out, path, "design.json", record)
         if as_json:
             print_json(record)
         elif as_csv:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from doe.commands.options import Data, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
-from doe.commands.steps import fitted, save
+from doe.commands.steps import fitted, keeping_runs, save
 from rbdyn.terminal import guarded, print_json
 
 
@@ -25,14 +25,14 @@ def fit(
     ] = False,
 ) -> None:
     """Fit the response surfaces and print their analysis of variance."""
-    with guarded(as_json):
+    with guarded(as_json), keeping_runs(out):
         from doe.report.fit import fit_record, fit_tables, print_fit
         from doe.study.surfaces import with_rivals
 
         loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)
         surfaces = with_rivals(surfaces)
         record = fit_record(surfaces)
-        save(out, "fit.json", record)
+        save(out, path, "fit.json", record)
         if out is not None:
             import pandas as pd
 

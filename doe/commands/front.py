@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from doe.commands.options import Data, Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
-from doe.commands.steps import fitted, save, searched
+from doe.commands.steps import fitted, keeping_runs, save, searched
 from rbdyn.faults import InputError, refuse
 from rbdyn.terminal import guarded, print_json
 
@@ -37,7 +37,7 @@ def front(
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also every point of the front.")] = False,
 ) -> None:
     """Find the Pareto front on the response surfaces."""
-    with guarded(as_json):
+    with guarded(as_json), keeping_runs(out):
         from doe.report.front import asked_point_record, front_record, print_front
         from doe.study.front import find_front
         from doe.study.goals import check_goals
@@ -59,7 +59,7 @@ def front(
             record["direct"] = direct_record(
                 loaded, searched(loaded, found, out, workers, quiet or as_json, scheduler, retry)
             )
-        save(out, "front.json", record)
+        save(out, path, "front.json", record)
         if as_json:
             print_json(record)
         else:

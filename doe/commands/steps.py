@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.terminal import output_folder, progress_bar
+from rbdyn.terminal import keeping, output_folder, progress_bar
 
 if TYPE_CHECKING:
     from doe.pareto import ParetoFront
@@ -17,12 +17,21 @@ if TYPE_CHECKING:
     from doe.study_file import Study
 
 
-def save(out: Path | None, name: str, record: dict[str, Any]) -> None:
-    """Write the JSON record of a command into the folder of ``--out``, if one is given."""
+def save(out: Path | None, source: Path, name: str, record: dict[str, Any]) -> None:
+    """Write the JSON record that a command made of the file ``source`` into the folder of ``--out``, if one is given."""
     if out is not None:
         from rbdyn.result import write_json
 
-        write_json(output_folder(out) / name, record)
+        write_json(output_folder(out, "doe", source) / name, record)
+
+
+@contextmanager
+def keeping_runs(out: Path | None) -> Iterator[None]:
+    """Let Ctrl-C tell that finished runs are kept, once there is a store of them in ``out``."""
+    from doe.study.runs import STORE
+
+    with keeping(None if out is None else out / STORE):
+        yield
 
 
 def fitted(
@@ -42,7 +51,7 @@ def fitted(
     loaded = Study.load(path)
     if data is not None:
         return loaded, fit_surfaces(loaded, read_runs(loaded, data))
-    with _store_folder(out) as folder, progress_bar("design runs", quiet) as progress:
+    with _store_folder(out, path) as folder, progress_bar("design runs", quiet) as progress:
         return loaded, fit_surfaces(loaded, run_design(loaded, folder, workers, progress, scheduler, retry))
 
 
@@ -62,7 +71,7 @@ def searched(
     from doe.study.store import Store
 
     with (
-        _store_folder(out) as folder,
+        _store_folder(out, study.path) as folder,
         Store(folder / STORE, study.path.stem) as store,
         progress_bar("direct front", quiet) as progress,
     ):
@@ -70,10 +79,10 @@ def searched(
 
 
 @contextmanager
-def _store_folder(out: Path | None) -> Iterator[Path]:
+def _store_folder(out: Path | None, source: Path) -> Iterator[Path]:
     """The given folder, or one that lasts as long as the command."""
     if out is not None:
-        yield output_folder(out)
+        yield output_folder(out, "doe", source)
         return
     with tempfile.TemporaryDirectory() as folder:
         yield Path(folder)

@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from doe.commands.options import Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
+from doe.commands.steps import keeping_runs
 from rbdyn.terminal import FAILED, guarded, output_folder, print_json, progress_bar
 
 
@@ -25,11 +26,12 @@ def study(
     verbose: Verbose = False,
 ) -> None:
     """Design, simulate, fit, optimise, confirm and dimension in one go; resumes by itself."""
-    with guarded(as_json), ExitStack() as bars:
+    folder = out or Path(f"{path.stem}_results")
+    with guarded(as_json), keeping_runs(folder), ExitStack() as bars:
         from doe.study_file import Study
 
         loaded = Study.load(path)
-        folder = output_folder(out or Path(f"{path.stem}_results"))
+        output_folder(folder, "doe", path)
         from doe.study.finished import finished, inputs_digest
 
         if not (verbose or retry) and (record := finished(folder, inputs_digest(loaded, direct))):

@@ -13,8 +13,8 @@ from typing import Any
 from doe.study.runner import Ran
 from rbdyn.faults import InputError, RunError
 
-# A scheduler that does not answer, or has no worker, for so long [s] is not there.
-CONNECT_S, WORKERS_S = 4.0, 10.0
+# A scheduler that does not shake hands, take up a client or have a worker within so long [s] is not there.
+KNOCK_S, CONNECT_S, WORKERS_S = 2.0, 4.0, 10.0
 # A study under way waits for new workers for so long [s] when the last one is gone.
 DESERTED_S = 60.0
 # The cluster is looked at as often as this [s].
@@ -109,7 +109,8 @@ async def _knock(address: str) -> None:
     """Shake hands with the scheduler; a client that cannot would leave threads behind."""
     from distributed.comm import connect
 
-    comm = await connect(address, timeout=CONNECT_S)
+    # Its own limit ends with the connection: what accepts that and says nothing would be waited for without end.
+    comm = await asyncio.wait_for(connect(address, timeout=KNOCK_S), KNOCK_S)
     await comm.close()
 
 
@@ -131,7 +132,7 @@ def _client(address: str) -> Iterator[Any]:
     # What answers there may be anything, and its words mean anything.
     except Exception:
         raise InputError(
-            [f"--scheduler {address}: no dask scheduler answers there within {CONNECT_S:g} s; check the address"]
+            [f"--scheduler {address}: no dask scheduler answers there within {KNOCK_S:g} s; check the address"]
         ) from None
     try:
         try:

@@ -10,14 +10,16 @@ import uuid
 from dataclasses import dataclass, field
 from pathlib import Path
 
-# A process of another machine that has not given a sign of life for so long [s] counts as gone. The clocks of both
-# machines must agree to much less than this.
+# A process of another machine that has not given a sign of life for so long [s] counts as gone. One whose clock is behind
+# by more than this seems gone too soon, and its runs are run twice; of one dated ahead see ``Owner.lives``.
 LEASE_S = 60.0
 # Signs of life are given as often as this [s].
 BEAT_S = 5.0
 
 # Owners of this process whose store is open.
 _open: set[str] = set()
+# Last sign of life of owners elsewhere, and when this process first saw it [s], by a clock that nobody sets.
+_seen: dict[str, tuple[float, float]] = {}
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,13 @@ class Owner:
     def lives(self, beat: float) -> bool:
         """Whether it may still be at work; ``beat``: its last sign of life [s since the epoch].
 
-        On the same machine the process itself is looked at, so a killed one is known at once; elsewhere a lease runs.
+        On the same machine the process itself is looked at, so a killed one is known at once; elsewhere a lease runs, from
+        the sign's date, or, where that lies ahead of this machine's clock, from when the sign was first seen here.
         """
         if self.machine != _machine():
-            return time.time() - beat < LEASE_S
+            if _seen.get(self.token, (None,))[0] != beat:
+                _seen[self.token] = (beat, time.monotonic())
+            return time.time() - beat < LEASE_S and time.monotonic() - _seen[self.token][1] < LEASE_S
         if self.pid == os.getpid() and self.born == _born(self.pid):
             return self.token in _open
         return _born(self.pid) == self.born

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from doe.study.failure import Failure
-from doe.study.store import Point, Store
+from doe.study.store import Outcome, Point, Sound, Store
 
-Outcome = dict[str, Any] | Failure
 # What other processes have done is looked at as often as this [s].
 POLL_S = 0.25
 
@@ -33,6 +32,7 @@ class Ran:
     lost: bool = False
 
 
+Progress = Callable[[int, int], None]
 # Takes the points that are ours to run out of those given, and hands over a point that has ended.
 Take = Callable[[Sequence[Point]], list[Point]]
 Give = Callable[[Point, Ran], None]
@@ -40,18 +40,18 @@ Engine = Callable[[Sequence[Point], Take, Give], None]
 
 
 def run_points(
-    points: Sequence[Point], store: Store, engine: Engine, progress: Callable[[int, int], None], retry: bool = False
+    points: Sequence[Point], store: Store, engine: Engine, progress: Progress, sound: Sound, retry: bool = False
 ) -> dict[str, Outcome]:
     """Results and failures of points, by key. What other live processes are running is waited for, not run again.
 
-    ``retry``: run those again that failed before. Raises RunError when the store cannot be written, and
-    KeyboardInterrupt on Ctrl-C; either way all finished runs stay stored and claims are given back.
+    What is stored and not ``sound`` is run again; with ``retry`` also what failed. Raises RunError when the store cannot be
+    written, KeyboardInterrupt on Ctrl-C; either way all finished runs stay stored and claims are given back.
     """
     wanted = {point.key: point for point in points}
     found: dict[str, Outcome] = {}
 
     def take(free: Sequence[Point]) -> list[Point]:
-        mine = store.claim(free)
+        mine = store.claim(free, sound)
         return [point for point in free if point.key in mine]
 
     def give(point: Point, ran: Ran) -> None:
@@ -69,7 +69,7 @@ def run_points(
         store.forget_failures(list(wanted.values()))
     try:
         while True:
-            found |= store.outcomes(_left(wanted, found))
+            found |= store.outcomes(_left(wanted, found), sound)
             progress(len(found), len(wanted))
             if not (left := _left(wanted, found)):
                 return found

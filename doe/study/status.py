@@ -25,7 +25,7 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
     if not (folder / STORE).exists():
         return _record(study, folder, points, {}, [], [])
     with Store(folder / STORE, read_only=True) as store:
-        return _record(study, folder, points, store.outcomes(points), store.claims(), store.ended())
+        return _record(study, folder, points, store.outcomes(points, clearance.sound), store.claims(), store.ended())
 
 
 def _record(

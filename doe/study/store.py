@@ -3,43 +3,29 @@
 A result is there whole or not at all: sqlite appends it to its write-ahead log in frames with checksums, and a log that
 was cut short is read up to the last whole transaction. Results are committed with ``synchronous = FULL``, that is, they
 are on the disk when ``put`` returns; claims with ``NORMAL``, for a power cut frees them anyway. Each result also carries
-its own SHA-256, so that a row spoilt later is run again, not read.
+its own SHA-256, so that a row spoilt later is told and run again, not read.
 
 Several processes of one machine may use a store at once: whoever claims a run does it, the others wait for it.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import sqlite3
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from doe.study.database import Database
 from doe.study.failure import Failure
-from doe.study.owner import BEAT_S, Owner, this_process
+from doe.study.owner import BEAT_S, LEASE_S, Owner, this_process
 from rbdyn.faults import InputError, RunError
-
-FORMAT, VERSION = "doe.store", "2"
-SCHEMA = (
-    "CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL)",
-    "CREATE TABLE owners (owner TEXT PRIMARY KEY, host TEXT, machine TEXT, pid INTEGER, born TEXT, beat REAL)",
-    """CREATE TABLE runs (
-        key TEXT PRIMARY KEY,
-        status TEXT NOT NULL CHECK (status IN ('claimed', 'done', 'failed')),
-        result TEXT, digest TEXT, cause TEXT,
-        study TEXT, label TEXT, run INTEGER, factors TEXT,
-        started REAL, ended REAL, seconds REAL, host TEXT, pid INTEGER, owner TEXT
-    )""",
-)
-# How long to wait for another process that writes [s].
-PATIENCE_S = 30.0
+from rbdyn.kept import digest_of
 
 
 @dataclass(frozen=True)
@@ -80,7 +66,12 @@ class EndedRun:
     owner: str | None
 
 
-class Store:
+Outcome = dict[str, Any] | Failure
+# Whether a result is what the reader of the store takes it for; None: any is.
+Sound = Callable[[dict[str, Any]], bool] | None
+
+
+class Store(Database):
     """Results by key, failures with their cause, and claims on what is being run."""
 
     def __init__(self, path: Path, study: str = "", read_only: bool = False) -> None:
@@ -88,116 +79,65 @@ class Store:
 
         Raises InputError for a file that is no store, or one of another version; RunError where the disk is full.
         """
-        self.path, self._study = path, study
-        self._lock, self._closed = threading.RLock(), threading.Event()
-        self._me = this_process()
-        self._opened = time.time()
+        super().__init__(path, read_only)
+        self._study, self._me, self._opened = study, this_process(), time.time()
+        self._closed = threading.Event()
         self._beating: threading.Thread | None = None
-        with self._faults():
-            self._connection = sqlite3.connect(
-                _address(path, read_only), timeout=PATIENCE_S, isolation_level=None, check_same_thread=False, uri=True
-            )
-            try:
-                self._check(read_only)
-            except BaseException:
-                self._connection.close()
-                raise
         self._me.enter()
-
-    def _check(self, read_only: bool) -> None:
-        tables = self._tables()
-        if not tables and read_only:
-            # Just made by a process that has not written to it yet.
-            self._connection.close()
-            self._connection = sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False)
-        if not tables:
-            with self._transaction(durable=True) as connection:
-                tables = self._tables()
-                if not tables:
-                    for statement in SCHEMA:
-                        connection.execute(statement)
-                    connection.executemany("INSERT INTO meta VALUES (?, ?)", [("format", FORMAT), ("version", VERSION)])
-                    tables = self._tables()
-        meta = dict(self._connection.execute("SELECT name, value FROM meta")) if "meta" in tables else {}
-        found = meta.get("version", "1") if meta.get("format") == FORMAT else ""
-        # The first version was a bare table of results.
-        if tables == {"runs"}:
-            found = "1"
-        if found != VERSION:
-            what = f"a store of version {found}, not {VERSION}" if found else "not a store of runs"
-            raise InputError([f"{self.path}: {what}; move it away or name another folder"])
-        (sound,) = self._connection.execute("PRAGMA quick_check(1)").fetchone()
-        if sound != "ok":
-            raise InputError([f"{self.path}: damaged ({sound}); move it away"])
-        if not read_only:
-            _patiently(self._connection, "PRAGMA journal_mode=WAL")
-
-    def _tables(self) -> set[str]:
-        found = _patiently(self._connection, "SELECT name FROM sqlite_master WHERE type = 'table'")
-        return {name for (name,) in found}
 
     def get(self, key: str) -> dict[str, Any] | None:
         """The stored result, or None."""
         found = self.outcomes([Point(key, key)]).get(key)
         return found if isinstance(found, dict) else None
 
-    def outcomes(self, points: Sequence[Point]) -> dict[str, dict[str, Any] | Failure]:
-        """Results and failures of those points that have ended, by key."""
-        found: dict[str, dict[str, Any] | Failure] = {}
+    def outcomes(self, points: Sequence[Point], sound: Sound = None) -> dict[str, Outcome]:
+        """Results and failures of those points that have ended, by key.
+
+        A row spoilt on the disk, or whose result is not ``sound``, is told on standard error and counts as not there.
+        """
+        found, spoilt = dict[str, Outcome](), list[str]()
         query = "SELECT status, result, digest, cause FROM runs WHERE key = ? AND status != 'claimed'"
         with self._lock, self._faults():
             for point in points:
                 row = self._connection.execute(query, (point.key,)).fetchone()
                 if row is None:
                     continue
-                status, result, digest, cause = row
-                if status == "failed":
-                    found[point.key] = Failure(point.label, cause, point.run, dict(point.factors))
-                elif _digest(result) == digest:
-                    found[point.key] = json.loads(result)
+                outcome = _outcome(point, sound, *row)
+                if outcome is not None:
+                    found[point.key] = outcome
+                else:
+                    spoilt.append(point.label)
+        self._tell(spoilt, f"kept results that cannot be read count as not done: {', '.join(spoilt)}")
         return found
 
-    def claim(self, points: Sequence[Point]) -> set[str]:
+    def claim(self, points: Sequence[Point], sound: Sound = None) -> set[str]:
         """Take what nobody has done or is doing; returns the keys that are now ours to run.
 
-        Claims of a process that is gone are taken over, and a row spoilt on the disk counts as not there.
+        Claims of a process that is gone are taken over; a row spoilt, or whose result is not ``sound``, is not there.
         """
-        mine = set()
+        mine, me = set(), self._me
         with self._transaction(durable=False) as connection:
             self._sign(connection)
             live: dict[str, bool] = {}
             for point in points:
                 row = connection.execute(
-                    "SELECT status, owner, result, digest FROM runs WHERE key = ?", (point.key,)
+                    "SELECT owner, status, result, digest, cause FROM runs WHERE key = ?", (point.key,)
                 ).fetchone()
-                if row is not None and not self._free(connection, live, *row):
+                if row is not None and row[1] != "claimed" and _outcome(point, sound, *row[1:]) is not None:
                     continue
+                if row is not None and row[1] == "claimed":
+                    if row[0] not in live:
+                        live[row[0]] = self._lives(row[0])
+                    if live[row[0]]:
+                        continue
+                factors = json.dumps(dict(point.factors))
                 connection.execute(
                     "INSERT OR REPLACE INTO runs (key, status, study, label, run, factors, started, host, pid, owner) "
                     "VALUES (?, 'claimed', ?, ?, ?, ?, ?, ?, ?, ?)",
-                    (
-                        point.key,
-                        self._study,
-                        point.label,
-                        point.run,
-                        json.dumps(dict(point.factors)),
-                        time.time(),
-                        self._me.host,
-                        self._me.pid,
-                        self._me.token,
-                    ),
+                    (point.key, self._study, point.label, point.run, factors, time.time(), me.host, me.pid, me.token),
                 )
                 mine.add(point.key)
         return mine
-
-    def _free(
-        self, connection: sqlite3.Connection, live: dict[str, bool], status: str, owner: str, *result: str
-    ) -> bool:
-        if status != "claimed":
-            return status == "done" and _digest(result[0]) != result[1]
-        if owner not in live:
-            live[owner] = _lives(connection, owner)
-        return not live[owner]
 
     def _sign(self, connection: sqlite3.Connection) -> None:
         """Note that this owner lives, now and from time to time from here on."""
@@ -231,7 +171,7 @@ class Store:
         An equal key already done is left, for equal keys have equal bits. ``host``, ``pid``: where it ran, if not here.
         """
         text = json.dumps(result)
-        self._end(key, "done", text, _digest(text), None, seconds, host, pid)
+        self._end(key, "done", text, digest_of(text), None, seconds, host, pid)
 
     def fail(self, key: str, cause: str, *, seconds: float | None = None) -> None:
         """Keep why a run could not go on."""
@@ -253,8 +193,9 @@ class Store:
         """Let points be run again that failed before this store was opened."""
         with self._transaction(durable=True) as connection:
             connection.executemany(
-                "DELETE FROM runs WHERE status = 'failed' AND key = ? AND ended < ?",
-                [(point.key, self._opened) for point in points],
+                # One dated ahead was ended by another clock.
+                "DELETE FROM runs WHERE status = 'failed' AND key = ? AND ended NOT BETWEEN ? AND ?",
+                [(point.key, self._opened, time.time()) for point in points],
             )
 
     def release(self) -> None:
@@ -266,15 +207,19 @@ class Store:
         """Runs that live processes have taken."""
         with self._lock, self._faults():
             rows = self._connection.execute(
-                "SELECT key, label, run, host, pid, started, owner FROM runs WHERE status = 'claimed' "
-                "ORDER BY started, run"
+                "SELECT key, label, run, host, pid, iif(typeof(started) = 'real', started, 0.0), owner "
+                "FROM runs WHERE status = 'claimed' ORDER BY started, run"
             ).fetchall()
-            live = {owner: _lives(self._connection, owner) for owner in {row[-1] for row in rows}}
+            live = {owner: self._lives(owner) for owner in {row[-1] for row in rows}}
         return [Claim(*row) for row in rows if live[row[-1]]]
 
     def ended(self) -> list[EndedRun]:
         """All runs that have ended, oldest first."""
-        query = "SELECT key, status, seconds, started, ended, owner FROM runs WHERE status != 'claimed' ORDER BY ended"
+        seconds, started = (f"iif(typeof({name}) = 'real', {name}, NULL)" for name in ("seconds", "started"))
+        query = (
+            f"SELECT key, status, {seconds}, {started}, ended, owner FROM runs "
+            "WHERE status != 'claimed' AND typeof(ended) = 'real' ORDER BY ended"
+        )
         with self._lock, self._faults():
             return [EndedRun(*row) for row in self._connection.execute(query)]
 
@@ -298,66 +243,31 @@ class Store:
     ) -> None:
         self.close()
 
-    @contextmanager
-    def _transaction(self, durable: bool) -> Iterator[sqlite3.Connection]:
-        with self._lock, self._faults():
-            connection = self._connection
-            connection.execute(f"PRAGMA synchronous={'FULL' if durable else 'NORMAL'}")
-            connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield connection
-                connection.execute("COMMIT")
-            finally:
-                if connection.in_transaction:
-                    connection.execute("ROLLBACK")
-
-    @contextmanager
-    def _faults(self) -> Iterator[None]:
-        """Turn what sqlite complains of into one sentence."""
-        try:
-            yield
-        except sqlite3.Error as error:
-            if getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-                raise RunError(
-                    f"{self.path}: cannot be written ({error}); finished runs are kept: make room on the disk and start "
-                    "again"
-                ) from None
-            raise InputError([f"{self.path}: cannot be used as a store of runs ({error}); move it away"]) from None
+    def _lives(self, owner: str) -> bool:
+        """Whether an owner may still be at work; one that signed ahead of this machine's clock is told."""
+        row = self._connection.execute(
+            "SELECT host, machine, pid, born, owner, beat FROM owners WHERE owner = ?", (owner,)
+        ).fetchone()
+        if row is None or not isinstance(row[5], float):
+            return False
+        lives, ahead = Owner(*row[:5]).lives(row[5]), row[5] - time.time()
+        if lives and ahead > BEAT_S and row[1] != self._me.machine:
+            self._tell(
+                [owner],
+                f"process {row[2]} on {row[0]} gave its last sign of life {ahead:.0f} s ahead of this clock; set both clocks "
+                f"right. Unless it gives another within {LEASE_S:g} s, its runs are taken over",
+            )
+        return lives
 
 
-def run_key(scene: dict[str, Any], version: str) -> str:
-    """Key of a run: hash of its resolved scene and of the version that ran it."""
-    text = json.dumps([version, scene], sort_keys=True)
-    return _digest(text)
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _address(path: Path, read_only: bool) -> str:
-    """URI of the file. One that is only read is left alone wholly: no log is begun beside it."""
-    if not read_only:
-        return path.absolute().as_uri()
-    logs = (path.with_name(path.name + end) for end in ("-wal", "-journal"))
-    return f"{path.absolute().as_uri()}?mode=ro{'' if any(log.exists() for log in logs) else '&immutable=1'}"
-
-
-def _lives(connection: sqlite3.Connection, owner: str) -> bool:
-    row = connection.execute(
-        "SELECT host, machine, pid, born, owner, beat FROM owners WHERE owner = ?", (owner,)
-    ).fetchone()
-    return row is not None and Owner(*row[:5]).lives(row[5])
-
-
-def _patiently(connection: sqlite3.Connection, statement: str) -> list[Any]:
-    """Run a statement that another process, which opens the store just now, may hold up."""
-    deadline = time.monotonic() + PATIENCE_S
-    while True:
-        try:
-            return connection.execute(statement).fetchall()
-        except sqlite3.OperationalError as error:
-            busy = getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
-            if not busy or time.monotonic() > deadline:
-                raise
-            time.sleep(0.05)
+def _outcome(point: Point, sound: Sound, status: str, result: Any, digest: Any, cause: Any) -> Outcome | None:
+    """What a row of an ended run tells; None where it is spoilt."""
+    if status == "failed":
+        return Failure(point.label, cause, point.run, dict(point.factors)) if isinstance(cause, str) else None
+    if not isinstance(result, str) or digest_of(result) != digest:
+        return None
+    try:
+        found = json.loads(result)
+    except ValueError:
+        return None
+    return found if isinstance(found, dict) and (sound is None or sound(found)) else None
