@@ -16,7 +16,7 @@ from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.equations import LOADS, LOSSES, POWERS, RollerBearing
 from rbdyn.dynamics.error_bars import error_notes, quantities
 from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
-from rbdyn.dynamics.left_out import left_out_notes
+from rbdyn.dynamics.left_out import heat_notes, left_out_notes
 from rbdyn.dynamics.method import (
     EXPLICIT,
     advance_by,
@@ -29,7 +29,7 @@ from rbdyn.dynamics.method import (
 from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.model import roller_bearing
 from rbdyn.dynamics.race_lanes import scratch
-from rbdyn.dynamics.race_report import race_report
+from rbdyn.dynamics.race_report import race_notes, race_report
 from rbdyn.dynamics.recording import Recording, record
 from rbdyn.dynamics.runge_kutta import FINISHED, NOT_FINITE, STEP_BUDGET, STEP_UNDERFLOW, Carry, Control, Tally
 from rbdyn.dynamics.settling import Ensemble, run_until_settled
@@ -236,6 +236,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
     figures = quantities(scene, runs, companions, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
     inner_load, outer_load = (max(getattr(run, f"max_{race}_load") for run in runs) for race in ("inner", "outer"))
+    races = race_report(scene, inner_load, outer_load)
     return SimulationResult(
         status="ok",
         impact_force=figures["impact_force_N"],
@@ -252,7 +253,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         max_inner_load=inner_load,
         max_outer_load=outer_load,
         max_land_load=max(run.max_land_load for run in runs),
-        races=race_report(scene, inner_load, outer_load),
+        races=races,
         clearance=clearance_report(scene),
         impact_window_turns=scene.impact_window_turns,
         transient_turns=ensemble.transient_turns,
@@ -270,6 +271,9 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         replicates=scene.numerics.replicates,
         seed=scene.numerics.seed,
         notes=(
+            *scene.unit_notes,
+            *race_notes(scene, races),
+            *heat_notes(scene, figures["power_loss_W"].value),
             *_notes(scene, power_gap),
             *left_out_notes(scene, figures["power_loss_W"].value),
             *ensemble.notes,

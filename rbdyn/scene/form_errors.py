@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
 from rbdyn.scene.bearing import Harmonic
-from rbdyn.scene.fields import NonNegative, or_refuse
+from rbdyn.scene.fields import NonNegative, NotVanishing, or_refuse
 
 Order = Annotated[int, Field(ge=1, le=2000)]
 # Beyond this share of the ball it is no form error but a slip of the unit.
@@ -23,7 +23,7 @@ class RandomWaviness(Strict):
 
     lowest_order: Order = 1
     highest_order: Order
-    height_um: Annotated[float, Field(gt=0.0, le=500.0)]
+    height_um: Annotated[float, Field(gt=0.0, le=500.0), NotVanishing]
     decay: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
 
 
