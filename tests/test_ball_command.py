@@ -94,7 +94,7 @@ def test_command_line_wants_one_study(command):
         (("--sweep", "operation.axial_load_N=1,2", "--race-limits", "P2"), "--sweep and --race-limits: are studies of their own"),
         (("--clearance", "0:100:3", "--race-limits", "P2"), "--clearance and --race-limits: are studies of their own"),
         (("--yield", "0.5"), "--yield 0.5: is a share of --race-limits; add that or leave it out"),
-        (("--clearance", "0:100:3"), "--clearance: bearing.contact_angle_deg = 25 rules the clearance, 23.81 um: give bearing."),
+        (("--clearance", "0:100:3"), "--clearance: bearing.contact_angle_deg = 25 rules the clearance, 23.8 um: give bearing."),
     ],
 )  # fmt: skip
 def test_command_line_refuses_pairs_and_contradictions(arguments, sentence):
