@@ -22,16 +22,15 @@ FITS = "mounting={bore_mm=27.0, outside_diameter_mm=60.0, housing_diameter_mm=80
 @pytest.mark.parametrize(
     ("assignment", "mend"),
     [
-        ("cage.mass_g=0.11", "outside the usual 3.01 to 1.2e+03; if 0.11 kg are meant, write 110"),
+        ("cage.mass_g=0.11", "outside the usual 2.98 to 1.19e+03; if 0.11 kg are meant, write 110"),
         ("bearing.radial_clearance_mm=0.000065", "if 6.5e-05 m are meant, write 0.065"),
-        ("bearing.radial_clearance_mm=-0.000065", "check its unit"),
         ("cage.pocket_clearance_mm=0.000065", "if 6.5e-05 m are meant, write 0.065"),
         ("cage.pocket_clearance_mm=4.0", "if 4 um are meant, write 0.004"),
         ("lubricant.temperature_C=343.0", "outside the usual -60 to 220; if 343 K are meant, write 69.85"),
-        ("lubricant.temperature_C=230.0", "check its unit"),
+        ("cage.mass_g=100000.0", "check its unit"),
         ("lubricant.race_roughness_um=50.0", "if 50 nm are meant, write 0.05"),
         ("lubricant.viscosity_mPas=0.0029", "if 0.0029 Pa s are meant, write 2.9"),
-        (FITS, "if 383 K are meant, write 109.8"),
+        (FITS, "if 383 K are meant, write 109.9"),
     ],
 )
 def test_unit_a_value_in_another_unit_says_which(make_scene, assignment, mend):
@@ -45,7 +44,7 @@ def test_unit_ordinary_values_are_not_suspected(make_scene):
     """Unit: the examples, the corners and extremes of their study, clearances of 1 um and 2 mm, a cage of PEEK."""
     for name in ("cylindrical_roller.toml", "all_options.toml"):
         assert Scene.load(EXAMPLES / name).unit_notes == ()
-    for clearance in ("0.0", "0.001", "-0.004", "0.1"):
+    for clearance in ("0.0", "0.001", "-0.004", "-0.000065", "0.1"):
         assert make_scene(f"bearing.radial_clearance_mm={clearance}").unit_notes == ()
     for clearance in ("0.001", "2.0"):
         changes = (f"cage.pocket_clearance_mm={clearance}", "cage.guide_clearance_mm=1.0", "cage.guidance=roller")

@@ -25,7 +25,7 @@ def unit_notes(
     guide = None if cage.guidance == "roller" else cage.guide_clearance_mm
     # The least clearances are below any grade of manufacture, the largest some times the loosest class.
     usual = [
-        ("bearing.radial_clearance_mm", abs(bearing.radial_clearance_mm) or None, (5e-4, 5e-3 * pitch)),
+        ("bearing.radial_clearance_mm", max(bearing.radial_clearance_mm, 0.0) or None, (5e-4, 5e-3 * pitch)),
         ("cage.guide_clearance_mm", guide, (5e-4, 0.03 * pitch)),
         ("cage.pocket_clearance_mm", cage.pocket_clearance_mm, (5e-4, 0.25 * roller)),
         ("cage.mass_g", cage.mass_g, (cage_g / 20.0, cage_g * 20.0)),
