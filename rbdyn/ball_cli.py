@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from rbdyn.command_options import Json, Quiet, SceneFile, Set
+from rbdyn.faults import InputError
 from rbdyn.terminal import FAILED, guarded, output_folder, print_json
 
 
@@ -35,9 +36,11 @@ def ball(
     race_limits: Annotated[
         str | None, typer.Option(metavar="CLASS", help="Race errors with which bearings meet P2, P4 or P5, instead.")
     ] = None,
-    wanted: Annotated[float, typer.Option("--yield", help="Share of bearings that must meet it.")] = 0.95,
+    wanted: Annotated[
+        float | None, typer.Option("--yield", help="Share of bearings that must meet --race-limits; 0.95 if left out.")
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write result.json and tables, with pictures, here.")
+        Path | None, typer.Option(metavar="DIR", help="Write the result as JSON here, with its tables and pictures.")
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -48,15 +51,22 @@ def ball(
         from rbdyn.scene import Scene, balls_only
 
         loaded = balls_only(Scene.load(scene, assignments or []))
+        studies = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
+        asked = {name: value for name, value in studies.items() if value is not None}
+        flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *asked)]
+        if len(flags) > 1:
+            raise InputError([f"{' and '.join(flags)}: are studies of their own; choose one"])
+        if wanted is not None and race_limits is None:
+            raise InputError([f"--yield {wanted:g}: is a share of --race-limits; add that or leave it out"])
         if sweeps:
             from rbdyn.sweep_command import run as run_sweep
 
             raise typer.Exit(run_sweep(loaded, sweeps, out, scene, as_json, quiet))
-        asked = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
-        if any(value is not None for value in asked.values()):
+        for name, value in asked.items():
             from rbdyn.ball_studies import run as run_study
 
-            raise typer.Exit(run_study(loaded, asked, wanted, out, scene, as_json))
+            share = 0.95 if wanted is None else wanted
+            raise typer.Exit(run_study(loaded, name, value, share, out, scene, as_json, quiet))
         folder = output_folder(out, "rbdyn ball", scene) if out else None
         from rbdyn.ball_command import print_result, with_runout, write
         from rbdyn.quasistatic.bearing import equilibrium

@@ -25,6 +25,9 @@ def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
         _print_row(f"{name} row" if name else "", record[name] if name else record, verbose)
     if "middle_ring" in record:
         _print_middle_ring(record)
+    held = record["reaction"]["moment_Nm"]
+    if any(held.values()):
+        print("moment on the inner ring: " + ", ".join(f"about {axis} {held[axis]:.4g} N m" for axis in "xy"))
     if "fits" in record:
         _print_fits(record["fits"])
     if "runout" in record:

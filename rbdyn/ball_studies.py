@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast, get_args
 
+import numpy as np
+
 from rbdyn.faults import InputError
+from rbdyn.quasistatic.equilibrium import OK
 from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
+from rbdyn.quasistatic.remarks import remarks, tipping
 from rbdyn.quasistatic.runout_class import ToleranceClass, running_accuracy
 from rbdyn.quasistatic.runout_lots import Lot
 from rbdyn.quasistatic.runout_model import bench_of, follow_ring, single_row
+from rbdyn.quasistatic.sweep import grouped
+from rbdyn.quasistatic.sweep_figures import ring_columns, row_columns
+from rbdyn.quasistatic.sweep_result import SweepResult
 from rbdyn.quasistatic.tolerance_design import RaceLimits, design
 from rbdyn.quasistatic.turn import Followed
 from rbdyn.ranges import axis_values
 from rbdyn.result import write_json
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
+from rbdyn.sweep_command import print_points
 from rbdyn.terminal import output_folder, print_json, print_table
 
 # What a study sweeps: function, unit of the values and that unit in SI.
@@ -27,6 +34,8 @@ SWEPT = {
     "clearance": (over_clearance, "um", 1e-6),
     "wear": (over_wear, "um", 1e-6),
 }
+# What its record tells of a point, by column of the table.
+TOLD = {"inner_stress_MPa": "inner_pressure_MPa", "outer_stress_MPa": "outer_pressure_MPa", "L10_Mrev": "L10_Mrev"}
 # Bearings of a lot that are solved in full to size the limits of race errors.
 SOLVED = 100
 
@@ -44,31 +53,43 @@ def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> dict
 
     Raises InputError for a double-decker, or where the sweep is refused.
     """
+    return _optimum(scene, swept, values)[0]
+
+
+def _optimum(scene: BallScene, swept: str, values: Sequence[float]) -> tuple[dict[str, Any], SweepResult]:
+    """Record of a study, and its points as a sweep tells them."""
     run, unit, si = SWEPT[swept]
     try:
         found = run(_single(scene, swept), [si * value for value in values])
     except ValueError as error:
         raise InputError([f"--{swept}: {error}"]) from None
+    table = _table(scene, f"{swept}_{unit}", values, found)
+    names = {"value": f"{swept}_{unit}", **TOLD, "status": "status"}
+    points = [{name: point[column] for name, column in names.items() if column in point} for point in table.points()]
     return {
         "swept": f"{swept}_{unit}",
-        "points": [_point(found, place, si) for place in range(len(found.points))],
+        "points": points,
         "least_stress": _best(found, "least_stress", si),
         "longest_life": _best(found, "longest_life", si),
-        "notes": list(found.notes),
-    }
+        "notes": [*found.notes, *(f"{table.where(note['points'])}: {note['note']}" for note in table.notes)],
+    }, table
 
 
-def _point(found: Sweep, place: int, si: float) -> dict[str, Any]:
-    point = found.points[place]
-    if point.life is None:
-        return {"value": point.value / si, "status": point.solution.status}
-    return {
-        "value": point.value / si,
-        "inner_stress_MPa": 1e-6 * point.inner_pressure,
-        "outer_stress_MPa": 1e-6 * point.outer_pressure,
-        "L10_Mrev": point.million_turns if math.isfinite(point.million_turns) else None,
-        "status": point.solution.status,
-    }
+def _table(scene: BallScene, key: str, values: Sequence[float], found: Sweep) -> SweepResult:
+    """Figures, balls and notes of the points scanned."""
+    points, places = found.points, np.arange(len(values))
+    solutions, ratings = [point.solution for point in points], [point.rating for point in points]
+    balls, displacement, reaction, stiffness = (
+        np.array([getattr(solution, name) for solution in solutions])
+        for name in ("told", "displacement", "reaction", "stiffness")
+    )
+    statuses = tuple(solution.status for solution in solutions)
+    columns = ring_columns(displacement, reaction, stiffness) | row_columns(balls, ratings)
+    for column in columns.values():
+        column[[status != OK for status in statuses]] = np.nan
+    told = [(0, remark) for remark in (*remarks(balls, ratings), tipping(displacement[:, 3:], scene))]
+    notes, rows = grouped(told, places, statuses), {"row": [(places, balls)]}
+    return SweepResult({key: tuple(values)}, columns, statuses, 0, 0.0, scene.model_dump(mode="json"), rows, notes)
 
 
 def _best(found: Sweep, which: str, si: float) -> dict[str, float]:
@@ -83,11 +104,8 @@ def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int
     """
     row = _single(scene, "race-limits")
     if tolerance_class not in get_args(ToleranceClass):
-        raise InputError(
-            [
-                f"--race-limits {tolerance_class}: is no tolerance class; choose one of {', '.join(get_args(ToleranceClass))}"
-            ]
-        )
+        known = ", ".join(get_args(ToleranceClass))
+        raise InputError([f"--race-limits {tolerance_class}: is no tolerance class; choose one of {known}"])
     if row.bearing.bore_mm is None:
         raise InputError(["bearing.bore_mm: missing; tolerance classes go by the bore, add it"])
     try:
@@ -130,49 +148,37 @@ def _single(scene: BallScene, option: str) -> SingleRowScene:
 
 
 def run(
-    scene: BallScene, asked: Mapping[str, str | None], wanted: float, out: Path | None, source: Path, as_json: bool
+    scene: BallScene, name: str, value: str, wanted: float, out: Path | None, source: Path, as_json: bool, quiet: bool
 ) -> int:
-    """Carry out the one study asked for, print and write it; returns the exit code. Raises InputError."""
-    chosen = {name: value for name, value in asked.items() if value is not None}
-    if len(chosen) > 1:
-        flags = " and ".join(f"--{name.replace('_', '-')}" for name in chosen)
-        raise InputError([f"{flags}: are studies of their own; choose one"])
-    ((name, value),) = chosen.items()
-    folder = output_folder(out, "rbdyn ball", source) if out else None
+    """Carry out the study ``name`` over ``value``, print and write it; returns the exit code. Raises InputError."""
+    folder, files = output_folder(out, "rbdyn ball", source) if out else None, [f"{name}.json"]
+    table: SweepResult | None = None
     if name == "race_limits":
         record = race_limits(scene, value, wanted)
     else:
-        record = optimum_study(scene, name, axis_values(value, f"--{name}"))
+        record, table = _optimum(scene, name, axis_values(value, f"--{name}"))
     if folder:
-        write_json(folder / f"{name}.json", record)
+        write_json(folder / files[0], record)
+        if table is not None:
+            from rbdyn.plots.ball_sweep import pictures
+
+            table.save(folder / f"{name}.csv")
+            files += [f"{name}.csv", *pictures(table, folder)]
     if as_json:
         print_json(record)
         return 0
-    _print_limits(record) if name == "race_limits" else _print_optimum(record)
+    if table is None:
+        _print_limits(record)
+    else:
+        print_points(table)
+        for best, title in (("least_stress", "least stress"), ("longest_life", "longest life")):
+            at = record[best]
+            print(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
+        for note in record["notes"] if not quiet else ():
+            print(f"note: {note}")
     if folder:
-        print(f"written to {folder}: {name}.json")
+        print(f"written to {folder}: {', '.join(files)}")
     return 0
-
-
-def _print_optimum(record: dict[str, Any]) -> None:
-    what = record["swept"].replace("_", " [") + "]"
-    rows = [
-        (f"{point['value']:.4g}", point["status"], "", "")
-        if "L10_Mrev" not in point
-        else (
-            f"{point['value']:.4g}",
-            f"{point['inner_stress_MPa']:.0f}",
-            f"{point['outer_stress_MPa']:.0f}",
-            "unloaded" if point["L10_Mrev"] is None else f"{point['L10_Mrev']:.4g}",
-        )
-        for point in record["points"]
-    ]
-    print_table("", (what, "inner stress [MPa]", "outer stress [MPa]", "L10r [million turns]"), rows)
-    for best, title in (("least_stress", "least stress"), ("longest_life", "longest life")):
-        at = record[best]
-        print(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
-    for note in record["notes"]:
-        print(f"note: {note}")
 
 
 def _print_limits(record: dict[str, Any]) -> None:

@@ -16,7 +16,10 @@ def _not_vanishing(value: float) -> float:
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 # Wide enough for any unit in use, narrow enough that no product of them overflows.
 SMALLEST, LARGEST = 1e-12, 1e12
-Positive = Annotated[float, Field(gt=0.0, le=LARGEST), AfterValidator(_not_vanishing)]
+# A ring for rollers of half a millimetre has 7 mg.
+LIGHTEST_RING_KG = 1e-6
+NotVanishing = AfterValidator(_not_vanishing)
+Positive = Annotated[float, Field(gt=0.0, le=LARGEST), NotVanishing]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST)]
 
 

@@ -45,16 +45,22 @@ def run(scene: BallScene, texts: Sequence[str], out: Path | None, source: Path, 
         print_json(found.as_dict())
     else:
         show(found)
+        for note in found.notes if not quiet else ():
+            print(f"note: {found.where(note['points'])}: {note['note']}")
         if folder:
             print(f"written to {folder}: {', '.join(files)}")
     for places in found.failures.values():
-        first = ", ".join(f"{key} = {value:g}" for key, value in found.at(places[0]).items())
-        count = "1 point" if len(places) == 1 else f"{len(places)} points, the first"
-        print(f"{count} at {first}: {found.statuses[places[0]]}", file=sys.stderr)
+        print(f"{found.where(places)}: {found.statuses[places[0]]}", file=sys.stderr)
     return FAILED if found.failures else 0
 
 
 def show(found: SweepResult) -> None:
+    """Print the points and what they cost."""
+    print_points(found)
+    print(f"{len(found.statuses)} points in {found.wall_s:.3g} s, {found.cold} of them not started from a neighbour")
+
+
+def print_points(found: SweepResult) -> None:
     """Print the points, of a long sweep the first and the last ones."""
     count = len(found.statuses)
     rows = [_row(found, place) for place in range(count) if count <= 2 * SHOWN or _outer(place, count)]
@@ -62,7 +68,6 @@ def show(found: SweepResult) -> None:
         rows.insert(SHOWN, ["..."] * len(rows[0]))
     units = [key.rpartition(".")[2] for key in found.keys]
     print_table("", [*units, *HEADER], rows)
-    print(f"{count} points in {found.wall_s:.3g} s, {found.cold} of them not started from a neighbour")
 
 
 def write(found: SweepResult, folder: Path) -> list[str]:

@@ -34,6 +34,7 @@ LARGE = {
     },
     "operation": {
         "inner_speed_rpm": 10000.0, "load_N": [6000.0, -1500.0, 15000.0], "moment_Nm": [90.0, -140.0],
+        "tilt": "free",
     },
     "model": {"raceway_control": "hybrid"},
 }  # fmt: skip

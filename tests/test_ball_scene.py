@@ -176,7 +176,7 @@ def test_unit_faults_of_a_double_decker():
 
 
 def test_unit_defaults():
-    """Unit: what a scene leaves out: outer raceway control with the sign of the gyroscopic moment, free tilt, rings at rest."""
+    """Unit: what a scene leaves out: outer raceway control with the sign of the gyroscopic moment, held tilt, rings at rest."""
     table = {"bearing": copy.deepcopy(SMALL["bearing"]), "operation": {"radial_load_N": 5.0}}
     plain = BallScene.from_dict(table)
     assert isinstance(plain, SingleRowScene)
@@ -185,9 +185,9 @@ def test_unit_defaults():
     assert (model.light_load_share, model.friction_limit, model.solver) == (0.3, 0.3, "convex")
     assert (operation.inner_speed_rpm, operation.outer_speed_rpm) == (0.0, 0.0)
     assert operation.load == (5.0, 0.0, 0.0) and operation.moment == (0.0, 0.0)
-    assert operation.given == (None,) * 5
+    assert operation.given == (None, None, None, 0.0, 0.0)
     assert plain.material("ball") == plain.material("inner_ring") == plain.material("outer_ring")
-    assert scene(SMALL).operation.given == (None, None, None, 0.0, 0.0)
+    assert scene(SMALL, operation={"tilt": "free"}).operation.given == (None,) * 5
     assert scene(SMALL, operation={"axial_load_N": None, "preload_um": 4.0}).operation.given[2] == 4e-3
     assert scene(SMALL, operation={"preload_N": 30.0}).operation.load == (200.0, 0.0, 230.0)
 

@@ -9,8 +9,10 @@ import pytest
 from conftest import ROOT
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 from rbdyn import equilibrium
+from rbdyn.cli import app
 from rbdyn.faults import InputError
 from rbdyn.plots import ball as ball_pictures
 from rbdyn.plots import ball_sweep as pictures
@@ -328,3 +330,38 @@ def test_command_line_table_and_exit_codes(broken, grid, monkeypatch, capsys):
     monkeypatch.setattr(sweeps, "sweep", lambda *rest: grid)
     assert sweep_command.run(scene_with(), [f"{SPEED}=1,2"], None, False, True) == 0
     assert "12 points" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("file", "changes", "keys"),
+    [
+        (EXAMPLE, ("operation.tilt=free",), {LOAD: [-300.0, 100.0, 20e3, 40e3], SPEED: [0.0, 60e3]}),
+        (EXAMPLE, ("model.raceway_control=hybrid",), {SPEED: [10e3, 60e3, 120e3], LOAD: [-50.0, 20.0]}),
+        (EXAMPLE, ("model.solver=newton", "operation.inner_speed_rpm=0.0"), {LOAD: [-100.0, 20e3, 1e7]}),
+        (DOUBLE, ("operation.tilt=free",), {LOAD: [-200.0, 50.0, 20e3]}),
+    ],
+)
+def test_oracle_a_sweep_has_the_notes_of_its_points(file, changes, keys, tmp_path):
+    """Oracle: the notes of each point are those of its equilibrium alone, in the table by what they are about; saved and read."""
+    scene = scene_with(*changes, file=file)
+    found = sweep(scene, keys)
+    table, told = found.table()["notes"], 0
+    for place, status in enumerate(found.statuses):
+        point = [f"{key}={value}" for key, value in found.at(place).items()]
+        alone = equilibrium(scene_with(*changes, *point, file=file)).record.get("notes", ())
+        assert status != "ok" or len(alone) == len([word for word in table[place].split("; ") if word])
+        for note in found.notes:
+            assert note["about"] not in table[place] if place not in note["points"] else note["about"] in table[place]
+            if place == note["points"][0]:
+                assert note["note"] in alone
+                told += 1
+    assert told == len(found.notes) >= 1
+    found.save(tmp_path / "sweep.json")
+    assert SweepResult.load(tmp_path / "sweep.json").notes == found.notes
+
+
+def test_command_line_prints_notes_of_points_unless_quiet():
+    """Command line: each note stands once, with how many points it is about and where the first is; none with --quiet."""
+    arguments = ["ball", str(EXAMPLE), "--sweep", f"{LOAD}=100,20000,40000"]
+    loud, quiet = (CliRunner().invoke(app, [*arguments, *more]).stdout for more in ((), ("--quiet",)))
+    assert f"note: 2 points, the first at {LOAD} = 20000: " in loud and "note" not in quiet

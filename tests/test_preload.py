@@ -13,8 +13,9 @@ from rbdyn import BallScene
 from rbdyn.quasistatic import fatigue, life, preload
 
 
-def scene(radial=150.0, axial=40.0, **operation):
-    """A small angular contact bearing at rest, rings held parallel."""
+def scene(radial=150.0, axial=40.0, clearance=None, **operation):
+    """A small angular contact bearing at rest, rings held parallel; with a ``clearance`` [m] in place of its contact angle."""
+    angle = {"contact_angle_deg": 15.0} if clearance is None else {"radial_clearance_mm": 1e3 * clearance}
     return BallScene.from_dict(
         {
             "bearing": {
@@ -22,7 +23,7 @@ def scene(radial=150.0, axial=40.0, **operation):
                 "balls": 10,
                 "ball_diameter_mm": 4.85,
                 "pitch_diameter_mm": 18.0,
-                "contact_angle_deg": 15.0,
+                **angle,
                 "inner_groove_factor": 0.52,
                 "outer_groove_factor": 0.5235,
             },
@@ -76,7 +77,11 @@ def test_clearance_sweep_meets_the_scene_drawn_with_that_clearance():
     """Unit: a clearance equal to that of the contact angle gives the same equilibrium; more of it shortens life here."""
     own = preload.clearance_of(scene().bearing)
     assert own == pytest.approx(2.0 * 0.0435 * 4.85e-3 * (1.0 - math.cos(math.radians(15.0))), rel=1e-12)
-    swept = preload.over_clearance(scene(), [0.5 * own, own, 2.0 * own])
+    with pytest.raises(
+        ValueError, match=r"bearing.contact_angle_deg = 15 rules the clearance, 14\.\d+ um: give bearing.radial_cl"
+    ):
+        preload.over_clearance(scene(), [0.5 * own, own, 2.0 * own])
+    swept = preload.over_clearance(scene(clearance=own), [0.5 * own, own, 2.0 * own])
     plain = preload.over_preload(scene(), [-1.0, 0.0, 1.0]).points[1]
     assert swept.points[1].peak_pressure == pytest.approx(plain.peak_pressure, rel=1e-8)
     assert swept.points[1].million_turns == pytest.approx(plain.million_turns, rel=1e-8)

@@ -1,16 +1,20 @@
-"""What a designer asks of each race: pressure, half-width and film at its largest load."""
+"""What a designer asks of each race: pressure, half-width and film at its largest load, and whether they are sound."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from rbdyn.contact.film_thickness import half_width, hertz_pressure
+from rbdyn.contact.static_limit import ROLLERS, dent_sentence
 from rbdyn.dynamics.model import race_contact_law
 from rbdyn.dynamics.race_traction import film_report, rolling_contacts
 from rbdyn.scene import Scene
 
+# Film over roughness below which asperities bear part of the load.
+FULL_FILM = 1.0
 SMALLEST_LOAD = 1e-3  # [N]: below this a race counts as unloaded
 
 
@@ -43,6 +47,20 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
                 "lambda_ratio": films[name]["lambda_ratio"],
             }
     return report
+
+
+def race_notes(scene: Scene, races: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
+    """Where ``races`` of a report lie beyond their laws: dents, and films too thin for the friction of a full one."""
+    pressures = {name: 1e6 * race["max_pressure_MPa"] for name, race in races.items()}
+    notes = [dent_sentence(most, ROLLERS, name) for name, most in pressures.items() if most > ROLLERS]
+    law, films = scene.traction, {name: race["lambda_ratio"] for name, race in races.items() if "lambda_ratio" in race}
+    thinnest = min(films, key=films.__getitem__, default=None)
+    if thinnest and films[thinnest] < FULL_FILM and law.friction == "film" and law.model not in ("coulomb", "off"):
+        notes.append(
+            f"film: lambda is {films[thinnest]:.2g} on the {thinnest} race, below {FULL_FILM:g}, so asperities touch while the friction is "
+            "that of a full film; set traction.friction = 'mixed', or check lubricant.temperature_C and the roughnesses"
+        )
+    return tuple(notes)
 
 
 def _most_loaded_slice(scene: Scene, race: str, load: float) -> float:

@@ -11,10 +11,10 @@ import numpy as np
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.equations import LOSSES
 from rbdyn.dynamics.error_bars import error_notes, quantities
-from rbdyn.dynamics.left_out import left_out_notes
+from rbdyn.dynamics.left_out import heat_notes, left_out_notes
 from rbdyn.dynamics.method import explicit_method, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.race_report import race_report
+from rbdyn.dynamics.race_report import race_notes, race_report
 from rbdyn.dynamics.recording import Recording
 from rbdyn.dynamics.run import Run, prepare
 from rbdyn.dynamics.settling import Ensemble, run_until_settled
@@ -76,6 +76,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
     figures = quantities(scene, runs, companions, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
     inner_load, outer_load = (max(getattr(run, f"max_{race}_load") for run in runs) for race in ("inner", "outer"))
+    races = race_report(scene, inner_load, outer_load)
     return SimulationResult(
         status="ok",
         impact_force=figures["impact_force_N"],
@@ -92,7 +93,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         max_inner_load=inner_load,
         max_outer_load=outer_load,
         max_land_load=max(run.max_land_load for run in runs),
-        races=race_report(scene, inner_load, outer_load),
+        races=races,
         clearance=clearance_report(scene),
         impact_window_turns=scene.impact_window_turns,
         transient_turns=ensemble.transient_turns,
@@ -110,6 +111,9 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         replicates=scene.numerics.replicates,
         seed=scene.numerics.seed,
         notes=(
+            *scene.unit_notes,
+            *race_notes(scene, races),
+            *heat_notes(scene, figures["power_loss_W"].value),
             *_notes(scene, power_gap),
             *left_out_notes(scene, figures["power_loss_W"].value),
             *ensemble.notes,

@@ -92,7 +92,7 @@ def _case(draw: np.random.Generator, number: int, model: dict[str, Any]) -> Case
     diameter, pitch = bearing["ball_diameter_mm"], bearing["pitch_diameter_mm"]
     force = 10.0 ** draw.uniform(*LOAD_DECADES) * (diameter / BALL_DIAMETER_MM[1]) ** 2
     kind = LOADS[int(draw.integers(len(LOADS)))]
-    operation = {**_speeds(draw, pitch), **_load(draw, kind, float(force), 1e-3 * pitch)}
+    operation = {**_speeds(draw, pitch), **_load(draw, kind, float(force), 1e-3 * pitch), "tilt": "free"}
     if kind != "moment" and draw.random() < TILT_FIXED:
         operation["tilt"] = "fixed"
         if draw.random() < 0.5:

@@ -5,18 +5,22 @@ from __future__ import annotations
 import time
 from typing import Any
 
+import numpy as np
+
 from rbdyn.quasistatic.double_decker import Start, solve_double_decker
-from rbdyn.quasistatic.double_decker_model import DoubleDeckerModel, double_decker_of, load_record, middle_record
+from rbdyn.quasistatic.double_decker_model import double_decker_of, load_record, middle_record
 from rbdyn.quasistatic.equilibrium import Solution
+from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.growth_model import growth_record, row_change
 from rbdyn.quasistatic.model import RPM, RowModel, given_of, load_of, row_of
+from rbdyn.quasistatic.remarks import Rating, overloads, remarks, sentences, tipping
 from rbdyn.quasistatic.result import FORMAT, BallResult, ball_records, displacement_record, stiffness_record
 from rbdyn.quasistatic.roots import other_roots
-from rbdyn.quasistatic.row_report import beyond_hertz, film_record, notes, row_record
+from rbdyn.quasistatic.row_report import film_record, row_record
 from rbdyn.quasistatic.solvers import SOLVERS
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
-from rbdyn.scene.ball import BallRow, DoubleDeckerScene, SingleRowScene
+from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 
 # Raceway controls under which there may be more than one equilibrium.
 SEVERAL_ROOTS = ("inner", "half")
@@ -40,14 +44,14 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
     head, tail = _frame(scene, solution.status, took)
     if not solution.found:
         return BallResult({**head, **tail})
-    why = beyond_hertz(scene.bearing, model, solution)
-    if why is not None:
-        return BallResult({**head, "status": why, **tail})
-    speeds = scene.operation.inner_speed_rpm * RPM, scene.operation.outer_speed_rpm * RPM
-    film = _film(scene, scene.bearing, model, solution, speeds, ("inner_ring", "outer_ring"))
-    record = row_record(scene.bearing, model, solution, speeds, film)
+    rating, table = row_rating(scene, model), solution.told[np.newaxis]
+    why = overloads(table, [rating])
+    if why:
+        return BallResult({**head, "status": why[0], **tail})
+    record = row_record(rating, solution, film_record(scene, rating, solution, ("inner_ring", "outer_ring")))
+    record["reaction"] = load_record(solution.reaction)
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
-    told = notes(scene.bearing, model, solution)
+    told = sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
     others = _other_roots(scene, model, solution)
     if others:
         told.append(
@@ -55,23 +59,14 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
             "other_roots; this one is reached from one common cage speed"
         )
     roots = {"other_roots": others} if others is not None else {}
-    return BallResult({**head, **record, **grown, **roots, "notes": told, **tail}, (solution,))
+    return BallResult({**head, **record, **grown, **roots, "notes": told, **tail}, (solution,), (rating,))
 
 
-def _film(
-    scene: BallScene,
-    drawing: BallRow,
-    model: RowModel,
-    solution: Solution,
-    speeds: tuple[float, float],
-    rings: tuple[str, str],
-) -> dict[str, Any] | None:
-    """Film of a row, where the scene tells the oil."""
-    if scene.lubricant is None:
-        return None
-    inner, outer = (scene.material(ring) for ring in rings)
-    materials = scene.material("ball"), inner, outer
-    return film_record(drawing, model, solution, speeds, materials, scene.lubricant)
+def row_rating(scene: SingleRowScene, model: RowModel) -> Rating:
+    """What pressure, life and remarks need of a single row."""
+    operation = scene.operation
+    speeds = operation.inner_speed_rpm, operation.outer_speed_rpm
+    return Rating(scene.bearing, model, reference_capacities(scene.bearing), speeds)
 
 
 def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[dict[str, Any]] | None:
@@ -79,7 +74,7 @@ def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> 
     if scene.model.raceway_control not in SEVERAL_ROOTS or scene.model.solver != "convex":
         return None
     found = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
-    return [{**displacement_record(root.displacement), "balls": ball_records(root)} for root in found]
+    return [{**displacement_record(root.displacement), "balls": ball_records(root.told)} for root in found]
 
 
 def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallResult:
@@ -92,24 +87,21 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
     if not solution.found:
         return BallResult({**head, **tail})
     rows = solution.inner, solution.outer
-    why = next(
-        (
-            f"{name} row {why}"
-            for name, drawing, layer, row in _layers(scene, model, rows)
-            if (why := beyond_hertz(drawing, layer, row)) is not None
-        ),
-        None,
-    )
-    if why is not None:
-        return BallResult({**head, "status": why, **tail})
-    inner, outer = scene.operation.inner_speed_rpm * RPM, scene.operation.outer_speed_rpm * RPM
-    speeds = {"inner": (inner, model.split.speed), "outer": (model.split.speed, outer)}
     rings = {"inner": ("inner_ring", "middle_ring"), "outer": ("middle_ring", "outer_ring")}
-    layers, told = {}, []
-    for name, drawing, layer, row in _layers(scene, model, rows):
-        film = _film(scene, drawing, layer, row, speeds[name], rings[name])
-        layers[name] = row_record(drawing, layer, row, speeds[name], film)
-        told += notes(drawing, layer, row, name)
+    operation, below, above, middle = scene.operation, scene.bearing.inner, scene.bearing.outer, model.split.speed / RPM
+    ratings = (
+        Rating(below, model.inner, reference_capacities(below), (operation.inner_speed_rpm, middle)),
+        Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed_rpm)),
+    )
+    layers: dict[str, Any] = {}
+    told: list[str] = []
+    for name, rating, row in zip(rings, ratings, rows, strict=True):
+        why = overloads(row.told[np.newaxis], [rating])
+        if why:
+            return BallResult({**head, "status": f"{name} row {why[0]}", **tail})
+        layers[name] = row_record(rating, row, film_record(scene, rating, row, rings[name]))
+        told += sentences(remarks(row.told[np.newaxis], [rating], name))
+    told += sentences([tipping(solution.displacement[np.newaxis, 3:], scene)])
     grown = growth_record(
         scene, dict(zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True))
     )
@@ -121,14 +113,7 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
         "residual_N": solution.residual,
         "iterations": solution.steps + sum(row.steps for row in rows),
     }
-    return BallResult({**head, **whole, **layers, **grown, "notes": told, **tail}, rows)
-
-
-def _layers(
-    scene: DoubleDeckerScene, model: DoubleDeckerModel, rows: tuple[Solution, Solution]
-) -> tuple[tuple[str, BallRow, RowModel, Solution], ...]:
-    """Name, drawing, parameters and equilibrium of the inner and the outer row."""
-    return (("inner", scene.bearing.inner, model.inner, rows[0]), ("outer", scene.bearing.outer, model.outer, rows[1]))
+    return BallResult({**head, **whole, **layers, **grown, "notes": told, **tail}, rows, ratings)
 
 
 def _frame(scene: BallScene, status: str, took: float) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -19,6 +19,8 @@ from rbdyn.quasistatic.row import Row, component_lengths
 # What ``tell`` leaves of a ball.
 INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, TOLD = range(7)
 OK = "ok"
+# A figure below this share of the largest of its kind is rounding: where symmetry makes it zero, it is told as zero.
+RESOLUTION = 1e-12
 SENTENCES = {NOT_CONVEX_MINIMUM: "no equilibrium was found even with one common cage speed"}
 LOST = (
     "no equilibrium was found with this raceway control, only with one common cage speed: the control or friction leaves the "
@@ -58,6 +60,33 @@ class Solution(NamedTuple):
     def found(self) -> bool:
         """Whether this is an equilibrium."""
         return self.status == OK
+
+    @property
+    def told(self) -> NDArray[np.float64]:
+        """(Z, TOLD): what ``solve_row`` told of the balls."""
+        return np.stack(self[3:9], axis=1)
+
+
+def _resolved(values: Any, largest: Any) -> Any:
+    return np.where(np.abs(values) <= RESOLUTION * largest, 0.0, values)
+
+
+def resolved(q: Any, taken: Any, matrix: Any, told: Any, lever: Any) -> Any:
+    """What ``solve_row`` left (..., 5), (..., 5), (..., 5, 5) and (..., Z, TOLD), with 0 for what is below its resolution.
+
+    Displacement and stiffness against their largest entry, the load that the ring takes against the largest contact load, angles
+    against 1 rad, gyroscopic moments against centrifugal force times ``lever`` (...) [m].
+    """
+    most = told[..., [INNER_LOAD, OUTER_LOAD]].max(axis=(-2, -1))
+    pull = np.abs(told[..., PULL]).max(axis=-1) * lever
+    largest = np.zeros(told.shape)
+    largest[..., [INNER_ANGLE, OUTER_ANGLE]], largest[..., MOMENT] = 1.0, pull[..., np.newaxis]
+    return (
+        _resolved(q, np.abs(q).max(axis=-1, keepdims=True)),
+        _resolved(taken, most[..., np.newaxis]),
+        _resolved(matrix, np.abs(matrix).max(axis=(-2, -1), keepdims=True)),
+        _resolved(told, largest),
+    )
 
 
 @routine
@@ -133,6 +162,7 @@ def told_solution(
 ) -> Solution:
     """What a compiled solve left, in the units and names of a Solution."""
     unit = component_lengths(row.lever)
+    q, taken, matrix, told = resolved(q, at.sums[TAKEN : TAKEN + RING], at.matrix, told, row.lever)
     return Solution(
         displacement=q / unit,
         balls=balls[:, :INNER_DEPTH],
@@ -143,8 +173,8 @@ def told_solution(
         outer_angle=told[:, OUTER_ANGLE],
         centrifugal_force=told[:, PULL],
         gyroscopic_moment=told[:, MOMENT],
-        reaction=at.sums[TAKEN : TAKEN + RING] * unit,
-        stiffness=at.matrix * np.outer(unit, unit),
+        reaction=taken * unit,
+        stiffness=matrix * np.outer(unit, unit),
         status=OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST),
         residual=worst,
         steps=int(counts[0]),

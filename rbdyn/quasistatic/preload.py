@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.contact.hertz_point import peak_pressure
+from rbdyn.faults import validated
 from rbdyn.quasistatic.equilibrium import Solution, solve
 from rbdyn.quasistatic.fatigue import reference_capacities, solution_life, turning_rings
-from rbdyn.quasistatic.life import BallLife
-from rbdyn.quasistatic.model import RowModel, given_of, load_of, row_of
+from rbdyn.quasistatic.model import given_of, load_of, row_of
+from rbdyn.quasistatic.remarks import Rating, pressures
 from rbdyn.scene.ball import BallRow, SingleRowScene
 
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -34,43 +34,29 @@ Capacities = Callable[[BallRow], tuple[float, float]]
 class Case(NamedTuple):
     """One bearing under one load, ready to be solved."""
 
-    model: RowModel
+    rating: Rating
     load: NDArray[np.float64]
     given: NDArray[np.float64]
-    capacities: tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Point:
-    """One equilibrium of a sweep.
+    """One equilibrium of a sweep, at a ``value`` of what is swept: largest Hertz pressure [Pa] and L10 [1e6 turns].
 
-    ``value``: of what is swept. ``inner_pressure, outer_pressure``: largest Hertz pressure on each race [Pa]. Those
-    and ``life`` are NaN and None where no equilibrium was found.
+    Both are NaN where no equilibrium was found.
     """
 
     value: float
-    inner_pressure: float
-    outer_pressure: float
-    life: BallLife | None
     solution: Solution
-
-    @property
-    def peak_pressure(self) -> float:
-        """The larger of both [Pa]."""
-        return max(self.inner_pressure, self.outer_pressure)
-
-    @property
-    def million_turns(self) -> float:
-        """L10 in 1e6 turns; NaN without an equilibrium."""
-        return math.nan if self.life is None else self.life.million_turns
+    rating: Rating
+    peak_pressure: float = math.nan
+    million_turns: float = math.nan
 
 
 @dataclass(frozen=True)
 class Sweep:
     """A scan over preload or clearance and its two optima; ``notes`` say where they differ or lie at an end."""
 
-    name: str
-    unit: str
     points: tuple[Point, ...]
     least_stress: Point
     longest_life: Point
@@ -92,21 +78,16 @@ class Sweep:
         return np.array([point.million_turns for point in self.points])
 
 
-def solved(value: float, case: Case, scene: SingleRowScene, start: Solution | None = None) -> Point:
+def solved(value: float, case: Case, start: Solution | None = None) -> Point:
     """Equilibrium, stress and life of a case; ``start``: a solution nearby."""
-    solution = solve(case.model.row, case.model.control, case.load, case.given, start)
+    solution = solve(case.rating.model.row, case.rating.model.control, case.load, case.given, start)
     if not solution.found and start is not None:
-        solution = solve(case.model.row, case.model.control, case.load, case.given)
+        solution = solve(case.rating.model.row, case.rating.model.control, case.load, case.given)
     if not solution.found:
-        return Point(value, math.nan, math.nan, None, solution)
-    turning = turning_rings(scene.operation.inner_speed_rpm, scene.operation.outer_speed_rpm)
-    return Point(
-        value,
-        float(np.max(peak_pressure(case.model.inner_contact, solution.inner_load))),
-        float(np.max(peak_pressure(case.model.outer_contact, solution.outer_load))),
-        solution_life(solution, case.capacities, turning),
-        solution,
-    )
+        return Point(value, solution, case.rating)
+    peak = np.max(list(pressures(solution.told[np.newaxis], [case.rating]).values()))
+    life = solution_life(solution, case.rating.capacities, turning_rings(*case.rating.speeds))
+    return Point(value, solution, case.rating, float(peak), life.million_turns)
 
 
 def golden_section(
@@ -127,14 +108,7 @@ def golden_section(
     return (left, at_left) if at_left <= at_right else (right, at_right)
 
 
-def sweep(
-    scene: SingleRowScene,
-    case_at: Callable[[float], Case],
-    values: Sequence[float],
-    name: str,
-    unit: str,
-    scale: float = 1.0,
-) -> Sweep:
+def sweep(case_at: Callable[[float], Case], values: Sequence[float], name: str, unit: str, scale: float = 1.0) -> Sweep:
     """Scan ``values``, at least three and rising, and refine both optima.
 
     ``case_at`` makes the case of a value; ``name``, ``unit`` and ``scale`` (units to one of SI) are for the notes.
@@ -145,9 +119,9 @@ def sweep(
     points: list[Point] = []
     start: Solution | None = None
     for value in values:
-        points.append(solved(value, case_at(value), scene, start))
-        start = points[-1].solution if points[-1].life is not None else None
-    found = [point for point in points if point.life is not None]
+        points.append(solved(value, case_at(value), start))
+        start = points[-1].solution if points[-1].solution.found else None
+    found = [point for point in points if point.solution.found]
     if len(found) < 3:
         raise ValueError(
             f"{name}: only {len(found)} of {len(points)} scanned values have an equilibrium; scan a range that has one"
@@ -158,11 +132,11 @@ def sweep(
         low, high = found[max(best - 1, 0)].value, found[min(best + 1, len(found) - 1)].value
 
         def point_at(value: float) -> Point:
-            return solved(value, case_at(value), scene, found[best].solution)
+            return solved(value, case_at(value), found[best].solution)
 
         def cost(value: float) -> float:
             point = point_at(value)
-            return math.inf if point.life is None else worth(point)
+            return worth(point) if point.solution.found else math.inf
 
         place, value = golden_section(cost, low, high, 1e-4 * (high - low))
         return point_at(place) if value < worth(found[best]) else found[best]
@@ -170,7 +144,7 @@ def sweep(
     least = refined(lambda point: point.peak_pressure)
     longest = refined(lambda point: -point.million_turns)
     notes = _notes(found, least, longest, name, unit, scale)
-    return Sweep(name, unit, tuple(points), least, longest, notes)
+    return Sweep(tuple(points), least, longest, notes)
 
 
 def _notes(found: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float) -> tuple[str, ...]:
@@ -202,40 +176,48 @@ def over_preload(
     ``capacities``: how races are rated, ``fatigue.reference_capacities`` or ``fatigue.plain_capacities``. Raises
     ValueError as ``sweep``, or where the scene prescribes the axial displacement, which no force can change.
     """
-    model, load, given = row_of(scene), load_of(scene), given_of(scene)
-    if not math.isnan(given[2]):
+    at = _case(scene, capacities)
+    if not math.isnan(at.given[2]):
         raise ValueError(
             "operation.prescribed.z_mm or preload_um: the axial displacement is prescribed, so a preload by force has no "
             "effect; leave it out"
         )
-    rated = capacities(scene.bearing)
 
     def case_at(preload: float) -> Case:
-        return Case(model, load + np.array([0.0, 0.0, preload, 0.0, 0.0]), given, rated)
+        return at._replace(load=at.load + np.array([0.0, 0.0, preload, 0.0, 0.0]))
 
-    return sweep(scene, case_at, preloads, "a preload of", "N")
+    return sweep(case_at, preloads, "a preload of", "N")
 
 
 def over_clearance(
     scene: SingleRowScene, clearances: Sequence[float], capacities: Capacities = reference_capacities
 ) -> Sweep:
-    """Sweep of the diametral clearance [m] with everything else as in the scene; raises ValueError as ``sweep``."""
+    """Sweep of the diametral clearance [m] with everything else as in the scene.
+
+    Raises ValueError as ``sweep``, or where the scene gives the contact angle, which rules the clearance.
+    """
+    angle = scene.bearing.contact_angle_deg
+    if angle is not None:
+        raise ValueError(
+            f"bearing.contact_angle_deg = {angle:g} rules the clearance, {1e6 * clearance_of(scene.bearing):.4g} um: give "
+            "bearing.radial_clearance_mm in its place, or --sweep bearing.clearance_change_um"
+        )
 
     def case_at(clearance: float) -> Case:
-        changed = with_clearance(scene, clearance)
-        return Case(row_of(changed), load_of(changed), given_of(changed), capacities(changed.bearing))
+        return _case(_redrawn(scene, radial_clearance_mm=1e3 * clearance), capacities)
 
-    return sweep(scene, case_at, clearances, "a clearance of", "um", 1e6)
+    return sweep(case_at, clearances, "a clearance of", "um", 1e6)
 
 
 def over_wear(scene: SingleRowScene, wears: Sequence[float], capacities: Capacities = reference_capacities) -> Sweep:
     """Sweep of the diameter that every ball has lost [m]; raises ValueError as ``sweep`` and ``worn``."""
+    return sweep(lambda wear: _case(worn(scene, wear), capacities), wears, "a wear of", "um", 1e6)
 
-    def case_at(wear: float) -> Case:
-        changed = worn(scene, wear)
-        return Case(row_of(changed), load_of(changed), given_of(changed), capacities(changed.bearing))
 
-    return sweep(scene, case_at, wears, "a wear of", "um", 1e6)
+def _case(scene: SingleRowScene, capacities: Capacities) -> Case:
+    speeds = scene.operation.inner_speed_rpm, scene.operation.outer_speed_rpm
+    rating = Rating(scene.bearing, row_of(scene), capacities(scene.bearing), speeds)
+    return Case(rating, load_of(scene), given_of(scene))
 
 
 def clearance_of(drawing: BallRow) -> float:
@@ -243,11 +225,6 @@ def clearance_of(drawing: BallRow) -> float:
     if drawing.radial_clearance_mm is not None:
         return 1e-3 * drawing.radial_clearance_mm
     return 2e-3 * drawing.groove_centre_distance_mm * (1.0 - math.cos(drawing.contact_angle))
-
-
-def with_clearance(scene: SingleRowScene, clearance: float) -> SingleRowScene:
-    """The scene with a diametral clearance [m] in place of its contact angle."""
-    return _redrawn(scene, radial_clearance_mm=1e3 * clearance)
 
 
 def worn(scene: SingleRowScene, wear: float) -> SingleRowScene:
@@ -272,4 +249,4 @@ def worn(scene: SingleRowScene, wear: float) -> SingleRowScene:
 
 def _redrawn(scene: SingleRowScene, **changes: float) -> SingleRowScene:
     bearing = {**scene.bearing.model_dump(), "contact_angle_deg": None, **changes}
-    return type(scene).model_validate({**scene.model_dump(), "bearing": bearing})
+    return validated(type(scene), {**scene.model_dump(), "bearing": bearing}, "scene")

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.quasistatic.equilibrium import Solution
+from rbdyn.quasistatic.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
+from rbdyn.quasistatic.remarks import Rating
 from rbdyn.result import read_record, write_json
 
 if TYPE_CHECKING:
@@ -23,11 +24,13 @@ class BallResult:
     """Equilibrium of a ball bearing.
 
     ``record``: what ``as_dict`` gives and ``save`` writes, units in the names. ``rows``: the solved rows in SI, one, or the
-    inner and the outer one of a double-decker; empty for a result that was loaded or that found no equilibrium.
+    inner and the outer one of a double-decker; empty for a result that was loaded or that found no equilibrium. ``ratings``: what
+    their pressures and lives rest on.
     """
 
     record: dict[str, Any]
     rows: tuple[Solution, ...] = ()
+    ratings: tuple[Rating, ...] = ()
 
     @property
     def status(self) -> str:
@@ -74,19 +77,24 @@ def displacement_record(displacement: NDArray[np.float64]) -> dict[str, Any]:
     return {"displacement_mm": {"x": x, "y": y, "z": z}, "tilt_mrad": {"x": tilt_x, "y": tilt_y}}
 
 
-def ball_records(solution: Solution) -> list[dict[str, float]]:
-    """One record a ball."""
-    size = solution.inner_load.size
-    columns = {
-        "azimuth_deg": 360.0 * np.arange(size) / size,
-        "inner_angle_deg": np.degrees(solution.inner_angle),
-        "outer_angle_deg": np.degrees(solution.outer_angle),
-        "inner_load_N": solution.inner_load,
-        "outer_load_N": solution.outer_load,
-        "centrifugal_force_N": solution.centrifugal_force,
-        "gyroscopic_moment_Nmm": 1e3 * solution.gyroscopic_moment,
+def ball_columns(balls: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """A value a ball, (n, Z) each, named as ``BallResult.table`` names them."""
+    size = balls.shape[1]
+    return {
+        "azimuth_deg": np.broadcast_to(360.0 * np.arange(size) / size, balls.shape[:2]),
+        "inner_angle_deg": np.degrees(balls[:, :, INNER_ANGLE]),
+        "outer_angle_deg": np.degrees(balls[:, :, OUTER_ANGLE]),
+        "inner_load_N": balls[:, :, INNER_LOAD],
+        "outer_load_N": balls[:, :, OUTER_LOAD],
+        "centrifugal_force_N": balls[:, :, PULL],
+        "gyroscopic_moment_Nmm": 1e3 * balls[:, :, MOMENT],
     }
-    return [{name: float(values[j]) for name, values in columns.items()} for j in range(size)]
+
+
+def ball_records(told: NDArray[np.float64]) -> list[dict[str, float]]:
+    """One record a ball, from what ``solve_row`` told (Z, TOLD)."""
+    columns = ball_columns(told[np.newaxis])
+    return [{name: float(values[0, j]) for name, values in columns.items()} for j in range(len(told))]
 
 
 def stiffness_record(stiffness: NDArray[np.float64]) -> dict[str, Any]:

@@ -10,25 +10,25 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.quasistatic.bearing import equilibrium
-from rbdyn.quasistatic.double_decker_model import middle_speed
-from rbdyn.quasistatic.equilibrium import LOST, OK, SENTENCES
-from rbdyn.quasistatic.fatigue import reference_capacities, turning_rings
-from rbdyn.quasistatic.model import RPM, RowModel, contacts, given_of, load_of, row_of
+from rbdyn.quasistatic.equilibrium import LOST, OK, SENTENCES, resolved
+from rbdyn.quasistatic.fatigue import reference_capacities
+from rbdyn.quasistatic.model import RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.newton import CONVERGED, COUNTERS, space
+from rbdyn.quasistatic.remarks import Rating, Remark, overloads, remarks, tipping
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.ring import BALL, RING
-from rbdyn.quasistatic.sweep_figures import Columns, Rating, overloads, ring_columns, row_columns, told
+from rbdyn.quasistatic.sweep_figures import Columns, ring_columns, row_columns
 from rbdyn.quasistatic.sweep_march import LEVER, Found, Points, empty, leaves, march_through
 from rbdyn.quasistatic.sweep_points import Axis, axes_of, scenes, snake
 from rbdyn.quasistatic.sweep_result import SweepResult
 from rbdyn.scene import BallScene, Scene, balls_only
-from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
+from rbdyn.scene.ball import SingleRowScene
 
 # Keys that change only what loads the ring: the row stays as it is.
 LOAD_KEYS = (
@@ -47,12 +47,13 @@ Group = tuple[NDArray[np.int64], Vector]
 
 
 class Walked(NamedTuple):
-    """What a sweep found, in the order in which it went; ``balls`` as ``SweepResult.told``."""
+    """What a sweep found, in the order in which it went; ``balls`` as ``SweepResult.told``, remarks with their first point."""
 
     columns: Columns
     statuses: list[str]
     balls: Mapping[str, Sequence[Vector] | Vector]
     cold: int
+    remarks: list[tuple[int, Remark]]
 
 
 def sweep(
@@ -86,7 +87,27 @@ def sweep(
         time.perf_counter() - began,
         scene.model_dump(mode="json"),
         {name: _sorted(balls, back) for name, balls in walked.balls.items()},
+        grouped(walked.remarks, visited, walked.statuses),
     )
+
+
+def grouped(
+    found: Sequence[tuple[int, Remark]], visited: NDArray[np.int64], statuses: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Notes by what they are about: the sentence of the first point in the table, and the points, counted from 0.
+
+    ``found``: remarks, each with the place of its first point on the walk; ``visited``: the table's place of each point walked.
+    """
+    groups: dict[str, list[tuple[int, int, Remark]]] = {}
+    for first, remark in found:
+        for k in np.flatnonzero(remark.where).tolist():
+            if statuses[first + k] == OK:
+                groups.setdefault(remark.word, []).append((int(visited[first + k]), k, remark))
+    notes = []
+    for word, group in groups.items():
+        _, k, remark = min(group, key=lambda one: one[0])
+        notes.append({"about": word, "note": remark.sentence(k), "points": sorted(place for place, _, _ in group)})
+    return notes
 
 
 def _sorted(balls: Sequence[Vector] | Vector, back: NDArray[np.int64]) -> list[Group]:
@@ -112,12 +133,15 @@ def _march(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ..
             model.control, row.cosine, row.sine, points, first, last, warm, q, balls, at, counts, found
         )
         progress(last, count)
-    columns = _columns(points, found, ratings)
+    *ring, balls = resolved(found.displacement, found.taken, found.matrix, found.told, points.numbers[:, LEVER])
+    columns = _columns(points, found, ring, balls, ratings)
     statuses = [OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST) for outcome in found.outcome.tolist()]
-    for k, why in overloads(found.told, ratings).items():
+    for k, why in overloads(balls, ratings).items():
         if statuses[k] == OK:
             statuses[k] = why
-    return Walked(columns, statuses, {"row": found.told}, int(found.cold.sum()))
+    tilts = (ring[0] / _units(points.numbers))[:, 3:]
+    notes = [(0, remark) for remark in (*remarks(balls, ratings), tipping(tilts, scene))]
+    return Walked(columns, statuses, {"row": balls}, int(found.cold.sum()), notes)
 
 
 def _packed(
@@ -127,12 +151,7 @@ def _packed(
     loading = [place for place, axis in enumerate(axes) if axis.key.startswith(LOAD_KEYS)]
     shaping = [place for place in range(len(axes)) if place not in loading]
     drawing = [place for place in shaping if axes[place].key.startswith("bearing.")]
-    places: list[tuple[Vector, ...]] = []
-    numbers: list[tuple[float, ...]] = []
-    controls: list[list[float]] = []
-    ratings: list[Rating] = []
-    loads: list[Vector] = []
-    givens: list[Vector] = []
+    packed: list[tuple[Any, ...]] = []
     made: RowModel | None = None
     loaded = shaped = drawn = [math.nan]
     for values, point in scenes(scene, axes, order):
@@ -144,25 +163,14 @@ def _packed(
             now = [values[place] for place in drawing]
             if now != drawn:
                 capacities, drawn = reference_capacities(point.bearing), now
-            inner_speed, outer_speed = point.operation.inner_speed_rpm, point.operation.outer_speed_rpm
-            rating = Rating(
-                point.bearing,
-                made.inner_contact,
-                made.outer_contact,
-                capacities,
-                turning_rings(inner_speed, outer_speed),
-                inner_speed - outer_speed,
-            )
+            speeds = point.operation.inner_speed_rpm, point.operation.outer_speed_rpm
+            rating = Rating(point.bearing, made, capacities, speeds)
         now = [values[place] for place in loading]
         if now != loaded:
             load, given, loaded = load_of(point), given_of(point), now
-        places.append(at_place)
-        numbers.append(number)
-        controls.append(control)
-        ratings.append(rating)
-        loads.append(load)
-        givens.append(given)
+        packed.append((at_place, number, control, rating, load, given))
     assert made is not None
+    places, numbers, controls, ratings, loads, givens = zip(*packed, strict=True)
     number_table, given_table = np.array(numbers), np.array(givens)
     units = _units(number_table)
     free = np.isnan(given_table)
@@ -174,7 +182,7 @@ def _packed(
         np.where(free, 0.0, given_table) * units,
         free.astype(float),
     )
-    return made, points, ratings
+    return made, points, list(ratings)
 
 
 def _units(numbers: Vector) -> Vector:
@@ -184,15 +192,11 @@ def _units(numbers: Vector) -> Vector:
     return units
 
 
-def _columns(points: Points, found: Found, ratings: Sequence[Rating]) -> Columns:
-    units = _units(points.numbers)
+def _columns(points: Points, found: Found, ring: Sequence[Vector], balls: Vector, ratings: Sequence[Rating]) -> Columns:
+    units, (displacement, taken, matrix) = _units(points.numbers), ring
     return {
-        **ring_columns(
-            found.displacement / units,
-            found.taken * units,
-            found.matrix * units[:, :, np.newaxis] * units[:, np.newaxis, :],
-        ),
-        **row_columns(found.told, ratings),
+        **ring_columns(displacement / units, taken * units, matrix * units[:, :, np.newaxis] * units[:, np.newaxis, :]),
+        **row_columns(balls, ratings),
         "residual_N": found.residual,
         "iterations": found.steps.astype(float),
     }
@@ -203,6 +207,7 @@ def _one_by_one(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[in
     rows: list[dict[str, float]] = []
     statuses: list[str] = []
     told_of: dict[str, list[Vector]] = {}
+    notes: list[tuple[int, Remark]] = []
     before: BallResult | None = None
     balls, cold = 0, 0
     for place, (_, point) in enumerate(list(scenes(scene, axes, order))):
@@ -218,7 +223,8 @@ def _one_by_one(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[in
         statuses.append(result.status)
         rows.append({})
         if result.found:
-            rows[-1], told_rows = _figures(point, result)
+            rows[-1], told_rows, found = _figures(point, result)
+            notes += [(place, remark) for remark in found]
         for name in ("row",) if isinstance(point, SingleRowScene) else ("inner", "outer"):
             size = count or getattr(point.bearing, name).balls
             told_of.setdefault(name, []).append(told_rows[name] if result.found else np.full((size, 6), np.nan))
@@ -226,50 +232,24 @@ def _one_by_one(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[in
         progress(place + 1, len(order))
     names = dict.fromkeys(name for row in rows for name in row)
     columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
-    return Walked(columns, statuses, told_of, cold)
+    return Walked(columns, statuses, told_of, cold, notes)
 
 
-def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Vector]]:
-    """Figures of one point, and what is known of each ball by row."""
+def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Vector], list[Remark]]:
+    """Figures of one point, what is known of each ball by row, and remarks."""
     record = result.record
-    load = record.get("reaction")
-    if load is None:
-        reaction = result.rows[0].reaction
-    else:
-        reaction = np.array([*load["load_N"].values(), *load["moment_Nm"].values()])
+    load = record["reaction"]
+    reaction = np.array([*load["load_N"].values(), *load["moment_Nm"].values()])
     stiffness = np.array(record["stiffness"]["matrix_SI"])
     columns = ring_columns(result.displacement[np.newaxis], reaction[np.newaxis], stiffness[np.newaxis])
-    balls = {}
-    for (name, rating), solution in zip(_ratings(scene).items(), result.rows, strict=True):
-        balls[name] = told(solution)
+    balls, found = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
+    names = ("row",) if len(result.rows) == 1 else ("inner", "outer")
+    for name, rating, solution in zip(names, result.ratings, result.rows, strict=True):
+        balls[name] = solution.told
+        found += remarks(solution.told[np.newaxis], [rating], name.removeprefix("row"))
         prefix = "" if name == "row" else f"{name}_row_"
         columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
     figures = {name: float(value[0]) for name, value in columns.items()}
     if "middle_ring" in record:
         figures["middle_ring_speed_rpm"] = record["middle_ring"]["speed_rpm"]
-    return {**figures, "residual_N": record["residual_N"], "iterations": float(record["iterations"])}, balls
-
-
-def _ratings(scene: BallScene) -> dict[str, Rating]:
-    """What pressure and life need, by row."""
-    speed = scene.operation
-    if isinstance(scene, DoubleDeckerScene):
-        middle = middle_speed(scene).speed / RPM
-        rows = {
-            "inner": (scene.bearing.inner, "inner_ring", "middle_ring", speed.inner_speed_rpm, middle),
-            "outer": (scene.bearing.outer, "middle_ring", "outer_ring", middle, speed.outer_speed_rpm),
-        }
-    else:
-        assert isinstance(scene, SingleRowScene)
-        rows = {"row": (scene.bearing, "inner_ring", "outer_ring", speed.inner_speed_rpm, speed.outer_speed_rpm)}
-    ball = scene.material("ball")
-    return {
-        name: Rating(
-            drawing,
-            *contacts(drawing, ball, scene.material(under), scene.material(over)),
-            reference_capacities(drawing),
-            turning_rings(below, above),
-            below - above,
-        )
-        for name, (drawing, under, over, below, above) in rows.items()
-    }
+    return {**figures, "residual_N": record["residual_N"], "iterations": float(record["iterations"])}, balls, found

@@ -4,39 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.contact.hertz_point import PointContact, peak_pressure
-from rbdyn.quasistatic.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, TOLD, Solution
-from rbdyn.quasistatic.life import LOAD_LIFE, RACE_EXPONENT, WEIBULL, Turning
-from rbdyn.quasistatic.row_report import overload
-from rbdyn.scene.ball import BallRow
+from rbdyn.quasistatic.equilibrium import INNER_ANGLE, INNER_LOAD, OUTER_ANGLE, OUTER_LOAD
+from rbdyn.quasistatic.fatigue import turning_rings
+from rbdyn.quasistatic.life import LOAD_LIFE, RACE_EXPONENT, WEIBULL
+from rbdyn.quasistatic.remarks import Rating, pressures
 
 Vector = NDArray[np.float64]
 Columns = dict[str, Vector]
-
-
-class Rating(NamedTuple):
-    """What pressure and life of a row need besides its loads: contacts, capacities of both races [N], speeds [rpm]."""
-
-    drawing: BallRow
-    inner_contact: PointContact
-    outer_contact: PointContact
-    capacities: tuple[float, float]
-    turning: Turning
-    relative_speed: float
-
-
-def told(solution: Solution) -> Vector:
-    """(Z, TOLD): what ``solve_row`` told of the balls of a solution."""
-    table = np.empty((solution.inner_load.size, TOLD))
-    table[:, INNER_LOAD], table[:, OUTER_LOAD] = solution.inner_load, solution.outer_load
-    table[:, INNER_ANGLE], table[:, OUTER_ANGLE] = solution.inner_angle, solution.outer_angle
-    table[:, PULL], table[:, MOMENT] = solution.centrifugal_force, solution.gyroscopic_moment
-    return table
 
 
 def ring_columns(displacement: Vector, reaction: Vector, stiffness: Vector) -> Columns:
@@ -72,11 +50,9 @@ def row_columns(balls: Vector, ratings: Sequence[Rating]) -> Columns:
         "inner_load_max_N": inner_load.max(axis=1),
         "outer_load_max_N": outer_load.max(axis=1),
     }
-    for race, load in (("inner", inner_load), ("outer", outer_load)):
-        contact = PointContact(*np.array([getattr(rating, f"{race}_contact") for rating in ratings]).T)
-        columns[f"{race}_pressure_MPa"] = 1e-6 * peak_pressure(contact, load.max(axis=1))
+    columns |= {f"{race}_pressure_MPa": 1e-6 * pressure for race, pressure in pressures(balls, ratings).items()}
     millions = lives(inner_load, outer_load, ratings)
-    speed = np.array([abs(rating.relative_speed) for rating in ratings])
+    speed = np.array([abs(rating.speeds[0] - rating.speeds[1]) for rating in ratings])
     with np.errstate(divide="ignore"):
         return columns | {"L10_Mrev": millions, "L10_h": np.where(speed > 0.0, 1e6 * millions / (60.0 * speed), np.inf)}
 
@@ -89,44 +65,8 @@ def lives(inner_load: Vector, outer_load: Vector, ratings: Sequence[Rating]) -> 
         cubes = load**LOAD_LIFE
         turning = np.mean(cubes, axis=1) ** (1.0 / LOAD_LIFE)
         fixed = np.mean(cubes**WEIBULL, axis=1) ** (1.0 / RACE_EXPONENT)
-        stands = np.array([standing[rating.turning] == race for rating in ratings])
+        stands = np.array([standing[turning_rings(*rating.speeds)] == race for rating in ratings])
         capacity = np.array([rating.capacities[i] for rating in ratings])
         damage += (np.where(stands, fixed, turning) / capacity) ** RACE_EXPONENT
     with np.errstate(divide="ignore"):
         return np.where(damage > 0.0, damage ** (-1.0 / WEIBULL), math.inf)
-
-
-def overloads(balls: Vector, ratings: Sequence[Rating]) -> dict[int, str]:
-    """Points whose loads no contact can carry, and why; see ``row_report.overload``."""
-    loads = balls[:, :, INNER_LOAD], balls[:, :, OUTER_LOAD]
-    suspect = np.zeros(len(ratings), bool)
-    for load, race in zip(loads, ("inner", "outer"), strict=True):
-        semi_major = np.array([getattr(rating, f"{race}_contact").semi_major for rating in ratings])
-        groove = np.array(
-            [
-                1e-3 * rating.drawing.ball_diameter_mm * getattr(rating.drawing, f"{race}_groove_factor")
-                for rating in ratings
-            ]
-        )
-        suspect |= semi_major * np.cbrt(load.max(axis=1)) > 0.999 * groove
-    found = {}
-    for k in np.flatnonzero(suspect).tolist():
-        rating = ratings[k]
-        why = overload(rating.drawing, rating.inner_contact, rating.outer_contact, loads[0][k], loads[1][k])
-        if why is not None:
-            found[k] = why
-    return found
-
-
-def ball_columns(balls: Vector) -> Columns:
-    """A value a ball, (n, Z) each, named as ``BallResult.table`` names them."""
-    size = balls.shape[1]
-    return {
-        "azimuth_deg": np.broadcast_to(360.0 * np.arange(size) / size, balls.shape[:2]),
-        "inner_angle_deg": np.degrees(balls[:, :, INNER_ANGLE]),
-        "outer_angle_deg": np.degrees(balls[:, :, OUTER_ANGLE]),
-        "inner_load_N": balls[:, :, INNER_LOAD],
-        "outer_load_N": balls[:, :, OUTER_LOAD],
-        "centrifugal_force_N": balls[:, :, PULL],
-        "gyroscopic_moment_Nmm": 1e3 * balls[:, :, MOMENT],
-    }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.faults import InputError
-from rbdyn.quasistatic.sweep_figures import ball_columns
+from rbdyn.quasistatic.result import ball_columns, ball_records
 from rbdyn.result import read_record, versions, write_json
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMAT = "rbdyn.sweep/1"
+FORMAT = "rbdyn.sweep/2"
 OK = "ok"
 
 
@@ -27,7 +28,8 @@ class SweepResult:
 
     ``keys``: values of each key; ``columns``: a figure a point, units in the names, NaN where ``statuses`` tells why there is no
     equilibrium. ``told``: by row of balls, what is known of each ball in SI as (points, (points, Z, 6)), a pair a number Z of balls;
-    empty in a loaded sweep. ``cold``: points not started from their neighbour. ``wall_s``: what they took.
+    empty in a loaded sweep. ``notes``: "about" what, the "note" of the first point and all "points" that it is about, counted from 0 in
+    the order of the table. ``cold``: points not started from their neighbour. ``wall_s``: what they took.
     """
 
     keys: dict[str, tuple[float, ...]]
@@ -37,6 +39,7 @@ class SweepResult:
     wall_s: float
     scene: dict[str, Any]
     told: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = field(default_factory=dict, repr=False)
+    notes: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -66,15 +69,25 @@ class SweepResult:
         indices = np.unravel_index(place, self.shape)
         return {key: values[int(index)] for (key, values), index in zip(self.keys.items(), indices, strict=True)}
 
+    def where(self, places: Sequence[int]) -> str:
+        """How many points, and at which values of the keys the first of them lies."""
+        first = ", ".join(f"{key} = {value:g}" for key, value in self.at(places[0]).items())
+        return f"{'1 point' if len(places) == 1 else f'{len(places)} points, the first'} at {first}"
+
     def grid(self, column: str) -> NDArray[np.float64]:
         """A column over the grid, one axis a key. Raises KeyError for an unknown one."""
         return self.columns[column].reshape(self.shape)
 
     def table(self) -> pd.DataFrame:
-        """A row a point: keys, figures, status."""
+        """A row a point: keys, figures, status, and what its notes are about."""
         import pandas as pd
 
-        return pd.DataFrame({**self._places(), **self.columns, "status": self.statuses})
+        words: list[list[str]] = [[] for _ in self.statuses]
+        for note in self.notes:
+            for place in note["points"]:
+                words[place].append(note["about"])
+        told = ["; ".join(about) for about in words]
+        return pd.DataFrame({**self._places(), **self.columns, "status": self.statuses, "notes": told})
 
     def balls(self) -> pd.DataFrame:
         """A row a ball and point: keys, row of balls, ball from 1, then as ``BallResult.table``.
@@ -106,16 +119,15 @@ class SweepResult:
         found = {}
         for name, groups in self.told.items():
             told = next(balls[points == place] for points, balls in groups if place in points)
-            columns = {key: values[0] for key, values in ball_columns(told).items()}
-            found[name] = [{key: float(values[j]) for key, values in columns.items()} for j in range(told.shape[1])]
+            found[name] = ball_records(told[0])
         return found
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form: a record a point, null where a figure is infinite or was not found."""
+    def points(self) -> list[dict[str, Any]]:
+        """A record a point, None where a figure is infinite or was not found."""
         places, names = self._places(), list(self.columns)
         values = [[_json(value) for value in self.columns[name].tolist()] for name in names]
         keys = [column.tolist() for column in places.values()]
-        points = [
+        return [
             {
                 **dict(zip(places, (column[place] for column in keys), strict=True)),
                 "status": status,
@@ -123,15 +135,19 @@ class SweepResult:
             }
             for place, status in enumerate(self.statuses)
         ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
         return {
             "format": FORMAT,
             "status": self.status,
             "keys": {key: list(values) for key, values in self.keys.items()},
-            "points": points,
+            "points": self.points(),
             "failures": [
                 {"cause": cause, "points": len(at), "first": self.at(at[0]), "status": self.statuses[at[0]]}
                 for cause, at in self.failures.items()
             ],
+            "notes": self.notes,
             "cost": {"wall_s": self.wall_s, "cold_starts": self.cold},
             "versions": versions(),
             "scene": self.scene,
@@ -155,7 +171,7 @@ class SweepResult:
             columns = {name: np.array([_number(point, name) for point in points], dtype=np.float64) for name in names}
             cost = data["cost"]
             statuses = tuple(point["status"] for point in points)
-            return cls(keys, columns, statuses, cost["cold_starts"], cost["wall_s"], data["scene"])
+            return cls(keys, columns, statuses, cost["cold_starts"], cost["wall_s"], data["scene"], notes=data["notes"])
         except (ValueError, KeyError, TypeError, AttributeError):
             raise InputError([f"{path}: not a whole sweep; sweep again"]) from None
 

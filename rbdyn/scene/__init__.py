@@ -13,7 +13,7 @@ from pydantic import model_validator
 
 from rbdyn.faults import InputError
 from rbdyn.fields import or_refuse
-from rbdyn.materials import Material
+from rbdyn.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
 from rbdyn.scene.laws import Laws, Numerics
@@ -21,6 +21,7 @@ from rbdyn.scene.lubricant import Lubricant, Traction
 from rbdyn.scene.mounting import Mounting, faults, material_of
 from rbdyn.scene.operation import Operation, Support
 from rbdyn.scene.reading import SceneFile
+from rbdyn.scene.units import unit_notes
 
 if TYPE_CHECKING:
     from rbdyn.ring_expansion import MountedClearance
@@ -99,7 +100,24 @@ class Scene(SceneFile):
             found.append(f"numerics.turns = {numerics.turns:g}: shorter than two samples; lengthen the run")
         if self.mounting is not None:
             found += faults(self.mounting, bearing)
-        return or_refuse(self, found)
+        found += self._overload_faults()
+        # A slip of the unit may be the cause of a fault.
+        slips = {note.partition(" = ")[0]: note for note in (self.unit_notes if found else ())}
+        return or_refuse(self, ["; ".join([fault, *(slips[key] for key in slips if key in fault)]) for fault in found])
+
+    def _overload_faults(self) -> list[str]:
+        """Whether the most loaded roller, by Stribeck 5 F/Z, would be flattened over more than its diameter."""
+        bearing, load = self.bearing, self.operation.largest_load_N
+        modulus = 1e-6 * equivalent_modulus(self.material("roller"), self.material("rings"))
+        diameter, length = bearing.roller_diameter_mm, bearing.effective_length_mm
+        radius = 0.5 * diameter * (1.0 - diameter / bearing.pitch_diameter_mm)
+        width = math.sqrt(32.0 * 5.0 * load / bearing.rollers * radius / (math.pi * length * modulus))  # Hertz
+        if width < diameter:
+            return []
+        return [
+            f"operation.radial_load_N = {load:g}: a roller of {diameter:g} mm would be flattened over {width:.3g} mm, which none can; "
+            "lessen the load or check its unit"
+        ]
 
     def _tilt_faults(self) -> list[str]:
         """Whether a roller that bears the whole load between tilted races touches over less than a slice."""
@@ -110,7 +128,6 @@ class Scene(SceneFile):
         if tilt < 1e-12 or load == 0.0:  # by then the ends move less than an atom
             return []
         from rbdyn.contact.hertz_line import palmgren
-        from rbdyn.materials import equivalent_modulus
 
         stiffness = palmgren(equivalent_modulus(self.material("roller"), self.material("rings")), length).stiffness
         # Q = K/l int_0^c (tilt x)^(10/9) dx = (9/19) K/l tilt^(10/9) c^(19/9)
@@ -137,6 +154,11 @@ class Scene(SceneFile):
 
         speeds = (self.operation.inner_speed_rpm * math.pi / 30.0, self.operation.outer_speed_rpm * math.pi / 30.0)
         return operating_clearance(self.mounting, self.bearing, self.materials, *speeds)
+
+    @property
+    def unit_notes(self) -> tuple[str, ...]:
+        """Sentences on values that look like another unit."""
+        return unit_notes(self.bearing, self.cage, self.lubricant, self.mounting, self.material("cage").density)
 
     @property
     def needs_slices(self) -> bool:

@@ -209,8 +209,9 @@ class BallOperation(Strict):
     axial_load_N: Force | None = None  # noqa: N815
     load_N: Annotated[list[Force], Field(min_length=3, max_length=3)] | None = None  # noqa: N815
     moment_Nm: Annotated[list[Moment], Field(min_length=2, max_length=2)] | None = None  # noqa: N815
-    # fixed: the shaft holds the ring at operation.prescribed.tilt_x_mrad and tilt_y_mrad, 0 where left out.
-    tilt: Literal["free", "fixed"] = "free"
+    # fixed: the shaft holds the ring at operation.prescribed.tilt_x_mrad and tilt_y_mrad, 0 where left out, as a shaft in two
+    # bearings does; a lone ring is free: a 7208 under 1000 N across and 1500 N along the axis tips by 3 mrad and lasts half as long.
+    tilt: Literal["free", "fixed"] = "fixed"
     prescribed: Prescribed = Prescribed()
     # A spring's axial force, on top of the load; or how far nut and spacer push the inner ring in after it touches.
     preload_N: Force = 0.0  # noqa: N815

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import Fraction, Positive, or_refuse
+from rbdyn.fields import LIGHTEST_RING_KG, Fraction, NotVanishing, Positive, or_refuse
 
 # Keys that belong to one roller profile each.
 PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "table": "profile_table_mm_um"}
@@ -61,7 +61,7 @@ class Bearing(Strict):
     # Inner ring with what of the shaft moves with it, 1 to 5 kg for a main shaft of this size. A drawing gives the ring
     # alone (0.04 kg in the bearing of Chen et al. 2022) and the part of the rotor's mass that this bearing carries. With
     # 0.3, 1 and 3 kg that bearing has impacts of 91, 86 and 93 N and a whirl of 0.51, 0.41 and 0.55.
-    inner_ring_mass_kg: Annotated[float, Field(gt=0.0, le=1e5)] = 1.0
+    inner_ring_mass_kg: Annotated[float, Field(ge=LIGHTEST_RING_KG, le=1e5)] = 1.0
 
     @property
     def raceway_diameters_mm(self) -> tuple[float, float]:
@@ -162,8 +162,8 @@ class Cage(Strict):
     """Cage and guide land. Clearances are diametral; ``pocket_clearance_mm`` is pocket width less roller diameter."""
 
     guidance: Literal["outer", "inner", "roller"]
-    guide_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0)]
-    pocket_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0)]
+    guide_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0), NotVanishing]
+    pocket_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0), NotVanishing]
     mass_g: Annotated[float, Field(ge=0.01, le=1e6)]
     # Of a roller on a pocket wall: on a drawing, the straight part of the wall that the roller's cylinder meets, less
     # the breaks of both edges. Where left out, contact (and lips) take the roller's effective length and a film the
@@ -204,7 +204,7 @@ class Cage(Strict):
 class CustomMaterial(Strict):
     """A material by its numbers."""
 
-    elastic_modulus_GPa: Annotated[float, Field(gt=0.0, le=2000.0)]  # noqa: N815
+    elastic_modulus_GPa: Annotated[float, Field(gt=0.0, le=2000.0), NotVanishing]  # noqa: N815
     poisson_ratio: Annotated[float, Field(ge=0.0, lt=0.5)]
     density_kg_m3: Annotated[float, Field(ge=100.0, le=30000.0)]
     # That of steel unless given.

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import NonNegative, or_refuse
+from rbdyn.fields import NonNegative, NotVanishing, or_refuse
 from rbdyn.scene.bearing import Harmonic
 
 Order = Annotated[int, Field(ge=1, le=2000)]
@@ -23,7 +23,7 @@ class RandomWaviness(Strict):
 
     lowest_order: Order = 1
     highest_order: Order
-    height_um: Annotated[float, Field(gt=0.0, le=500.0)]
+    height_um: Annotated[float, Field(gt=0.0, le=500.0), NotVanishing]
     decay: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
 
 

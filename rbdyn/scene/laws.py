@@ -8,13 +8,13 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import NonNegative, Positive, or_refuse
+from rbdyn.fields import NonNegative, NotVanishing, Positive, or_refuse
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
 AUTO_WARM_UP_TURNS = 20.0
 # Batches of a turn that all replicates together may keep, 0.65 kB each; in one run they are longer where there would be more.
 MOST_KEPT, MOST_OF_A_RUN = 4_000_000, 20_000
-Restitution = Annotated[float, Field(gt=0.0, le=1.0)]
+Restitution = Annotated[float, Field(gt=0.0, le=1.0), NotVanishing]
 
 
 class Laws(Strict):
@@ -26,7 +26,7 @@ class Laws(Strict):
     slices: Annotated[int, Field(ge=1, le=1001)] | None = None
     race_damping: Literal["viscous", "hunt_crossley", "off"] = "viscous"
     # Share of critical damping (ADORE-style input 0.05; 0.1 elsewhere), engaged over about half a film thickness.
-    race_damping_ratio: Annotated[float, Field(gt=0.0, le=1.0)] = 0.05
+    race_damping_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.05
     race_damping_engagement_um: Positive = 0.1
     # 0.08 to 0.32 s/m for metals.
     race_damping_alpha_s_m: Positive = 0.2
@@ -47,11 +47,11 @@ class Laws(Strict):
     # critical pocket film of ADORE-style inputs is 0.8 um). The fill is the share of the wall that has oil.
     pocket_film: bool = False
     pocket_film_floor_um: Positive = 0.8
-    pocket_fill: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    pocket_fill: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 1.0
     guide_land: Literal["film", "dry", "off"] = "film"
     # Film below which the land touches (critical film of ADORE-style inputs), and how full of oil the land is.
     land_film_floor_um: Positive = 3.0
-    land_fill: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    land_fill: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 1.0
     land_damping_alpha_s_m: NonNegative | None = None
     land_restitution: Restitution | None = None
     land_restitution_speed_m_s: Positive = 0.5
@@ -60,7 +60,7 @@ class Laws(Strict):
     # What multiplies it, in force and in power. Isothermal elastohydrodynamic solutions of one contact put 1 at 0.97 to
     # 1.15 (2 F u is lost a contact: F is a force per surface); SKF's rolling moments of ten catalogue bearings want 0.5 to
     # 1.3, the less the faster, the lighter loaded and the thicker the oil (examples/published/friction_totals.py).
-    rolling_resistance_factor: Annotated[float, Field(gt=0.0, le=5.0)] = 1.0
+    rolling_resistance_factor: Annotated[float, Field(gt=0.0, le=5.0), NotVanishing] = 1.0
     drag: Literal["cylinder", "off"] = "cylinder"
     # A free cylinder; packed rollers shield each other (0.3 to 0.5).
     drag_coefficient: NonNegative = 1.0
@@ -111,11 +111,11 @@ class Numerics(Strict):
     replicates: Annotated[int, Field(ge=1, le=10000)] = 8
     seed: Annotated[int, Field(ge=0)] = 1
     # The largest force grows with the time one waits for it, so it is taken over windows of a fixed length.
-    impact_window_turns: Annotated[float, Field(gt=0.0)] = 20
+    impact_window_turns: Annotated[float, Field(gt=0.0), NotVanishing] = 20
     samples_per_turn: Annotated[int, Field(ge=8, le=100000)] = 512
     # Repeats a share of the replicates at another tolerance to find the numerical error.
     companion: bool = True
-    companion_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.25
+    companion_share: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.25
     step_budget_per_turn: Annotated[int, Field(ge=100)] = 100_000
 
     @property

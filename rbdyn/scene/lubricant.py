@@ -9,12 +9,19 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import Fraction, NonNegative, Positive, or_refuse
+from rbdyn.fields import Fraction, NonNegative, NotVanishing, Positive, or_refuse
 from rbdyn.lubricants import Oil, oil_at
 
 RheologyOil = Literal["MIL-L-7808", "MIL-L-23699", "MIL-L-27502", "Santotrac 30", "Santotrac 50", "Mobil DTE SAE30"]
+HOTTEST_C = 350.0
 # Models whose traction follows pressure and temperature.
 RHEOLOGIES = ("thermal_newtonian", "eyring", "limiting_shear")
+
+
+def _no_kelvin(value: Any) -> Any:
+    if isinstance(value, float) and HOTTEST_C < value < 1e3:
+        raise ValueError(f"must be at most {HOTTEST_C:g}; if {value:g} K are meant, write {value - 273.15:.4g}")
+    return value
 
 
 def _four_numbers(value: Any) -> Any:
@@ -28,16 +35,16 @@ class Lubricant(Strict):
     """The oil and its temperature; ``viscosity_mPas`` and ``pressure_coefficient_1_GPa`` replace the oil's own."""
 
     oil: Literal["MIL-L-7808", "MIL-L-23699"]
-    temperature_C: Annotated[float, Field(ge=-60.0, le=350.0)]  # noqa: N815
+    temperature_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C), BeforeValidator(_no_kelvin)]  # noqa: N815
     viscosity_mPas: Positive | None = None  # noqa: N815
     # alpha of viscosity exp(alpha p): 5 to 25 for oils.
-    pressure_coefficient_1_GPa: Annotated[float, Field(gt=0.0, le=100.0)] | None = None  # noqa: N815
+    pressure_coefficient_1_GPa: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] | None = None  # noqa: N815
     # Share of oil in the mixture that rollers plough through: 0.2 to 5 % for jet lubrication.
     oil_fraction: Fraction = 0.02
     # Root mean square. Honed races and rollers of aircraft bearings have 0.03 to 0.1; 0.05 gives Lambda = 2.4 to 2.9
     # in the bearing of Chen et al. 2022 at 100 C, 0.1 gives 1.2 to 1.45.
-    roller_roughness_um: Annotated[float, Field(gt=0.0, le=100.0)] = 0.05
-    race_roughness_um: Annotated[float, Field(gt=0.0, le=100.0)] = 0.05
+    roller_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
+    race_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
     # Where the oil begins ahead of the edge of a contact, in its half-widths; flooded where left out. ADORE-style inputs
     # have 10, which leaves the film whole and takes 5 to 19 % of the rolling resistance.
     inlet_distance: Positive | None = None
@@ -74,9 +81,9 @@ class Traction(Strict):
     # 3 to 10 MPa for mineral oils (Johnson and Tevaarwerk 1977).
     eyring_stress_MPa: Positive = 5.0  # noqa: N815
     # Shear stress over pressure at which limiting_shear yields: 0.05 to 0.10 (Bair and Winer 1979).
-    limiting_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0)] = 0.07
+    limiting_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.07
     # The same as a cap of thermal_newtonian and eyring, whose stress grows without bound past 1.5 GPa.
-    largest_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0)] = 0.1
+    largest_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.1
     # mixed: asperities carry the share exp(-b Lambda^c) of a load (Zhou and Hoeprich 1991) and rub dry.
     friction: Literal["film", "mixed"] = "film"
     boundary_friction: NonNegative = 0.1

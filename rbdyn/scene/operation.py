@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import NonNegative, Positive, or_refuse
+from rbdyn.fields import LIGHTEST_RING_KG, NonNegative, Positive, or_refuse
 
 Speed = Annotated[float, Field(ge=-1e6, le=1e6)]
 Load = Annotated[float, Field(ge=0.0, le=1e7)]
@@ -93,4 +93,4 @@ class Support(Strict):
 
     stiffness_N_m: Positive  # noqa: N815
     damping_N_s_m: NonNegative  # noqa: N815
-    outer_ring_mass_kg: Annotated[float, Field(gt=0.0, le=1e5)] = 0.5
+    outer_ring_mass_kg: Annotated[float, Field(ge=LIGHTEST_RING_KG, le=1e5)] = 0.5
