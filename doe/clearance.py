@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.study.failure import Failure
-from doe.study.runner import Give, Outcome, Ran, Take, run_points
-from doe.study.store import Point, Store
+from doe.running.failure import Failure
+from doe.running.runner import Give, Outcome, Ran, Take, run_points
+from doe.running.store import Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
 from rbdyn.kept import code_version, run_key
@@ -30,7 +30,7 @@ from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.ensemble import Stop
-    from rbdyn.dynamics.history import History
+    from rbdyn.dynamics.motion.history import History
 
 Array = NDArray[np.float64]
 
@@ -204,7 +204,7 @@ def _in_threads(
 ) -> None:
     """Engine of this process. A point is claimed when a thread is free for it, so that processes share the work."""
     from rbdyn.dynamics.ensemble import Stop, run_all
-    from rbdyn.dynamics.model import roller_bearing
+    from rbdyn.dynamics.parameters.model import roller_bearing
     from rbdyn.dynamics.run import prepare
 
     stop, taken = Stop(), list[Point]()
@@ -225,7 +225,7 @@ def _in_threads(
 
 def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point], take: Take, give: Give) -> None:
     """Engine of a cluster, whose scheduler knows best what runs where: it gets all points at once."""
-    from doe.study.cluster import run_on_cluster
+    from doe.running.cluster import run_on_cluster
 
     taken: list[Point] = []
 
@@ -268,7 +268,7 @@ def attempt_text(text: str, version: str) -> Ran:
 def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array, NDArray[np.int64]]:
     """Values, 95 % statistical half-widths (NaN where there is none), and about how many independent values are behind
     each, each of shape (runs, responses)."""
-    from rbdyn.dynamics.batch_means import MOST_BATCHES
+    from rbdyn.dynamics.statistics.batch_means import MOST_BATCHES
 
     records: list[dict[str, Any]] = [result.as_dict() for result in results]
     values, errors, samples = (
@@ -281,7 +281,7 @@ def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array,
 
 def histories(study: Study, points: dict[str, Array], turns: float) -> dict[str, History]:
     """Motion of the confirmation scene at each point, over at most ``turns`` shaft turns. Raises RunError."""
-    from rbdyn.dynamics.history import history
+    from rbdyn.dynamics.motion.history import history
 
     scenes = {name: confirmation_scene(study, point) for name, point in points.items()}
     return {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}

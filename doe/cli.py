@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rbdyn.loading import Loading
+from rbdyn.cli.loading import Loading
 
 with Loading():
     import typer
@@ -13,7 +13,7 @@ with Loading():
     from doe.commands.front import front
     from doe.commands.status import status
     from doe.commands.study import study
-    from rbdyn import streams
+    from rbdyn.cli import streams
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 

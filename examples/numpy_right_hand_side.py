@@ -168,7 +168,7 @@ class NumpyRightHandSide:
         self.bearing, self.calls = bearing, 0
 
     def __call__(self, t: float, y: Array) -> Array:
-        """Derivative of the state, laid out as in ``rbdyn.dynamics.state``."""
+        """Derivative of the state, laid out as in ``rbdyn.dynamics.forces.state``."""
         self.calls += 1
         b = self.bearing
         z = b.rollers
@@ -209,7 +209,7 @@ def main(
     turns: Annotated[float, typer.Option(help="Shaft turns to integrate, at most 1.")] = 0.25,
 ) -> None:
     """Print error and time of SciPy's RK45 on the numpy right-hand side, and how many times faster rbdyn is."""
-    from rbdyn.terminal import guarded
+    from rbdyn.cli.terminal import guarded
 
     with guarded(as_json=False):
         compare(scene, turns)
@@ -218,12 +218,12 @@ def main(
 def compare(scene: Path, turns: float) -> None:
     """Measure both and print. Raises InputError, RunError."""
     from rbdyn import Scene
-    from rbdyn.accuracy.comparison import attempts_of, compiling, curve, table
-    from rbdyn.accuracy.equal_error import times_faster
-    from rbdyn.accuracy.methods import OURS, Method, by_scipy
     from rbdyn.accuracy.report import processor
-    from rbdyn.accuracy.trajectory import reference, settled
-    from rbdyn.terminal import print_table
+    from rbdyn.accuracy.rollers.comparison import attempts_of, compiling, curve, table
+    from rbdyn.accuracy.rollers.equal_error import times_faster
+    from rbdyn.accuracy.rollers.methods import OURS, Method, by_scipy
+    from rbdyn.accuracy.rollers.trajectory import reference, settled
+    from rbdyn.cli.terminal import print_table
 
     stretches = settled(Scene.load(scene), turns)
     ready = by_scipy("RK45", lambda stretch: NumpyRightHandSide(stretch.bearing))

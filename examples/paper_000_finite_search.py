@@ -26,16 +26,17 @@ import pandas as pd
 import typer
 from numpy.typing import NDArray
 
-from rbdyn.accuracy.ball_solvers import problem_of, timed
-from rbdyn.quasistatic import equilibrium, finite_search, plain_newton
-from rbdyn.quasistatic.battery import Problem
+from rbdyn.accuracy.balls.cases import Problem
+from rbdyn.accuracy.balls.solvers import problem_of, timed
+from rbdyn.cli.terminal import print_table
 from rbdyn.quasistatic.bearing import equilibrium as solve_scene
-from rbdyn.quasistatic.equilibrium import Solution
-from rbdyn.quasistatic.finite_search import Search, offset_distances, search_points
-from rbdyn.quasistatic.levenberg_marquardt import Damping
+from rbdyn.quasistatic.rivals import finite_search, plain_newton
+from rbdyn.quasistatic.rivals.finite_search import Search, offset_distances, search_points
+from rbdyn.quasistatic.rivals.levenberg_marquardt import Damping
+from rbdyn.quasistatic.row import equilibrium
+from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
-from rbdyn.terminal import print_table
 
 BEARINGS: dict[str, dict[str, Any]] = {
     "71808": {

@@ -21,14 +21,14 @@ import pandas as pd
 import typer
 from published.common import Table, canvas, save
 
-from rbdyn.quasistatic.linear_runout import linear_response
-from rbdyn.quasistatic.race_errors import RaceErrors, ball_path, perfect, waviness
-from rbdyn.quasistatic.runout import homogenisation
-from rbdyn.quasistatic.runout_class import running_accuracy
-from rbdyn.quasistatic.runout_lots import Lot, draw_parts, readings
-from rbdyn.quasistatic.runout_model import bench_of
-from rbdyn.quasistatic.tolerance_design import Bench, RaceLimits, design, runouts
-from rbdyn.quasistatic.turn import Followed, follow
+from rbdyn.quasistatic.runout.classes import running_accuracy
+from rbdyn.quasistatic.runout.linear import linear_response
+from rbdyn.quasistatic.runout.lots import Lot, draw_parts, readings
+from rbdyn.quasistatic.runout.measures import homogenisation
+from rbdyn.quasistatic.runout.model import bench_of
+from rbdyn.quasistatic.runout.race_errors import RaceErrors, ball_path, perfect, waviness
+from rbdyn.quasistatic.runout.tolerance_design import Bench, RaceLimits, design, runouts
+from rbdyn.quasistatic.runout.turn import Followed, follow
 from rbdyn.scene.ball import BallScene
 
 SCENE = Path(__file__).parent / "angular_contact_7014.toml"

@@ -20,10 +20,11 @@ from published.common import Check, Table, canvas, percent, save, tell
 
 from rbdyn import BallScene
 from rbdyn.contact.hertz_point import peak_pressure
-from rbdyn.quasistatic import fatigue, preload, rating
-from rbdyn.quasistatic.equilibrium import solve
-from rbdyn.quasistatic.life import row_life
-from rbdyn.quasistatic.model import given_of, load_of, row_of
+from rbdyn.life import ball_capacity as rating
+from rbdyn.life.balls import row_life
+from rbdyn.quasistatic import fatigue, preload
+from rbdyn.quasistatic.row.equilibrium import solve
+from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 
 SPEED_RPM = 63000.0
 RADIAL_N = 150.0

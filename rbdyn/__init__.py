@@ -8,7 +8,7 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # as type checkers take it, without ``typing``
 if TYPE_CHECKING:
-    from rbdyn.dynamics.history import History, history
+    from rbdyn.dynamics.motion.history import History, history
     from rbdyn.dynamics.simulate import simulate
     from rbdyn.faults import InputError, RunError
     from rbdyn.quasistatic.bearing import equilibrium
@@ -36,8 +36,8 @@ _HOMES = {
     "equilibrium": "rbdyn.quasistatic.bearing",
     "BallResult": "rbdyn.quasistatic.result",
     "simulate": "rbdyn.dynamics.simulate",
-    "history": "rbdyn.dynamics.history",
-    "History": "rbdyn.dynamics.history",
+    "history": "rbdyn.dynamics.motion.history",
+    "History": "rbdyn.dynamics.motion.history",
     "SimulationResult": "rbdyn.result",
     "InputError": "rbdyn.faults",
     "RunError": "rbdyn.faults",

@@ -11,8 +11,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from rbdyn.compiled.sources import source_digest
 from rbdyn.result import versions
-from rbdyn.sources import source_digest
 
 
 class Kept:

@@ -7,8 +7,8 @@ import copy
 import numpy as np
 
 from rbdyn import BallScene
-from rbdyn.quasistatic.equilibrium import solve
-from rbdyn.quasistatic.model import row_of
+from rbdyn.quasistatic.row.equilibrium import solve
+from rbdyn.quasistatic.row.model import row_of
 
 FREE = np.full(5, np.nan)
 AT_REST = {"inner_speed_rpm": 0.0, "outer_speed_rpm": 0.0}

@@ -15,9 +15,9 @@ import numpy as np
 from conftest import make
 from numba.core import event
 
-from rbdyn.dynamics.equations import derivative
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.race_lanes import scratch
+from rbdyn.dynamics.forces.equations import derivative
+from rbdyn.dynamics.forces.race_lanes import scratch
+from rbdyn.dynamics.parameters.model import roller_bearing
 
 
 class Recorder(event.Listener):

@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.equations import LOADS, POWERS, derivative
-from rbdyn.dynamics.geometry import kinematics, layout_of, raceway_radii, roller_radii
-from rbdyn.dynamics.race_lanes import scratch
+from rbdyn.compiled.kernel import entry
+from rbdyn.dynamics.forces.equations import LOADS, POWERS, derivative
+from rbdyn.dynamics.forces.race_lanes import scratch
+from rbdyn.dynamics.parameters.geometry import kinematics, layout_of, raceway_radii, roller_radii
 from rbdyn.faults import read_toml
-from rbdyn.kernel import entry
 from rbdyn.scene import Scene
 
 ROOT = Path(__file__).parent.parent

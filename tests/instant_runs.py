@@ -72,7 +72,7 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
     from doe.commands.study import study as doe_study
     from doe.study.runs import run_design
     from doe.study_file import Study
-    from rbdyn.terminal import guarded, output_folder, print_json
+    from rbdyn.cli.terminal import guarded, output_folder, print_json
 
     ran = instantly(setattr, seconds)
     if whole:

@@ -15,20 +15,20 @@ from numpy_twin import cross
 
 from rbdyn.contact.hertz_line import SlicedLineContact, TiltedLineContact
 from rbdyn.contact.traction import MixedTraction
-from rbdyn.dynamics.cage_body import BalancedCage, UnbalancedCage, mass_centre
-from rbdyn.dynamics.clock import ClockedDrive
-from rbdyn.dynamics.drive import SteadyDrive, TwoSpeedDrive, action
-from rbdyn.dynamics.energy import mechanical_energy
-from rbdyn.dynamics.equations import LOAD, SHAFT, cage_motion, inner_motion
-from rbdyn.dynamics.geometry import layout_of
-from rbdyn.dynamics.gravity import Gravity, NoGravity
-from rbdyn.dynamics.guide_land import guide_forces
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.race_form import RoundRace, WavyRace
-from rbdyn.dynamics.race_lanes import race_forces, scratch
-from rbdyn.dynamics.races import EqualRollers, unequal_rollers
-from rbdyn.dynamics.ring_motion import outer_motion
-from rbdyn.dynamics.schedule import Constant
+from rbdyn.dynamics.forces.cage_body import BalancedCage, UnbalancedCage, mass_centre
+from rbdyn.dynamics.forces.clock import ClockedDrive
+from rbdyn.dynamics.forces.drive import SteadyDrive, TwoSpeedDrive, action
+from rbdyn.dynamics.forces.energy import mechanical_energy
+from rbdyn.dynamics.forces.equations import LOAD, SHAFT, cage_motion, inner_motion
+from rbdyn.dynamics.forces.gravity import Gravity, NoGravity
+from rbdyn.dynamics.forces.guide_land import guide_forces
+from rbdyn.dynamics.forces.race_form import RoundRace, WavyRace
+from rbdyn.dynamics.forces.race_lanes import race_forces, scratch
+from rbdyn.dynamics.forces.races import EqualRollers, unequal_rollers
+from rbdyn.dynamics.forces.ring_motion import outer_motion
+from rbdyn.dynamics.forces.schedule import Constant
+from rbdyn.dynamics.parameters.geometry import layout_of
+from rbdyn.dynamics.parameters.model import roller_bearing
 
 WAVINESS = "[{order=2, amplitude_um=5.0, phase_deg=10.0}, {order=13, amplitude_um=0.5, phase_deg=-30.0}]"
 SCHEDULE = (

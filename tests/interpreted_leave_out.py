@@ -13,6 +13,8 @@ import pytest
 from conftest import make, right_hand_side, state_near_contact
 from interpreted_invariants import REWRITTEN, on_both
 
+from rbdyn.accuracy.rollers.footprint import law_types
+from rbdyn.accuracy.rollers.option_cost import OPTIONS
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.film import ShortJournalFilm
 from rbdyn.contact.hertz_line import LineContact, LineContactOnBar, PowerLineContact
@@ -25,16 +27,14 @@ from rbdyn.contact.traction import (
     NoTraction,
     TractionSurface,
 )
-from rbdyn.dynamics.clock import ClockedDrive
-from rbdyn.dynamics.drag import CylinderDrag, NoDrag
-from rbdyn.dynamics.equations import LOAD
-from rbdyn.dynamics.guide_land import DryContact, InnerGuide, NoContact, NoFilm, NoGuide, OuterGuide
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.pocket import LippedPocket, LubricatedPocket, NoPocket
-from rbdyn.dynamics.schedule import Constant, Ramps, SmoothRamps, Steps
-from rbdyn.dynamics.support import SupportedRing
-from rbdyn.footprint import law_types
-from rbdyn.option_cost import OPTIONS
+from rbdyn.dynamics.forces.clock import ClockedDrive
+from rbdyn.dynamics.forces.drag import CylinderDrag, NoDrag
+from rbdyn.dynamics.forces.equations import LOAD
+from rbdyn.dynamics.forces.guide_land import DryContact, InnerGuide, NoContact, NoFilm, NoGuide, OuterGuide
+from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, NoPocket
+from rbdyn.dynamics.forces.schedule import Constant, Ramps, SmoothRamps, Steps
+from rbdyn.dynamics.forces.support import SupportedRing
+from rbdyn.dynamics.parameters.model import roller_bearing
 
 # Round-off of the sums, relative to the largest of each kind of derivative, power or load. Both paths compute the
 # overlaps, which are differences of positions, from the same numbers in the same order.

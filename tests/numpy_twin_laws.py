@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rbdyn.contact import film_thickness, rheology
-from rbdyn.lubricants import oil_at
+from rbdyn.properties.lubricants import oil_at
 
 EXACT = {"xtol": 1e-300, "rtol": 1e-15}
 
@@ -294,6 +294,6 @@ def roller_errors(scene):
         return nominal + 0.5e-6 * np.array(drawing.roller_diameter_errors_um)
     if drawing.roller_diameter_spread_um == 0.0:
         return np.full(drawing.rollers, nominal)
-    from rbdyn.dynamics.geometry import roller_radii
+    from rbdyn.dynamics.parameters.geometry import roller_radii
 
     return roller_radii(scene)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rbdyn import accuracy
-from rbdyn.accuracy import replication, slicing, tolerances, work_precision
-from rbdyn.dynamics.batch_means import student_half_width
+from rbdyn.accuracy.rollers import replication, slicing, tolerances, work_precision
+from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.faults import InputError, RunError
 
 EXAMPLE = "examples/cylindrical_roller.toml"

@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from rbdyn.accuracy import ball_solvers, method_bias, replication, slicing, tolerances
+from rbdyn.accuracy.balls import solvers as ball_solvers
 from rbdyn.accuracy.judgement import about, check_replicates, judged, overall, replicates_needed, turns_needed
-from rbdyn.accuracy.tolerances import OUTPUTS, Bias
-from rbdyn.dynamics.batch_means import student_factor, student_half_width
+from rbdyn.accuracy.rollers import method_bias, replication, slicing, tolerances
+from rbdyn.accuracy.rollers.tolerances import OUTPUTS, Bias
+from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
 from rbdyn.faults import InputError
 
 RTOLS = (0.1, 0.02, 0.01, 1e-4)

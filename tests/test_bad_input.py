@@ -14,14 +14,14 @@ from typer.testing import CliRunner
 
 from doe.cli import app
 from doe.dimension_chain import read_chains
-from doe.report.asked import design_record as summary_design
-from doe.report.design import design_record
+from doe.report.steps.design import design_record
+from doe.report.study.asked import design_record as summary_design
 from doe.study.design import design_of, evaluation
 from doe.study_file import Study
 from doe.study_file.table import read_table
 from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, one_line, read_toml
 from rbdyn.quasistatic.result import BallResult
-from rbdyn.quasistatic.sweep_points import parsed
+from rbdyn.quasistatic.sweep.points import parsed
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
@@ -238,7 +238,7 @@ def test_blocks_are_numbered_from_one_everywhere(tmp_path):
     """Design, its CSV, the summary and the table of runs number the blocks of a design alike."""
     from types import SimpleNamespace
 
-    from doe.report.files import _runs_table
+    from doe.report.study.files import _runs_table
     from doe.study.runs import Runs
 
     path = study(tmp_path, ('alpha = "rotatable"', 'alpha = "orthogonal_blocks"\nblocks = true'))

@@ -11,11 +11,11 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from rbdyn.ball_studies import optimum_study, race_limits, runout_record
-from rbdyn.cli import app
+from rbdyn.cli.app import app
+from rbdyn.cli.ball_studies import optimum_study, race_limits, runout_record
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.bearing import equilibrium
-from rbdyn.quasistatic.sweep import sweep
+from rbdyn.quasistatic.sweep.run import sweep
 from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from mpmath import mp
 from scipy.optimize import brentq
 
-from rbdyn.materials import MATERIALS
-from rbdyn.quasistatic.equilibrium import solve
-from rbdyn.quasistatic.model import given_of, load_of, row_of
+from rbdyn.properties.materials import MATERIALS
+from rbdyn.quasistatic.row.equilibrium import solve
+from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 
 STEEL = MATERIALS["bearing_steel"]
 SQUARE = np.array([np.nan, np.nan, np.nan, 0.0, 0.0])

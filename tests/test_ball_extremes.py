@@ -8,8 +8,8 @@ from ball_scenes import CAGE, HARD, LARGE, balanced, model_of, scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbdyn.quasistatic.equilibrium import solve
-from rbdyn.quasistatic.model import given_of, row_of
+from rbdyn.quasistatic.row.equilibrium import solve
+from rbdyn.quasistatic.row.model import given_of, row_of
 
 FORCE = st.floats(-1.0, 1.0)
 

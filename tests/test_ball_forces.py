@@ -13,9 +13,9 @@ from mpmath import mp
 from numba import njit
 
 from rbdyn import BallScene
-from rbdyn.materials import MATERIALS
-from rbdyn.quasistatic.ball import ball_forces, gradually, held
-from rbdyn.quasistatic.model import row_of
+from rbdyn.properties.materials import MATERIALS
+from rbdyn.quasistatic.row.ball import ball_forces, gradually, held
+from rbdyn.quasistatic.row.model import row_of
 
 CONTROLS = ("common_cage", "outer", "inner", "half", "hybrid")
 STEEL = MATERIALS["bearing_steel"]

@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 from mpmath import fp, mp
 from numba import njit
 
-from rbdyn.materials import MATERIALS
-from rbdyn.quasistatic.ball import ball_forces
-from rbdyn.quasistatic.ball_motion import orbit_and_spin
-from rbdyn.quasistatic.control import FixedShare, Spinning
-from rbdyn.quasistatic.model import RPM, cage_speed, row_model
-from rbdyn.scene.ball import BallModel, BallRow
+from rbdyn.properties.materials import MATERIALS
+from rbdyn.quasistatic.row.ball import ball_forces
+from rbdyn.quasistatic.row.ball_motion import orbit_and_spin
+from rbdyn.quasistatic.row.control import FixedShare, Spinning
+from rbdyn.quasistatic.row.model import RPM, cage_speed, row_model
+from rbdyn.scene.ball import BallModel
+from rbdyn.scene.ball_bearing import BallRow
 
 DIAMETER, PITCH, DENSITY = 0.0127, 0.070, 7800.0
 MASS = DENSITY * math.pi * DIAMETER**3 / 6.0

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
-from rbdyn.quasistatic import life, rating
+from rbdyn.life import ball_capacity as rating
+from rbdyn.life import balls as life
 
 GAMMA = 11.5 / 43.5
 CAPACITY = 23400.0

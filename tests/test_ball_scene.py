@@ -12,11 +12,11 @@ from ball_scenes import DEEP, SMALL, changed, scene
 from typer.testing import CliRunner
 
 from rbdyn import BallScene, Scene, equilibrium
-from rbdyn.cli import app
+from rbdyn.cli.app import app
 from rbdyn.faults import InputError
-from rbdyn.quasistatic.control import CommonCage, FixedShare, FrictionShare
-from rbdyn.quasistatic.equilibrium import solve
-from rbdyn.quasistatic.model import given_of, load_of, row_of
+from rbdyn.quasistatic.row.control import CommonCage, FixedShare, FrictionShare
+from rbdyn.quasistatic.row.equilibrium import solve
+from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 from rbdyn.scene import balls_only, rollers_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 

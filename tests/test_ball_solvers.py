@@ -11,17 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import Scene
-from rbdyn.accuracy import ball_battery, ball_solvers
-from rbdyn.accuracy.ball_solvers import problem_of
+from rbdyn.accuracy.balls import battery as ball_battery
+from rbdyn.accuracy.balls import solvers as ball_solvers
+from rbdyn.accuracy.balls.cases import CONTROLS, LOADS, cases, posed
+from rbdyn.accuracy.balls.solvers import problem_of
 from rbdyn.accuracy.report import Progress
 from rbdyn.faults import InputError
-from rbdyn.quasistatic import equilibrium, finite_search, limited, minpack, plain_newton
-from rbdyn.quasistatic.battery import CONTROLS, LOADS, cases, posed
 from rbdyn.quasistatic.bearing import equilibrium as solve_scene
-from rbdyn.quasistatic.elimination import eliminate
-from rbdyn.quasistatic.finite_search import loaded, offset_distances, search_points
-from rbdyn.quasistatic.full_system import evaluate, forces, system_of, unknowns
-from rbdyn.quasistatic.model import given_of, load_of, row_of
+from rbdyn.quasistatic.rivals import finite_search, limited, minpack, plain_newton
+from rbdyn.quasistatic.rivals.elimination import eliminate
+from rbdyn.quasistatic.rivals.finite_search import loaded, offset_distances, search_points
+from rbdyn.quasistatic.rivals.full_system import evaluate, forces, system_of, unknowns
+from rbdyn.quasistatic.row import equilibrium
+from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 from rbdyn.scene import BallScene
 
 BALLS = ROOT / "examples" / "angular_contact_ball.toml"

@@ -12,18 +12,18 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from rbdyn import equilibrium
-from rbdyn.cli import app
+from rbdyn.cli.app import app
 from rbdyn.faults import InputError
 from rbdyn.plots import ball as ball_pictures
 from rbdyn.plots import ball_sweep as pictures
-from rbdyn.quasistatic import sweep as sweeps
-from rbdyn.quasistatic.control import CommonCage, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.fatigue import reference_capacities, solution_life, turning_rings
-from rbdyn.quasistatic.newton import RACE_CONTROL_LOST
-from rbdyn.quasistatic.sweep import sweep
-from rbdyn.quasistatic.sweep_march import leaves, with_numbers
-from rbdyn.quasistatic.sweep_points import Axis, axes_of, parsed, snake
-from rbdyn.quasistatic.sweep_result import SweepResult
+from rbdyn.quasistatic.row.control import CommonCage, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.row.newton import RACE_CONTROL_LOST
+from rbdyn.quasistatic.sweep import run as sweeps
+from rbdyn.quasistatic.sweep.march import leaves, with_numbers
+from rbdyn.quasistatic.sweep.points import Axis, axes_of, parsed, snake
+from rbdyn.quasistatic.sweep.result import SweepResult
+from rbdyn.quasistatic.sweep.run import sweep
 from rbdyn.scene import BallScene
 
 EXAMPLE = ROOT / "examples" / "angular_contact_ball.toml"
@@ -321,7 +321,7 @@ def test_command_line_sweeps(command, tmp_path):
 
 def test_command_line_table_and_exit_codes(broken, grid, monkeypatch, capsys):
     """Command line: a long table is cut; failures are grouped on standard error and the exit code is 1."""
-    from rbdyn import sweep_command
+    from rbdyn.cli import ball_sweep as sweep_command
 
     monkeypatch.setattr(sweeps, "sweep", lambda *rest: broken)
     assert sweep_command.run(scene_with(), [f"{SPEED}=1,2"], None, False, True) == 1

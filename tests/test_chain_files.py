@@ -8,11 +8,11 @@ from chains import by_name
 from test_doe_command_line import doe
 
 from doe.dimension_chain import read_chains, solve
-from doe.report.chain import print_chain
+from doe.report.steps.chain import print_chain
 from doe.study_file.chain_section import StudyChain, chain_table
 from rbdyn.faults import InputError, read_toml
-from rbdyn.materials import Material
-from rbdyn.ring_expansion import Ring, mounted_clearance
+from rbdyn.mounting.rings import Ring, mounted_clearance
+from rbdyn.properties.materials import Material
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 BEARING = EXAMPLES / "bearing_chains.toml"

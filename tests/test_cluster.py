@@ -20,10 +20,10 @@ import pytest
 from test_doe_command_line import doe
 from test_study import SHORT, short_study, silent
 
-from doe.study import cluster
-from doe.study.runner import Ran
+from doe.running import cluster
+from doe.running.runner import Ran
+from doe.running.store import Store
 from doe.study.runs import STORE, run_design
-from doe.study.store import Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError
 

@@ -13,10 +13,18 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy.integrate import solve_ivp
 
+from rbdyn.compiled.elementary import (
+    eighteenth_root,
+    fast_atan,
+    fast_cos_sin,
+    fast_exp,
+    fast_expm1,
+    fast_log,
+    tenth_root,
+)
 from rbdyn.contact import damping, film, hertz_line, rolling_resistance, traction
-from rbdyn.elementary import eighteenth_root, fast_atan, fast_cos_sin, fast_exp, fast_expm1, fast_log, tenth_root
-from rbdyn.lubricants import oil_at
-from rbdyn.materials import MATERIALS, equivalent_modulus
+from rbdyn.properties.lubricants import oil_at
+from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 
 STEEL = equivalent_modulus(MATERIALS["bearing_steel"], MATERIALS["bearing_steel"])
 LINE = hertz_line.palmgren(STEEL, 3.5e-3)
@@ -326,7 +334,7 @@ def test_invariant_film_resists_motion(eccentricity, radial_rate, whirl_rate):
 
 def test_literature_petrov():
     """Literature: a centred journal feels Petrov's moment 2 pi eta R^3 L omega/c and no force, exactly."""
-    from rbdyn.dynamics.guide_land import film_wrench
+    from rbdyn.dynamics.forces.guide_land import film_wrench
 
     land = film.short_journal_film(2.87e-3, 24.7e-3, 3e-3, 2, 75e-6, 3e-6, 0.5)
     fx, fy, on_journal, on_bearing, power = film_wrench(land, 1.0, 0.0, 0.0, 0.0, 0.0, 996.6, 100.0)

@@ -15,14 +15,14 @@ from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
 from rbdyn.faults import InputError
-from rbdyn.materials import MATERIALS
-from rbdyn.quasistatic import double_decker
-from rbdyn.quasistatic.ball import ball_forces
-from rbdyn.quasistatic.double_decker import Layer, load_on_middle_ring, solve_double_decker
-from rbdyn.quasistatic.double_decker_model import double_decker_of, static_capacity
-from rbdyn.quasistatic.equilibrium import solve
-from rbdyn.quasistatic.model import RPM, contacts, given_of, load_of
-from rbdyn.scene.ball import BallRow
+from rbdyn.properties.materials import MATERIALS
+from rbdyn.quasistatic.double_decker import equilibrium as double_decker
+from rbdyn.quasistatic.double_decker.equilibrium import Layer, load_on_middle_ring, solve_double_decker
+from rbdyn.quasistatic.double_decker.model import double_decker_of, static_capacity
+from rbdyn.quasistatic.row.ball import ball_forces
+from rbdyn.quasistatic.row.equilibrium import solve
+from rbdyn.quasistatic.row.model import RPM, contacts, given_of, load_of
+from rbdyn.scene.ball_bearing import BallRow
 
 FILE = Path(__file__).parent.parent / "examples" / "double_decker.toml"
 FREE = np.full(5, np.nan)
@@ -338,7 +338,7 @@ def test_unit_command_prints_both_rows(tmp_path):
     """Unit: rbdyn ball prints rows and middle ring, writes a table of all balls, and gives one JSON object."""
     from typer.testing import CliRunner
 
-    from rbdyn.cli import app
+    from rbdyn.cli.app import app
 
     printed = CliRunner().invoke(app, ["ball", str(FILE), "--out", str(tmp_path)])
     assert printed.exit_code == 0

@@ -13,8 +13,8 @@ import pytest
 from conftest import EVERYTHING
 from numpy_twin import POWERS, twin
 
-from rbdyn.dynamics.equations import LOSSES, SHAFT
-from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.forces.equations import LOSSES, SHAFT
+from rbdyn.dynamics.parameters.model import roller_bearing
 
 # Position round-off of 3e-18 m over the smallest approaches of the random states (some 1e-8 m) is 3e-10 of that
 # contact's load, and 1e-10 of the largest force on a body.

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rbdyn.dynamics.guide_land import NoGuide
+from rbdyn.dynamics.forces.guide_land import NoGuide
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SCRIPTS = sorted(path.stem for path in EXAMPLES.glob("*.py"))
@@ -124,7 +124,7 @@ def test_literature_nu215():
     from published.skidding import NU215, slip
 
     from rbdyn import Scene
-    from rbdyn.dynamics.geometry import raceway_radii
+    from rbdyn.dynamics.parameters.geometry import raceway_radii
 
     assert [2e3 * r for r in raceway_radii(Scene.load(NU215))] == pytest.approx([118.57, 88.5])
     # One traction curve, which is compiled already; the check itself takes the one that follows pressure.
@@ -158,7 +158,7 @@ def test_literature_whirl(effort):
 
 def test_oracle_numpy_right_hand_side(outer, evaluate, random_state):
     """Oracle: the page of numpy gives the derivative of the compiled code; other laws are refused by name."""
-    from rbdyn.dynamics.model import roller_bearing
+    from rbdyn.dynamics.parameters.model import roller_bearing
     from rbdyn.faults import InputError
 
     module = script("numpy_right_hand_side")

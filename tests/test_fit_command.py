@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from doe.cli import app
-from doe.report.fit import print_fit
+from doe.report.steps.fit import print_fit
 from doe.study.runs import read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study

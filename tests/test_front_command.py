@@ -8,7 +8,7 @@ from pareto_cases import TABLE, TOLERANCES, edited_study, table_surfaces
 from typer.testing import CliRunner
 
 from doe.cli import app
-from doe.report.front import front_record
+from doe.report.steps.front import front_record
 from doe.study.front import find_front
 from doe.study.goals import known_tolerances
 from doe.study.widest import widest_of

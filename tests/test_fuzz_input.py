@@ -17,8 +17,8 @@ from doe.study.checked import check_study
 from doe.study.design import design_of
 from doe.study_file import Study
 from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError
-from rbdyn.quasistatic.sweep_result import FORMAT as SWEEP_FORMAT
-from rbdyn.quasistatic.sweep_result import SweepResult
+from rbdyn.quasistatic.sweep.result import FORMAT as SWEEP_FORMAT
+from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.result import FORMAT, SimulationResult
 from rbdyn.scene import Scene
 

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipkm1
 
 from rbdyn.contact import hertz_point as hertz
-from rbdyn.materials import MATERIALS, equivalent_modulus
+from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 
 STEEL = equivalent_modulus(MATERIALS["bearing_steel"], MATERIALS["bearing_steel"])
 

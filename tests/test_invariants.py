@@ -13,15 +13,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbdyn.dynamics.clock import ClockedDrive
-from rbdyn.dynamics.energy import mechanical_energy
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.equations import LOAD, SHAFT
-from rbdyn.dynamics.geometry import layout_of
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.races import unequal_rollers
+from rbdyn.dynamics.forces.clock import ClockedDrive
+from rbdyn.dynamics.forces.energy import mechanical_energy
+from rbdyn.dynamics.forces.equations import LOAD, SHAFT
+from rbdyn.dynamics.forces.races import unequal_rollers
+from rbdyn.dynamics.forces.schedule import SmoothRamps
+from rbdyn.dynamics.parameters.geometry import layout_of
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
-from rbdyn.dynamics.schedule import SmoothRamps
 
 FOLDER = Path(__file__).parent
 SCENES = pytest.mark.parametrize("fixture", ["outer", "inner", "everything"])

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from test_runge_kutta import one_step, orders_of, run_of, slope_of, vibrating
 
-from rbdyn.dynamics import kutta_pair as pair
-from rbdyn.dynamics import runge_kutta as rk
-from rbdyn.dynamics.energy import mechanical_energy
-from rbdyn.dynamics.equations import SHAFT
+from rbdyn.dynamics.forces.energy import mechanical_energy
+from rbdyn.dynamics.forces.equations import SHAFT
+from rbdyn.dynamics.integrators import kutta_pair as pair
+from rbdyn.dynamics.integrators import runge_kutta as rk
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.faults import RunError
 

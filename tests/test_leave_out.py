@@ -18,21 +18,21 @@ import pytest
 
 import rbdyn.contact
 import rbdyn.dynamics
+from rbdyn.accuracy.rollers.footprint import added_modules, instructions, law_types, parameter_bytes
+from rbdyn.accuracy.rollers.option_cost import OPTIONS, with_options
 from rbdyn.contact.film import journal_film_force
 from rbdyn.contact.hertz_line import sum_of_slices
 from rbdyn.contact.pocket_film import wall_film
 from rbdyn.contact.traction import asperity_load_share, bicubic
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.geometry import layout_of
-from rbdyn.dynamics.guide_land import journal_wrench
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.pocket import dry_walls, film_on_wall
-from rbdyn.dynamics.race_form import turned_multiple
+from rbdyn.dynamics.forces.guide_land import journal_wrench
+from rbdyn.dynamics.forces.pocket import dry_walls, film_on_wall
+from rbdyn.dynamics.forces.race_form import turned_multiple
+from rbdyn.dynamics.forces.schedule import segment
+from rbdyn.dynamics.parameters.geometry import layout_of
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import Run
-from rbdyn.dynamics.schedule import segment
-from rbdyn.footprint import added_modules, instructions, law_types, parameter_bytes
-from rbdyn.option_cost import OPTIONS, with_options
 
 FOLDER = Path(__file__).parent
 # Every law that can be switched off, off.
@@ -88,8 +88,8 @@ STATE = {
     "speed and load by schedule": 3,
 }
 # Modules that an option loads and the plain scene does not.
-CLOCK = ("rbdyn.dynamics.clock", "rbdyn.dynamics.schedule")
-SLICES = ("rbdyn.contact.profile", "rbdyn.dynamics.slice_loads")
+CLOCK = ("rbdyn.dynamics.forces.clock", "rbdyn.dynamics.forces.schedule")
+SLICES = ("rbdyn.contact.profile", "rbdyn.dynamics.forces.slice_loads")
 MODULES = {
     "logarithmic profile, 31 slices": SLICES,
     "tilt, 31 slices": SLICES,
@@ -97,15 +97,15 @@ MODULES = {
     "wavy inner race, with clock": CLOCK,
     "rotating load, with clock": CLOCK,
     "speed and load by schedule": CLOCK,
-    "outer ring on a support": ("rbdyn.dynamics.support",),
+    "outer ring on a support": ("rbdyn.dynamics.forces.support",),
 }
 # Packages and modules that a simulation of the plain scene has no use for.
 NOT_NEEDED = (
     "pandas", "matplotlib", "pymoo", "sklearn", "doe", "rich",
     "scipy.special", "scipy.linalg", "scipy.interpolate", "scipy.signal", "scipy.stats", "scipy.optimize",
-    "rbdyn.accuracy", "rbdyn.option_cost", "rbdyn.footprint", "rbdyn.scaling", "rbdyn.slip_map", "rbdyn.show",
-    "rbdyn.plots", "rbdyn.mounting", "rbdyn.ring_expansion", "rbdyn.dynamics.history", "rbdyn.dynamics.observe",
-    "rbdyn.dynamics.life", "rbdyn.dynamics.rating", "rbdyn.dynamics.lyapunov", "rbdyn.dynamics.orbit",
+    "rbdyn.accuracy", "rbdyn.accuracy.rollers.option_cost", "rbdyn.accuracy.rollers.footprint", "rbdyn.accuracy.rollers.scaling", "rbdyn.dynamics.slip_map", "rbdyn.cli.show",
+    "rbdyn.plots", "rbdyn.mounting.fits", "rbdyn.mounting.rings", "rbdyn.dynamics.motion.history", "rbdyn.dynamics.forces.observe",
+    "rbdyn.life.rollers", "rbdyn.dynamics.motion.rating", "rbdyn.dynamics.motion.lyapunov", "rbdyn.dynamics.motion.orbit",
     *(module for modules in MODULES.values() for module in modules),
 )  # fmt: skip
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from rbdyn.dynamics.left_out import (
+from rbdyn.dynamics.parameters.left_out import (
     LEFT_OUT,
     cylinder_moment,
     disc_moment,

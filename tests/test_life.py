@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from rbdyn.contact.profile import logarithmic_relief, slice_centres
-from rbdyn.dynamics import life
+from rbdyn.life import rollers as life
 
 GAMMA = 9.0 / 43.5
 

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from rbdyn.contact import hertz_line
 from rbdyn.contact.profile import crowned_relief, logarithmic_relief, slice_centres
-from rbdyn.materials import MATERIALS, Material, equivalent_modulus
+from rbdyn.properties.materials import MATERIALS, Material, equivalent_modulus
 
 STEEL = equivalent_modulus(MATERIALS["bearing_steel"], MATERIALS["bearing_steel"])
 LENGTH, GAMMA = 3.5e-3, 9.0 / 43.5

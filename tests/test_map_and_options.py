@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from rbdyn import accuracy
+from rbdyn.accuracy.rollers.option_cost import OPTIONS, option_costs, study, with_options
+from rbdyn.cli.app import _write_map as write
+from rbdyn.cli.ranges import axis_values
+from rbdyn.dynamics.slip_map import FIGURES, POINTS, slip_map
 from rbdyn.faults import InputError
-from rbdyn.option_cost import OPTIONS, option_costs, study, with_options
-from rbdyn.ranges import axis_values
 from rbdyn.scene import Scene
-from rbdyn.slip_map import FIGURES, POINTS, slip_map, write
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "cylindrical_roller.toml"
 SPEEDS, LOADS = (12000.0, 24000.0), (60.0, 1300.0)
@@ -73,7 +74,7 @@ def test_unit_failed_points_are_records(make_scene):
 
 def counted(monkeypatch) -> list[float]:
     """Loads of the runs that a map begins from here on."""
-    from rbdyn import slip_map as module
+    from rbdyn.dynamics import slip_map as module
 
     ran, usual = [], module.run_replicate
 

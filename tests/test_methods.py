@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 
 from rbdyn import accuracy
-from rbdyn.accuracy import comparison, method_bias, methods
-from rbdyn.accuracy.comparison import attempt, attempts_of, curve
-from rbdyn.accuracy.equal_error import front, times_faster
-from rbdyn.accuracy.fixed_step import runge_kutta_4, steps_of, velocity_of
-from rbdyn.accuracy.methods import METHODS, OURS, RUNGE_KUTTA_4, SCIPY_RK45, VELOCITY_VERLET, Method, fixed_step
-from rbdyn.accuracy.right_hand_side import BudgetSpent, RightHandSide
-from rbdyn.accuracy.trajectory import Error, Reference, difference, end_of, reference, settled
+from rbdyn.accuracy.rollers import comparison, method_bias, methods
+from rbdyn.accuracy.rollers.comparison import attempt, attempts_of, curve
+from rbdyn.accuracy.rollers.equal_error import front, times_faster
+from rbdyn.accuracy.rollers.fixed_step import runge_kutta_4, steps_of, velocity_of
+from rbdyn.accuracy.rollers.methods import METHODS, OURS, RUNGE_KUTTA_4, SCIPY_RK45, VELOCITY_VERLET, Method, fixed_step
+from rbdyn.accuracy.rollers.right_hand_side import BudgetSpent, RightHandSide
+from rbdyn.accuracy.rollers.trajectory import Error, Reference, difference, end_of, reference, settled
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.equations import LOADS, POWERS
-from rbdyn.dynamics.geometry import layout_of
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.race_lanes import scratch
+from rbdyn.dynamics.forces.equations import LOADS, POWERS
+from rbdyn.dynamics.forces.race_lanes import scratch
+from rbdyn.dynamics.integrators.runge_kutta import Tally
+from rbdyn.dynamics.parameters.geometry import layout_of
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
-from rbdyn.dynamics.runge_kutta import Tally
 from rbdyn.faults import InputError, RunError
 
 CVODE = [method for method in METHODS if method.name.startswith("CVODE")]

@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rbdyn.dynamics import orbit
-from rbdyn.dynamics.geometry import reduced_radii
-from rbdyn.dynamics.history import History
-from rbdyn.dynamics.lyapunov import lyapunov_exponent
-from rbdyn.materials import equivalent_modulus
+from rbdyn.dynamics.motion import orbit
+from rbdyn.dynamics.motion.history import History
+from rbdyn.dynamics.motion.lyapunov import lyapunov_exponent
+from rbdyn.dynamics.parameters.geometry import reduced_radii
+from rbdyn.properties.materials import equivalent_modulus
 
 TURNS, PER_TURN = 10, 512
 WHIRL, CAGE = 0.4, 0.39  # of the shaft speed

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rbdyn.dynamics import orbit_frame
-from rbdyn.dynamics import runge_kutta as rk
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.integrators import orbit_frame
+from rbdyn.dynamics.integrators import runge_kutta as rk
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from test_doe_command_line import doe
 
+from rbdyn.cli.terminal import keeping, output_folder
 from rbdyn.faults import InputError
-from rbdyn.terminal import keeping, output_folder
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 

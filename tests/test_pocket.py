@@ -16,10 +16,10 @@ from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping
 from rbdyn.contact.hertz_line import LineContact
 from rbdyn.contact.pocket_film import film_shape, pocket_film, wall_film
 from rbdyn.contact.traction import CoulombTraction, NoTraction
-from rbdyn.dynamics.booking import book_peaks, book_point
-from rbdyn.dynamics.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
-from rbdyn.dynamics.pocket import LippedPocket, LubricatedPocket, Pocket, pocket_contact, pocket_energy
-from rbdyn.dynamics.runge_kutta import Tally
+from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
+from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, Pocket, pocket_contact, pocket_energy
+from rbdyn.dynamics.integrators.booking import book_peaks, book_point
+from rbdyn.dynamics.integrators.runge_kutta import Tally
 
 VISCOSITY, RADIUS, LENGTH, FLOOR = 2.87e-3, 4.5e-3, 5e-3, 0.8e-6
 FILM = pocket_film(VISCOSITY, RADIUS, LENGTH, FLOOR, 1.0)
@@ -292,7 +292,7 @@ def test_unit_lips_hold_radially():
 def test_unit_scene_makes_the_pocket(make_scene):
     """Unit: film, floor, lips and restitution of a scene reach the pocket."""
     from rbdyn.contact.damping import alpha_of_restitution
-    from rbdyn.dynamics.model import roller_bearing
+    from rbdyn.dynamics.parameters.model import roller_bearing
 
     scene = make_scene(
         "cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.06", "model.pocket_film=true",
@@ -316,7 +316,7 @@ def test_unit_scene_makes_the_pocket(make_scene):
 
 def test_unit_contact_length_of_the_scene(make_scene):
     """Unit: contact, film and lips take the given length; without it the effective length, and a film the whole roller."""
-    from rbdyn.dynamics.model import roller_bearing
+    from rbdyn.dynamics.parameters.model import roller_bearing
 
     wet = ("model.pocket_film=true", "cage.guidance=roller")
     plain, given = (

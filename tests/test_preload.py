@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import BallScene
-from rbdyn.quasistatic import fatigue, life, preload
+from rbdyn.life import balls as life
+from rbdyn.quasistatic import fatigue, preload
 
 
 def scene(radial=150.0, axial=40.0, clearance=None, **operation):

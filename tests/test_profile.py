@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from rbdyn.contact import profile
-from rbdyn.materials import MATERIALS, equivalent_modulus
+from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 
 STEEL = equivalent_modulus(MATERIALS["bearing_steel"], MATERIALS["bearing_steel"])
 LENGTH = 12e-3

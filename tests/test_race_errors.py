@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbdyn.faults import InputError, validated
-from rbdyn.quasistatic.race_errors import ball_path, perfect, random_waviness, rolling, waviness
-from rbdyn.quasistatic.runout_model import errors_of
+from rbdyn.quasistatic.runout.model import errors_of
+from rbdyn.quasistatic.runout.race_errors import ball_path, perfect, random_waviness, rolling, waviness
 from rbdyn.scene.form_errors import FormErrors, faults
 
 Z = 7

@@ -14,8 +14,8 @@ from rbdyn.contact.damping import NoDamping
 from rbdyn.contact.hertz_line import dowson_higginson, palmgren
 from rbdyn.contact.rolling_resistance import NoRollingResistance
 from rbdyn.contact.traction import CoulombTraction, NoTraction
-from rbdyn.dynamics.race_form import RoundRace, form_at, largest_rise, wavy_race
-from rbdyn.dynamics.races import Race, race_contact
+from rbdyn.dynamics.forces.race_form import RoundRace, form_at, largest_rise, wavy_race
+from rbdyn.dynamics.forces.races import Race, race_contact
 
 RADIUS, ROLLER, Z = {1.0: 26.25e-3, -1.0: 17.25e-3}, 4.5e-3, 10
 CONTACT = palmgren(226.4e9, 3.5e-3)
@@ -79,8 +79,8 @@ def test_unit_lobe_stands_at_its_phase():
 @pytest.mark.parametrize("contact", [CONTACT, dowson_higginson(226.4e9, 3.5e-3, 0.2)], ids=["power", "log"])
 def test_oracle_force_is_virtual_work(side, contact):
     """Oracle: force on roller and moment on ring are minus the energy's slopes over place and angle of the ring."""
-    from rbdyn.dynamics.energy import race_energy
-    from rbdyn.dynamics.ring_motion import RingMotion
+    from rbdyn.dynamics.forces.energy import race_energy
+    from rbdyn.dynamics.forces.ring_motion import RingMotion
 
     draw = np.random.default_rng(4)
     race = race_of(side, waves((2, 8e-6, 0.3), (17, 1e-6, 1.0)), contact)
@@ -174,8 +174,8 @@ def test_literature_orders_that_shake_a_ring(order):
 
 def test_unit_scene_makes_the_form(make_scene):
     """Unit: order, amplitude and phase of a scene; a clock only where a form turns; the reach holds the highest wave."""
-    from rbdyn.dynamics.geometry import layout_of
-    from rbdyn.dynamics.model import roller_bearing
+    from rbdyn.dynamics.parameters.geometry import layout_of
+    from rbdyn.dynamics.parameters.model import roller_bearing
 
     standing = make_scene("bearing.outer_waviness=[{order=2, amplitude_um=10.0, phase_deg=90.0}]")
     bearing = roller_bearing(standing)

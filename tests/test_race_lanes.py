@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numba import njit
 
+from rbdyn.compiled.kernel import alike, either
 from rbdyn.contact.hertz_line import LineContact, sliced
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.pocket import NoPocket, pocket_contact, pocket_gap
-from rbdyn.dynamics.race_form import RoundRace
-from rbdyn.dynamics.race_lanes import share_vectors
-from rbdyn.kernel import alike, either
+from rbdyn.dynamics.forces.pocket import NoPocket, pocket_contact, pocket_gap
+from rbdyn.dynamics.forces.race_form import RoundRace
+from rbdyn.dynamics.forces.race_lanes import share_vectors
+from rbdyn.dynamics.parameters.model import roller_bearing
 
 
 @njit

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_bvp
 
 from rbdyn.faults import InputError, validated
-from rbdyn.materials import MATERIALS, Material
-from rbdyn.mounting import operating_clearance
-from rbdyn.ring_expansion import Ring, interface_pressure, mounted_clearance
+from rbdyn.mounting.fits import operating_clearance
+from rbdyn.mounting.rings import Ring, interface_pressure, mounted_clearance
+from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Bearing, CustomMaterial, Materials
 from rbdyn.scene.mounting import Mounting, faults, material_of

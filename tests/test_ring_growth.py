@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
 from rbdyn.faults import InputError
-from rbdyn.materials import MATERIALS
-from rbdyn.quasistatic.growth_model import layer_changes, mounted_of, row_change
-from rbdyn.quasistatic.ring_growth import groove_change, printed_growth
-from rbdyn.ring_expansion import Ring, interface_pressure, loosening_speed
+from rbdyn.mounting.ball_rings import layer_changes, mounted_of, row_change
+from rbdyn.mounting.ring_growth import groove_change, printed_growth
+from rbdyn.mounting.rings import Ring, interface_pressure, loosening_speed
+from rbdyn.properties.materials import MATERIALS
 
 STEEL, CERAMIC = MATERIALS["bearing_steel"], MATERIALS["silicon_nitride"]
 SPEED = 40000.0 * math.pi / 30.0

@@ -15,7 +15,7 @@ from numba import njit
 from rbdyn.contact import film_thickness
 from rbdyn.contact import rolling_resistance as rolling
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.model import roller_bearing, rolling_law
+from rbdyn.dynamics.parameters.model import roller_bearing, rolling_law
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.faults import InputError
 

@@ -7,24 +7,24 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rbdyn.dynamics import rosenbrock as ros
-from rbdyn.dynamics import runge_kutta as rk
-from rbdyn.dynamics.arrow_matrix import PARTS, arrow_matrix, factor, shifted, solve
-from rbdyn.dynamics.batch_means import student_half_width
-from rbdyn.dynamics.energy import mechanical_energy
+from rbdyn.compiled.kernel import entry
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.equations import POWERS, SHAFT
-from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, scales, slip_scale
-from rbdyn.dynamics.implicit import differences, workspace
-from rbdyn.dynamics.jacobian import jacobian
-from rbdyn.dynamics.method import held_by_stability, largest_eigenvalue
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.race_lanes import scratch
+from rbdyn.dynamics.forces.energy import mechanical_energy
+from rbdyn.dynamics.forces.equations import POWERS, SHAFT
+from rbdyn.dynamics.forces.race_lanes import scratch
+from rbdyn.dynamics.forces.state import layout
+from rbdyn.dynamics.integrators import rosenbrock as ros
+from rbdyn.dynamics.integrators import runge_kutta as rk
+from rbdyn.dynamics.integrators.arrow_matrix import PARTS, arrow_matrix, factor, shifted, solve
+from rbdyn.dynamics.integrators.implicit import differences, workspace
+from rbdyn.dynamics.integrators.jacobian import jacobian
+from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
+from rbdyn.dynamics.parameters.geometry import absolute_tolerance, layout_of, scales, slip_scale
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.state import layout
-from rbdyn.kernel import entry
+from rbdyn.dynamics.statistics.batch_means import student_half_width
 
 STEEP = ("traction.constants=[-0.05,5.0,100.0,0.05]",)
 # A slope of 40 s/m, where the implicit method is the cheaper one.

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rbdyn.dynamics import runge_kutta as rk
-from rbdyn.dynamics.energy import mechanical_energy
 from rbdyn.dynamics.ensemble import CancelledError, Stop
-from rbdyn.dynamics.equations import POWERS, SHAFT
-from rbdyn.dynamics.geometry import scales
-from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.forces.energy import mechanical_energy
+from rbdyn.dynamics.forces.equations import POWERS, SHAFT
+from rbdyn.dynamics.integrators import runge_kutta as rk
+from rbdyn.dynamics.parameters.geometry import scales
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
 from rbdyn.faults import RunError
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from rbdyn.faults import InputError, RunError
-from rbdyn.quasistatic.equilibrium import solve
-from rbdyn.quasistatic.linear_runout import CHANGES, linear_response
-from rbdyn.quasistatic.race_errors import ball_path, perfect, waviness
-from rbdyn.quasistatic.runout_lots import RACES, Lot, bearing_errors, draw_parts, readings
-from rbdyn.quasistatic.runout_model import bench_of, follow_ring
-from rbdyn.quasistatic.tolerance_design import design, full_runouts, runouts
-from rbdyn.quasistatic.turn import follow
-from rbdyn.quasistatic.walk import walk
+from rbdyn.quasistatic.row.equilibrium import solve
+from rbdyn.quasistatic.runout.linear import CHANGES, linear_response
+from rbdyn.quasistatic.runout.lots import RACES, Lot, bearing_errors, draw_parts, readings
+from rbdyn.quasistatic.runout.model import bench_of, follow_ring
+from rbdyn.quasistatic.runout.race_errors import ball_path, perfect, waviness
+from rbdyn.quasistatic.runout.tolerance_design import design, full_runouts, runouts
+from rbdyn.quasistatic.runout.turn import follow
+from rbdyn.quasistatic.runout.walk import walk
 from rbdyn.scene.ball import BallScene
 
 SCENE = Path(__file__).parent.parent / "examples" / "angular_contact_7014.toml"
@@ -240,7 +240,7 @@ def test_unit_walk_compiled_and_interpreted(bench, monkeypatch):
     errors = replace(perfect(Z), inner_sway=waviness((17, 1e-6, 0.1)))
     balls = ball_path(errors, bench.turning, 5)
     compiled = follow(bench.row, bench.control, bench.load, balls, 1)
-    monkeypatch.setattr("rbdyn.quasistatic.turn.walk", walk.py_func)
+    monkeypatch.setattr("rbdyn.quasistatic.runout.turn.walk", walk.py_func)
     interpreted = follow(bench.row, bench.control, bench.load, balls, 1)
     assert np.array_equal(compiled.path, interpreted.path)
     assert compiled.largest_load == pytest.approx(interpreted.largest_load, rel=1e-14)

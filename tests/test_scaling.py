@@ -8,11 +8,21 @@ import numpy as np
 import pytest
 
 from rbdyn.accuracy import write
-from rbdyn.dynamics.geometry import raceway_radii, shaft_speeds
-from rbdyn.dynamics.model import roller_bearing
+from rbdyn.accuracy.rollers.scaling import (
+    Memory,
+    Point,
+    Scaling,
+    fit,
+    peak_memory,
+    report,
+    scaling,
+    with_rollers,
+    with_slices,
+)
+from rbdyn.dynamics.parameters.geometry import raceway_radii, shaft_speeds
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError
-from rbdyn.scaling import Memory, Point, Scaling, fit, peak_memory, report, scaling, with_rollers, with_slices
 
 SOME = (10, 20)
 
@@ -71,7 +81,7 @@ def test_unit_times_are_measured_and_written(found, tmp_path):
     whole = Scaling({**found.points, "slices": list(found.points["rollers"])}, [Memory(4, 100.0), Memory(8, 100.0)])
     assert write(report(whole), tmp_path) == ["scaling.json", "scaling.csv", "scaling.png"]
     saved = json.loads((tmp_path / "scaling.json").read_text())
-    assert saved["format"] == "rbdyn.scaling/1" and set(saved["fits"]) == {"rollers", "slices"}
+    assert saved["format"] == "rbdyn.accuracy.rollers.scaling/1" and set(saved["fits"]) == {"rollers", "slices"}
     assert (tmp_path / "scaling.png").stat().st_size > 10_000
     assert len((tmp_path / "scaling.csv").read_text().splitlines()) == 5
 

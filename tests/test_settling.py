@@ -9,20 +9,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rbdyn.accuracy import coverage
-from rbdyn.dynamics.drift import drift_of, drifting, slow_change, unseen_regime
+from rbdyn.accuracy.rollers import coverage
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
-from rbdyn.dynamics.geometry import CAGE_SHARES, absolute_tolerance, roller_radii
-from rbdyn.dynamics.method import explicit_method
-from rbdyn.dynamics.metrics import CAGE_SPEED, POWER_LOSS, Replicate
-from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
+from rbdyn.dynamics.forces.state import CAGE_ANGLE
+from rbdyn.dynamics.integrators.method import explicit_method
+from rbdyn.dynamics.parameters.geometry import CAGE_SHARES, absolute_tolerance, roller_radii
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.start import start_state
 from rbdyn.dynamics.recording import Recording, record
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.settling import run_until_settled, whole_windows
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.start import start_state
-from rbdyn.dynamics.state import CAGE_ANGLE
+from rbdyn.dynamics.statistics.drift import drift_of, drifting, slow_change, unseen_regime
+from rbdyn.dynamics.statistics.metrics import CAGE_SPEED, POWER_LOSS, Replicate
 from rbdyn.faults import RunError
 from rbdyn.result import Quantity
 

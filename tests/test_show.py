@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from conftest import EXAMPLE, SHORT
 
+from rbdyn.cli.show import ask
 from rbdyn.faults import InputError
-from rbdyn.show import ask
 
 QUICK = [part for assignment in SHORT for part in ("--set", assignment)]
 PICTURES = {

@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rbdyn.dynamics.batch_means import student_factor, student_half_width
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.equations import (
+from rbdyn.dynamics.forces.equations import (
     INNER_LOAD,
     LAND_LOAD,
     LOADS,
@@ -22,12 +21,13 @@ from rbdyn.dynamics.equations import (
     POWERS,
     SHAFT,
 )
-from rbdyn.dynamics.geometry import kinematics
-from rbdyn.dynamics.history import history
-from rbdyn.dynamics.metrics import IMPACT_FORCE, POWER_LOSS, Replicate, quantity
-from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.motion.history import history
+from rbdyn.dynamics.parameters.geometry import kinematics
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate
+from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
+from rbdyn.dynamics.statistics.metrics import IMPACT_FORCE, POWER_LOSS, Replicate, quantity
 from rbdyn.faults import InputError, RunError
 from rbdyn.result import Quantity, SimulationResult
 
@@ -187,7 +187,7 @@ def test_unit_everything_off_loses_nothing(conservative):
 
 def test_invariant_guidance_brakes_or_drives(outer, inner, outer_result, evaluate):
     """Invariant: an outer land brakes the cage, an inner land drives it; the cage then runs faster, never past the shaft."""
-    from rbdyn.dynamics.start import start_state
+    from rbdyn.dynamics.parameters.start import start_state
 
     for scene, sign in ((outer, -1.0), (inner, 1.0)):
         bearing = roller_bearing(scene)

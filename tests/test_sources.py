@@ -8,8 +8,8 @@ import tokenize
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from rbdyn import sources
-from rbdyn.sources import SITE, code_behind, compiled_digest, source_digest, what_runs
+from rbdyn.compiled import sources
+from rbdyn.compiled.sources import SITE, code_behind, compiled_digest, source_digest, what_runs
 
 MODULES = sorted(path for name in ("rbdyn", "doe") for path in (SITE / name).rglob("*.py"))
 SKIPPED = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
@@ -79,7 +79,7 @@ def copy(tmp_path, monkeypatch):
         ("rbdyn/plots/motion.py", '"', "'"),
         ("rbdyn/scene/bearing.py", "# Harmonics of the raceway radii", "# Waves of the raceways"),
         ("rbdyn/scene/bearing.py", '"""Geometry of a cylindrical roller bearing.', '"""Drawing.'),
-        ("rbdyn/cli.py", '"', "'"),
+        ("rbdyn/cli/app.py", '"', "'"),
         ("doe/report/words.py", '"', "'"),
     ],
 )
@@ -93,8 +93,8 @@ def test_unit_words_and_pictures_invalidate_nothing(copy, module, old, new):
 @pytest.mark.parametrize(
     ("module", "old", "new"),
     [
-        ("rbdyn/elementary.py", "0.5 * f * f", "0.25 * f * f"),
-        ("rbdyn/dynamics/kutta_pair.py", "return ", "return 1.0 * "),
+        ("rbdyn/compiled/elementary.py", "0.5 * f * f", "0.25 * f * f"),
+        ("rbdyn/dynamics/integrators/kutta_pair.py", "return ", "return 1.0 * "),
         ("rbdyn/contact/damping.py", "(1.0 + 1.5 * damping", "(1.0 + 1.6 * damping"),
     ],
 )

@@ -7,12 +7,12 @@ import json
 import pandas as pd
 import pytest
 
-from rbdyn import stability
 from rbdyn.accuracy import write
+from rbdyn.accuracy.rollers import stability
+from rbdyn.accuracy.rollers.option_cost import with_options
+from rbdyn.accuracy.rollers.stability import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery, cases, ending
 from rbdyn.faults import InputError
-from rbdyn.option_cost import with_options
 from rbdyn.scene import Scene
-from rbdyn.stability import CLOSED, OPEN, REFUSED, STOPPED, TIGHTENED, Ending, battery, cases, ending
 
 EXAMPLE = "examples/cylindrical_roller.toml"
 
@@ -78,7 +78,7 @@ def test_unit_record_and_files(rows, tmp_path):
     listed = list(rows.values())
     assert write(stability.report(listed), tmp_path) == ["stability.json", "stability.csv"]
     saved = json.loads((tmp_path / "stability.json").read_text())
-    assert saved["format"] == "rbdyn.stability/1" and saved["status"] == "ok"
+    assert saved["format"] == "rbdyn.accuracy.rollers.stability/1" and saved["status"] == "ok"
     assert [case["case"] for case in saved["cases"]] == list(rows)
     assert len(pd.read_csv(tmp_path / "stability.csv")) == len(rows)
     assert {len(row.cells()) for row in listed} == {len(stability.HEADER)}
@@ -108,7 +108,7 @@ def test_command_line_exit_codes(monkeypatch):
     """Command line: one JSON object; 0 where all is explained, 1 where a balance stays open."""
     from typer.testing import CliRunner
 
-    from rbdyn.cli import app
+    from rbdyn.cli.app import app
 
     for status, code in ((CLOSED, 0), (REFUSED, 0), (OPEN, 1)):
         monkeypatch.setattr(

@@ -11,12 +11,12 @@ from numpy_twin_laws import race_load, raceways, roller_errors
 from scipy.optimize import brentq
 
 from rbdyn.contact.hertz_line import LineContactOnBar
-from rbdyn.dynamics import state
-from rbdyn.dynamics.energy import mechanical_energy
-from rbdyn.dynamics.geometry import cage_inertia, kinematics, raceway_radii, scales
-from rbdyn.dynamics.guide_land import InnerGuide, NoFilm, NoGuide, OuterGuide
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.start import start_state, static_share
+from rbdyn.dynamics.forces import state
+from rbdyn.dynamics.forces.energy import mechanical_energy
+from rbdyn.dynamics.forces.guide_land import InnerGuide, NoFilm, NoGuide, OuterGuide
+from rbdyn.dynamics.parameters.geometry import cage_inertia, kinematics, raceway_radii, scales
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.start import start_state, static_share
 
 
 def test_literature_speeds_at_the_papers_point(outer):

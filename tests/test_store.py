@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from doe.study import owner
-from doe.study.failure import Failure, grouped
-from doe.study.owner import LEASE_S, this_process
-from doe.study.store import Point, Store
+from doe.running import owner
+from doe.running.failure import Failure, grouped
+from doe.running.owner import LEASE_S, this_process
+from doe.running.store import Point, Store
 from rbdyn.faults import InputError, RunError
 from rbdyn.kept import digest_of
 
@@ -128,7 +128,7 @@ def test_folder_that_cannot_be_written_is_told_as_such():
 
 
 def test_file_that_another_process_holds_is_told_as_such(path, monkeypatch):
-    monkeypatch.setattr("doe.study.database.PATIENCE_S", 0.1)
+    monkeypatch.setattr("doe.running.database.PATIENCE_S", 0.1)
     with Store(path) as holder, Store(path) as other:
         holder._connection.execute("BEGIN EXCLUSIVE")
         with pytest.raises(InputError, match=r"another process holds it; start again when that has ended$"):
@@ -313,7 +313,7 @@ def test_claim_from_the_future_is_told_and_lasts_one_lease_from_when_it_was_firs
 
 
 def test_a_live_process_gives_signs_of_life(path, monkeypatch):
-    monkeypatch.setattr("doe.study.store.BEAT_S", 0.02)
+    monkeypatch.setattr("doe.running.store.BEAT_S", 0.02)
     with Store(path) as store, Store(path) as other:
         store.claim(POINTS[:1])
         query = "SELECT beat FROM owners"
@@ -344,7 +344,7 @@ def test_reading_leaves_the_folder_as_it_was(path, tmp_path):
 
 def test_many_openings_at_once_make_one_store(path):
     code = (
-        "import sys; from pathlib import Path; from doe.study.store import Point, Store\n"
+        "import sys; from pathlib import Path; from doe.running.store import Point, Store\n"
         "with Store(Path(sys.argv[1])) as store:\n"
         "    print(len(store.claim([Point(f'k{n}', 'p') for n in range(50)])))\n"
         "    store.put('k' + sys.argv[2], {})"

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from doe import clearance
-from doe.report.files import write
-from doe.report.front import front_record
+from doe.report.steps.front import front_record
+from doe.report.study.files import write
 from doe.study import run_study
 from doe.study.confirmation import Confirmed, Gain, gains
 from doe.study.finished import finished as is_finished

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from doe import clearance
 from doe.cli import app
-from doe.report.files import write
+from doe.report.study.files import write
 from doe.study import run_study
 from doe.study.back_off import Conditioned, Missed
 from doe.study.confirmation import Confirmed

@@ -13,10 +13,10 @@ from instant_runs import instantly
 from test_doe_command_line import doe, invoke, loaded_by
 from test_study import short_study, silent
 
-from doe.report.status import print_status
+from doe.report.steps.status import print_status
+from doe.running.store import Point, Store
 from doe.study.runs import STORE, run_design
 from doe.study.status import study_status
-from doe.study.store import Point, Store
 from doe.study_file import Study
 
 

@@ -11,17 +11,23 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy.integrate import quad, solve_ivp
 
-from rbdyn.dynamics.cage_body import BalancedCage, UnbalancedCage, cage_acceleration, cage_kinetic_energy, mass_centre
-from rbdyn.dynamics.clock import ClockedDrive
-from rbdyn.dynamics.drive import SteadyDrive, TwoSpeedDrive, action, load_potential, load_power
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.geometry import layout_of
-from rbdyn.dynamics.gravity import Gravity, NoGravity, height_energy
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.ring_motion import HeldRing, support_energy, support_motion
+from rbdyn.dynamics.forces.cage_body import (
+    BalancedCage,
+    UnbalancedCage,
+    cage_acceleration,
+    cage_kinetic_energy,
+    mass_centre,
+)
+from rbdyn.dynamics.forces.clock import ClockedDrive
+from rbdyn.dynamics.forces.drive import SteadyDrive, TwoSpeedDrive, action, load_potential, load_power
+from rbdyn.dynamics.forces.gravity import Gravity, NoGravity, height_energy
+from rbdyn.dynamics.forces.ring_motion import HeldRing, support_energy, support_motion
+from rbdyn.dynamics.forces.schedule import Constant, Ramps, SmoothRamps, Steps, value_at
+from rbdyn.dynamics.forces.support import SupportedRing
+from rbdyn.dynamics.parameters.geometry import layout_of
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
-from rbdyn.dynamics.schedule import Constant, Ramps, SmoothRamps, Steps, value_at
-from rbdyn.dynamics.support import SupportedRing
 
 TIMES, VALUES = np.array([0.0, 2.0, 3.0, 7.0]), np.array([10.0, -4.0, 6.0, 6.5])
 
@@ -242,9 +248,9 @@ def test_invariant_spin_up_from_rest(make_scene):
     """
     from conftest import EVERYTHING
 
-    from rbdyn.dynamics.energy import mechanical_energy
-    from rbdyn.dynamics.equations import LOAD, SHAFT
-    from rbdyn.dynamics.geometry import kinematics
+    from rbdyn.dynamics.forces.energy import mechanical_energy
+    from rbdyn.dynamics.forces.equations import LOAD, SHAFT
+    from rbdyn.dynamics.parameters.geometry import kinematics
 
     scene = make_scene(
         *EVERYTHING,

@@ -25,9 +25,9 @@ from rbdyn.contact.traction import (
     traction,
     traction_surface,
 )
-from rbdyn.dynamics.race_traction import film_report, race_traction
+from rbdyn.dynamics.parameters.race_traction import film_report, race_traction
 from rbdyn.faults import InputError
-from rbdyn.lubricants import oil_at
+from rbdyn.properties.lubricants import oil_at
 from rbdyn.scene import Scene
 from rbdyn.scene.lubricant import RHEOLOGIES, smallest_traction
 

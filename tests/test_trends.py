@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from rbdyn import Scene, history, simulate
-from rbdyn.dynamics.geometry import kinematics
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.start import start_state
-from rbdyn.dynamics.state import CAGE_SPEED
+from rbdyn.dynamics.forces.state import CAGE_SPEED
+from rbdyn.dynamics.parameters.geometry import kinematics
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.start import start_state
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "cylindrical_roller.toml"
 RUN = (

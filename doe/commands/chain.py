@@ -10,8 +10,8 @@ import typer
 
 from doe.commands.options import Json, Save
 from doe.commands.steps import save
+from rbdyn.cli.terminal import BAD_INPUT, guarded, print_json
 from rbdyn.faults import InputError
-from rbdyn.terminal import BAD_INPUT, guarded, print_json
 
 
 def chain(
@@ -28,7 +28,7 @@ def chain(
     """Solve dimension chains: limits, yield, contributions, allocation. One that misses its limits is refused."""
     with guarded(as_json):
         from doe.dimension_chain import is_several, read_chains, solve
-        from doe.report.chain import chains_record, print_chain
+        from doe.report.steps.chain import chains_record, print_chain
 
         several = is_several(path)
         results, faults = {}, []

@@ -8,7 +8,7 @@ import typer
 
 from doe.commands.options import Json, Save, StudyPath
 from doe.commands.steps import save
-from rbdyn.terminal import guarded, print_json
+from rbdyn.cli.terminal import guarded, print_json
 
 
 def design(
@@ -21,7 +21,7 @@ def design(
 ) -> None:
     """Print the design: every run, and how well the runs can tell what is asked of them."""
     with guarded(as_json):
-        from doe.report.design import design_record, print_csv, print_design
+        from doe.report.steps.design import design_record, print_csv, print_design
         from doe.study.checked import check_study
         from doe.study.design import design_of, evaluation
         from doe.study_file import Study

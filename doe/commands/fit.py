@@ -8,7 +8,7 @@ import typer
 
 from doe.commands.options import Data, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import fitted, keeping_runs, save
-from rbdyn.terminal import guarded, print_json
+from rbdyn.cli.terminal import guarded, print_json
 
 
 def fit(
@@ -26,7 +26,7 @@ def fit(
 ) -> None:
     """Fit the response surfaces and print their analysis of variance."""
     with guarded(as_json), keeping_runs(out):
-        from doe.report.fit import fit_record, fit_tables, print_fit
+        from doe.report.steps.fit import fit_record, fit_tables, print_fit
         from doe.study.surfaces import with_rivals
 
         loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)

@@ -8,8 +8,8 @@ import typer
 
 from doe.commands.options import Data, Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import fitted, keeping_runs, save, searched
+from rbdyn.cli.terminal import guarded, print_json
 from rbdyn.faults import InputError, refuse
-from rbdyn.terminal import guarded, print_json
 
 if TYPE_CHECKING:
     from doe.study_file import Study
@@ -38,7 +38,7 @@ def front(
 ) -> None:
     """Find the Pareto front on the response surfaces."""
     with guarded(as_json), keeping_runs(out):
-        from doe.report.front import asked_point_record, front_record, print_front
+        from doe.report.steps.front import asked_point_record, front_record, print_front
         from doe.study.front import find_front
         from doe.study.goals import check_goals
         from doe.study_file import Study
@@ -54,7 +54,7 @@ def front(
 
             record["point"] = asked_point_record(loaded, surfaces, found, np.array(values))
         if direct:
-            from doe.report.confirmation import direct_record
+            from doe.report.steps.confirmation import direct_record
 
             record["direct"] = direct_record(
                 loaded, searched(loaded, found, out, workers, quiet or as_json, scheduler, retry)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from doe.commands.options import Json, Out, Quiet, StudyPath
-from rbdyn.terminal import guarded, print_json
+from rbdyn.cli.terminal import guarded, print_json
 
 
 def status(path: StudyPath, out: Out = None, as_json: Json = False, quiet: Quiet = False) -> None:
     """Tell where a study stands: done, failed by cause, running, missing, time spent and left."""
     with guarded(as_json):
-        from doe.report.status import print_status
+        from doe.report.steps.status import print_status
         from doe.study.status import study_status
         from doe.study_file import Study
 

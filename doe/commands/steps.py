@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.terminal import keeping, output_folder, progress_bar
+from rbdyn.cli.terminal import keeping, output_folder, progress_bar
 
 if TYPE_CHECKING:
     from doe.pareto import ParetoFront
@@ -65,10 +65,10 @@ def searched(
     retry: bool,
 ) -> Direct:
     """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
+    from doe.running.store import Store
     from doe.study.direct import find_direct
     from doe.study.runs import STORE
     from doe.study.simulations import Simulations
-    from doe.study.store import Store
 
     with (
         _store_folder(out, study.path) as folder,

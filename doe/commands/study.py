@@ -11,7 +11,7 @@ import typer
 
 from doe.commands.options import Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
 from doe.commands.steps import keeping_runs
-from rbdyn.terminal import FAILED, guarded, output_folder, print_json, progress_bar
+from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json, progress_bar
 
 
 def study(
@@ -43,9 +43,9 @@ def study(
             print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
             _leave_by(record)
             return
-        from doe.report.answer import print_outcome, print_verdict
-        from doe.report.files import write
-        from doe.report.fit import print_fit
+        from doe.report.steps.fit import print_fit
+        from doe.report.study.answer import print_outcome, print_verdict
+        from doe.report.study.files import write
         from doe.study import run_study
 
         outcome = run_study(

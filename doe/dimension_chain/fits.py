@@ -1,12 +1,12 @@
 """Links that are no sums: raceways that a press fit widens or narrows, parts that temperature widens.
 
-Rings, shafts and housings are thick cylinders of one length in plane stress (Lamé), as in `rbdyn.ring_expansion`.
+Rings, shafts and housings are thick cylinders of one length in plane stress (Lamé), as in `rbdyn.mounting.rings`.
 """
 
 from __future__ import annotations
 
-from rbdyn.materials import Material
-from rbdyn.ring_expansion import Ring, interface_pressure
+from rbdyn.mounting.rings import Ring, interface_pressure
+from rbdyn.properties.materials import Material
 
 MM = 1e-3
 

@@ -1,7 +1,7 @@
 """Pareto fronts: search, picks, errors.
 
 - ``goals``, ``archive``, ``indicators``, ``picks``: costs of responses, what is not dominated, how good, which one
-- ``nsga2``: the front of cheap responses
+- ``nsga2``, ``front``: search among cheap responses, and the front found
 - ``uncertainty``: what the surfaces' errors make of a front and of a gain
 - ``quadratic``, ``tolerance_aware``: the front of what manufacture leaves of a point
 - ``tolerance``: backwards from a pick to the widest tolerances that keep its gains
@@ -9,9 +9,10 @@
 """
 
 from doe.pareto.archive import non_dominated
+from doe.pareto.front import ParetoFront, front
 from doe.pareto.goals import Goals
 from doe.pareto.indicators import hypervolume
-from doe.pareto.nsga2 import InfeasibleError, ParetoFront, front
+from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import knee_depth
 
 __all__ = ["Goals", "InfeasibleError", "ParetoFront", "front", "hypervolume", "knee_depth", "non_dominated"]

@@ -9,20 +9,12 @@ Source: Deb et al., A fast and elitist multiobjective genetic algorithm: NSGA-II
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from doe.pareto.archive import Archive, archives, spread
-from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume, normalised
-from doe.pareto.picks import NAMES, Rule, knee_depth, pick_all
-
-if TYPE_CHECKING:
-    from doe.pareto.tolerance_aware import ToleranceAware
-    from doe.pareto.uncertainty import FrontUncertainty
+from doe.pareto.archive import Archive, archives
 
 Array = NDArray[np.float64]
 Objectives = Callable[[Array], Array]
@@ -45,130 +37,12 @@ class InfeasibleError(ValueError):
         super().__init__("no point keeps all limits; loosen one")
 
 
-@dataclass(frozen=True, eq=False)
-class ParetoFront:
-    """Non-dominated points of every point evaluated, in ascending order of the first cost.
-
-    ``points`` (f, k) in the factors' units; ``values`` (f, m) in the responses' units, watched ones too, and
-    ``costs`` (f, q) what their goals make of them. ``ideal`` and ``nadir`` (q,) are the best and worst of each cost on
-    the front; ``knee``, ``pick`` and ``picks`` (the pick of every rule) are row numbers. ``archive_size`` counts the
-    front before thinning and ``hypervolume`` is of that front; ``hypervolume_history`` (generations,) is on the same
-    scale. ``baseline_values`` (m,) and ``baseline_costs`` (q,) are None without a baseline. ``feasible`` is the share
-    of the evaluated points that keep all limits. ``standard_errors`` (f, m), ``uncertainty`` and ``tolerance_aware``
-    are None where they were not asked for.
-    """
-
-    points: Array
-    values: Array
-    costs: Array
-    hypervolume: float
-    hypervolume_history: Array
-    ideal: Array
-    nadir: Array
-    knee: int
-    pick: int
-    picks: dict[Rule, int]
-    pick_reason: str
-    baseline_values: Array | None
-    baseline_costs: Array | None
-    archive_size: int
-    evaluations: int
-    feasible: float
-    generations: int
-    seed: int
-    goals: Goals
-    standard_errors: Array | None = None
-    uncertainty: FrontUncertainty | None = None
-    tolerance_aware: ToleranceAware | None = None
-
-
 class Search(NamedTuple):
     """Archive after every generation, number of evaluations and the share of them that keep all limits."""
 
     archives: list[Archive]
     evaluations: int
     feasible: float
-
-
-def front(
-    objectives: Objectives,
-    lower: ArrayLike,
-    upper: ArrayLike,
-    *,
-    goals: Goals | None = None,
-    population: int = 100,
-    generations: int = 200,
-    seed: int = 1,
-    baseline: ArrayLike | None = None,
-    keep: int = 200,
-    pick: Rule = "knee",
-    standard_errors: Objectives | None = None,
-    doubt: Doubt | None = None,
-) -> ParetoFront:
-    """Find the Pareto front of responses over a box; the same seed gives the same bits.
-
-    Parameters
-    ----------
-    objectives : maps points (n, k) to responses (n, m), at least two of them with a goal.
-    lower, upper : bounds of the factors, shape (k,).
-    goals : what is wanted of the responses; all to be minimised without it.
-    population, generations, seed : of NSGA-II.
-    baseline : a point (k,) to improve on. Picks are then among those front points that dominate it.
-    keep : about how many points to return. A larger front is thinned to evenly spread points, among them
-        the best and worst of each cost, the knee and the picks.
-    pick : rule that makes the pick.
-    standard_errors : maps points (n, k) to the standard errors (n, m) of their responses.
-    doubt : maps points (n, k) to how far below and above (n, m) their responses may be; limits hold all over it.
-
-    Raises
-    ------
-    ValueError when the bounds are not a box, a setting is out of range, or an objective is not finite;
-    InfeasibleError when no point evaluated keeps all limits.
-    """
-    low, high = np.asarray(lower, float), np.asarray(upper, float)
-    check_search(low, high, population, generations, keep)
-    if baseline is not None and np.shape(baseline) != low.shape:
-        raise ValueError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
-    if goals is None:
-        goals = Goals.of(["min"] * _evaluate(objectives, (low + high)[None, :] / 2).shape[1])
-    wanted = goals
-
-    def judge(points: Array) -> Judged:
-        values = _evaluate(objectives, points)
-        below, above = (0.0, 0.0) if doubt is None else doubt(points)
-        return Judged(wanted.costs(values), wanted.violations(values - below, values + above))
-
-    found = search(judge, low, high, population, generations, seed)
-    points, costs = found.archives[-1]
-    ideal, nadir = costs.min(axis=0), costs.max(axis=0)
-    baseline_values = None if baseline is None else _evaluate(objectives, np.atleast_2d(baseline))[0]
-    baseline_costs = None if baseline_values is None else goals.costs(baseline_values)
-    best = int(knee_depth(costs).argmax())
-    picks, among = pick_all(costs, goals, baseline_costs)
-    kept = spread(normalised(costs, ideal, nadir), keep, [best, *picks.values()])
-    places = {rule: int(np.searchsorted(kept, row)) for rule, row in picks.items()}
-    return ParetoFront(
-        points=points[kept],
-        values=_evaluate(objectives, points[kept]),
-        costs=costs[kept],
-        hypervolume=hypervolume(costs, ideal, nadir),
-        hypervolume_history=np.array([hypervolume(each.costs, ideal, nadir) for each in found.archives]),
-        ideal=ideal,
-        nadir=nadir,
-        knee=int(np.searchsorted(kept, best)),
-        pick=places[pick],
-        picks=places,
-        pick_reason=f"{NAMES[pick]} {among}",
-        baseline_values=baseline_values,
-        baseline_costs=baseline_costs,
-        archive_size=len(costs),
-        evaluations=found.evaluations,
-        feasible=found.feasible,
-        generations=generations,
-        seed=seed,
-        goals=goals,
-        standard_errors=None if standard_errors is None else standard_errors(points[kept]),
-    )
 
 
 def search(

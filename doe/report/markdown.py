@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from doe.report.content import sections
-from doe.report.content.blocks import Block, Bullets, Heading, Table, Tiles, Words
-from doe.report.content.record import Record, known
-from doe.report.content.sections import title
+from doe.report.sections import sections
+from doe.report.sections.blocks import Block, Bullets, Heading, Table, Tiles, Words
+from doe.report.sections.contents import title
+from doe.report.sections.record import Record, known
 
 # What Markdown or the HTML in it would take for its own: marks anywhere, underscores at the rim of a word, links.
 SPECIAL = re.compile(r"[\\`*|]|(?<![^\W_])_|_(?![^\W_])|(?<=\])[(\[:]|^(?:[#>+-]|\d+\.)(?=\s)")

@@ -29,7 +29,6 @@ from doe.response_surface.known_variance import KnownVariance, compare
 from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import ModelError, model_error
 from doe.response_surface.terms import MODELS, Model, in_actual_units, model_matrix, second_order
-from doe.response_surface.words import describe
 
 Array = NDArray[np.float64]
 Weighting = Literal["equal", "replicates"]
@@ -200,7 +199,6 @@ class Surface:
             "model_error": None if self.model_error is None else self.model_error.as_dict(),
             "diagnostics": self.diagnostics,
             "rival": self.rival,
-            "sentences": describe(self),
         }
 
     @cached_property

@@ -6,7 +6,7 @@
 - ``direct``: the front of the simulator itself
 - ``picks``, ``confirmation``: points worth a simulation, and whether what they gain is real
 - ``widest``, ``chains``: tolerances that keep the gains, and the parts
-- ``simulations``, ``runner``, ``store``, ``database``, ``owner``, ``cluster``, ``failure``: where points run and how they are kept
+- ``simulations``: points beside the design; ``checked``: one judgement of a study before anything runs
 - ``status``, ``finished``: where a study stands
 - ``reference``: a published table beside
 - ``whole``: all of it in one go

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from doe.running.failure import Failure
 from doe.study.confirmation import Choice, Confirmed, confirm
 from doe.study.direct_pick import DirectPick, direct_pick
-from doe.study.failure import Failure
 from doe.study.front import find_front
 from doe.study.limits import ORDER, Limit, limits_of, verdict_of
 from doe.study.picks import choices

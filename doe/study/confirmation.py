@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.study.failure import Failure
+from doe.running.failure import Failure
 from doe.study.goals import goals_of
 from doe.study_file import Study
 from rbdyn.faults import RunError

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doe.designs import to_actual
-from doe.study.failure import Failure, grouped
+from doe.running.failure import Failure, grouped
 from doe.study.goals import goals_of, region_of
 from doe.study.surfaces import standard_errors
 from doe.study_file import Study

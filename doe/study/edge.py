@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doe.designs import to_coded
+from doe.running.failure import Failure
 from doe.study.confirmation import Choice, Confirmed, confirmed_from
 from doe.study.drawn import jacobian
-from doe.study.failure import Failure
 from doe.study.goals import goals_of, region_of
 from doe.study_file import Study
 from rbdyn.faults import InputError

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from doe.study_file import Study
+from rbdyn.compiled.sources import source_digest
 from rbdyn.result import versions
-from rbdyn.sources import source_digest
 
 
 def inputs_digest(study: Study, direct: bool) -> str:

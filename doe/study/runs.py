@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from doe.designs import Design, to_actual, to_coded
 from doe.designs.model import model_terms
+from doe.running.failure import Failure, alike, sentence, successes
 from doe.study.design import check_runs, design_of
-from doe.study.failure import Failure, alike, sentence, successes
 from doe.study_file import Study
 from rbdyn.faults import RunError
 
@@ -103,7 +103,7 @@ def run_design(
     Runs that fail are left out. Raises InputError, KeyboardInterrupt, and RunError when too few are left.
     """
     from doe import clearance
-    from doe.study.store import Store
+    from doe.running.store import Store
 
     asked = ordered_runs(study)
     design, coded, actual = asked.design, asked.design.coded, asked.actual

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from doe.running.store import Store
 from doe.study.runs import Progress
-from doe.study.store import Store
 
 if TYPE_CHECKING:
-    from doe.study.failure import Failure
+    from doe.running.failure import Failure
     from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
 

@@ -8,9 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from doe.study.failure import Failure, grouped
+from doe.running.failure import Failure, grouped
+from doe.running.store import Claim, EndedRun, Point, Store
 from doe.study.runs import STORE, ordered_runs
-from doe.study.store import Claim, EndedRun, Point, Store
 from doe.study_file import Study
 
 FORMAT = "doe.status/1"

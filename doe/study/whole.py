@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from doe.running.failure import Failure
 from doe.study.chains import solve_chains
 from doe.study.checked import check_study
 from doe.study.chosen import choose
@@ -19,7 +20,6 @@ from doe.study.design import design_of
 from doe.study.direct import Direct, find_direct
 from doe.study.direct_pick import DirectPick, local_of
 from doe.study.edge import Edge, edge_of
-from doe.study.failure import Failure
 from doe.study.finished import inputs_digest
 from doe.study.front import find_front
 from doe.study.goals import check_goals
@@ -109,7 +109,7 @@ def run_study(
     ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself. Raises
     InputError, RunError, KeyboardInterrupt.
     """
-    from doe.study.store import Store
+    from doe.running.store import Store
     from doe.study.widest import widest_of
 
     clock = _Clock()

@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 
 from rbdyn import Scene, SimulationResult, simulate
+from rbdyn.cli.terminal import print_table
 from rbdyn.result import Quantity
-from rbdyn.terminal import print_table
 
 EXAMPLES = Path(__file__).parent.parent
 CHEN = EXAMPLES / "cylindrical_roller.toml"

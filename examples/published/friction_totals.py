@@ -23,8 +23,8 @@ from published.common import CHEN, Check, Effort, Table, canvas, save, simulated
 from published.operating import palmgren_moments, skf_moments
 from rbdyn import Scene
 from rbdyn.contact.rolling_resistance import rolling_force
-from rbdyn.dynamics.geometry import kinematics, raceway_radii, reduced_radii, roller_mass
-from rbdyn.dynamics.model import race_contact_law, rolling_law
+from rbdyn.dynamics.parameters.geometry import kinematics, raceway_radii, reduced_radii, roller_mass
+from rbdyn.dynamics.parameters.model import race_contact_law, rolling_law
 
 BEARINGS = Path(__file__).parent / "catalogue_bearings.csv"
 TEMPERATURE_C = 70.0

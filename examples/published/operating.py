@@ -31,7 +31,7 @@ from published.common import (
     trend,
 )
 from rbdyn import Scene
-from rbdyn.lubricants import oil_at
+from rbdyn.properties.lubricants import oil_at
 
 # Table 8: as designed, and the paper's optimum.
 DESIGNS = {"design": (0.020, 0.150, 0.300), "optimum": (0.017, 0.187, 0.285)}

@@ -16,7 +16,7 @@ import math
 from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
-from rbdyn.dynamics.batch_means import student_factor
+from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.faults import InputError
 from rbdyn.scene import Scene
 

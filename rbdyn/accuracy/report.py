@@ -68,7 +68,7 @@ def write(report: Report, folder: Path) -> list[str]:
 
 def show(report: Report, verbose: bool = False) -> None:
     """Print tables, conclusions and the machine."""
-    from rbdyn.terminal import print_table
+    from rbdyn.cli.terminal import print_table
 
     for table in report.tables:
         print_table(*table)

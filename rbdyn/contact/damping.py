@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rbdyn.kernel import law
+from rbdyn.compiled.kernel import law
 
 
 class NoDamping(NamedTuple):

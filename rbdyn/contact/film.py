@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rbdyn.elementary import fast_atan
-from rbdyn.kernel import kernel
+from rbdyn.compiled.elementary import fast_atan
+from rbdyn.compiled.kernel import kernel
 
 
 class ShortJournalFilm(NamedTuple):

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.lubricants import Oil
+from rbdyn.properties.lubricants import Oil
 
 # Below, the fitted numerator of the thermal factor runs through zero (cold oil at high speed).
 SMALLEST_PRESSURE_TERM = 0.1

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.elementary import eighteenth_root, fast_exp, fast_log, reordered_sum, tenth_root
-from rbdyn.kernel import VECTOR, kernel, law
+from rbdyn.compiled.elementary import eighteenth_root, fast_exp, fast_log, reordered_sum, tenth_root
+from rbdyn.compiled.kernel import VECTOR, kernel, law
 
 EXPONENT = 10.0 / 9.0
 # Below this an overlap is round-off; it keeps logarithms and roots finite.

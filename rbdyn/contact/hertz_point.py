@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.kernel import entry, kernel
+from rbdyn.compiled.kernel import entry, kernel
 
 
 class PointContact(NamedTuple):

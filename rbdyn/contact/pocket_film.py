@@ -23,8 +23,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rbdyn.elementary import fma
-from rbdyn.kernel import kernel
+from rbdyn.compiled.elementary import fma
+from rbdyn.compiled.kernel import kernel
 
 
 class PocketFilm(NamedTuple):

@@ -46,7 +46,7 @@ def lundberg_relief(
 ) -> NDArray[np.float64]:
     """Drop that presses uniformly along the contact at ``design_load`` [N] (Lundberg 1939).
 
-    P(x) = 2Q/(pi l E') ln[1/(1 - (2x/l)^2)] with E' of ``rbdyn.materials.equivalent_modulus`` [Pa]: the surface
+    P(x) = 2Q/(pi l E') ln[1/(1 - (2x/l)^2)] with E' of ``rbdyn.properties.materials.equivalent_modulus`` [Pa]: the surface
     displacement of both half-spaces under a line load Q/l of length l, less that at its middle. It serves one
     contact of the roller; infinite at the very ends. Raises ValueError when a position lies off the contact.
     """

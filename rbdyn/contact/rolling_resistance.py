@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rbdyn.elementary import tenth_root
-from rbdyn.kernel import law
+from rbdyn.compiled.elementary import tenth_root
+from rbdyn.compiled.kernel import law
 
 SMALLEST_LOAD = 1e-30  # [N], keeps the root finite
 # Of Biboulet and Houpert 2010: the rigid branch 1.42 sqrt(U W), and where the elastic one, 1.47 U^0.75, takes over.

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.elementary import fast_exp, fast_expm1, fast_log, fma
-from rbdyn.kernel import kernel, law
+from rbdyn.compiled.elementary import fast_exp, fast_expm1, fast_log, fma
+from rbdyn.compiled.kernel import kernel, law
 
 SMALLEST_LOAD = 1e-30  # [N], keeps the logarithm finite
 LARGEST_SPEED_RATIO = 1e12  # slip over the speed scale of a surface; mu has long become constant

@@ -11,13 +11,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.energy import mechanical_energy
 from rbdyn.dynamics.ensemble import Ended, Stop, run_all
-from rbdyn.dynamics.equations import RollerBearing
-from rbdyn.dynamics.geometry import raceway_radii, scales
-from rbdyn.dynamics.metrics import Replicate
+from rbdyn.dynamics.forces.energy import mechanical_energy
+from rbdyn.dynamics.forces.equations import RollerBearing
+from rbdyn.dynamics.forces.state import CAGE_ANGLE
+from rbdyn.dynamics.parameters.geometry import raceway_radii, scales
 from rbdyn.dynamics.run import Run
-from rbdyn.dynamics.state import CAGE_ANGLE
+from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import MOST_OF_A_RUN
 

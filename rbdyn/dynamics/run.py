@@ -9,15 +9,23 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.energy import mechanical_energy
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.equations import LOADS, POWERS, RollerBearing
-from rbdyn.dynamics.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
-from rbdyn.dynamics.method import EXPLICIT, advance_by, cheaper_method, explicit_method, pair_of
-from rbdyn.dynamics.race_lanes import scratch
-from rbdyn.dynamics.runge_kutta import FINISHED, NOT_FINITE, STEP_BUDGET, STEP_UNDERFLOW, Carry, Control, Tally
-from rbdyn.dynamics.start import start_state
-from rbdyn.dynamics.state import INNER_ANGLE, OUTER_ANGLE, name
+from rbdyn.dynamics.forces.energy import mechanical_energy
+from rbdyn.dynamics.forces.equations import LOADS, POWERS, RollerBearing
+from rbdyn.dynamics.forces.race_lanes import scratch
+from rbdyn.dynamics.forces.state import INNER_ANGLE, OUTER_ANGLE, name
+from rbdyn.dynamics.integrators.method import EXPLICIT, advance_by, cheaper_method, explicit_method, pair_of
+from rbdyn.dynamics.integrators.runge_kutta import (
+    FINISHED,
+    NOT_FINITE,
+    STEP_BUDGET,
+    STEP_UNDERFLOW,
+    Carry,
+    Control,
+    Tally,
+)
+from rbdyn.dynamics.parameters.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
+from rbdyn.dynamics.parameters.start import start_state
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
-from rbdyn.dynamics.bias import companion_tolerance
-from rbdyn.dynamics.drift import drifting
 from rbdyn.dynamics.ensemble import Ended, Stop, run_all
-from rbdyn.dynamics.metrics import Replicate
 from rbdyn.dynamics.recording import Recording, batches_of
-from rbdyn.dynamics.transient import start_of_counting
+from rbdyn.dynamics.statistics.bias import companion_tolerance
+from rbdyn.dynamics.statistics.drift import drifting
+from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.dynamics.statistics.transient import start_of_counting
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 

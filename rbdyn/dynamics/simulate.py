@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.equations import LOSSES
-from rbdyn.dynamics.error_bars import error_notes, quantities
-from rbdyn.dynamics.left_out import heat_notes, left_out_notes
-from rbdyn.dynamics.method import explicit_method, stiffness_cost, stiffness_notes
-from rbdyn.dynamics.model import roller_bearing
-from rbdyn.dynamics.race_report import race_notes, race_report
+from rbdyn.dynamics.forces.equations import LOSSES
+from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
+from rbdyn.dynamics.parameters.left_out import heat_notes, left_out_notes
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.race_report import race_notes, race_report
 from rbdyn.dynamics.recording import Recording
 from rbdyn.dynamics.run import Run, prepare
 from rbdyn.dynamics.settling import Ensemble, run_until_settled
+from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene
 

@@ -20,14 +20,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.batch_means import estimate
-from rbdyn.dynamics.bias import bias_scale, companion_tolerance
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.error_bars import FIGURES, settled
-from rbdyn.dynamics.metrics import Replicate, mean_gap
-from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.statistics.batch_means import estimate
+from rbdyn.dynamics.statistics.bias import bias_scale, companion_tolerance
+from rbdyn.dynamics.statistics.error_bars import FIGURES, settled
+from rbdyn.dynamics.statistics.metrics import Replicate, mean_gap
 from rbdyn.faults import InputError
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
@@ -280,7 +280,7 @@ def _noise_factor(scene: Scene, rtol: float) -> float:
 
 
 def _companion_noise(scene: Scene, rtol: float) -> float:
-    """Part of the numerical error that is half-width, over the statistical error (``rbdyn.dynamics.bias``)."""
+    """Part of the numerical error that is half-width, over the statistical error (``rbdyn.dynamics.statistics.bias``)."""
     return bias_scale(rtol) * math.sqrt(1.0 + 1.0 / scene.numerics.companion_share)
 
 

@@ -2,28 +2,21 @@
 
 - ``motion``: cage orbit, pocket and land forces, whirl, sections, spectra, of a history
 - ``contacts``: load, slip and heat around the bearing; power by loss
-- ``solvers``: solvers of the equilibrium of balls at work
-- ``accuracy``: error against run time; ``scaling``: run time over rollers and slices
 - ``ball``: one equilibrium of a ball bearing; ``ball_sweep``: many, over one or two keys of the scene
 - ``drawing``: the bearing at one moment, clearances magnified; shared by ``animation`` (GIF or MP4) and ``player`` (HTML)
 """
 
-from rbdyn.plots.accuracy import methods_at_work, replicates_at_work, slices_at_work, work_precision
 from rbdyn.plots.contacts import power_by_loss, roller_loads, sliding
 from rbdyn.plots.motion import cage_orbit, forces, pocket_forces, section, spectra, whirl
 
 __all__ = [
     "cage_orbit",
     "forces",
-    "methods_at_work",
     "pocket_forces",
     "power_by_loss",
-    "replicates_at_work",
     "roller_loads",
     "section",
-    "slices_at_work",
     "sliding",
     "spectra",
     "whirl",
-    "work_precision",
 ]

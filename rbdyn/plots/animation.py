@@ -13,7 +13,7 @@ from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
 from rbdyn.plots.style import GREEN, GREY, INNER, OUTER, plt
 
 if TYPE_CHECKING:
-    from rbdyn.dynamics.history import History
+    from rbdyn.dynamics.motion.history import History
 
 TURNS = 2.0
 FRAMES_PER_TURN = 40

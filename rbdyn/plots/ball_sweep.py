@@ -13,7 +13,7 @@ from rbdyn.plots.ball import angles_on
 from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Line2D, plain, plt, save
 
 if TYPE_CHECKING:
-    from rbdyn.quasistatic.sweep_result import SweepResult
+    from rbdyn.quasistatic.sweep.result import SweepResult
 
 # Values of a key that are drawn around the bearing, or as lines of their own.
 MOST_LINES = 5

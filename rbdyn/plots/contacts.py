@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from rbdyn.dynamics import orbit
+from rbdyn.dynamics.motion import orbit
 from rbdyn.plots.style import BLUE, INNER, OUTER, plain, plt, save
 
 if TYPE_CHECKING:
-    from rbdyn.dynamics.history import History
+    from rbdyn.dynamics.motion.history import History
 
 # Losses below this share of the whole are left out of the bars.
 SMALLEST_SHARE = 1e-4

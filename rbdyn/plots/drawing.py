@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.geometry import raceway_radii, shaft_speeds
-from rbdyn.dynamics.orbit import largest
+from rbdyn.dynamics.motion.orbit import largest
+from rbdyn.dynamics.parameters.geometry import raceway_radii, shaft_speeds
 
 if TYPE_CHECKING:
-    from rbdyn.dynamics.history import History
+    from rbdyn.dynamics.motion.history import History
 
 Array = NDArray[np.float64]
 

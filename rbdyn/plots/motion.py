@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from matplotlib.axes import Axes
 
-from rbdyn.dynamics import orbit
+from rbdyn.dynamics.motion import orbit
 from rbdyn.plots.style import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, plain, plt, save
 
 if TYPE_CHECKING:
-    from rbdyn.dynamics.history import History
+    from rbdyn.dynamics.motion.history import History
 
 SHOWN_POCKETS = 3
 POCKET_COLOURS = (BLUE, ORANGE, GREEN)

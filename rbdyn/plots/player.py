@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
 
 if TYPE_CHECKING:
-    from rbdyn.dynamics.history import History
+    from rbdyn.dynamics.motion.history import History
 
 TURNS = 3.0
 FRAMES_PER_TURN = 128

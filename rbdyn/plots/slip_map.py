@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rbdyn.dynamics.slip_map import SlipMap
 from rbdyn.plots.style import plt, save
-
-if TYPE_CHECKING:
-    from rbdyn.slip_map import SlipMap
 
 PANELS = (
     ("cage_slip", "cage slip [%]", 100.0),

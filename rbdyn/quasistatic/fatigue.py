@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from rbdyn.quasistatic.equilibrium import Solution
-from rbdyn.quasistatic.life import BallLife, Turning, lundberg_palmgren_capacities, rated_capacities, row_life
-from rbdyn.quasistatic.rating import dynamic_capacity
-from rbdyn.scene.ball import BallRow
+from rbdyn.life.ball_capacity import dynamic_capacity
+from rbdyn.life.balls import BallLife, Turning, lundberg_palmgren_capacities, rated_capacities, row_life
+from rbdyn.quasistatic.row.equilibrium import Solution
+from rbdyn.scene.ball_bearing import BallRow
 
 # ISO 281 grants grooves closer than its table's no more than the table.
 CLOSEST_RATED = 0.52

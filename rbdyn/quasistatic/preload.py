@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.faults import validated
-from rbdyn.quasistatic.equilibrium import Solution, solve
 from rbdyn.quasistatic.fatigue import reference_capacities, solution_life, turning_rings
-from rbdyn.quasistatic.model import given_of, load_of, row_of
 from rbdyn.quasistatic.remarks import Rating, pressures
-from rbdyn.scene.ball import BallRow, SingleRowScene
+from rbdyn.quasistatic.row.equilibrium import Solution, solve
+from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.scene.ball import SingleRowScene
+from rbdyn.scene.ball_bearing import BallRow
 
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 # Optima closer together than this share of the range, or that lose less than this of stress or life, count as one.

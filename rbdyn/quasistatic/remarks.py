@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
 from rbdyn.contact.static_limit import BALLS, dent_sentence
-from rbdyn.quasistatic.control import FixedShare, FrictionShare
-from rbdyn.quasistatic.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_LOAD
-from rbdyn.quasistatic.model import RowModel
-from rbdyn.scene.ball import BallRow, BallScene
+from rbdyn.quasistatic.row.control import FixedShare, FrictionShare
+from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_LOAD
+from rbdyn.quasistatic.row.model import RowModel
+from rbdyn.scene.ball import BallScene
+from rbdyn.scene.ball_bearing import BallRow
 
 # A contact at a steeper angle lies beyond any shoulder [rad].
 STEEPEST = math.radians(80.0)

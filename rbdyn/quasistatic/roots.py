@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.quasistatic.control import Control, FixedShare, FrictionShare, Spinning
-from rbdyn.quasistatic.equilibrium import Solution, solve
-from rbdyn.quasistatic.row import Row
+from rbdyn.quasistatic.row.control import Control, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.row.equilibrium import Solution, solve
+from rbdyn.quasistatic.row.row import Row
 
 # Shares of the inner race and of the speeds whose equilibria are the starts of the search.
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)

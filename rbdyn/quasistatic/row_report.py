@@ -10,12 +10,12 @@ import numpy as np
 from rbdyn.contact import point_film
 from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
-from rbdyn.materials import equivalent_modulus
-from rbdyn.quasistatic.equilibrium import Solution
+from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.fatigue import solution_life, turning_rings
-from rbdyn.quasistatic.model import RPM
 from rbdyn.quasistatic.remarks import Rating, needed_friction
 from rbdyn.quasistatic.result import ball_records, displacement_record, stiffness_record
+from rbdyn.quasistatic.row.equilibrium import Solution
+from rbdyn.quasistatic.row.model import RPM
 from rbdyn.scene.ball import BallScene
 
 

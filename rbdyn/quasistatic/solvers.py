@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rbdyn.quasistatic import equilibrium, finite_search, plain_newton
-from rbdyn.quasistatic.equilibrium import Solution
+from rbdyn.quasistatic.rivals import finite_search, plain_newton
+from rbdyn.quasistatic.row import equilibrium
+from rbdyn.quasistatic.row.equilibrium import Solution
 
 SOLVERS: dict[str, Callable[..., Solution]] = {
     "convex": equilibrium.solve,

@@ -1,7 +1,7 @@
 """One validated scene: bearing, cage, lubricant, operation, laws and numerics.
 
 Keys carry their units; whatever a paper leaves out stands here as a default with its reason. Nothing in this package
-is compiled: ``rbdyn.dynamics.model`` turns a scene into the SI parameters of the kernels.
+is compiled: ``rbdyn.dynamics.parameters.model`` turns a scene into the SI parameters of the kernels.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pydantic import model_validator
 
 from rbdyn.faults import InputError
 from rbdyn.fields import or_refuse
-from rbdyn.materials import Material, equivalent_modulus
+from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
 from rbdyn.scene.laws import Laws, Numerics
@@ -24,7 +24,7 @@ from rbdyn.scene.reading import SceneFile
 from rbdyn.scene.units import unit_notes
 
 if TYPE_CHECKING:
-    from rbdyn.ring_expansion import MountedClearance
+    from rbdyn.mounting.rings import MountedClearance
 
 # Slices where a profile or a tilt needs them (ISO/TS 16281 asks for at least 30).
 PROFILE_SLICES = 31
@@ -150,7 +150,7 @@ class Scene(SceneFile):
         """What fits, temperatures and rotation do to the clearance; None where the scene tells no mounting."""
         if self.mounting is None:
             return None
-        from rbdyn.mounting import operating_clearance
+        from rbdyn.mounting.fits import operating_clearance
 
         speeds = (self.operation.inner_speed_rpm * math.pi / 30.0, self.operation.outer_speed_rpm * math.pi / 30.0)
         return operating_clearance(self.mounting, self.bearing, self.materials, *speeds)

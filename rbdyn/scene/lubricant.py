@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from rbdyn.faults import Strict
 from rbdyn.fields import Fraction, NonNegative, NotVanishing, Positive, or_refuse
-from rbdyn.lubricants import Oil, oil_at
+from rbdyn.properties.lubricants import Oil, oil_at
 
 RheologyOil = Literal["MIL-L-7808", "MIL-L-23699", "MIL-L-27502", "Santotrac 30", "Santotrac 50", "Mobil DTE SAE30"]
 HOTTEST_C = 350.0

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
 from rbdyn.fields import NonNegative, Positive, or_refuse
-from rbdyn.materials import MATERIALS, Material
+from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
 
 Celsius = Annotated[float, Field(ge=-200.0, le=1000.0)]

@@ -10,12 +10,12 @@ from importlib.resources import files
 from itertools import groupby
 from typing import Any
 
-from doe.report.content import sections
-from doe.report.content.blocks import Section, Table, Widget
-from doe.report.content.record import Record, known
-from doe.report.content.sections import title
 from doe.report.html.data import page_data
 from doe.report.html.render import render
+from doe.report.sections import sections
+from doe.report.sections.blocks import Section, Table, Widget
+from doe.report.sections.contents import title
+from doe.report.sections.record import Record, known
 
 # In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
 SCRIPTS = {

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from doe.report.content.answer import tolerance_of
-from doe.report.content.fronts import bounds, complete, fronts, picks
-from doe.report.content.record import Factor, Record, factors, fits, part, responses
+from doe.report.sections.answer import tolerance_of
+from doe.report.sections.fronts import bounds, complete, fronts, picks
+from doe.report.sections.record import Factor, Record, factors, fits, part, responses
 from doe.report.words import quantity, rounded_down
 
 

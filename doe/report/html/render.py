@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from doe.report.content.blocks import Block, Bullets, Figures, Heading, Table, Tile, Tiles, Words
+from doe.report.sections.blocks import Block, Bullets, Figures, Heading, Table, Tile, Tiles, Words
 
 
 def render(block: Block) -> str:

@@ -1,0 +1,284 @@
+"""The answer an engineer acts on, what was asked, and what simulation confirmed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from doe.report.sections.blocks import Block, Section, Table, Tile, Tiles, Words
+from doe.report.sections.record import Factor, Record, factors, nearest, part, responses, scalars
+from doe.report.words import dimension, half_width, label, percentage, quantity, rounded_down, shown, with_error
+
+# Characters above which a value is a sentence, to be broken.
+LONG = 40
+VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
+LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"}
+
+
+def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+    """Clearances, gains, whether they are real, and the parts to make."""
+    blocks: list[Block] = []
+    if text := part(summary, "limits_sentence"):
+        blocks.append(Words(str(text), "statement"))
+    if pick := part(summary, "pick"):
+        blocks.append(Tiles([_tile(summary, each, pick) for each in factors(summary) if each.name in pick]))
+    if text := statement(summary):
+        blocks.append(Words(text, "statement"))
+    if table := _gains(summary):
+        blocks.append(table)
+    if table := limits(summary, ("baseline", "pick")):
+        blocks.append(table)
+    if text := part(summary, "edge", "sentence"):
+        blocks.append(Words(str(text)))
+    if table := part_dimensions(summary):
+        blocks.append(table)
+    reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
+    if reason:
+        blocks.append(Words(f"Why this point: {reason}.", "note"))
+    return Section("answer", "The answer", blocks) if blocks else None
+
+
+def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
+    beneath = []
+    if tolerance := tolerance_of(summary, factor):
+        beneath.append(f"± {rounded_down(tolerance)} {factor.unit}".strip())
+    baseline = part(summary, "confirmation", "baseline", "factors") or part(summary, "front", "baseline", "factors")
+    if baseline and factor.name in baseline:
+        beneath.append(f"baseline {factor.text(baseline[factor.name])}")
+    return Tile(factor.words, factor.text(pick[factor.name]), factor.unit, beneath)
+
+
+def tolerance_of(summary: Record, factor: Factor) -> float | None:
+    """Half-width of the tolerance of a factor: the one found for the pick, else the one asked for."""
+    return part(summary, "tolerances", factor.name, "half_width") or factor.tolerance
+
+
+def statement(summary: Record) -> str:
+    """Whether the gain is real, in words."""
+    if summary.get("statement"):
+        return str(summary["statement"])
+    verdicts = [gain.get("verdict") for gain in (part(summary, "gains") or {}).values()]
+    if not verdicts:
+        return ""
+    counts = [f"{verdicts.count(verdict)} {verdict}" for verdict in VERDICTS if verdict in verdicts]
+    return f"Of {len(verdicts)} responses, by more than their 95 % errors or within them: {', '.join(counts)}."
+
+
+def _gains(summary: Record) -> Table | None:
+    gains = part(summary, "gains")
+    if not gains:
+        return None
+    columns = [part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick")]
+    rows = [
+        (label(name), *(_value(column.get(name)) for column in columns), percentage(gain), verdict(gain))
+        for name, gain in gains.items()
+    ]
+    header = ("response", "baseline", "pick", "gain", "verdict")
+    return Table("Gains confirmed by simulation (95 % intervals)", header, rows, text_columns=(4,))
+
+
+def limits(summary: Record, names: Sequence[str] = ()) -> Table | None:
+    """Limits judged by simulation at the points of these names, at every confirmed point without any."""
+    points = part(summary, "confirmation") or {}
+    rows = [
+        (
+            name.replace("_", " "),
+            f"{label(response)} {limit.get('sense') or ''} {shown(limit.get('bound'))}",
+            with_error(limit.get("value"), limit.get("error")),
+            LIMITS.get(str(limit.get("verdict")), ""),
+        )
+        for name in names or points
+        for response, limit in (part(points, name, "limits") or {}).items()
+    ]
+    if not rows:
+        return None
+    note = "Kept or broken by more than the error; between the two a limit is undecided."
+    header = ("point", "limit", "simulated", "verdict")
+    return Table("Limits judged by simulation", header, rows, note, text_columns=(1, 3))
+
+
+def verdict(gain: Record) -> str:
+    """With a sign that is told without colour."""
+    return VERDICTS.get(str(gain.get("verdict")), str(gain.get("verdict") or ""))
+
+
+def part_dimensions(summary: Record) -> Table | None:
+    """Parts of every chain."""
+    rows = []
+    chains = part(summary, "chains") or {}
+    for name, chain in chains.items():
+        for each, dimensions in allocation(chain).items():
+            rows.append((label(each), dimension(dimensions), dimensions.get("grade") or "", label(name)))
+    if not rows:
+        return None
+    header = ("part", "dimension [mm]", "grade", "chain")
+    return Table("Part dimensions", header, rows, _yields(chains), text_columns=(2, 3))
+
+
+def allocation(chain: Record) -> dict[str, Any]:
+    """Parts of a chain whose dimensions are known."""
+    wanted = {"nominal_mm", "upper_mm", "lower_mm"}
+    return {name: each for name, each in (chain.get("allocation") or {}).items() if wanted <= set(each)}
+
+
+def _yields(chains: Record) -> str:
+    """Yield of each chain that is not refused, and which are."""
+    refused = [name for name, chain in chains.items() if str(chain.get("status")).startswith("refused")]
+    known = [
+        f"{label(name)} {share:.6f}"
+        for name, chain in chains.items()
+        if name not in refused and (share := part(chain, "yield", "as_given")) is not None
+    ]
+    said = [f"Yield: {', '.join(known)}."] if known else []
+    if refused:
+        said.append(f"Refused: {', '.join(map(label, refused))}; the parts shown are the nearest that fit.")
+    return " ".join(said)
+
+
+def asked(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+    """Factors, responses and scene as they were given."""
+    record = part(summary, "asked")
+    if not record:
+        return None
+    given = factors(summary)
+    blocks: list[Block] = []
+    effort = [
+        f"{shown(record[key])} {words}"
+        for key, words in (
+            ("replicates", "replicates a design run"),
+            ("turns", "counted shaft turns each"),
+            ("confirmation_replicates", "replicates to confirm a point"),
+        )
+        if record.get(key) is not None
+    ]
+    files = [f"study {record['study_file']}"] if record.get("study_file") else []
+    files += [f"scene {record['scene_file']}"] if record.get("scene_file") else []
+    if text := "; ".join([", ".join(files), ", ".join(effort)]).strip("; "):
+        blocks.append(Words(text[0].upper() + text[1:] + "."))
+    rows = [
+        (
+            f"{each.letter}: {label(each.name)}",
+            each.key or "",
+            each.text(each.centre),
+            shown(each.step),
+            f"{each.text(each.low)} to {each.text(each.high)}" if each.low is not None else "",
+            shown(each.resolution),
+            f"± {shown(each.tolerance)}" if each.tolerance else "",
+        )
+        for each in given
+    ]
+    header = ("factor", "key of the scene", "centre", "step", "region", "resolution", "tolerance")
+    blocks.append(Table("Factors", header, rows, text_columns=(1,)))
+    wishes = [(label(each["name"]), *_wish(each)) for each in responses(summary)]
+    columns = ("response", "goal", "limits", "weight", "model")
+    blocks.append(Table("Responses", columns, wishes, text_columns=(1, 4)))
+    if scene := record.get("scene"):
+        settings = [
+            (f"{table}.{key}", shown(value, 6))
+            for table, keys in scene.items()
+            if isinstance(keys, Mapping)
+            for key, value in keys.items()
+            if value is not None and not isinstance(value, Mapping)
+        ]
+        blocks.append(Table("Scene: the bearing and its operation", ("key", "value"), settings, folded=True))
+    return Section("asked", "What was asked", blocks)
+
+
+def _wish(response: Record) -> tuple[str, str, str, str]:
+    goal = {"min": "small", "max": "large", "none": "watched"}.get(
+        str(response.get("goal")), str(response.get("goal") or "")
+    )
+    if response.get("target") is not None:
+        goal = f"at {shown(response['target'])}"
+    limits = [
+        f"{sign} {shown(response[key])}"
+        for key, sign in (("lower", "≥"), ("upper", "≤"))
+        if response.get(key) is not None
+    ]
+    return goal, ", ".join(limits), shown(response.get("weight")), str(response.get("model") or "")
+
+
+def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+    """Simulated responses at every confirmed point beside what the surfaces said."""
+    points = part(summary, "confirmation")
+    if not points:
+        return None
+    given = [
+        each
+        for each in factors(summary)
+        if any(part(point, "factors", each.name) is not None for point in points.values())
+    ]
+    names = [each["name"] for each in responses(summary)]
+    header = ["point", *(label(each.name) for each in given), *map(label, names)]
+    rows = [
+        [
+            name.replace("_", " "),
+            *(each.text(part(point, "factors", each.name)) for each in given),
+            *(_value(part(point, "responses", response)) for response in names),
+        ]
+        for name, point in points.items()
+    ]
+    blocks: list[Block] = [Table("Simulated with fresh seeds (95 % intervals)", header, rows)]
+    if predicted := part(summary, "front", "predicted_gains"):
+        # The surfaces foretell the gains of their own pick, which another may have overtaken.
+        name = nearest(summary, part(summary, "front", "pick", "factors"), points) or "pick"
+        found = part(points, name, "gains") or (part(summary, "gains") if name == "pick" else None) or {}
+        rows = [
+            [label(each), percentage(gain), percentage(found.get(each) or {}), verdict(found.get(each) or {})]
+            for each, gain in predicted.items()
+        ]
+        columns = ("response", "gain on the surfaces", "gain simulated", "verdict")
+        caption = f"What the surfaces promised and the simulation kept, {name.replace('_', ' ')}"
+        blocks.append(Table(caption, columns, rows, text_columns=(3,)))
+    gained = {name.replace("_", " "): point["gains"] for name, point in points.items() if point.get("gains")}
+    if gained:
+        rows = [[name, *(_signed(gains.get(each)) for each in names)] for name, gains in gained.items()]
+        caption = "Gains over the baseline at every confirmed point"
+        note = "▲ better, ▼ worse, ● within its 95 % error."
+        blocks.append(Table(caption, ["point", *(quantity(each)[0] for each in names)], rows, note))
+    if table := limits(summary):
+        blocks.append(table)
+    reasons = [(name.replace("_", " "), point["reason"]) for name, point in points.items() if point.get("reason")]
+    if reasons:
+        blocks.append(Table("Why these points", ("point", "reason"), reasons, text_columns=(1,)))
+    return Section("confirmation", "Confirmation", blocks)
+
+
+def _signed(gain: Record | None) -> str:
+    """A gain with the sign of its verdict."""
+    return f"{verdict(gain)[:1]} {percentage(gain)}" if gain else ""
+
+
+def _value(found: Record | None) -> str:
+    return with_error(found.get("value"), half_width(found)) if found else ""
+
+
+def tolerances(summary: Record) -> Table | None:
+    """The widest tolerances that keep the gain."""
+    found = part(summary, "tolerances")
+    if not found:
+        return None
+    names = {each.name for each in factors(summary)}
+    rows = [
+        (
+            label(name),
+            f"± {rounded_down(each.get('half_width') or 0.0)}",
+            shown(each.get("probability")),
+            _limit(each.get("limited_by")),
+        )
+        for name, each in found.items()
+        if name in names and isinstance(each, Mapping)
+    ]
+    header = ("factor", "tolerance", "probability", "limited by")
+    return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,)) if rows else None
+
+
+def _limit(limited_by: Any) -> str:
+    return label(limited_by) if isinstance(limited_by, str) else shown(limited_by)
+
+
+def record_table(caption: str, record: Record | None, folded: bool = False) -> Table | None:
+    """Everything in nested tables, a row each."""
+    rows = list(scalars(record or {}))
+    prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
+    return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose) if rows else None

@@ -1,0 +1,66 @@
+"""All sections of a report in the order in which they are read; what the summary does not hold is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import PurePath
+from typing import Any
+
+from doe.report.sections import answer, bearing, ends, experiments, fits, fronts, parts
+from doe.report.sections.blocks import Block, Bullets, Section, Table, Words
+from doe.report.sections.record import Record, factors, responses
+from doe.report.words import quantity
+
+CHAPTERS = (
+    answer.answer,
+    answer.asked,
+    experiments.design,
+    fits.surfaces,
+    fits.diagnostics,
+    fronts.front,
+    answer.confirmation,
+    parts.chains,
+    bearing.power,
+    bearing.motion,
+    ends.reference,
+    ends.settings,
+    ends.notes,
+)
+
+
+def sections(summary: Record, motion: Mapping[str, Any] | None = None) -> list[Section]:
+    """Sections with something to say."""
+    found = [chapter(summary, motion or {}) for chapter in CHAPTERS]
+    names = [*(each.name for each in factors(summary)), *(each["name"] for each in responses(summary))]
+    words = {name: quantity(name)[0] for name in names}
+    return [
+        replace(section, blocks=[_readable(block, words) for block in section.blocks])
+        for section in found
+        if section is not None and section.blocks
+    ]
+
+
+def _readable(block: Block, words: Mapping[str, str]) -> Block:
+    """Sentences with quantities by their words; tables without empty columns."""
+
+    def spelt(text: str) -> str:
+        for name, spoken in words.items():
+            text = text.replace(name, spoken)
+        return text
+
+    match block:
+        case Words(text):
+            return replace(block, text=spelt(text))
+        case Bullets(items):
+            return Bullets([spelt(item) for item in items])
+        case Table():
+            return block.without_empty_columns()
+    return block
+
+
+def title(summary: Record) -> str:
+    """What the study was called, or the name of its file in words."""
+    asked = summary.get("asked") or {}
+    stem = PurePath(asked.get("study_file") or "clearance study").stem.replace("_", " ")
+    return asked.get("title") or stem[:1].upper() + stem[1:]

@@ -1,0 +1,200 @@
+"""The Pareto front: every trade-off on the surfaces, the picks, and the fronts that stand beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from doe.report.sections import plots_of_fronts as plots
+from doe.report.sections.answer import record_table, tolerances
+from doe.report.sections.blocks import Block, Figures, Section, Table, Widget, Words
+from doe.report.sections.plots_of_fronts import Front
+from doe.report.sections.record import Record, factors, nearest, part, responses
+from doe.report.words import label, percentage, shown, with_error
+
+# Points of a front that are drawn; more cannot be told apart.
+MOST_POINTS = 400
+DIRECT = (
+    ("hypervolume", "hypervolume on the simulator", "hypervolume_error"),
+    ("surrogate_hypervolume", "hypervolume through the surfaces", "surrogate_hypervolume_error"),
+    ("loss_percent", "loss of the surfaces [%]", "loss_error_percent"),
+    ("evaluations", "evaluations", ""),
+    ("seconds", "time [s]", ""),
+)
+
+
+def fronts(summary: Record) -> list[Front]:
+    """The front on the surfaces and those beside it, each sorted by the first response and thinned."""
+    names = [each["name"] for each in responses(summary)]
+    found: list[Front] = []
+    for role, words, points in (
+        ("front", "on the surfaces", part(summary, "front", "front")),
+        ("robust", "with tolerances", part(summary, "front", "tolerance_aware", "front")),
+        ("direct", "on the simulator", part(summary, "direct", "front")),
+        ("surrogate", "of the surfaces, simulated", part(summary, "direct", "surrogate_front")),
+    ):
+        whole = [point for point in points or [] if complete(point, summary)]
+        if not whole or not names:
+            continue
+        whole.sort(key=lambda point: point["responses"][names[0]])
+        share = max(len(whole) / MOST_POINTS, 1.0)
+        kept = [whole[int(number * share)] for number in range(round(len(whole) / share))]
+        found.append(Front(role, words, kept, sum(len(each.points) for each in found)))
+    return found
+
+
+def complete(point: Record, summary: Record) -> bool:
+    """Whether every factor and response of a point is known, so that it can be drawn."""
+    values = [part(point, "factors", each.name) for each in factors(summary)]
+    values += [part(point, "responses", each["name"]) for each in responses(summary)]
+    return None not in values
+
+
+def picks(summary: Record) -> dict[str, Record]:
+    """Baseline and picks that the front names, by name; "pick" is the one that the study stands by.
+
+    That is the pick of the front, or the one that reckons with tolerances; then the other goes "without tolerances".
+    """
+    plain = part(summary, "front", "pick")
+    named = {"knee": part(summary, "front", "knee")} | (part(summary, "front", "picks") or {})
+    named = {name.replace("_", " "): point for name, point in named.items() if point}
+    chosen = nearest(summary, part(summary, "pick"), ({"": plain} if plain else {}) | named)
+    if chosen and plain:
+        overtaken = {name: point for name, point in named.items() if name != chosen}
+        named = overtaken | {"without tolerances": plain, "pick": named[chosen]}
+    elif plain:
+        named["pick"] = plain
+    # The surfaces at the pick itself, which stands on the resolution of the drawing.
+    if rounded := part(summary, "pick_on_surfaces"):
+        named["pick"] = rounded
+    baseline = part(summary, "front", "baseline")
+    return ({"baseline": baseline} if baseline else {}) | named
+
+
+def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+    """Pictures that answer to the pointer, the picks, and what stands beside."""
+    record = part(summary, "front")
+    if not record:
+        return None
+    sets = fronts(summary)
+    names = [each["name"] for each in responses(summary)]
+    marks = picks(summary)
+    blocks: list[Block] = []
+    if sets and len(names) > 1:
+        confirmed = part(summary, "confirmation") or {}
+        drawn = {name: point for name, point in marks.items() if complete(point, summary)}
+        blocks.append(Widget("front"))
+        pairs = plots.pairs(names, sets, drawn, confirmed, bounds(summary))
+        blocks.append(Figures([*pairs, plots.legend_of(sets, drawn, confirmed, bool(bounds(summary)))], "", "pairs"))
+        caption = "Each line is a point of the front: its clearances to the left, its responses to the right."
+        blocks.append(Figures([plots.parallel(factors(summary), names, sets, drawn)], caption, "parallel"))
+    if marks:
+        blocks.append(_picks(summary, names, marks))
+    where = "of the pick without tolerances" if "without tolerances" in marks else "of the pick"
+    if gains := record.get("predicted_gains"):
+        rows = [(label(name), percentage(gain), str(gain.get("verdict") or "")) for name, gain in gains.items()]
+        header = ("response", "gain", "verdict")
+        blocks.append(Table(f"Gains on the surfaces {where}", header, rows, text_columns=(2,)))
+    if record.get("statement"):
+        blocks.append(Words(str(record["statement"])))
+    blocks += [table for table in (_limits(record), tolerances(summary)) if table]
+    if text := part(summary, "tolerances_sentence"):
+        blocks.append(Words(str(text)))
+    blocks += _search(record)
+    blocks += _beside(summary)
+    return Section("front", "Pareto front", blocks)
+
+
+def bounds(summary: Record) -> dict[str, list[float]]:
+    """Limits of every response that has any."""
+    given = {each["name"]: [each.get("lower"), each.get("upper")] for each in responses(summary)}
+    return {name: [x for x in ends if x is not None] for name, ends in given.items() if ends != [None, None]}
+
+
+def _picks(summary: Record, names: Sequence[str], marks: Mapping[str, Record]) -> Table:
+    given = factors(summary)
+    rows = [
+        [
+            name,
+            *(each.text(part(point, "factors", each.name), 1) for each in given),
+            *(with_error(part(point, "responses", response), part(point, "errors", response)) for response in names),
+        ]
+        for name, point in marks.items()
+    ]
+    header = ["point", *(label(each.name) for each in given), *map(label, names)]
+    return Table("Picks on the surfaces", header, rows)
+
+
+def _limits(record: Record) -> Table | None:
+    rows = [
+        (
+            f"{label(limit['response'])} {limit['sense']} {shown(limit['limit'])}",
+            shown(limit["value"]),
+            shown(limit.get("kept")),
+        )
+        for limit in record.get("constraints") or []
+        if {"response", "sense", "limit", "value"} <= set(limit)
+    ]
+    return Table("Limits at the pick on the surfaces", ("limit", "value", "kept"), rows) if rows else None
+
+
+def _search(record: Record) -> list[Block]:
+    known = [
+        f"{words} {shown(record[key])}"
+        for key, words in (("generations", "generations"), ("evaluations", "evaluations"), ("seed", "seed"),
+                           ("hypervolume", "hypervolume"), ("archive", "points in the archive"), ("feasible_share", "feasible share"))
+        if record.get(key) is not None
+    ]  # fmt: skip
+    blocks: list[Block] = [Words(f"NSGA-II: {', '.join(known)}.", "note")] if known else []
+    history = [value for value in record.get("hypervolume_history") or [] if value is not None]
+    if len(history) > 2:
+        blocks.append(Figures([plots.hypervolume(history)], "Hypervolume by generation: flat at the end means found."))
+    return blocks
+
+
+def _beside(summary: Record) -> list[Block]:
+    """How sure the pick is, and the fronts found in other ways."""
+    blocks: list[Block] = []
+    if sure := part(summary, "front", "pick_dominates_baseline"):
+        chance = with_error(sure.get("probability"), 1.96 * (sure.get("standard_error") or 0.0))
+        words = "On surfaces drawn from their errors the pick dominates the baseline with probability"
+        blocks.append(Words(f"{words} {chance}."))
+    if aware := part(summary, "front", "tolerance_aware"):
+        blocks += _with_tolerances(aware, [each["name"] for each in responses(summary)])
+    if direct := part(summary, "direct"):
+        blocks += _on_the_simulator(direct)
+    return blocks
+
+
+def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
+    kind = str(aware.get("kind") or "").replace("_", " ")
+    level = f" {shown(aware['quantile'])}" if aware.get("quantile") is not None and kind == "quantile" else ""
+    number = len(aware.get("front") or [])
+    blocks: list[Block] = [Words(f"Front with tolerances: {kind}{level} over the tolerance box, {number} points.")]
+    points = {
+        "baseline": aware.get("baseline_robust"),
+        "plain pick": aware.get("plain_pick_robust"),
+        "pick with tolerances": part(aware, "pick", "robust"),
+    }
+    rows = [(point, *(shown(values.get(name)) for name in names)) for point, values in points.items() if values]
+    if rows:
+        header = ["point", *map(label, names)]
+        blocks.append(Table("What manufacture leaves of the responses", header, rows))
+    costs = {key: aware.get(key) for key in ("survival", "nominal_loss_percent", "robust_gain_percent")}
+    if table := record_table("What the tolerances cost", costs):
+        blocks.append(table)
+    return blocks
+
+
+def _on_the_simulator(direct: Record) -> list[Block]:
+    blocks: list[Block] = [Words(str(direct["sentence"]))] if direct.get("sentence") else []
+    if direct.get("run"):
+        blocks.append(Words(f"A run of the direct search: {direct['run']}."))
+    rows = [
+        (words, with_error(direct[key], direct.get(error)))
+        for key, words, error in DIRECT
+        if direct.get(key) is not None
+    ]
+    if rows:
+        blocks.append(Table("Front searched on the simulator itself", ("", "value"), rows))
+    return blocks

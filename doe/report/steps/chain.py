@@ -1,0 +1,98 @@
+"""A dimension chain on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from rbdyn.cli.terminal import print_table
+
+if TYPE_CHECKING:
+    from doe.dimension_chain import ChainResult
+
+BAR = 20  # characters of a contribution of 100 %
+
+
+def chains_record(results: Mapping[str, ChainResult]) -> dict[str, Any]:
+    """JSON of ``doe chain`` for a file of several chains."""
+    refused = [name for name, result in results.items() if result.refused]
+    status = f"refused: {', '.join(refused)}" if refused else "ok"
+    return {"chains": {name: result.as_dict() for name, result in results.items()}, "status": status}
+
+
+def print_chain(name: str, chain: ChainResult, quiet: bool = False, verbose: bool = False) -> None:
+    """Parts, contributions, closing link and yield of a dimension chain; verbosely also the yields by distribution."""
+    title = f"dimension chain {name}" + (": the nearest parts that meet the limits" if chain.refused else "")
+    rows = [(part.name, part.text, part.grade or "") for part in chain.allocation]
+    print_table(title, ("part", "dimension [mm]", "grade"), rows)
+    if quiet:
+        return
+    shares = [
+        (part, _percent(each["variance_percent"]), _percent(each["worst_case_percent"]))
+        for part, each in chain.contributions.items()
+    ]
+    print_table("contributions", ("part", "variance", "worst case"), shares)
+    if verbose:
+        _print_yields(chain)
+        quantiles = [(f"{100 * share:g} %", f"{size:.4f}") for share, size in chain.quantiles_mm.items()]
+        print_table("quantiles of the closing link", ("share below", "size [mm]"), quantiles)
+    _print_answer(chain)
+    if chain.selective is not None:
+        _print_selective(chain, verbose)
+
+
+def _percent(percent: float) -> str:
+    return f"{'█' * round(BAR * percent / 100)} {percent:5.1f} %"
+
+
+def _print_yields(chain: ChainResult) -> None:
+    exact = chain.exact_yields or {}
+    rows = [
+        (
+            kind.replace("_", " "),
+            f"{share:.6f} ± {chain.standard_errors[kind]:.1g}",
+            f"{exact[kind]:.6f}" if kind in exact else "",
+            *(_ppm(chain.rejected[kind], side) for side in ("low", "high")),
+        )
+        for kind, share in chain.yields.items()
+    ]
+    header = ("distribution of the parts", "yield", "without sampling", "ppm below", "ppm above")
+    print_table(f"yield of {chain.samples} assemblies", header, rows)
+
+
+def _ppm(rejected: Mapping[str, float], side: str) -> str:
+    return f"{rejected[f'{side}_ppm']:.0f} ± {rejected[f'{side}_standard_error_ppm']:.1f}"
+
+
+def _print_answer(chain: ChainResult) -> None:
+    (low, high), (least, most), out = chain.worst_case_mm, chain.rss_mm, chain.rejected["as_given"]
+    print(
+        f"{'as given: ' if chain.refused else ''}closing link {low:.4f} to {high:.4f} mm in worst case, "
+        f"{least:.4f} to {most:.4f} mm by root sum square, yield "
+        f"{chain.yields['as_given']:.6f} ± {chain.standard_errors['as_given']:.1g} "
+        f"({out['low_ppm']:.0f} ppm below, {out['high_ppm']:.0f} ppm above)"
+        + (f", Cp {chain.cp:.2f}, Cpk {chain.cpk:.2f}" if chain.cp is not None else "")
+    )
+    if chain.linearisation is not None:
+        bent = chain.linearisation
+        print(
+            f"a linear chain would miss the worst case by {bent.worst_case_error_mm:.4f} mm, the mean by "
+            f"{bent.mean_shift_mm:+z.4f} mm and the standard deviation by {bent.deviation_error_percent or 0.0:+z.1f} %"
+        )
+    if chain.cost is not None:
+        print(f"cost of the allocated tolerances {chain.cost:.4g}")
+
+
+def _print_selective(chain: ChainResult, verbose: bool) -> None:
+    found = chain.selective
+    assert found is not None
+    low, high = found.worst_case_mm
+    needed = "no number of classes keeps" if found.classes_needed is None else f"{found.classes_needed} would keep"
+    print(
+        f"matched in {found.classes} classes: closing link {low:.4f} to {high:.4f} mm in worst case ({needed} the "
+        f"limits), {100 * found.matched:.2f} % of the parts find a mate, {found.good:.6f} ± "
+        f"{found.standard_error:.1g} of the matched within the limits ({found.random:.6f} at random)"
+    )
+    if verbose:
+        rows = [(name, "  ".join(f"{edge:.4f}" for edge in edges)) for name, edges in found.edges_mm.items()]
+        print_table("classes", ("part", "limits of the classes [mm]"), rows)

@@ -1,0 +1,226 @@
+"""The Pareto front as JSON and on the terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doe.designs import to_coded
+from doe.pareto.indicators import REFERENCE
+from doe.report.steps.tolerance_aware import print_tolerance_aware, tolerance_aware_record
+from doe.study.drawn import predict_all
+from doe.study.front import half_widths
+from doe.study.goals import beyond_runs, goals_of
+from doe.study.predicted import PredictedGain, predicted_gains, statement
+from rbdyn.cli.terminal import print_table
+
+if TYPE_CHECKING:
+    from doe.pareto import ParetoFront
+    from doe.response_surface import Surface
+    from doe.study_file import Study
+
+Array = NDArray[np.float64]
+
+
+def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
+    """JSON of ``doe front``: factor and response values in their own units and senses."""
+    assert front.baseline_values is not None and front.standard_errors is not None
+    assert front.uncertainty is not None
+    sure = front.uncertainty
+    points = [
+        {**_named(study, point, values, errors), "non_dominated_probability": float(probability)}
+        for point, values, errors, probability in zip(
+            front.points, front.values, sure.half_widths, sure.non_dominated, strict=True
+        )
+    ]
+    gains = predicted_gains(study, surfaces, front.points[front.pick])
+    picks: dict[str, Any] = {rule: points[row] for rule, row in front.picks.items()}
+    record: dict[str, Any] = {
+        "front": points,
+        "hypervolume": front.hypervolume,
+        "largest_hypervolume": REFERENCE ** front.costs.shape[1],
+        "hypervolume_history": front.hypervolume_history.tolist(),
+        "ideal": _extreme(study, front, front.costs.argmin(axis=0)),
+        "nadir": _extreme(study, front, front.costs.argmax(axis=0)),
+        "knee": points[front.knee],
+        "pick": {**points[front.pick], "reason": front.pick_reason, "beyond_runs": _far(study, front)},
+        "picks": picks,
+        "baseline": point_record(study, surfaces, study.baseline),
+        "pick_dominates_baseline": {
+            "probability": sure.pick_dominates,
+            "standard_error": sure.pick_dominates_error,
+            "draws": sure.draws,
+        },
+        "predicted_gains": _with_optimism(gains, sure.optimism),
+        "statement": statement(gains),
+        "constraints": _limits(study, front.values[front.pick]),
+        "archive": front.archive_size,
+        "evaluations": front.evaluations,
+        "feasible_share": front.feasible,
+        "generations": front.generations,
+        "seed": front.seed,
+    }
+    if record["pick"]["beyond_runs"]:
+        record["statement"] += " The pick lies farther out than any run: the surfaces extrapolate there."
+    if front.tolerance_aware is not None:
+        record["tolerance_aware"] = tolerance_aware_record(study, surfaces, front.tolerance_aware)
+        picks["tolerance_aware"] = record["tolerance_aware"]["pick"]
+    return record
+
+
+def _far(study: Study, front: ParetoFront) -> bool:
+    return beyond_runs(study, to_coded(front.points[front.pick], study.centre, study.step))
+
+
+def point_record(study: Study, surfaces: list[Surface], point: Array) -> dict[str, Any]:
+    """Factors, responses on the surfaces and their 95 % half widths at a point in factor units."""
+    coded = to_coded(point, study.centre, study.step)
+    errors = np.array([surface.prediction_standard_error(coded) for surface in surfaces])
+    values = predict_all(surfaces, coded[None])[0]
+    return _named(study, point, values, half_widths(surfaces, errors))
+
+
+def asked_point_record(study: Study, surfaces: list[Surface], front: ParetoFront, point: Array) -> dict[str, Any]:
+    """A point that was asked for: its gains over the baseline, and what the front makes of it."""
+    from doe.pareto.archive import dominates
+
+    gains = predicted_gains(study, surfaces, point)
+    coded = to_coded(point, study.centre, study.step)
+    costs = goals_of(study).costs(predict_all(surfaces, coded[None])[0])
+    beyond = beyond_runs(study, coded)
+    outside = " The point lies farther out than any run: the surfaces extrapolate there." if beyond else ""
+    return {
+        **point_record(study, surfaces, point),
+        "predicted_gains": gains_record(gains),
+        "dominated_by": int(dominates(front.costs, costs).sum()),
+        "beyond_runs": beyond,
+        "constraints": _limits(study, predict_all(surfaces, coded[None])[0]),
+        "sentences": [gain.sentence for gain in gains],
+        "statement": statement(gains) + outside,
+    }
+
+
+def gains_record(gains: list[PredictedGain]) -> dict[str, Any]:
+    """JSON of predicted gains, by response."""
+    return {
+        gain.response: {
+            "percent": gain.percent,
+            "error_percent": gain.error,
+            "verdict": gain.verdict,
+            "single_run_scatter_percent": gain.scatter,
+            "within_single_run_scatter": gain.within_scatter,
+        }
+        for gain in gains
+    }
+
+
+def _with_optimism(gains: list[PredictedGain], optimism: Array | None) -> dict[str, Any]:
+    record = gains_record(gains)
+    for gain, excess in zip(gains, [] if optimism is None else optimism.tolist(), strict=False):
+        record[gain.response]["selection_optimism_percent"] = 100.0 * excess / abs(gain.baseline)
+    return record
+
+
+def print_front(record: dict[str, Any], verbose: bool = False) -> None:
+    """Baseline, picks, gains and convergence of a front; verbosely, every point of it."""
+    names = [*record["baseline"]["factors"], *record["baseline"]["responses"]]
+    points = {name: record[name] for name in ("baseline", "knee", "pick")}
+    points |= {f"pick by {rule}": point for rule, point in record["picks"].items()}
+    points |= {"the point asked for": record["point"]} if "point" in record else {}
+    if verbose:
+        points |= {str(number): point for number, point in enumerate(record["front"], 1)}
+    rows = [(name, *_cells(point)) for name, point in points.items()]
+    title = f"Pareto front on the surfaces, {len(record['front'])} of {record['archive']} points"
+    print_table(f"{title} (95 % intervals of the mean)", ("", *names), rows)
+    _print_gains("the pick", record["predicted_gains"])
+    sure = record["pick_dominates_baseline"]
+    print(record["statement"])
+    flattered = ", ".join(
+        f"{name} {gain['selection_optimism_percent']:+.2f} %" for name, gain in record["predicted_gains"].items()
+    )
+    print(f"the rule picks what errors flatter; luck expected in these gains: {flattered}")
+    print(
+        f"pick: {record['pick']['reason']}; on {sure['draws']} surfaces drawn from their errors it dominates the "
+        f"baseline with probability {sure['probability']:.3f} ± {1.96 * sure['standard_error']:.3f}"
+    )
+    for limit in record["constraints"]:
+        print(f"limit: {limit['response']} {limit['sense']} {limit['limit']:g}; the pick has {limit['value']:.5g}")
+    if record["feasible_share"] < 1.0:
+        print(f"{100 * record['feasible_share']:.1f} % of the evaluated points keep all limits")
+    _print_convergence(record)
+    if "tolerance_aware" in record:
+        print_tolerance_aware(record["tolerance_aware"])
+    if "point" in record:
+        asked = record["point"]
+        _print_gains("the point asked for", asked["predicted_gains"])
+        for sentence in [*asked["sentences"], asked["statement"]]:
+            print(sentence)
+        print(f"{asked['dominated_by']} of the {len(record['front'])} points of the front dominate it")
+
+
+def _print_convergence(record: dict[str, Any]) -> None:
+    history, whole = record["hypervolume_history"], record["hypervolume"]
+    reached = next(number for number, each in enumerate(history, 1) if each >= 0.99 * whole)
+    print(
+        f"hypervolume {whole:.4f} of {record['largest_hypervolume']:.3f}; 99 % of it after generation {reached} of "
+        f"{record['generations']}, {record['evaluations']} evaluations"
+    )
+
+
+def _print_gains(whose: str, gains: dict[str, Any]) -> None:
+    rows = [
+        (
+            name,
+            f"{gain['percent']:+.2f} ± {_number(gain['error_percent'])} %",
+            gain["verdict"],
+            f"± {_number(gain['single_run_scatter_percent'])} %",
+        )
+        for name, gain in gains.items()
+    ]
+    header = ("", "gain over the baseline", "verdict", "scatter of two single runs")
+    print_table(f"predicted gains of {whose}", header, rows)
+
+
+def _number(value: float | None) -> str:
+    return "?" if value is None else f"{value:.2f}"
+
+
+def _cells(point: dict[str, Any]) -> list[str]:
+    errors = point.get("errors", {})
+    factors = [f"{x:.5g}" for x in point["factors"].values()]
+    shown = [
+        f"{x:.5g}" if errors.get(name) is None else f"{x:.5g} ± {errors[name]:.2g}"
+        for name, x in point["responses"].items()
+    ]
+    return factors + shown
+
+
+def _named(study: Study, point: Array, values: Array, errors: Array) -> dict[str, Any]:
+    return {
+        "factors": dict(zip(study.factors, point.tolist(), strict=True)),
+        "responses": dict(zip(study.responses, values.tolist(), strict=True)),
+        "errors": {
+            name: None if np.isnan(error) else float(error) for name, error in zip(study.responses, errors, strict=True)
+        },
+    }
+
+
+def _extreme(study: Study, front: ParetoFront, rows: Any) -> dict[str, float]:
+    """The responses with a goal where each is best or worst."""
+    pairs = zip(front.goals.objectives, rows, strict=True)
+    return {study.responses[index]: float(front.values[row, index]) for index, row in pairs}
+
+
+def _limits(study: Study, values: Array) -> list[dict[str, Any]]:
+    return [
+        {
+            "response": study.responses[index],
+            "sense": sense,
+            "limit": limit,
+            "value": float(values[index]),
+            "kept": bool(values[index] <= limit if sense == "<=" else values[index] >= limit),
+        }
+        for index, sense, limit in goals_of(study).limited
+    ]

@@ -1,0 +1,36 @@
+"""Where a study stands, on the terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rbdyn.cli.terminal import print_table
+
+
+def print_status(record: dict[str, Any], quiet: bool) -> None:
+    """A line of counts and one of time; unless ``quiet`` also who runs what, and why points failed."""
+    points = record["points"]
+    counts = ", ".join(f"{points[kind]} {kind}" for kind in ("done", "failed", "running", "missing"))
+    print(f"{record['study']}: {record['status']}; of {points['total']} design points {counts}")
+    left = "not known yet" if record["left_s"] is None else _span(record["left_s"])
+    print(f"time spent {_span(record['spent_s'])} of one thread; time left {left}")
+    if quiet:
+        return
+    other = {kind: number for kind, number in record["other"].items() if number}
+    if other:
+        print(f"other runs: {', '.join(f'{number} {kind}' for kind, number in other.items())}")
+    if record["running"]:
+        rows = [
+            (each["label"], each["host"], str(each["pid"]), each["since"], _span(each["for_s"]))
+            for each in record["running"]
+        ]
+        print_table("running", ("", "host", "process", "since", "for"), rows)
+    for group in record["failures"]:
+        print(f"failed: {', '.join(group['labels'])}: {group['cause']}")
+
+
+def _span(seconds: float) -> str:
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"

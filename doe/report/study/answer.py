@@ -1,0 +1,145 @@
+"""The few lines of a study that a person acts on."""
+
+from __future__ import annotations
+
+import io
+from contextlib import redirect_stdout
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from doe.report.steps.chain import print_chain
+from doe.report.words import rounded_down
+from doe.running.failure import grouped
+from doe.study.confirmation import statement
+from doe.study.limits import limits_of
+from rbdyn.cli.terminal import print_table
+
+if TYPE_CHECKING:
+    from doe.study import Outcome
+
+
+def print_outcome(outcome: Outcome, quiet: bool) -> None:
+    """The end of a study on the terminal: the answer last, where the eye is."""
+    study = outcome.study
+    if not quiet and outcome.beside and study.file.reference:
+        _print_beside(study.file.reference.label, outcome)
+    if not quiet:
+        _print_other_points(outcome)
+    _print_answer(outcome)
+    if not quiet:
+        for note in outcome.notes:
+            print(f"note: {note}")
+
+
+def print_verdict(outcome: Outcome) -> None:
+    """What became of the limits: the first that is to be read."""
+    if outcome.limits_sentence:
+        print(outcome.limits_sentence)
+
+
+def answer_text(outcome: Outcome) -> str:
+    """The answer as it is printed."""
+    with redirect_stdout(io.StringIO()) as text:
+        print_verdict(outcome)
+        _print_answer(outcome)
+    return text.getvalue()
+
+
+def _print_answer(outcome: Outcome) -> None:
+    from doe.clearance import direct_run
+
+    study = outcome.study
+    if outcome.direct is not None:
+        direct = outcome.direct
+        print(
+            f"direct front: {direct.front.evaluations} simulations in {direct.seconds['search']:.0f} s. "
+            f"{direct.loss.sentence}"
+        )
+        print(f"a run of the direct search: {direct_run(study)}")
+    _print_clearances(outcome)
+    rows = []
+    for gain in outcome.gains["pick"]:
+        index = study.responses.index(gain.response)
+        cells = [_value(each, index) for each in (outcome.baseline, outcome.pick)]
+        rows.append((gain.response, *cells, f"{gain.percent:+.2f} ± {gain.error:.2f} %", gain.verdict))
+    print_table("confirmed by simulation (95 % intervals)", ("", "baseline", "pick", "improvement", "verdict"), rows)
+    print(statement(outcome.gains["pick"]))
+    _print_limits(outcome)
+    print(f"pick: {outcome.pick.reason}")
+    print(outcome.edge.sentence)
+    for name, chain in outcome.chains.items():
+        print_chain(name, chain)
+        print(chain.status)
+    for group in grouped(outcome.failures):
+        print(f"failed ({len(group['labels'])}): {', '.join(group['labels'])}: {group['cause']}")
+
+
+def _print_limits(outcome: Outcome) -> None:
+    """Every limit at the baseline and at the pick, judged by simulation."""
+    rows = []
+    for limit in outcome.limits:
+        base = next(each for each in limits_of(outcome.study, outcome.baseline) if each.response == limit.response)
+        told = [(f"{each.value:.5g} ± {each.error:.2g}", each.verdict) for each in (base, limit)]
+        rows.append((f"{limit.response} {limit.sense} {limit.bound:g}", *told[0], *told[1]))
+    if rows:
+        header = ("", "baseline", "verdict", "pick", "verdict")
+        print_table("limits judged by simulation", header, rows)
+
+
+def _print_clearances(outcome: Outcome) -> None:
+    found = outcome.tolerances
+    half_widths = [None] * len(outcome.study.factors) if found is None else found.half_widths.tolist()
+    rows = [
+        (name, f"{base:.4g}", f"{pick:.4g}", *([] if half is None else [f"± {rounded_down(half)}"]))
+        for name, base, pick, half in zip(
+            outcome.study.factors, outcome.baseline.point, outcome.pick.point, half_widths, strict=True
+        )
+    ]
+    header = ("", "baseline", "pick", *([] if found is None else ["widest tolerance"]))
+    print_table("chosen clearances", header, rows)
+    if found is not None:
+        print(f"tolerances: {found.sentence}")
+
+
+def _print_other_points(outcome: Outcome) -> None:
+    """Confirmed points beside the pick."""
+    study = outcome.study
+    others = {name: each for name, each in outcome.confirmed.items() if name not in ("baseline", "pick")}
+    if not others:
+        return
+    rows = [
+        (
+            name.replace("_", " "),
+            *(f"{x:.4g}" for x in each.point),
+            *(f"{gain.percent:+.2f} ± {gain.error:.2f} %" for gain in outcome.gains[name]),
+        )
+        for name, each in others.items()
+    ]
+    wanted = [gain.response for gain in outcome.gains["pick"]]
+    print_table("other points, improvements confirmed by simulation", ("", *study.factors, *wanted), rows)
+
+
+def _print_beside(reference: str, outcome: Outcome) -> None:
+    rows = []
+    for row in outcome.beside:
+        rows.append((row.response, "level: min, mean, max", _three(row.our_range), _three(row.their_range), ""))
+        for factor, (ours, theirs) in row.effects.items():
+            same = "same sign" if ours[0] * theirs[0] > 0.0 else "opposite sign"
+            rows.append(("", f"effect of {factor}", _effect(ours), _effect(theirs), same))
+        rows.append(("", "rank correlation of the runs", f"{row.rank_correlation:+.2f}", "", ""))
+    print_table(f"our runs beside {reference} (* significant at 5 %)", ("", "", "ours", "theirs", ""), rows)
+    for row in outcome.beside:
+        print(f"{row.verdict} {row.why}".rstrip())
+
+
+def _value(confirmed: Any, index: int) -> str:
+    return f"{confirmed.values[index]:.5g} ± {np.nan_to_num(confirmed.error[index]):.2g}"
+
+
+def _effect(effect: tuple[float, bool]) -> str:
+    return f"{effect[0]:+.3g}{'*' if effect[1] else ''}"
+
+
+def _three(values: tuple[float, float, float]) -> str:
+    return ", ".join(f"{x:.4g}" for x in values)

@@ -1,0 +1,84 @@
+"""summary.json: everything that a study found, as plain numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from doe.report.steps.confirmation import confirmation_record, direct_record, edge_record, gains_record, limits_record
+from doe.report.steps.fit import fit_record
+from doe.report.steps.front import front_record, point_record
+from doe.report.study.asked import asked_record, design_record
+from doe.running.failure import grouped
+from doe.study.confirmation import statement
+from rbdyn.result import versions
+
+if TYPE_CHECKING:
+    from doe.study import Outcome
+    from doe.study.direct_pick import DirectPick
+
+FORMAT = "doe.study/1"
+
+
+def summary(outcome: Outcome) -> dict[str, Any]:
+    """JSON of ``doe study``."""
+    study, gains = outcome.study, outcome.gains["pick"]
+    record: dict[str, Any] = {
+        "format": FORMAT,
+        "status": "ok" if outcome.verdict == "kept" else outcome.verdict,
+        "limits": limits_record(outcome.limits),
+        "limits_sentence": outcome.limits_sentence,
+        "tried": outcome.tried,
+        "edge": edge_record(outcome.edge),
+        "asked": asked_record(study),
+        "design": design_record(outcome),
+        "fit": fit_record(outcome.surfaces),
+        "front": front_record(study, outcome.surfaces, outcome.front),
+        "pick_on_surfaces": point_record(study, outcome.surfaces, outcome.pick.point),
+        "pick": dict(zip(study.factors, outcome.pick.point.tolist(), strict=True)),
+        "confirmation": confirmation_record(outcome),
+        "gains": gains_record(gains),
+        "statement": statement(gains),
+        "chains": {name: chain.as_dict() for name, chain in outcome.chains.items()},
+        "beside_reference": _beside_record(outcome),
+        "notes": list(outcome.notes),
+        "failures": grouped(outcome.failures),
+        "cost": dict(outcome.cost),
+        "versions": versions(),
+        "inputs": outcome.inputs,
+        "seeds": {"design": study.file.design.seed, "front": study.file.front.seed, "direct": study.file.direct.seed},
+    }
+    if outcome.direct is not None:
+        record["direct"] = direct_record(study, outcome.direct)
+    if outcome.direct_pick is not None:
+        record["direct"]["chosen"] = _chosen_record(outcome.direct_pick)
+    if outcome.tolerances is not None:
+        record["tolerances"] = outcome.tolerances.as_dict(study.factors)
+        record["tolerances_sentence"] = outcome.tolerances.sentence
+    return record
+
+
+def _chosen_record(pick: DirectPick) -> dict[str, Any]:
+    """Why the pick is this point of the direct front, and the share of its parts that still dominate the baseline."""
+    aware = pick.aware
+    return {
+        "row": pick.row,
+        "reason": pick.reason,
+        "survives": None if aware is None or aware.survives is None else float(aware.survives[pick.row]),
+    }
+
+
+def _beside_record(outcome: Outcome) -> dict[str, Any]:
+    return {
+        row.response: {
+            "ours_min_mean_max": [float(x) for x in row.our_range],
+            "theirs_min_mean_max": [float(x) for x in row.their_range],
+            "linear_effects": {
+                factor: {"ours": ours[0], "theirs": theirs[0], "same_sign": ours[0] * theirs[0] > 0.0}
+                for factor, (ours, theirs) in row.effects.items()
+            },
+            "rank_correlation": row.rank_correlation,
+            "verdict": row.verdict,
+            "why": row.why,
+        }
+        for row in outcome.beside
+    }

@@ -1,0 +1,146 @@
+"""Runs on a cluster: the workers of a dask scheduler, reached through joblib."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import queue
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from doe.running.runner import Ran
+from rbdyn.faults import InputError, RunError
+
+# A scheduler that does not shake hands, take up a client or have a worker within so long [s] is not there.
+KNOCK_S, CONNECT_S, WORKERS_S = 2.0, 4.0, 10.0
+# A study under way waits for new workers for so long [s] when the last one is gone.
+DESERTED_S = 60.0
+# The cluster is looked at as often as this [s].
+LOOK_S = 1.0
+
+
+def run_on_cluster(
+    address: str, work: Callable[[str], Ran], tasks: Callable[[], Sequence[str]], ended: Callable[[int, Ran], None]
+) -> None:
+    """Run ``work`` on every text of ``tasks()`` and hand over each result, with its place, as it ends.
+
+    ``tasks`` is called once the cluster is there. A task whose worker is lost runs again on another; one that was lost
+    again and again is handed over as lost. Raises InputError when there is no cluster to start on, or its workers run
+    other code; RunError when it goes away.
+    """
+    with _client(address) as client:
+        texts = tasks()
+        answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        thread = threading.Thread(target=_feed, args=(client, work, texts, answers), daemon=True)
+        thread.start()
+        left, alone_s = len(texts), 0.0
+        while left:
+            try:
+                answer = answers.get(timeout=LOOK_S)
+            except queue.Empty:
+                alone_s = 0.0 if _workers(client) else alone_s + LOOK_S
+                if client.status != "running" or alone_s > DESERTED_S:
+                    raise RunError(f"--scheduler {address}: {_gone(client)}") from None
+                continue
+            if isinstance(answer, InputError):
+                raise answer
+            if isinstance(answer, BaseException):
+                raise RunError(f"--scheduler {address}: {_gone(client)}") from answer
+            ended(*answer)
+            left -= 1
+
+
+def _gone(client: Any) -> str:
+    what = "its workers are gone" if client.status == "running" else "the scheduler is gone"
+    return f"{what}; finished runs are kept: start again when the cluster is back"
+
+
+def _workers(client: Any) -> int:
+    return len(client.scheduler_info(n_workers=-1)["workers"]) if client.status == "running" else 0
+
+
+def _feed(client: Any, work: Callable[[str], Ran], texts: Sequence[str], answers: Any) -> None:
+    """Put (place, Ran) into ``answers`` as each ends, or what went wrong."""
+    from joblib import Parallel, delayed, parallel_config
+
+    # All at once, so that workers which join later find work. The text of a scene is sent with its task: larger objects
+    # would be kept on one worker, and lost with it.
+    tasks = (delayed(_numbered)(place, text, work) for place, text in enumerate(texts))
+    try:
+        with parallel_config(backend=_backend(client)):
+            run = Parallel(n_jobs=-1, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
+            for answer in run(tasks):
+                answers.put(answer)
+    except Exception as error:
+        answers.put(error)
+
+
+def _numbered(place: int, text: str, work: Callable[[str], Ran]) -> tuple[int, Ran]:
+    return place, work(text)
+
+
+def _backend(client: Any) -> Any:
+    """joblib's dask backend, which also hands over a task that dask has given up, and never runs any in this process."""
+    from joblib._dask import DaskDistributedBackend
+
+    class Backend(DaskDistributedBackend):
+        def effective_n_jobs(self, n_jobs: int) -> int:
+            # Of a single worker joblib makes none at all.
+            return max(2, super().effective_n_jobs(n_jobs))
+
+        def submit(self, func: Any, callback: Any = None) -> Any:
+            future = super().submit(func, callback)
+            place = func.items[0][1][0]
+
+            def given_up(ended: Any) -> None:
+                error = ended.exception()
+                if error is not None and callback is not None:
+                    callback([(place, Ran(None, f"its workers were lost ({error})", 0.0, lost=True))])
+
+            future.add_done_callback(given_up)
+            return future
+
+    return Backend(client=client)
+
+
+async def _knock(address: str) -> None:
+    """Shake hands with the scheduler; a client that cannot would leave threads behind."""
+    from distributed.comm import connect
+
+    # Its own limit ends with the connection: what accepts that and says nothing would be waited for without end.
+    comm = await asyncio.wait_for(connect(address, timeout=KNOCK_S), KNOCK_S)
+    await comm.close()
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
+    try:
+        import distributed
+    except ImportError:
+        raise InputError(
+            [f"--scheduler {address}: needs the package distributed; pip install 'rbdyn[cluster]'"]
+        ) from None
+    # What it would log is said here in a sentence.
+    for name in logging.root.manager.loggerDict:
+        if name.split(".")[0] == "distributed":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        asyncio.run(_knock(address))
+        client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+    # What answers there may be anything, and its words mean anything.
+    except Exception:
+        raise InputError(
+            [f"--scheduler {address}: no dask scheduler answers there within {KNOCK_S:g} s; check the address"]
+        ) from None
+    try:
+        try:
+            client.wait_for_workers(1, timeout=WORKERS_S)
+        except TimeoutError:
+            raise InputError(
+                [f"--scheduler {address}: has no workers; start some with dask worker {address}"]
+            ) from None
+        yield client
+    finally:
+        client.close(timeout=CONNECT_S)

@@ -1,0 +1,86 @@
+"""Runs points: what the store has is read, the rest is claimed, run, and stored as it ends.
+
+Where points run is the business of an engine: threads of this process, or the workers of a cluster.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from doe.running.failure import Failure
+from doe.running.store import Outcome, Point, Sound, Store
+
+# What other processes have done is looked at as often as this [s].
+POLL_S = 0.25
+
+
+@dataclass(frozen=True)
+class Ran:
+    """A run that has ended: its result, or why it could not go on; where it ran unless in this process.
+
+    One that was lost, not one that failed, leaves no trace in the store: the next resumption runs it.
+    """
+
+    result: dict[str, Any] | None
+    cause: str | None
+    seconds: float
+    host: str | None = None
+    pid: int | None = None
+    lost: bool = False
+
+
+Progress = Callable[[int, int], None]
+# Takes the points that are ours to run out of those given, and hands over a point that has ended.
+Take = Callable[[Sequence[Point]], list[Point]]
+Give = Callable[[Point, Ran], None]
+Engine = Callable[[Sequence[Point], Take, Give], None]
+
+
+def run_points(
+    points: Sequence[Point], store: Store, engine: Engine, progress: Progress, sound: Sound, retry: bool = False
+) -> dict[str, Outcome]:
+    """Results and failures of points, by key. What other live processes are running is waited for, not run again.
+
+    What is stored and not ``sound`` is run again; with ``retry`` also what failed. Raises RunError when the store cannot be
+    written, KeyboardInterrupt on Ctrl-C; either way all finished runs stay stored and claims are given back.
+    """
+    wanted = {point.key: point for point in points}
+    found: dict[str, Outcome] = {}
+
+    def take(free: Sequence[Point]) -> list[Point]:
+        mine = store.claim(free, sound)
+        return [point for point in free if point.key in mine]
+
+    def give(point: Point, ran: Ran) -> None:
+        if ran.result is not None:
+            store.put(point.key, ran.result, seconds=ran.seconds, host=ran.host, pid=ran.pid)
+            found[point.key] = ran.result
+        else:
+            cause = ran.cause or "no result"
+            if not ran.lost:
+                store.fail(point.key, cause, seconds=ran.seconds)
+            found[point.key] = Failure(point.label, cause, point.run, dict(point.factors))
+        progress(len(found), len(wanted))
+
+    if retry:
+        store.forget_failures(list(wanted.values()))
+    try:
+        while True:
+            found |= store.outcomes(_left(wanted, found), sound)
+            progress(len(found), len(wanted))
+            if not (left := _left(wanted, found)):
+                return found
+            taken = {claim.key for claim in store.claims()}
+            if free := [point for point in left if point.key not in taken]:
+                engine(free, take, give)
+            else:
+                time.sleep(POLL_S)
+    finally:
+        store.release()
+
+
+def _left(wanted: dict[str, Point], found: dict[str, Outcome]) -> list[Point]:
+    return [point for key, point in wanted.items() if key not in found]

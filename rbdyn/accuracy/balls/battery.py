@@ -1,0 +1,214 @@
+"""Every solver over the battery of random scenes (``rbdyn.accuracy.balls.cases``): how many it solves, how fast.
+
+The scene gives materials, gyroscopic moment, friction limit and light load share; all else is the battery's. The slow solvers see only the
+first so many scenes. Times are of the second of two calls from Python, those of MINPACK's and the search's of one.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rbdyn.accuracy.balls.cases import CONTROLS, LOADS, SCENES, SEED, Case, Problem, cases, posed
+from rbdyn.accuracy.balls.solvers import WHOLE, Success, causes, fared, success_table
+from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.quasistatic.rivals.finite_search import loaded
+from rbdyn.quasistatic.rivals.full_system import system_of, unknowns
+from rbdyn.quasistatic.row.equilibrium import Solution
+from rbdyn.quasistatic.row.row import component_lengths
+from rbdyn.scene.ball import BallScene
+
+FORMAT = "rbdyn.accuracy.battery/1"
+# A tenth of a second and more for a scene they fail on.
+SLOW = {"MINPACK LM": 500, "finite search": 500}
+FAST = ("convex", "plain Newton")
+OURS = "convex"
+# What the battery takes of the scene's model.
+MODEL = ("gyroscopic", "light_load_share", "friction_limit")
+# Balls whose loads differ by more than this share of the largest are in another equilibrium.
+SAME = 1e-6
+
+
+class Run(NamedTuple):
+    """One solver on one case."""
+
+    case: Case
+    solver: str
+    solution: Solution
+    solve_us: float
+
+
+def study(scene: BallScene, progress: Callable[[int, int], None] | None = None, scenes: int = SCENES) -> Report:
+    """``rbdyn accuracy --battery``, its first ``scenes`` scenes."""
+    drawn = cases(scenes, SEED, **{key: getattr(scene.model, key) for key in MODEL})
+    ball, rings = scene.material("ball"), scene.material("inner_ring")
+    problems = [posed(case, ball, rings) for case in drawn]
+    sizes = {name: min(SLOW.get(name, scenes), scenes) for name in WHOLE}
+    counted = Progress(progress, sum(sizes.values()))
+    runs = {name: run(name, drawn[:size], problems, counted) for name, size in sizes.items()}
+    ours = runs[OURS]
+    by_control = [_of(control, [r for r in ours if r.case.control == control]) for control in CONTROLS]
+    by_load = [_of(load, [r for r in ours if r.case.load == load]) for load in LOADS]
+    solvers = [_of(name, found) for name, found in runs.items()]
+    others = {name: _elsewhere(found, ours) for name, found in runs.items() if name != OURS}
+    refused = _refused_by_rule_a(runs["finite search"], problems)
+    sentence = conclusion(solvers)
+    return Report(
+        stem="battery",
+        record=record(
+            FORMAT,
+            scenes=scenes,
+            seed=SEED,
+            by_control=[row._asdict() for row in by_control if row is not None],
+            by_load=[row._asdict() for row in by_load if row is not None],
+            solvers=[row._asdict() for row in solvers if row is not None],
+            another_equilibrium=others,
+            refused_by_rule_a=refused,
+            conclusion=sentence,
+        ),
+        tables=(
+            success_table("convex solver, by raceway control", _some(by_control), "control"),
+            success_table("convex solver, by load", _some(by_load), "load"),
+            _steps_table(ours),
+            success_table(_title(sizes, scenes), _some(solvers)),
+            _share_table("solved by load", LOADS, runs, lambda case: case.load),
+            _share_table("solved by raceway control", CONTROLS, runs, lambda case: case.control),
+        ),
+        sentences=(
+            *causes(_some(solvers)),
+            *(f"{name}: {count} of its equilibria are others than ours" for name, count in others.items() if count),
+            f"rule a as printed refuses {refused} of the equilibria that the finite search found, for their unloaded balls",
+            sentence,
+        ),
+        sheets={"battery": [_flat(r) for found in runs.values() for r in found]},
+        pictures={"battery": lambda path: _draw(runs, path)},
+    )
+
+
+def run(name: str, drawn: Sequence[Case], problems: Sequence[Problem], counted: Progress) -> list[Run]:
+    """One solver over cases; what compiles is compiled before."""
+    solver, runs = WHOLE[name], []
+    for problem in problems[: len(CONTROLS)]:
+        solver(*problem)
+    for case, problem in zip(drawn, problems, strict=False):
+        if name in FAST:
+            solver(*problem)
+        began = time.perf_counter()
+        solution = solver(*problem)
+        runs.append(Run(case, name, solution, 1e6 * (time.perf_counter() - began)))
+        counted.step()
+    return runs
+
+
+def conclusion(rows: Sequence[Success | None]) -> str:
+    """Who solves most, and how the others compare."""
+    ranked = sorted(_some(rows), key=lambda row: -row.solved)
+    best, rest = ranked[0], ranked[1:]
+    others = ", ".join(f"{row.solver} {row.shown_share}" for row in rest)
+    return (
+        f"{best.solver} solves {best.shown_share} of {best.problems} random scenes, half of them within "
+        f"{best.median_us:.0f} us; {others}; 95 % intervals."
+    )
+
+
+def _of(name: str, runs: Sequence[Run]) -> Success | None:
+    return fared(name, [r.solution for r in runs], [r.solve_us for r in runs]) if runs else None
+
+
+def _some(rows: Sequence[Success | None]) -> list[Success]:
+    return [row for row in rows if row is not None]
+
+
+def _elsewhere(runs: Sequence[Run], ours: Sequence[Run]) -> int:
+    """Equilibria that differ from ours on the same scene."""
+    count = 0
+    for r, own in zip(runs, ours, strict=False):
+        if r.solution.found and own.solution.found:
+            gap = np.abs(r.solution.outer_load - own.solution.outer_load).max()
+            count += bool(gap > SAME * own.solution.outer_load.max())
+    return count
+
+
+def _refused_by_rule_a(runs: Sequence[Run], problems: Sequence[Problem]) -> int:
+    """Equilibria in which some deflection is not above 0."""
+    count = 0
+    for r, problem in zip(runs, problems, strict=False):
+        if r.solution.found:
+            system = system_of(problem.row, problem.load, problem.given)
+            lever = problem.row.lever
+            q = r.solution.displacement * component_lengths(lever)
+            count += not loaded(system, unknowns(system, q, r.solution.balls))
+    return count
+
+
+def _steps_table(runs: Sequence[Run]) -> Table:
+    """Newton steps of the convex solver and its continuations, by control."""
+    cells = []
+    for control in CONTROLS:
+        own = [r.solution for r in runs if r.case.control == control]
+        if own:
+            steps = [solution.steps for solution in own]
+            continued = sum(solution.strides > 0 for solution in own)
+            cells.append((control, f"{np.median(steps):.0f}", f"{np.percentile(steps, 99.0):.0f}",
+                          f"{max(steps)}", f"{continued}"))  # fmt: skip
+    return Table("Newton steps of the convex solver", ("control", "median", "99 %", "most", "continued"), cells)
+
+
+def _share_table(title: str, kinds: Sequence[str], runs: dict[str, list[Run]], kind_of: Callable[[Case], str]) -> Table:
+    """Share that each solver solves of the scenes of each kind."""
+    cells = []
+    for kind in kinds:
+        line = [kind]
+        for found in runs.values():
+            solved = [r.solution.found for r in found if kind_of(r.case) == kind]
+            line.append(f"{100.0 * np.mean(solved):.1f} %" if solved else "")
+        cells.append(line)
+    return Table(title, ("", *runs), cells)
+
+
+def _title(sizes: dict[str, int], scenes: int) -> str:
+    fewer = [f"{name} on the first {size}" for name, size in sizes.items() if size < scenes]
+    return "solvers on the same scenes" + (f" ({', '.join(fewer)}: too slow for all)" if fewer else "")
+
+
+def _flat(of: Run) -> dict[str, Any]:
+    """One line of the sheet."""
+    case, solution = of.case, of.solution
+    return {
+        "scene": case.number,
+        "control": case.control,
+        "load": case.load,
+        "solver": of.solver,
+        "status": solution.status,
+        "solve_us": of.solve_us,
+        "steps": solution.steps,
+        "searches": solution.searches,
+        "residual_N": solution.residual,
+    }
+
+
+def _draw(runs: dict[str, list[Run]], path: Path) -> None:
+    """Share of the scenes that each solver has solved within a time [us]."""
+    from rbdyn.accuracy.rollers.pictures import METHOD_COLOURS, Named
+    from rbdyn.plots.style import label_ends, plain, plt, save
+
+    figure, axis = plt.subplots(figsize=(7.6, 5.0))
+    axis.set_xscale("log")
+    axis.set_xlabel("time of a call [us]")
+    axis.set_ylabel("share of scenes solved within it [%]")
+    axis.set_ylim(0.0, 103.0)
+    plain(axis)
+    ends: list[Named] = []
+    for (name, found), colour in zip(runs.items(), METHOD_COLOURS, strict=False):
+        solved = np.sort([run.solve_us for run in found if run.solution.found])
+        if solved.size:
+            share = 100.0 * np.arange(1, solved.size + 1) / len(found)
+            axis.step(solved, share, where="post", color=colour, linewidth=2.0 if colour == "black" else 1.2)
+            ends.append(([(float(solved[0]), float(share[0])), (float(solved[-1]), float(share[-1]))], name, colour))
+    axis.margins(x=0.15)
+    label_ends(axis, ends)
+    save(figure, path)

@@ -1,0 +1,295 @@
+"""Solvers of the equilibrium of one scene: residual against time, and how often each succeeds nearby.
+
+Every solver starts cold and is stopped after more and more iterations; its residual is the largest that the full equations
+leave, over the largest force of the scene. Times are the shortest of several runs of the whole call from Python, after a
+first that compiles. Then the load and the speed of the scene are perturbed at random, with a seed.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rbdyn.accuracy.balls.cases import Problem
+from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.faults import InputError, RunError
+from rbdyn.quasistatic.rivals import finite_search, limited, minpack, plain_newton
+from rbdyn.quasistatic.row import equilibrium
+from rbdyn.quasistatic.row.equilibrium import Solution
+from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.scene.ball import BallScene, SingleRowScene
+
+# Below, a residual is rounding.
+ROUNDING = 1e-18
+FORMAT = "rbdyn.accuracy.solvers/1"
+LIMITS = (1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 64, 128, 256, 512)
+REPEATS = 5
+PERTURBATIONS = 200
+SEED = 1
+# Decades each way of each component of the load, and of the speed.
+LOAD_DECADES, SPEED_DECADES = 1.0, 0.5
+
+Solver = Callable[..., Solution]
+# Ours first. The limit counts Newton steps, iterations of all searches, or MINPACK's evaluations.
+LIMITED: dict[str, Solver] = {
+    "convex": limited.solve,
+    "plain Newton": plain_newton.solve,
+    "MINPACK hybrid": minpack.hybrid,
+    "MINPACK LM": minpack.levenberg_marquardt,
+    "finite search": finite_search.solve,
+}
+WHOLE: dict[str, Solver] = {**LIMITED, "convex": equilibrium.solve}
+
+
+class Attempt(NamedTuple):
+    """One solver stopped after ``limit`` iterations: residual over the largest force, and time [us]."""
+
+    solver: str
+    limit: int
+    residual: float
+    solve_us: float
+    status: str
+
+
+class Success(NamedTuple):
+    """How a solver fares over many problems: share solved; median, 99 % and longest time [us]; median steps; causes."""
+
+    solver: str
+    problems: int
+    solved: float
+    median_us: float
+    slow_us: float
+    longest_us: float
+    median_steps: float
+    causes: dict[str, int]
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the share solved."""
+        return share(round(self.solved * self.problems), self.problems)
+
+    @property
+    def shown_share(self) -> str:
+        """The share solved with its interval, in words."""
+        low, high = self.interval
+        return f"{100.0 * self.solved:.2f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"
+
+
+def share(count: int, total: int) -> tuple[float, float]:
+    """95 % interval of a share of which ``count`` of ``total`` were seen (Wilson 1927, J. Am. Stat. Assoc. 22, 209)."""
+    z, seen = 1.96, count / total
+    spread = math.sqrt(seen * (1.0 - seen) / total + (0.5 * z / total) ** 2)
+    middle, scale = seen + 0.5 * z * z / total, 1.0 + z * z / total
+    return max((middle - z * spread) / scale, 0.0), min((middle + z * spread) / scale, 1.0)
+
+
+def study(
+    scene: BallScene,
+    progress: Callable[[int, int], None] | None = None,
+    limits: Sequence[int] = LIMITS,
+    perturbations: int = PERTURBATIONS,
+) -> Report:
+    """``rbdyn accuracy`` of a ball bearing. Raises InputError for two rows, RunError where there is no equilibrium."""
+    if not isinstance(scene, SingleRowScene):
+        raise InputError([f"bearing.kind = {scene.bearing.kind!r}: its solvers are not compared; take one of its rows"])
+    counted = Progress(progress, len(LIMITED) * (len(limits) + perturbations))
+    attempts = work_precision(problem_of(scene), limits, counted)
+    nearby = perturbed(scene, perturbations)
+    rows = [_fared(name, solver, nearby, counted) for name, solver in WHOLE.items()]
+    sentence = conclusion(attempts, rows)
+    return Report(
+        stem="solvers",
+        record=record(
+            FORMAT,
+            rows=[attempt._asdict() for attempt in attempts],
+            nearby=[row._asdict() for row in rows],
+            perturbations={
+                "count": perturbations,
+                "seed": SEED,
+                "load_decades": LOAD_DECADES,
+                "speed_decades": SPEED_DECADES,
+            },
+            conclusion=sentence,
+        ),
+        tables=(_attempt_table(attempts), success_table(f"{perturbations} seeded scenes nearby", rows)),
+        sentences=(*causes(rows), sentence),
+        sheets={"solvers": [attempt._asdict() for attempt in attempts]},
+        pictures={"solvers": lambda path: _draw(attempts, path)},
+    )
+
+
+def problem_of(scene: SingleRowScene) -> Problem:
+    """What a solver takes of a scene."""
+    model = row_of(scene)
+    return Problem(model.row, model.control, load_of(scene), given_of(scene))
+
+
+def work_precision(problem: Problem, limits: Sequence[int], counted: Progress) -> list[Attempt]:
+    """Each solver stopped after each of ``limits`` iterations. Raises RunError where there is no equilibrium."""
+    reference = equilibrium.solve(*problem)
+    if not reference.found:
+        raise RunError(f"there is nothing to compare: {reference.status}")
+    scale = max(float(reference.inner_load.max()), float(reference.outer_load.max()), float(np.abs(problem.load).max()))
+    attempts = []
+    for name, solver in LIMITED.items():
+        for limit in limits:
+            found, took = timed(solver, problem, REPEATS, limit=limit)
+            attempts.append(Attempt(name, limit, found.residual / scale, took, found.status))
+            counted.step()
+    return attempts
+
+
+def timed(solver: Solver, problem: Problem, repeats: int, **options: Any) -> tuple[Solution, float]:
+    """Solution and shortest time [us] of ``repeats`` calls after a first."""
+    found = solver(*problem, **options)
+    shortest = float("inf")
+    for _ in range(repeats):
+        began = time.perf_counter()
+        solver(*problem, **options)
+        shortest = min(shortest, time.perf_counter() - began)
+    return found, 1e6 * shortest
+
+
+def perturbed(scene: SingleRowScene, count: int, seed: int = SEED) -> list[Problem]:
+    """Problems of the scene with other loads and speeds: each component, and both speeds together, times 10^u."""
+    draw = np.random.default_rng(seed)
+    problems = []
+    for _ in range(count):
+        load = [part * 10.0 ** draw.uniform(-LOAD_DECADES, LOAD_DECADES) for part in scene.operation.load]
+        moment = [part * 10.0 ** draw.uniform(-LOAD_DECADES, LOAD_DECADES) for part in scene.operation.moment]
+        faster = 10.0 ** draw.uniform(-SPEED_DECADES, SPEED_DECADES)
+        operation = scene.operation.model_copy(
+            update={
+                "radial_load_N": None,
+                "axial_load_N": None,
+                "load_N": load,
+                "moment_Nm": moment,
+                "preload_N": 0.0,
+                "inner_speed_rpm": scene.operation.inner_speed_rpm * faster,
+                "outer_speed_rpm": scene.operation.outer_speed_rpm * faster,
+            }
+        )
+        problems.append(problem_of(scene.model_copy(update={"operation": operation})))
+    return problems
+
+
+def fared(name: str, found: Sequence[Solution], took_us: Sequence[float]) -> Success:
+    """Summary of many solutions and their times [us]."""
+    why: dict[str, int] = {}
+    for solution in found:
+        if not solution.found:
+            why[solution.status] = why.get(solution.status, 0) + 1
+    return Success(
+        name,
+        len(found),
+        sum(solution.found for solution in found) / len(found),
+        float(np.median(took_us)),
+        float(np.percentile(took_us, 99.0)),
+        float(np.max(took_us)),
+        float(np.median([solution.steps for solution in found])),
+        dict(sorted(why.items(), key=lambda entry: -entry[1])),
+    )
+
+
+def success_table(title: str, rows: Sequence[Success], first: str = "solver") -> Table:
+    """Table of how solvers fare."""
+    header = (first, "scenes", "solved", "median [us]", "99 % [us]", "longest [us]", "steps")
+    cells = [
+        (
+            row.solver,
+            f"{row.problems}",
+            f"{100.0 * row.solved:.2f} %",
+            f"{row.median_us:.0f}",
+            f"{row.slow_us:.0f}",
+            f"{row.longest_us:.0f}",
+            f"{row.median_steps:.0f}",
+        )
+        for row in rows
+    ]
+    return Table(title, header, cells)
+
+
+def causes(rows: Sequence[Success]) -> list[str]:
+    """A sentence for each solver that failed somewhere."""
+    return [
+        f"{row.solver} failed: " + "; ".join(f"{count} x {why}" for why, count in row.causes.items())
+        for row in rows
+        if row.causes
+    ]
+
+
+def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
+    """Which solver to take here: the fastest of those that are as sure as the surest, as far as so many scenes tell."""
+    reached: dict[str, float] = {}
+    for attempt in attempts:
+        if attempt.status == "ok":
+            reached[attempt.solver] = min(attempt.solve_us, reached.get(attempt.solver, float("inf")))
+    surest = max(rows, key=lambda row: row.solved)
+    alike = [row for row in rows if row.interval[1] >= surest.interval[0]]
+    best = min(alike, key=lambda row: row.median_us)
+    rivals = ", ".join(f"{row.solver} {row.shown_share}" for row in alike if row is not best)
+    times = ", ".join(f"{name} {took:.0f} us" for name, took in sorted(reached.items(), key=lambda it: it[1]))
+    return (
+        f"To an equilibrium of this scene: {times or 'none'}. Take {best.solver}: it solves "
+        f"{best.shown_share} of {best.problems} scenes nearby, half of them within {best.median_us:.0f} us"
+        + (f"; so many scenes do not tell it from {rivals} in sureness." if rivals else ".")
+    )
+
+
+def _fared(name: str, solver: Solver, problems: Sequence[Problem], counted: Progress) -> Success:
+    found, times = [], []
+    for problem in problems:
+        solution, took = timed(solver, problem, 1)
+        found.append(solution)
+        times.append(took)
+        counted.step()
+    return fared(name, found, times)
+
+
+def _attempt_table(attempts: Sequence[Attempt]) -> Table:
+    header = ("solver", "iterations at most", "residual over largest force", "time [us]")
+    cells = [
+        (attempt.solver, f"{attempt.limit}", f"{attempt.residual:.1e}", f"{attempt.solve_us:.0f}")
+        for attempt in _until_done(attempts)
+    ]
+    return Table("residual against time", header, cells)
+
+
+def _until_done(attempts: Sequence[Attempt]) -> list[Attempt]:
+    """Attempts of each solver up to the first that converges."""
+    shown: list[Attempt] = []
+    done: set[str] = set()
+    for attempt in attempts:
+        if attempt.solver not in done:
+            shown.append(attempt)
+        if attempt.status == "ok":
+            done.add(attempt.solver)
+    return shown
+
+
+def _draw(attempts: Sequence[Attempt], path: Path) -> None:
+    """Residual of each solver stopped after more and more iterations, against its time."""
+    from matplotlib.ticker import LogLocator
+
+    from rbdyn.accuracy.rollers.pictures import MARKS, METHOD_COLOURS, Named, logarithmic
+    from rbdyn.plots.style import label_ends, plt, save
+
+    figure, axis = plt.subplots(figsize=(7.6, 5.0))
+    logarithmic(axis, "residual over the largest force", "time of a call [us]")
+    axis.xaxis.set_major_locator(LogLocator(base=100.0, numticks=12))
+    ends: list[Named] = []
+    attempts = _until_done(attempts)
+    names = list(dict.fromkeys(attempt.solver for attempt in attempts))
+    for name, mark, colour in zip(names, MARKS, METHOD_COLOURS, strict=False):
+        points = [(max(a.residual, ROUNDING), a.solve_us) for a in attempts if a.solver == name]
+        axis.plot(*zip(*points, strict=True), mark, linestyle="-", color=colour, markersize=4.5,
+                  linewidth=2.0 if name == names[0] else 1.0)  # fmt: skip
+        ends.append((points, name, colour))
+    axis.margins(0.12)
+    label_ends(axis, ends)
+    save(figure, path)

@@ -1,0 +1,293 @@
+"""Methods beside each other on one compiled right-hand side: error against time, and how many times faster ours is."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rbdyn.accuracy.judgement import SOUGHT
+from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.accuracy.rollers import method_bias
+from rbdyn.accuracy.rollers.equal_error import Speedup, times_faster
+from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, compiled
+from rbdyn.accuracy.rollers.stretch import Stretch
+from rbdyn.accuracy.rollers.trajectory import (
+    DEFAULT_TURNS,
+    STARTS,
+    Error,
+    Reference,
+    agreement_record,
+    agreement_table,
+    difference,
+    reference,
+    settled,
+    worst,
+)
+from rbdyn.dynamics.run import prepare
+from rbdyn.faults import RunError
+from rbdyn.scene import Scene
+
+FORMAT = "rbdyn.methods/1"
+OK = "ok"
+# A run is timed again and again, at most so often and, past the first time, for so long.
+REPEATS, TIMED_S = 5, 0.1
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One method at one setting over all stretches: worst error, processor time and right-hand sides a shaft turn.
+
+    Where it failed, ``status`` says why, the errors are None and the time is what it took to fail.
+    """
+
+    method: str
+    setting: str
+    status: str
+    position_error_m: float | None
+    scaled_error: float | None
+    turn_ms: float | None
+    rhs_per_turn: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return dict(self.__dict__)
+
+
+def study(
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    turns: float = DEFAULT_TURNS,
+    methods: Sequence[Method] = METHODS,
+    sought: float = SOUGHT,
+) -> Report:
+    """``rbdyn accuracy --methods``: trajectories, and the statistics of the compiled methods, judged to ``sought``.
+
+    Raises InputError, RunError where the references fail, KeyboardInterrupt.
+    """
+    motion = trajectories(scene, progress, turns, methods)
+    rows = method_bias.bias_rows(scene, progress=progress)
+    chosen = method_bias.conclusion(rows, scene, sought)
+    written = [row.as_dict() for row in rows]
+    return replace(
+        motion,
+        record=motion.record
+        | {"statistics": written, "sought": sought, "conclusion": f"{motion.record['conclusion']} {chosen}"},
+        tables=(*motion.tables, method_bias.table(rows, sought)),
+        sentences=(*motion.sentences, chosen),
+        sheets={**motion.sheets, "statistics": [method_bias.flat(row) for row in written]},
+    )
+
+
+def trajectories(
+    scene: Scene, progress: Callable[[int, int], None] | None, turns: float, methods: Sequence[Method]
+) -> Report:
+    """Error and time of every method at every setting. Raises as ``study``."""
+    stretches = settled(scene, turns)
+    compile_s = compiling(stretches[0], methods)
+    counted = Progress(progress, STARTS + sum(len(method.settings) for method in methods))
+    known = reference(stretches, counted.step)
+    attempts = []
+    for method in methods:
+        for attempt in attempts_of(method, stretches, known):
+            attempts.append(attempt)
+            counted.step()
+    ratios = speedups(attempts, known.floor(turns))
+    sentences = conclusion(attempts, ratios, known.floor(turns), turns)
+    return Report(
+        stem="methods",
+        record=record(
+            FORMAT,
+            rows=[attempt.as_dict() for attempt in attempts],
+            conclusion=" ".join(sentences),
+            turns=turns,
+            starts=STARTS,
+            reference=agreement_record(known),
+            resolved_m=known.floor(turns),
+            times_faster={name: ratio.__dict__ for name, ratio in ratios.items()},
+            compile_s=compile_s,
+        ),
+        tables=(agreement_table(known), table(attempts, turns), ratio_table(ratios)),
+        sentences=(*sentences, f"{compile_s:.1f} s to load or compile, in none of the times"),
+        sheets={"methods": [attempt.as_dict() for attempt in attempts]},
+        pictures={"methods": lambda path: _draw(attempts, known.floor(turns), turns, path)},
+    )
+
+
+def compiling(stretch: Stretch, methods: Sequence[Method]) -> float:
+    """Compile, or fetch from disk, all that the methods need; returns the seconds it took."""
+    started = time.perf_counter()
+    prepare(stretch.scene, stretch.bearing)
+    compiled(stretch)
+    for method in methods:
+        if not method.adaptive:
+            run(method, stretch, method.settings[0])
+    return time.perf_counter() - started
+
+
+def attempts_of(method: Method, stretches: Sequence[Stretch], known: Reference) -> Iterator[Attempt]:
+    """An attempt a setting; a single one where the method is not installed."""
+    for setting in method.settings:
+        try:
+            yield attempt(method, setting, stretches, known)
+        except NotInstalledError as error:
+            yield Attempt(method.name, "", str(error), None, None, None, None)
+            return
+
+
+def attempt(method: Method, setting: float, stretches: Sequence[Stretch], known: Reference) -> Attempt:
+    """Error of a first run over each stretch, time of later ones. Raises NotInstalledError."""
+    errors: list[Error] = []
+    turns = sum(stretch.turns for stretch in stretches)
+    cpu_s = derivatives = 0.0
+    label = method.label(stretches[0], setting)
+    for stretch, end in zip(stretches, known.ends, strict=True):
+        status, y, calls, seconds = run(method, stretch, setting)
+        if y is None:
+            return Attempt(method.name, label, status, None, None, seconds / stretch.turns * 1e3, None)
+        errors.append(difference(stretch, y, end))
+        derivatives += calls
+        cpu_s += timed(method, stretch, setting)
+    error = worst(errors)
+    return Attempt(method.name, label, OK, error.position_m, error.scaled, cpu_s / turns * 1e3, derivatives / turns)
+
+
+def run(method: Method, stretch: Stretch, setting: float) -> tuple[str, Any, int, float]:
+    """Status, end state (None where it failed), right-hand sides and seconds of one run."""
+    go = method.ready(stretch, setting)
+    started = time.thread_time()
+    try:
+        y, calls = go()
+    except NotInstalledError:
+        raise
+    except RunError as error:
+        return f"failed: {error}", None, 0, time.thread_time() - started
+    seconds = time.thread_time() - started
+    if not np.isfinite(y).all():
+        return "failed: the end is not finite", None, 0, seconds
+    return OK, y, calls, seconds
+
+
+def timed(method: Method, stretch: Stretch, setting: float) -> float:
+    """Least processor time of several runs [s]."""
+    times: list[float] = []
+    while not times or (len(times) < REPEATS and sum(times) < TIMED_S):
+        times.append(run(method, stretch, setting)[3])
+    return min(times)
+
+
+def curve(attempts: Sequence[Attempt], method: str, floor: float) -> list[tuple[float, float]]:
+    """(position error [m], ms a turn) of what arrived with an error that the reference resolves."""
+    return [
+        (a.position_error_m, a.turn_ms)
+        for a in attempts
+        if a.method == method and a.position_error_m is not None and a.turn_ms and a.position_error_m > floor
+    ]
+
+
+def speedups(attempts: Sequence[Attempt], floor: float) -> dict[str, Speedup]:
+    """How many times faster ours is than each other method that shares errors with it."""
+    ours = curve(attempts, OURS.name, floor)
+    found = {
+        name: times_faster(ours, curve(attempts, name, floor))
+        for name in dict.fromkeys(a.method for a in attempts)
+        if name != OURS.name
+    }
+    return {name: ratio for name, ratio in found.items() if ratio is not None}
+
+
+def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: float, turns: float) -> list[str]:
+    """In words: who is faster at equal error, and what failed."""
+    sentences = []
+    if ratios:
+        told = ", ".join(
+            f"{ratio.mean:.2g} ({ratio.least:.2g} to {ratio.greatest:.2g}) times that of {name}"
+            for name, ratio in ratios.items()
+        )
+        sentences.append(
+            f"At equal position error after {turns:g} turns the speed of {OURS.name} is {told}: geometric mean, least and "
+            "greatest over the errors in common."
+        )
+    failed = {a.method: sum(b.method == a.method and b.status != OK for b in attempts) for a in attempts}
+    told = ", ".join(f"{name} at {count}" for name, count in failed.items() if count)
+    if told:
+        sentences.append(f"Failed settings: {told}.")
+    sentences.append(f"Errors below {floor:.1g} m are not resolved and count for nothing.")
+    return sentences
+
+
+def table(attempts: Sequence[Attempt], turns: float) -> Table:
+    """Table for the terminal, failures in their places."""
+
+    def shown(value: float | None, form: str) -> str:
+        return "" if value is None else format(value, form)
+
+    cells = [
+        (
+            a.method,
+            a.setting,
+            shown(a.position_error_m, ".2g"),
+            shown(a.scaled_error, ".2g"),
+            shown(a.turn_ms, ".3g"),
+            shown(a.rhs_per_turn, ".0f"),
+            a.status,
+        )
+        for a in attempts
+    ]
+    header = (
+        "method", "setting", "position error [m]", "worst over scale", "ms a turn", "right-hand sides a turn", "status",
+    )  # fmt: skip
+    return Table(f"errors after {turns:g} shaft turns, worst of {STARTS} starts; one thread", header, cells)
+
+
+def ratio_table(ratios: dict[str, Speedup]) -> Table:
+    """How many times faster ours is."""
+    cells = [
+        (name, f"{r.mean:.3g}", f"{r.least:.3g}", f"{r.greatest:.3g}", f"{r.low:.1g} to {r.high:.1g}")
+        for name, r in ratios.items()
+    ]
+    return Table(
+        f"times that {OURS.name} is faster at equal error",
+        ("than", "mean", "least", "greatest", "position errors [m]"),
+        cells,
+    )
+
+
+def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) -> None:
+    """Position error of each method against the time of a shaft turn; crosses at the right edge failed."""
+    from rbdyn.accuracy.rollers.pictures import MARKS, METHOD_COLOURS, failed_at_the_edge, logarithmic
+    from rbdyn.plots.style import GREY, label_ends, plt, save
+
+    figure, axis = plt.subplots(figsize=(8.6, 6.0))
+    logarithmic(
+        axis,
+        f"largest position error after {turns:g} shaft turns, worst of the starts [m]",
+        "processor time of a shaft turn [ms]",
+    )
+    ends = []
+    failures: dict[str, tuple[list[float], str]] = {}
+    names = list(dict.fromkeys(attempt.method for attempt in attempts))
+    for name, mark, colour in zip(names, MARKS, METHOD_COLOURS, strict=False):
+        own = [attempt for attempt in attempts if attempt.method == name]
+        points = [(a.position_error_m, a.turn_ms) for a in own if a.position_error_m and a.turn_ms]
+        failed = [a.turn_ms for a in own if not a.position_error_m and a.turn_ms]
+        if points:
+            axis.plot(*zip(*points, strict=True), mark, linestyle="-", color=colour, markersize=4.5,
+                      linewidth=2.0 if name == names[0] else 1.0)  # fmt: skip
+            ends.append((points, name, colour))
+        if failed:
+            failures[name] = failed, colour
+    axis.margins(0.08)
+    left, right = axis.get_xlim()
+    if floor > left:
+        axis.axvspan(left, floor, color="0.93", zorder=0)
+        axis.annotate("not resolved", (floor, 0.5), xycoords=axis.get_xaxis_transform(), fontsize=8,
+                      color=GREY, ha="left", rotation=90, xytext=(3, 0), textcoords="offset points")  # fmt: skip
+    axis.set_xlim(left, right)
+    axis.set_ylim(top=axis.get_ylim()[1] * 1.6)
+    failed_at_the_edge(axis, failures)
+    label_ends(axis, ends)
+    save(figure, path)

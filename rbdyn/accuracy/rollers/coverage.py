@@ -1,0 +1,181 @@
+"""How often the stated intervals hold the truth, which is what an error bar claims.
+
+The truth is one long, settled, tightly integrated run with seeds of its own. The scene is then repeated with other seeds,
+and of every figure it is counted how often value and ``Quantity.error`` hold the truth, whose own error joins as root sum
+of squares. Beside it the same of the statistical error alone, the mean half-width and the mean offset: an interval that
+always holds the truth is too wide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.dynamics.parameters.geometry import roller_radii
+from rbdyn.dynamics.simulate import simulate
+from rbdyn.dynamics.statistics.error_bars import FIGURES
+from rbdyn.result import Quantity, SimulationResult
+from rbdyn.scene import Scene
+
+FORMAT = "rbdyn.coverage/1"
+REPEATS = 200
+# Of the truth: replicates and turns counted over those of the scene at least, rtol at most, seed. It discards half as
+# many turns as it counts.
+TRUTH_REPLICATES, TRUTH_LENGTH, TRUTH_RTOL, TRUTH_SEED = 64, 10.0, 1e-3, 987_654
+FIRST_SEED, SEED_STEP = 5000, 37
+# Shares of a sound interval; a single figure scatters by 3 % over 200 repeats.
+POOLED, LOWEST = (0.94, 0.96), 0.90
+
+
+@dataclass(frozen=True)
+class Row:
+    """One figure: truth with its error, shares of repeats whose stated and whose statistical error alone hold it, mean
+    half-width and mean offset relative to it."""
+
+    figure: str
+    truth: float
+    truth_error: float
+    covered: float
+    statistical_alone: float
+    half_width: float
+    offset: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return dict(self.__dict__)
+
+
+def study(scene: Scene, progress: Callable[[int, int], None] | None = None, repeats: int = REPEATS) -> Report:
+    """``rbdyn accuracy --coverage``. Raises RunError, KeyboardInterrupt."""
+    scene = one_bearing(scene)
+    counted = Progress(progress, repeats + 1)
+    truth = simulate(truth_of(scene))
+    counted.step()
+    results = []
+    for k in range(repeats):
+        results.append(simulate(with_numerics(scene, seed=FIRST_SEED + SEED_STEP * k)))
+        counted.step()
+    rows = [row(name, truth, results) for name in FIGURES]
+    turns = sum(result.cost["turns"] for result in results) / repeats
+    asked = scene.numerics.turns + scene.numerics.warm_up_turns
+    longer = sum(result.counted_turns > 1.01 * scene.numerics.turns for result in results) / repeats
+    sentences = [
+        conclusion(rows, repeats),
+        f"A run took {turns:.0f} shaft turns over all replicates and companions; asked for were "
+        f"{asked * (scene.numerics.replicates + scene.numerics.companions):.0f}, and {100.0 * longer:.0f} % of the runs "
+        "were lengthened.",
+    ]
+    header = ("figure", "truth", "±", "covered", "statistical alone", "half-width", "offset")
+    cells = [
+        (
+            one.figure,
+            f"{one.truth:.6g}",
+            f"{one.truth_error:.2g}",
+            f"{one.covered:.3f}",
+            f"{one.statistical_alone:.3f}",
+            f"{100.0 * one.half_width:.2g} %",
+            f"{100.0 * one.offset:+.2g} %",
+        )
+        for one in rows
+    ]
+    return Report(
+        stem="coverage",
+        record=record(
+            FORMAT,
+            rows=[one.as_dict() for one in rows],
+            pooled=pooled(rows),
+            repeats=repeats,
+            mean_turns=turns,
+            lengthened=longer,
+            conclusion=" ".join(sentences),
+        ),
+        tables=(Table(f"95 % intervals that hold the truth, {repeats} repeats", header, cells),),
+        sentences=sentences,
+        sheets={"coverage": [one.as_dict() for one in rows]},
+    )
+
+
+def one_bearing(scene: Scene) -> Scene:
+    """The scene with the rollers that its seed draws: another seed would be another bearing, not a repeat."""
+    radii = roller_radii(scene)
+    if radii is None:
+        return scene
+    errors_um = (1e6 * radii - 500.0 * scene.bearing.roller_diameter_mm) / 0.5
+    rollers = {"roller_diameter_spread_um": 0.0, "roller_diameter_errors_um": errors_um.tolist()}
+    return scene.model_copy(update={"bearing": scene.bearing.model_copy(update=rollers)})
+
+
+def with_numerics(scene: Scene, **changes: Any) -> Scene:
+    """The scene with other numerics."""
+    return scene.model_copy(update={"numerics": scene.numerics.model_copy(update=changes)})
+
+
+def truth_of(scene: Scene) -> Scene:
+    """The scene as its truth is found: long after its transient, or as long as asked for where a schedule runs."""
+    numerics = scene.numerics
+    steady = scene.operation.schedule is None
+    turns = TRUTH_LENGTH * numerics.turns
+    return with_numerics(
+        scene,
+        replicates=max(TRUTH_REPLICATES, numerics.replicates),
+        turns=turns if steady else numerics.turns,
+        discard_turns=max(0.5 * turns, numerics.warm_up_turns) if steady else numerics.discard_turns,
+        rtol=min(TRUTH_RTOL, 0.1 * numerics.rtol),
+        impact_window_turns=scene.impact_window_turns,
+        seed=TRUTH_SEED,
+        companion=False,
+        extend=False,
+    )
+
+
+def row(name: str, truth: SimulationResult, results: list[SimulationResult]) -> Row:
+    """Coverage of one figure."""
+    exact = figure_of(truth, name)
+    doubt, size = exact.statistical_error or 0.0, abs(exact.value) or 1.0
+    figures = [figure_of(result, name) for result in results]
+    count = len(figures)
+
+    def share(errors: list[float]) -> float:
+        pairs = zip(figures, errors, strict=True)
+        return sum(abs(one.value - exact.value) <= math.hypot(error, doubt) for one, error in pairs) / count
+
+    return Row(
+        figure=name,
+        truth=exact.value,
+        truth_error=doubt,
+        covered=share([one.error or 0.0 for one in figures]),
+        statistical_alone=share([one.statistical_error or 0.0 for one in figures]),
+        half_width=sum(one.error or 0.0 for one in figures) / count / size,
+        offset=sum(one.value - exact.value for one in figures) / count / size,
+    )
+
+
+def figure_of(result: SimulationResult, name: str) -> Quantity:
+    """A figure of a result by its name in a record."""
+    return Quantity(**result.as_dict()[name])
+
+
+def pooled(rows: list[Row]) -> float:
+    """Share over all figures, those that say the same (slip and speed; contact and impact of a dry pocket) once."""
+    same = {"cage_slip"}
+    truth = {one.figure: one.truth for one in rows}
+    if truth["impact_contact_force_N"] == truth["impact_force_N"]:
+        same.add("impact_contact_force_N")
+    own = [one for one in rows if one.figure not in same]
+    return sum(one.covered for one in own) / len(own)
+
+
+def conclusion(rows: list[Row], repeats: int) -> str:
+    """Whether the intervals are what they claim to be."""
+    low, high = POOLED
+    share, scatter = pooled(rows), 1.96 * math.sqrt(0.95 * 0.05 / repeats)
+    narrow = [f"{one.figure} {one.covered:.2f}" for one in rows if one.covered < LOWEST]
+    told = f"Pooled over the figures {share:.3f} (0.95 ± {scatter:.3f} for a sound interval of one figure)"
+    if narrow:
+        return f"{told}; too narrow (below {LOWEST:.2f}): {', '.join(narrow)}."
+    if share > high:
+        return f"{told}; none is too narrow, together they are wider than they need be."
+    return f"{told}; none below {LOWEST:.2f}." if share >= low else f"{told}; together they are too narrow."

@@ -1,0 +1,130 @@
+"""Explicit methods of fixed step, to measure the adaptive one against: classical Runge-Kutta 4 and velocity Verlet.
+
+Velocity Verlet is the usual method of particle codes (DEM). Forces here depend on velocity, so the second kick needs
+a predicted velocity: with a = a(x, v),
+
+    x' = x + h v + h^2/2 a,   v* = v + h a,   a' = a(x', v*),   v' = v + h/2 (a + a')
+
+One right-hand side a step, because a' serves the next step; second order, for v* is off by O(h^2) only. What has no
+position of its own (spins, the clock) takes the v-formulas.
+
+Both keep a tally as our method does, at step ends: works by their own weights, largest loads, the cage's whirl.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.compiled.kernel import entry, kernel
+from rbdyn.dynamics.forces.equations import LOADS, POWERS, derivative, derivative_once
+from rbdyn.dynamics.forces.state import (
+    CAGE_ANGLE,
+    CAGE_SPEED,
+    CAGE_VX,
+    CAGE_VY,
+    CAGE_X,
+    CAGE_Y,
+    RING_VX,
+    RING_VY,
+    RING_X,
+    RING_Y,
+    Layout,
+)
+from rbdyn.dynamics.integrators.booking import book_whirl
+
+BODY_PAIRS = ((CAGE_X, CAGE_VX), (CAGE_Y, CAGE_VY), (CAGE_ANGLE, CAGE_SPEED), (RING_X, RING_VX), (RING_Y, RING_VY))
+
+
+def velocity_of(layout: Layout) -> NDArray[np.int64]:
+    """For each state component the index of its velocity; -1 for what is not a position."""
+    pairs = np.full(layout.size, -1)
+    z = layout.rollers
+    pairs[: 2 * z] = np.arange(2 * z, 4 * z)
+    for position, velocity in BODY_PAIRS:
+        pairs[5 * z + position] = 5 * z + velocity
+    if layout.support is not None:
+        pairs[layout.support : layout.support + 2] = layout.support + 2, layout.support + 3
+    return pairs
+
+
+@kernel
+def all_finite(y):
+    """Whether no component is NaN or infinite."""
+    total = 0.0
+    for i in range(y.size):
+        total += y[i] - y[i]
+    return total == 0.0
+
+
+@kernel
+def book(tally, y, body, loads):
+    """Take up the largest loads at a step's end, and the speed of the cage's centre as a sample of its whirl."""
+    for force in range(LOADS):
+        tally.largest[force] = max(tally.largest[force], loads[0, force])
+    book_whirl(tally.whirl, y[body + CAGE_VX], y[body + CAGE_VY])
+
+
+@entry
+def runge_kutta_4(bearing, y, step, steps, scratch, tally):
+    """Advance ``y`` in place by ``steps`` steps of ``step`` [s] of the classical fourth-order method.
+
+    Returns the steps done: fewer than asked for where the state ceased to be finite.
+    """
+    n = y.size
+    k, stage = np.zeros((4, n)), np.empty(n)
+    power, loads = np.empty((4, POWERS)), np.empty((4, LOADS))
+    for done in range(steps):
+        for s in range(k.shape[0]):
+            reach = 0.0 if s == 0 else step if s == 3 else 0.5 * step
+            for i in range(n):
+                stage[i] = y[i] + reach * k[max(s - 1, 0), i]
+            derivative(bearing, stage, s, k, power, loads, scratch)
+        book(tally, y, 5 * bearing.rollers, loads)
+        for i in range(n):
+            y[i] += step / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
+        for p in range(POWERS):
+            tally.work[p] += step / 6.0 * (power[0, p] + 2.0 * (power[1, p] + power[2, p]) + power[3, p])
+        if not all_finite(y):
+            return done
+    return steps
+
+
+@entry
+def velocity_verlet(bearing, velocity_of, y, step, steps, scratch, tally):
+    """Advance ``y`` in place by ``steps`` steps of ``step`` [s] of velocity Verlet, with ``velocity_of(layout)``.
+
+    Returns the steps done: fewer than asked for where the state ceased to be finite.
+    """
+    n = y.size
+    k, new = np.zeros((2, n)), np.empty(n)
+    power, loads = np.empty((2, POWERS)), np.empty((2, LOADS))
+    derivative_once(bearing, y, 0, k, power, loads, scratch)
+    for done in range(steps):
+        for i in range(n):
+            new[i] = y[i] + step * k[0, i]
+            if velocity_of[i] >= 0:
+                new[i] += 0.5 * step * step * k[0, velocity_of[i]]
+        derivative(bearing, new, 1, k, power, loads, scratch)
+        for i in range(n):
+            if velocity_of[i] < 0:
+                new[i] = y[i] + 0.5 * step * (k[0, i] + k[1, i])
+        for i in range(n):
+            y[i] = new[i]
+            k[0, i] = new[velocity_of[i]] if velocity_of[i] >= 0 else k[1, i]
+        for p in range(POWERS):
+            tally.work[p] += 0.5 * step * (power[0, p] + power[1, p])
+            power[0, p] = power[1, p]
+        for force in range(LOADS):
+            loads[0, force] = loads[1, force]
+        book(tally, y, 5 * bearing.rollers, loads)
+        if not all_finite(y):
+            return done
+    return steps
+
+
+def steps_of(duration: float, step: float) -> int:
+    """Whole number of steps of about this size [s] in a duration [s]."""
+    return max(math.ceil(duration / step - 1e-9), 1)

@@ -1,0 +1,149 @@
+"""Bias of the statistics by method: whether a method that is cheap on a trajectory is so where it counts.
+
+The methods of fixed step run the same seeded replicates as ours does, discard and count the same turns and keep the
+same tally; the reference is ours at a tight tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
+from rbdyn.accuracy.report import Progress, Table
+from rbdyn.accuracy.rollers.methods import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
+from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, OUTPUTS, Bias, bias_cells, bias_of
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.recording import record
+from rbdyn.dynamics.run import Run, prepare
+from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.faults import RunError
+from rbdyn.scene import Scene
+
+REFERENCE_RTOL = 1e-4
+SETTINGS = ((OURS, (1e-1, 1e-2, 1e-3)), (RUNGE_KUTTA_4, (2.0, 1.0, 0.5)), (VELOCITY_VERLET, (1.0, 0.5, 0.25, 0.125)))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One method at one setting: processor time a shaft turn [ms], largest relative power gap, bias of the outputs.
+
+    Where a replicate could not go on, ``status`` says why and the rest is None.
+    """
+
+    method: str
+    setting: str
+    status: str
+    turn_ms: float | None
+    power_gap: float | None
+    found: Bias | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return {**self.__dict__, "found": self.found.__dict__ if self.found else None}
+
+
+def bias_rows(
+    scene: Scene,
+    settings: Sequence[tuple[Method, Sequence[float]]] = SETTINGS,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Row]:
+    """A row a setting. Raises InputError for a single replicate, RunError where the reference fails, KeyboardInterrupt."""
+    check_replicates(scene)
+    bearing = roller_bearing(scene)
+    prepare(scene, bearing)
+    counting = Progress(progress, 1 + sum(len(values) for _, values in settings))
+    reference = _replicates(scene, lambda index: Run(scene, bearing, index, REFERENCE_RTOL, Stop()))
+    counting.step()
+    rows = []
+    for method, values in settings:
+        for setting in values:
+
+            def start(index: int, method: Method = method, setting: float = setting) -> Run:
+                if method.adaptive:
+                    return Run(scene, bearing, index, setting, Stop())
+                step = fixed_step(scene, setting)
+                return FixedStepRun(scene, bearing, index, step, method.name == VELOCITY_VERLET.name)
+
+            label = f"rtol {setting:g}" if method.adaptive else f"{_steps(scene, setting):.0f} steps a turn"
+            try:
+                rows.append(_row(scene, method.name, label, _replicates(scene, start), reference))
+            except RunError as error:
+                rows.append(Row(method.name, label, f"failed: {error}", None, None, None))
+            counting.step()
+    return rows
+
+
+def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str:
+    """The cheapest setting of each method shown to be without bias, and what errors hide of the rest."""
+    best: dict[str, Row] = {}
+    hidden = []
+    for row in rows:
+        if row.found is None or row.power_gap is None or row.turn_ms is None or row.power_gap > NEGLIGIBLE:
+            continue
+        verdict = row.found.verdict(sought)
+        if verdict == "within" and (row.method not in best or row.turn_ms < (best[row.method].turn_ms or 0.0)):
+            best[row.method] = row
+        if verdict == "undecided":
+            hidden += row.found.hidden(f"{row.method}, {row.setting}", sought)
+    rest = undecided(hidden, scene, sought) if hidden else ""
+    limits = f"biases of at most {percent(sought)} and a power balance closed to {percent(NEGLIGIBLE)}"
+    if not best:
+        return f"Which method keeps its statistics is {rest}." if rest else f"No method shows {limits}."
+    told = ", ".join(
+        f"{row.method} {row.turn_ms:.2f} ms ({row.setting}, errors at most {percent(row.found.known_to)})"
+        for row in best.values()
+        if row.found is not None
+    )
+    return f"Measured {limits}, a turn: {told}." + (f" Other settings are {rest}." if rest else "")
+
+
+def table(rows: Sequence[Row], sought: float = SOUGHT) -> Table:
+    """Table for the terminal, failures in their places."""
+    cells = [
+        (row.method, row.setting, row.status, *[""] * 6)
+        if row.found is None
+        else (
+            row.method,
+            row.setting,
+            row.status,
+            f"{row.turn_ms:.2f}",
+            f"{100.0 * (row.power_gap or 0.0):.2g} %",
+            *bias_cells(row.found),
+            row.found.verdict(sought),
+        )
+        for row in rows
+    ]
+    header = ("method", "setting", "status", "ms a turn", "power gap", *OUTPUTS, f"within {percent(sought)}")
+    return Table(f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors", header, cells)
+
+
+def flat(row: dict[str, Any]) -> dict[str, Any]:
+    """A row without nesting, for a sheet."""
+    plain = {key: value for key, value in row.items() if key != "found"}
+    found = row["found"] or {}
+    return plain | {f"{name}_{kind}": of[name] for kind, of in found.items() for name in of}
+
+
+def _steps(scene: Scene, contact_times: float) -> float:
+    return scene.turn_s / fixed_step(scene, contact_times)
+
+
+def _replicates(scene: Scene, start: Callable[[int], Run]) -> list[Replicate]:
+    return [record(start(index)) for index in range(scene.numerics.replicates)]
+
+
+def _row(scene: Scene, method: str, setting: str, runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Row:
+    turns = scene.numerics.turns + scene.numerics.warm_up_turns
+    return Row(
+        method=method,
+        setting=setting,
+        status="ok",
+        turn_ms=float(np.median([run.cpu_s for run in runs])) / turns * 1e3,
+        power_gap=max(run.power_gap for run in runs),
+        found=bias_of(runs, reference),
+    )

@@ -1,0 +1,177 @@
+"""What each option of a scene costs: nanoseconds a right-hand side with it and without it, the time to compile it, and
+what it adds to state, parameters, compiled code and loaded modules.
+
+An option is a few assignments to the scene. Each is run in turn with the scene as it is, so that both see the same
+machine; a median over replicates is taken of the processor time per right-hand side, the integrator's own work included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rbdyn.accuracy.report import Report, Table, record
+from rbdyn.accuracy.rollers.footprint import Footprint, added_modules, footprint
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.run import prepare
+from rbdyn.faults import InputError, set_key
+from rbdyn.scene import Scene
+
+FORMAT = "rbdyn.options/1"
+TURNS, DISCARDED = 10, 2
+REPEATS = 3
+# What stands in the scene of Chen et al. 2022 is taken away; what does not is added, in a usual size.
+OPTIONS: dict[str, tuple[str, ...]] = {
+    "contact law of ISO/TS 16281": ('model.line_contact="iso16281"',),
+    "contact law of Houpert": ('model.line_contact="houpert"',),
+    "contact law of Dowson and Higginson": ('model.line_contact="dowson_higginson"',),
+    "logarithmic profile, 31 slices": ('bearing.roller_profile="logarithmic"',),
+    "tilt, 31 slices": ("bearing.tilt_mrad=0.5",),
+    "unequal rollers": ("bearing.roller_diameter_spread_um=0.5",),
+    "two-lobed outer race": ("bearing.outer_waviness=[{order=2,amplitude_um=10.0}]",),
+    "wavy inner race, with clock": ("bearing.inner_waviness=[{order=11,amplitude_um=0.2}]",),
+    "traction by pressure and temperature": ('traction.model="thermal_newtonian"',),
+    "mixed friction": ('traction.friction="mixed"',),
+    "dry traction": ('traction.model="coulomb"',),
+    "without traction": ('traction.model="off"',),
+    "without race damping": ('model.race_damping="off"',),
+    "without rolling resistance": ('model.rolling_resistance="off"',),
+    "starved inlets": ("lubricant.inlet_distance=10.0",),
+    "pocket film": ("model.pocket_film=true",),
+    "rigid pocket bars": ('model.pocket_bar_stiffness_N_m="rigid"',),
+    "without pockets": ('model.pocket="off"',),
+    "guidance on the inner ring": ('cage.guidance="inner"',),
+    "guidance by the rollers": ('cage.guidance="roller"',),
+    "dry land": ('model.guide_land="dry"',),
+    "without land": ('model.guide_land="off"',),
+    "cage imbalance": ("cage.imbalance_um=20.0",),
+    "outer ring turns": ("operation.outer_speed_rpm=3000.0",),
+    "outer ring on a support": ("support.stiffness_N_m=2e7", "support.damping_N_s_m=2e3"),
+    "rotating load, with clock": ("operation.rotating_load_N=100.0",),
+    "speed and load by schedule": (
+        "operation.schedule={time_s=[0.0,0.01],inner_speed_rpm=[20000.0,24000.0],radial_load_N=[1000.0,1300.0]}",
+    ),
+    "gravity": ("operation.gravity_m_s2=9.81",),
+    "without drag": ('model.drag="off"',),
+}
+
+
+@dataclass(frozen=True)
+class OptionCost:
+    """Median processor time per right-hand side [ns] with the option and of the scene beside it, the largest relative
+    power gap, the seconds it took to compile (or to load from disk), what the program holds with the option and without
+    it, and the modules that only the option loads."""
+
+    option: str
+    with_ns: float
+    without_ns: float
+    power_gap: float
+    compile_s: float
+    holds: Footprint
+    plain_holds: Footprint
+    modules: tuple[str, ...]
+
+    @property
+    def difference_ns(self) -> float:
+        """What the option costs [ns]; negative where it saves."""
+        return self.with_ns - self.without_ns
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        times = ("option", "with_ns", "without_ns", "difference_ns", "power_gap", "compile_s")
+        sizes = {
+            f"{which}{name}": size
+            for which, held in (("with_", self.holds), ("without_", self.plain_holds))
+            for name, size in held.__dict__.items()
+        }
+        return {name: getattr(self, name) for name in times} | sizes | {"modules": list(self.modules)}
+
+
+def option_costs(
+    scene: Scene, options: Mapping[str, Sequence[str]] = OPTIONS, progress: Callable[[int, int], None] | None = None
+) -> list[OptionCost]:
+    """A row an option that the scene allows. Raises RunError, KeyboardInterrupt."""
+    plain = with_options(scene, (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}"))
+    plain_bearing = roller_bearing(plain)
+    prepare(plain, plain_bearing)
+    plain_holds = footprint(plain, plain_bearing)
+    chosen = _allowed(plain, options)
+    bearings = [roller_bearing(option) for option in chosen.values()]
+    modules = added_modules(plain, list(chosen.values()))
+    rows = []
+    for (name, option), bearing, needed in zip(chosen.items(), bearings, modules, strict=True):
+        compile_s = prepare(option, bearing)
+        times: tuple[list[float], list[float]] = ([], [])
+        gap = 0.0
+        for replicate in range(REPEATS):
+            for which, (one, parameters) in enumerate(((option, bearing), (plain, plain_bearing))):
+                run = run_replicate(one, parameters, replicate, one.numerics.rtol, Stop())
+                times[which].append(run.cpu_s / run.derivatives * 1e9)
+                gap = run.power_gap if which == 0 else gap
+        with_ns, without_ns = (float(np.median(found)) for found in times)
+        holds = footprint(option, bearing)
+        rows.append(OptionCost(name, with_ns, without_ns, gap, compile_s, holds, plain_holds, needed))
+        if progress is not None:
+            progress(len(rows), len(chosen))
+    return rows
+
+
+def _allowed(scene: Scene, options: Mapping[str, Sequence[str]]) -> dict[str, Scene]:
+    """The scene with each option, but for options that contradict something it has."""
+    allowed = {}
+    for name, assignments in options.items():
+        with suppress(InputError):
+            allowed[name] = with_options(scene, assignments)
+    return allowed
+
+
+def with_options(scene: Scene, assignments: Sequence[str]) -> Scene:
+    """The scene with ``key.path=value`` assignments. Raises InputError where they contradict it."""
+    data = scene.model_dump(mode="json", exclude_none=True)
+    for assignment in assignments:
+        set_key(data, assignment)
+    return Scene.from_dict(data, " ".join(assignments))
+
+
+def study(
+    scene: Scene, progress: Callable[[int, int], None] | None = None, options: Mapping[str, Sequence[str]] = OPTIONS
+) -> Report:
+    """``rbdyn accuracy --options``. Raises RunError, KeyboardInterrupt."""
+    rows = [row.as_dict() for row in option_costs(scene, options, progress)]
+    cells = [
+        (
+            row["option"],
+            f"{row['with_ns']:.0f}",
+            f"{row['without_ns']:.0f}",
+            f"{row['difference_ns']:+.0f}",
+            f"{100.0 * row['power_gap']:.2g} %",
+            f"{row['compile_s']:.1f}",
+            f"{row['with_state'] - row['without_state']:+d}",
+            f"{row['with_parameter_bytes'] - row['without_parameter_bytes']:+d}",
+            f"{row['with_instructions'] - row['without_instructions']:+d}",
+            " ".join(module.rpartition(".")[2] for module in row["modules"]),
+        )
+        for row in rows
+    ]
+    header = (
+        *("option", "with", "without", "difference", "power gap", "s to compile or load"),
+        *("state", "parameters [B]", "instructions", "modules"),
+    )
+    plain = [
+        f"without any: {row['without_state']} numbers of state, {row['without_parameter_bytes']} B of parameters, "
+        f"{row['without_instructions']} instructions compiled (LLVM)"
+        for row in rows[:1]
+    ]
+    return Report(
+        stem="options",
+        record=record(FORMAT, options=rows),
+        tables=(Table("nanoseconds a right-hand side; what the option adds to the program", header, cells),),
+        sentences=plain,
+        sheets={"options": [row | {"modules": " ".join(row["modules"])} for row in rows]},
+    )

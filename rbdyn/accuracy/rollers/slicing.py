@@ -1,0 +1,204 @@
+"""Slices of a roller with a profile or between tilted races: error of the load and of the statistics against cost.
+
+The load law is exact in itself: its error is measured at equal approach against a very fine slicing, over all loads
+up to twice the largest on the shaft. Statistics are compared with those of the finest slicing run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
+from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.accuracy.rollers.option_cost import with_options
+from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, OUTPUTS, Bias, bias_cells, bias_of, flat
+from rbdyn.contact.hertz_line import line_load
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing
+from rbdyn.dynamics.recording import run_series
+from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.faults import InputError
+from rbdyn.scene import Scene
+
+FORMAT = "rbdyn.slices/1"
+COUNTS = (5, 9, 15, 21, 31, 61, 121, 241)
+FINE = 1001  # the most a scene may have
+LOADS = 40
+# Loads below this share of the largest: the touching part is too short to matter to anything.
+LIGHTEST = 0.02
+
+
+@dataclass(frozen=True)
+class Row(Bias):
+    """One number of slices: largest relative error of the load at equal approach, nanoseconds a right-hand side."""
+
+    slices: int
+    load_error: float
+    rhs_ns: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return dict(self.__dict__)
+
+
+def study(
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    counts: Sequence[int] = COUNTS,
+    sought: float = SOUGHT,
+) -> Report:
+    """``rbdyn accuracy --slices``.
+
+    Raises InputError for a roller without slices or a single replicate, RunError, KeyboardInterrupt.
+    """
+    rows = slice_rows(scene, counts, progress)
+    chosen = conclusion(rows, scene, sought)
+    header = ("slices", "load error", "ns a right-hand side", *OUTPUTS, f"within {percent(sought)}")
+    cells = [
+        (
+            f"{row.slices}",
+            f"{100.0 * row.load_error:.2g} %",
+            f"{row.rhs_ns:.0f}",
+            *bias_cells(row),
+            "reference" if row is rows[-1] else row.verdict(sought),
+        )
+        for row in rows
+    ]
+    numerics = scene.numerics
+    return Report(
+        stem="slices",
+        record=record(
+            FORMAT,
+            rows=[row.as_dict() for row in rows],
+            conclusion=chosen,
+            turns=numerics.turns,
+            replicates=numerics.replicates,
+            sought=sought,
+        ),
+        tables=(Table(f"bias against {rows[-1].slices} slices, 95 % errors", header, cells),),
+        sentences=(
+            chosen,
+            f"{numerics.replicates} replicates of {numerics.turns:g} turns; load errors against {FINE} slices",
+        ),
+        sheets={"slices": [flat(row) for row in rows]},
+        pictures={"slices": lambda path: _draw(rows, path, sought)},
+    )
+
+
+def slice_rows(
+    scene: Scene, counts: Sequence[int] = COUNTS, progress: Callable[[int, int], None] | None = None
+) -> list[Row]:
+    """A row a number of slices, fewest first; the last is the reference of the statistics."""
+    if not scene.needs_slices:
+        raise InputError(
+            [
+                f"bearing.roller_profile = {scene.bearing.roller_profile!r} with bearing.tilt_mrad = 0: one slice is "
+                "exact; give the roller a profile or the races a tilt to study its slices"
+            ]
+        )
+    check_replicates(scene)
+    counts = sorted(counts)
+    counted = Progress(progress, len(counts) * scene.numerics.replicates)
+    series: dict[int, list[Replicate]] = {}
+    for count in counts:
+        cut = with_options(scene, (f"model.slices={count}",))
+        bearing = roller_bearing(cut)
+        prepare(cut, bearing)
+        series[count] = run_series(cut, bearing, [cut.numerics.rtol], 1, lambda done, total: counted.step(), Stop())[0]
+    errors = load_errors(scene, counts)
+    return [
+        Row(
+            **bias_of(runs, series[counts[-1]]).__dict__,
+            slices=count,
+            load_error=errors[count],
+            rhs_ns=float(np.median([run.cpu_s / run.derivatives for run in runs])) * 1e9,
+        )
+        for count, runs in series.items()
+    ]
+
+
+def load_errors(scene: Scene, counts: Sequence[int]) -> dict[int, float]:
+    """Largest relative error of the load over approaches, azimuths and both races, per number of slices."""
+    largest = 2.0 * max(scene.operation.largest_load_N, 1.0)
+    directions = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)] if scene.bearing.tilt_mrad else [(1.0, 0.0)]
+    errors = dict.fromkeys(counts, 0.0)
+    for race in ("outer", "inner"):
+        fine, laws = (contact_law(scene, race, FINE), {count: contact_law(scene, race, count) for count in counts})
+        overlaps = np.geomspace(1e-3, 1.0, LOADS) * overlap_at(fine, largest)
+        for direction in directions:
+            for overlap in overlaps:
+                load = line_load(fine, overlap, *direction)[0]
+                if load < LIGHTEST * largest:
+                    continue
+                for count, law in laws.items():
+                    error = abs(line_load(law, overlap, *direction)[0] / load - 1.0)
+                    errors[count] = max(errors[count], error)
+    return errors
+
+
+def contact_law(scene: Scene, race: str, slices: int) -> Any:
+    """Load law of the "outer" or "inner" race with so many slices."""
+    return race_contact_law(with_options(scene, (f"model.slices={slices}",)), race)
+
+
+def overlap_at(law: Any, load: float) -> float:
+    """Overlap [m] at which a contact bears a load [N], where the tilt is largest."""
+    low, high = 0.0, 1e-6
+    while line_load(law, high, 1.0, 0.0)[0] < load:
+        high *= 2.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if line_load(law, middle, 1.0, 0.0)[0] < load else (low, middle)
+    return high
+
+
+def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str:
+    """The fewest slices shown to keep load and statistics, or what hides them.
+
+    The last row is the reference of the statistics and no evidence for its own.
+    """
+    good = [row for row in rows if row.load_error <= NEGLIGIBLE]
+    if not good:
+        return f"not even {rows[-1].slices} slices keep the load within {percent(NEGLIGIBLE)}"
+    fewest = (
+        f"{good[0].slices} slices are the fewest whose load is right within {percent(NEGLIGIBLE)}: "
+        f"{good[0].rhs_ns:.0f} ns a right-hand side. The scene has {scene.slices}."
+    )
+    compared = [row for row in good if row is not rows[-1]]
+    chosen = next((row for row in compared if row.verdict(sought) == "within"), None)
+    hidden = [
+        found
+        for row in compared
+        if row.verdict(sought) == "undecided" and (chosen is None or row.slices < chosen.slices)
+        for found in row.hidden(f"{row.slices} slices", sought)
+    ]
+    sentences = [fewest]
+    if chosen is not None:
+        sentences.append(
+            f"At {chosen.slices} the biases of the outputs measure at most {percent(sought)} (their errors at most "
+            f"{percent(chosen.known_to)})."
+        )
+    if hidden:
+        below = (chosen or rows[-1]).slices
+        sentences.append(f"What fewer than {below} do to the outputs is {undecided(hidden, scene, sought)}.")
+    return " ".join(sentences)
+
+
+def _draw(rows: Sequence[Row], path: Any, sought: float) -> None:
+    """Error of the load and bias of each output against the time of a right-hand side, marked with slices."""
+    from rbdyn.accuracy.rollers.pictures import finish_biased, logarithmic, marked, outputs_at_work
+    from rbdyn.plots.style import plt, save
+
+    figure, axis = plt.subplots(figsize=(7.6, 5.0))
+    logarithmic(axis, "relative error", "processor time of a right-hand side [ns]")
+    times = [row.rhs_ns for row in rows]
+    ends = outputs_at_work(axis, rows, times, sought)
+    marks = [f"{row.slices}" for row in rows]
+    ends.append(marked(axis, "load at equal approach", [row.load_error for row in rows], times, marks))
+    finish_biased(axis, "slices", ends, sought)
+    save(figure, path)

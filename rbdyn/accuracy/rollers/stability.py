@@ -1,0 +1,229 @@
+"""How extreme variants of a scene end: with a finite answer whose power balance closes, or with the reason why not.
+
+A case is a few assignments to the scene. Each runs one replicate over few turns. Where the balance stays open, the case
+runs once more at a tenth of the tolerance, to see whether tightening mends it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rbdyn.accuracy.report import Report, Table, record
+from rbdyn.accuracy.rollers.option_cost import with_options
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.faults import InputError, RunError
+from rbdyn.scene import Scene
+
+FORMAT = "rbdyn.accuracy.rollers.stability/1"
+LARGEST_GAP = 0.01
+TURNS, DISCARDED = 5, 2
+# What a case may end with. All but "open" say what to do; "refused" and "stopped" do so in their reason.
+CLOSED, TIGHTENED, OPEN, STOPPED, REFUSED = "closed", "closed, tightened", "open", "stopped", "refused"
+HEADER = (
+    "case",
+    "status",
+    "method",
+    "steps a turn",
+    "ms a turn",
+    "power gap",
+    "stiffness ratio",
+    "impact [N]",
+    "whirl ratio",
+    "loss [W]",
+)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a case ended; figures are None where it did not run.
+
+    ``held``: share of the explicit steps that stability held, not accuracy; ``stiffness_ratio``: |eigenvalue| of the motion
+    that held them times the duration of a shaft turn, zero where none was held.
+    """
+
+    case: str
+    assignments: tuple[str, ...]
+    status: str
+    reason: str = ""
+    method: str | None = None
+    rtol: float | None = None
+    steps_per_turn: float | None = None
+    turn_ms: float | None = None
+    power_gap: float | None = None
+    held: float | None = None
+    stiffness_ratio: float | None = None
+    impact_force_N: float | None = None  # noqa: N815
+    whirl_deviation_ratio: float | None = None
+    power_loss_W: float | None = None  # noqa: N815
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether the case neither closes nor tells why."""
+        return self.status == OPEN
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return {**self.__dict__, "assignments": list(self.assignments)}
+
+    def cells(self) -> tuple[str, ...]:
+        """A line of the table."""
+
+        def shown(value: float | None, form: str) -> str:
+            return "" if value is None else format(value, form)
+
+        return (
+            self.case,
+            self.status,
+            self.method or "",
+            shown(self.steps_per_turn, ".0f"),
+            shown(self.turn_ms, ".3g"),
+            shown(self.power_gap, ".1e"),
+            shown(self.stiffness_ratio, ".1e"),
+            shown(self.impact_force_N, ".4g"),
+            shown(self.whirl_deviation_ratio, ".3g"),
+            shown(self.power_loss_W, ".4g"),
+        )
+
+
+def cases(scene: Scene) -> dict[str, tuple[str, ...]]:
+    """Extreme variants of a scene, by name."""
+    operation, bearing = scene.operation, scene.bearing
+    rpm = operation.inner_speed_rpm or operation.outer_speed_rpm
+    run_s = (TURNS + DISCARDED) * scene.turn_s
+    pitch = bearing.pitch_diameter_mm * max(100.0 / bearing.rollers, 1.0)
+
+    def speeds(first: float) -> str:
+        return f"operation.schedule={{time_s=[0.0,{run_s!r}],inner_speed_rpm=[{first!r},{rpm!r}]}}"
+
+    return {
+        "as given": (),
+        "100 000 rpm": ("operation.inner_speed_rpm=100000.0",),
+        "10 rpm": ("operation.inner_speed_rpm=10.0", "numerics.turns=2", "numerics.discard_turns=1"),
+        "no load": ("operation.radial_load_N=0.0",),
+        "20 times the load": (f"operation.radial_load_N={20.0 * operation.radial_load_N!r}",),
+        "no clearance": ("bearing.radial_clearance_mm=0.0",),
+        "preload of 20 um": ("bearing.radial_clearance_mm=-0.02",),
+        "pocket clearance of 1 um": ("cage.pocket_clearance_mm=0.001",),
+        "pocket clearance of 2 mm": ("cage.pocket_clearance_mm=2.0",),
+        "guide clearance of 1 um": ("cage.guide_clearance_mm=0.001", "model.land_film_floor_um=0.1"),
+        "guide clearance of 2 mm": ("cage.guide_clearance_mm=2.0",),
+        "cage of 0.1 g": ("cage.mass_g=0.1",),
+        "cage of 5 kg": ("cage.mass_g=5000.0",),
+        "ceramic rollers": ('materials.roller="silicon_nitride"',),
+        "traction slope of 10 s/m": ('traction.model="four_constant"', "traction.constants=[-0.05,5.0,100.0,0.05]"),
+        "dry friction": ('traction.model="coulomb"',),
+        "2 rollers": ("bearing.rollers=2",),
+        "100 rollers": ("bearing.rollers=100", f"bearing.pitch_diameter_mm={pitch!r}"),
+        "reversal": (speeds(-rpm),),
+        "start from rest": (speeds(0.0),),
+        "oil at -20 C": ("lubricant.temperature_C=-20.0",),
+        "oil at 300 C": ("lubricant.temperature_C=300.0",),
+        "films down to 1 nm": (
+            "model.pocket_film=true",
+            "model.pocket_film_floor_um=0.001",
+            "model.land_film_floor_um=0.001",
+        ),
+        "undamped contacts": (
+            'model.race_damping="off"',
+            "model.pocket_damping_alpha_s_m=0.0",
+            "model.land_damping_alpha_s_m=0.0",
+        ),
+        "rtol 1e-12": ("numerics.rtol=1e-12", "numerics.turns=2", "numerics.discard_turns=1"),
+        "1000 turns": ("numerics.turns=1000",),
+    }
+
+
+def battery(
+    scene: Scene, chosen: Mapping[str, Sequence[str]] | None = None, progress: Callable[[int, int], None] | None = None
+) -> list[Ending]:
+    """A row a case; all cases unless some are ``chosen``. Raises KeyboardInterrupt."""
+    listed = cases(scene) if chosen is None else chosen
+    rows = []
+    for done, (name, assignments) in enumerate(listed.items(), 1):
+        rows.append(ending(scene, name, assignments))
+        if progress is not None:
+            progress(done, len(listed))
+    return rows
+
+
+def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
+    """Run one case."""
+    short = (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}", "numerics.impact_window_turns=1e9")
+    told = tuple(assignments)
+    try:
+        varied = with_options(scene, (*short, *told))
+        bearing = roller_bearing(varied)
+    except InputError as error:
+        return Ending(case, told, REFUSED, "; ".join(error.faults))
+    rtol, tightened = varied.numerics.rtol, False
+    try:
+        prepare(varied, bearing)
+        run = run_replicate(varied, bearing, 0, rtol, Stop())
+        if not run.power_gap <= LARGEST_GAP and rtol >= 1e-12:
+            rtol, tightened = 0.1 * rtol, True
+            run = run_replicate(varied, bearing, 0, rtol, Stop())
+    except RunError as error:
+        return Ending(case, told, STOPPED, str(error))
+    status, reason = _judge(run, rtol, tightened)
+    turns = varied.numerics.turns + varied.numerics.warm_up_turns
+    eigenvalue, held = largest_eigenvalue(run.stiffness), held_by_stability(run.stiffness)
+    finite = {
+        "power_gap": run.power_gap,
+        "impact_force_N": run.impact_force,
+        "whirl_deviation_ratio": run.whirl_deviation_ratio,
+        "power_loss_W": run.power_loss,
+    }
+    return Ending(
+        case,
+        told,
+        status,
+        reason,
+        method=run.method,
+        rtol=rtol,
+        steps_per_turn=(run.accepted_steps + run.rejected_steps) / turns,
+        turn_ms=run.cpu_s / turns * 1e3,
+        held=held,
+        stiffness_ratio=eigenvalue * varied.turn_s,
+        **{name: value if math.isfinite(value) else None for name, value in finite.items()},
+    )
+
+
+def _judge(run: Replicate, rtol: float, tightened: bool) -> tuple[str, str]:
+    figures = (run.power_gap, run.impact_force, run.whirl_deviation_ratio, run.power_loss)
+    if not all(math.isfinite(figure) for figure in figures):
+        return OPEN, "a figure is not finite"
+    if run.power_gap > LARGEST_GAP:
+        return OPEN, f"power balance closes only to {100.0 * run.power_gap:.2g} %, even at rtol {rtol:g}"
+    if tightened:
+        return TIGHTENED, f"the power balance closes only with numerics.rtol = {rtol:g}; set it"
+    return CLOSED, ""
+
+
+def study(scene: Scene, progress: Callable[[int, int], None] | None = None) -> Report:
+    """``rbdyn accuracy --stability``. Raises KeyboardInterrupt."""
+    return report(battery(scene, progress=progress))
+
+
+def report(rows: Sequence[Ending]) -> Report:
+    """Table of the endings, and every reason."""
+    unexplained = sum(row.unexplained for row in rows)
+    told = record(FORMAT, largest_gap=LARGEST_GAP, cases=[row.as_dict() for row in rows])
+    if unexplained:
+        told["status"] = f"{unexplained} of {len(rows)} cases neither close nor tell why"
+    title = f"extreme scenes; closed: power balance within {100.0 * LARGEST_GAP:g} %"
+    return Report(
+        stem="stability",
+        record=told,
+        tables=(Table(title, HEADER, [row.cells() for row in rows]),),
+        sentences=[f"{row.case}: {row.reason}" for row in rows if row.reason],
+        sheets={"stability": [{**row.as_dict(), "assignments": " ".join(row.assignments)} for row in rows]},
+        failed=unexplained > 0,
+    )

@@ -1,0 +1,203 @@
+"""Bias of the statistics: what each tolerance costs and how far its outputs are from converged ones.
+
+Every tolerance runs the same seeded replicates. The reference is the tightest tolerance; what the difference of two
+means and its 95 % half-width allow to be said, ``judgement`` decides. Times are those of single-threaded runs, taken
+after everything was compiled.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rbdyn.accuracy.judgement import SOUGHT, Difference, Verdict, check_replicates, judged, overall, percent, undecided
+from rbdyn.accuracy.report import Progress, Table
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.recording import run_series
+from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.statistics.batch_means import student_half_width
+from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.faults import RunError
+from rbdyn.scene import Scene
+
+TOLERANCES = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 1e-3, 1e-4)
+OUTPUTS: dict[str, Callable[[Replicate], float]] = {
+    "impact_force_N": lambda run: run.impact_force,
+    "whirl_deviation_ratio": lambda run: run.whirl_deviation_ratio,
+    "power_loss_W": lambda run: run.power_loss,
+}
+# A gap of the power balance, or an error of a load, below this hurts nobody; neither of them scatters.
+NEGLIGIBLE = 0.005
+
+
+@dataclass(frozen=True)
+class Bias:
+    """Per output: its mean, its relative bias against a reference and the 95 % error of that."""
+
+    value: dict[str, float]
+    bias: dict[str, float]
+    bias_error: dict[str, float]
+
+    def verdict_of(self, name: str, sought: float = SOUGHT) -> Verdict:
+        """Whether an output is off by more than ``sought``, as far as its error tells."""
+        return judged(self.bias[name], self.bias_error[name], sought)
+
+    def verdict(self, sought: float = SOUGHT) -> Verdict:
+        """That of all outputs together."""
+        return overall(self.verdict_of(name, sought) for name in OUTPUTS)
+
+    @property
+    def known_to(self) -> float:
+        """Largest 95 % error of any output."""
+        return max(self.bias_error[name] for name in OUTPUTS)
+
+    def hidden(self, row: str, sought: float = SOUGHT) -> list[Difference]:
+        """Differences that their errors hide; ``row`` says where."""
+        return [
+            Difference(f"{name} at {row}", self.bias[name], self.bias_error[name])
+            for name in OUTPUTS
+            if self.verdict_of(name, sought) == "undecided"
+        ]
+
+
+@dataclass(frozen=True)
+class Row(Bias):
+    """One tolerance: processor time per shaft turn [ms] and per right-hand side [ns] (medians over replicates),
+    steps per turn, largest relative power gap."""
+
+    rtol: float
+    turn_ms: float
+    rhs_ns: float
+    steps_per_turn: float
+    power_gap: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form."""
+        return dict(self.__dict__)
+
+
+@dataclass(frozen=True)
+class StatisticsBias:
+    """Rows, loosest tolerance first; the last is the reference. ``failures``: tolerances at which a replicate could
+    not go on, and why."""
+
+    rows: Sequence[Row]
+    failures: dict[float, str]
+
+
+def statistics_bias(
+    scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Callable[[int, int], None] | None = None
+) -> StatisticsBias:
+    """A row a tolerance. Runs one replicate at a time.
+
+    Raises InputError for a single replicate, KeyboardInterrupt, RunError where the tightest fails.
+    """
+    check_replicates(scene)
+    bearing = roller_bearing(scene)
+    prepare(scene, bearing)
+    ordered = sorted(tolerances)
+    counted = Progress(progress, len(ordered) * scene.numerics.replicates)
+    series: dict[float, list[Replicate]] = {}
+    failures: dict[float, str] = {}
+    for rtol in ordered:
+        try:
+            series[rtol] = run_series(scene, bearing, [rtol], 1, lambda done, total: counted.step(), Stop())[0]
+        except RunError as error:
+            if rtol == ordered[0]:
+                raise
+            failures[rtol] = str(error)
+    rows = [_row(scene, rtol, runs, series[ordered[0]]) for rtol, runs in series.items()]
+    return StatisticsBias(rows[::-1], failures)
+
+
+def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str:
+    """Which tolerance to take: the loosest shown to bias no output and to close in power, or what hides it.
+
+    The last row, with which the others are compared, is no evidence for itself.
+    """
+    reference = rows[-1]
+    closing = [row for row in rows[:-1] if row.power_gap <= NEGLIGIBLE]
+    verdicts = [row.verdict(sought) for row in closing]
+    chosen = closing[verdicts.index("within")] if "within" in verdicts else None
+    open_rows = [
+        row
+        for row, verdict in zip(closing, verdicts, strict=True)
+        if verdict == "undecided" and (chosen is None or row.rtol > chosen.rtol)
+    ]
+    hidden = [found for row in open_rows for found in row.hidden(f"rtol {row.rtol:g}", sought)]
+    rest = undecided(hidden, scene, sought) if hidden else ""
+    if chosen is None:
+        return rest or (
+            f"no tolerance looser than the reference, rtol {reference.rtol:g}, has biases of at most {percent(sought)} and a "
+            f"power balance that closes within {percent(NEGLIGIBLE)}"
+        )
+    return (
+        f"rtol {chosen.rtol:g} is {'one' if hidden else 'the loosest'} whose biases measure at most {percent(sought)} (their "
+        f"errors at most {percent(chosen.known_to)}) and whose power balance closes within {percent(NEGLIGIBLE)}: "
+        f"{chosen.turn_ms:.2f} ms a shaft turn. The scene has {scene.numerics.rtol:g}."
+        + (f" Looser ones are {rest}." if hidden else "")
+    )
+
+
+def bias_of(runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Bias:
+    """Bias of every output of ``runs`` against ``reference``; the error is that of two independent means."""
+    value, bias, bias_error = {}, {}, {}
+    for name, figure in OUTPUTS.items():
+        ours, theirs = (np.array([figure(run) for run in series]) for series in (runs, reference))
+        value[name] = float(ours.mean())
+        scale = abs(float(theirs.mean())) or 1.0
+        bias[name] = float(ours.mean() - theirs.mean()) / scale
+        bias_error[name] = math.hypot(*(student_half_width(x) or 0.0 for x in (ours, theirs))) / scale
+    return Bias(value, bias, bias_error)
+
+
+def table(found: StatisticsBias, sought: float = SOUGHT) -> Table:
+    """Table for the terminal; failed tolerances at the end."""
+    header = (
+        *("rtol", "ms a turn", "ns a right-hand side", "steps a turn", "power gap"),
+        *OUTPUTS,
+        f"within {percent(sought)}",
+    )
+    cells = [
+        (
+            f"{row.rtol:g}",
+            f"{row.turn_ms:.2f}",
+            f"{row.rhs_ns:.0f}",
+            f"{row.steps_per_turn:.0f}",
+            f"{100.0 * row.power_gap:.2g} %",
+            *bias_cells(row),
+            "reference" if row is found.rows[-1] else row.verdict(sought),
+        )
+        for row in found.rows
+    ]
+    cells += [(f"{rtol:g}", "failed", *[""] * (len(header) - 2)) for rtol in found.failures]
+    return Table(f"bias against rtol {found.rows[-1].rtol:g}, 95 % errors", header, cells)
+
+
+def bias_cells(row: Bias) -> list[str]:
+    """Bias of each output with its error, as text."""
+    return [f"{100.0 * row.bias[name]:+.2f} ± {100.0 * row.bias_error[name]:.2f} %" for name in OUTPUTS]
+
+
+def flat(row: Row | Any) -> dict[str, Any]:
+    """A row without nesting, for a sheet."""
+    nested = {key: value for key, value in row.as_dict().items() if isinstance(value, dict)}
+    plain = {key: value for key, value in row.as_dict().items() if key not in nested}
+    return plain | {f"{name}_{kind}": of[name] for kind, of in nested.items() for name in of}
+
+
+def _row(scene: Scene, rtol: float, runs: list[Replicate], reference: list[Replicate]) -> Row:
+    turns = scene.numerics.turns + scene.numerics.warm_up_turns
+    return Row(
+        **bias_of(runs, reference).__dict__,
+        rtol=rtol,
+        turn_ms=float(np.median([run.cpu_s for run in runs])) / turns * 1e3,
+        rhs_ns=float(np.median([run.cpu_s / run.derivatives for run in runs])) * 1e9,
+        steps_per_turn=float(np.mean([run.accepted_steps + run.rejected_steps for run in runs])) / turns,
+        power_gap=max(run.power_gap for run in runs),
+    )

@@ -1,0 +1,64 @@
+"""Error against run time of the time integration: of the statistics at each tolerance, and of the motion itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rbdyn.accuracy.judgement import SOUGHT
+from rbdyn.accuracy.report import Report, record
+from rbdyn.accuracy.rollers import comparison, tolerances
+from rbdyn.accuracy.rollers.methods import COMPILED
+from rbdyn.accuracy.rollers.trajectory import DEFAULT_TURNS
+from rbdyn.scene import Scene
+
+FORMAT = "rbdyn.accuracy/1"
+
+
+def study(
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    turns: float = DEFAULT_TURNS,
+    rtols: Sequence[float] = tolerances.TOLERANCES,
+    sought: float = SOUGHT,
+) -> Report:
+    """``rbdyn accuracy``: bias of the statistics, judged to ``sought``, and the trajectories of the compiled methods.
+
+    Raises InputError, RunError where a reference fails, KeyboardInterrupt.
+    """
+    motion = comparison.trajectories(scene, progress, turns, COMPILED)
+    found = tolerances.statistics_bias(scene, rtols, progress)
+    chosen = tolerances.conclusion(found.rows, scene, sought)
+    numerics = scene.numerics
+    agreement, trajectories, _ = motion.tables
+    return Report(
+        stem="accuracy",
+        record=record(
+            FORMAT,
+            rows=[row.as_dict() for row in found.rows],
+            sought=sought,
+            failures={f"{rtol:g}": why for rtol, why in found.failures.items()},
+            conclusion=chosen,
+            turns=numerics.turns,
+            replicates=numerics.replicates,
+            trajectory={key: motion.record[key] for key in _MOTION},
+        ),
+        tables=(agreement, trajectories, tolerances.table(found, sought)),
+        sentences=(
+            *motion.sentences,
+            chosen,
+            *(f"rtol {rtol:g} failed: {why}" for rtol, why in found.failures.items()),
+            f"{numerics.replicates} replicates of {numerics.turns:g} turns",
+        ),
+        sheets={"accuracy": [tolerances.flat(row) for row in found.rows], "trajectory": motion.record["rows"]},
+        pictures={"accuracy": lambda path: _draw(found.rows, path, sought), "trajectory": motion.pictures["methods"]},
+    )
+
+
+_MOTION = ("rows", "conclusion", "turns", "starts", "reference", "resolved_m", "times_faster", "compile_s")
+
+
+def _draw(rows: Sequence[tolerances.Row], path: Any, sought: float) -> None:
+    from rbdyn.accuracy.rollers import pictures
+
+    pictures.work_precision(rows, path, sought)

@@ -1,0 +1,340 @@
+"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball`` stands beside."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rbdyn.cli.ball import ball
+from rbdyn.cli.options import Json, Out, Quiet, Replicates, SceneFile, Seed, Set, Turns, Verbose, Workers
+from rbdyn.cli.terminal import FAILED, guarded, keeping, output_folder, print_json, print_table, progress_bar
+
+if TYPE_CHECKING:
+    from rbdyn.dynamics.slip_map import SlipMap
+    from rbdyn.result import SimulationResult
+    from rbdyn.scene import Scene
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+# Length of the history that --out draws.
+TRACE_TURNS = 10.0
+
+app.command()(ball)
+
+
+@app.callback()
+def main() -> None:
+    """Dynamics of rolling bearings: forces, whirl and power loss with their errors."""
+
+
+@app.command()
+def simulate(
+    scene: SceneFile,
+    assignments: Set = None,
+    turns: Turns = None,
+    replicates: Replicates = None,
+    seed: Seed = None,
+    workers: Workers = None,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            metavar="2%",
+            help="Choose tolerance, turns and replicates so that impact, whirl and loss are known to this.",
+        ),
+    ] = None,
+    out: Out = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss."""
+    with guarded(as_json):
+        loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
+        aim = None if target is None else _aim(target, turns, replicates)
+        folder = output_folder(out, "rbdyn simulate", scene) if out else None
+        from rbdyn.dynamics.simulate import simulate as run_scene
+
+        with progress_bar("simulating", quiet or as_json) as progress:
+            result = run_scene(loaded, workers, progress, target=aim)
+        loaded = type(loaded).from_dict(result.scene)
+        if folder:
+            _write(loaded, result, folder)
+        if as_json:
+            print_json(result.as_dict())
+        else:
+            _print(result, quiet, verbose)
+            if folder:
+                print(f"written to {folder}: result.json, history.csv, cage_orbit.png, pocket_forces.png")
+
+
+@app.command()
+def accuracy(
+    scene: SceneFile,
+    assignments: Set = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write the study as JSON, CSV and pictures here.")
+    ] = None,
+    methods: Annotated[bool, typer.Option("--methods", help="Other integrators beside ours, instead.")] = False,
+    slices: Annotated[bool, typer.Option("--slices", help="Slices of a profiled roller, instead.")] = False,
+    replicates: Annotated[
+        bool, typer.Option("--replicates", help="Statistical error against run time, instead.")
+    ] = False,
+    coverage: Annotated[
+        bool, typer.Option("--coverage", help="How often the stated intervals hold the truth, instead.")
+    ] = False,
+    repeats: Annotated[
+        int | None, typer.Option(min=2, max=100_000, metavar="N", help="Repeats of the coverage; 200 unless given.")
+    ] = None,
+    options: Annotated[bool, typer.Option("--options", help="What each option costs, instead.")] = False,
+    stability: Annotated[
+        bool, typer.Option("--stability", help="How stiff and extreme variants of the scene end, instead.")
+    ] = False,
+    scaling: Annotated[
+        bool, typer.Option("--scaling", help="Time by rollers and slices, memory by turns, instead.")
+    ] = False,
+    battery: Annotated[
+        bool, typer.Option("--battery", help="Solvers over thousands of random ball bearings, instead.")
+    ] = False,
+    scenes: Annotated[
+        int | None, typer.Option(min=1, max=100_000, metavar="N", help="Scenes of the battery; 5000 unless given.")
+    ] = None,
+    trajectory: Annotated[
+        float | None, typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25.")
+    ] = None,
+    sought: Annotated[
+        float | None,
+        typer.Option("--sought-percent", min=0.01, max=50.0, help="Bias of an output that counts; by default 1 %."),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also versions.")] = False,
+) -> None:
+    """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, the solvers."""
+    with guarded(as_json):
+        from rbdyn import accuracy as studies
+
+        asked = {
+            "methods": methods,
+            "slices": slices,
+            "replicates": replicates,
+            "coverage": coverage,
+            "options": options,
+            "stability": stability,
+            "scaling": scaling,
+            "battery": battery,
+        }
+        from rbdyn.accuracy.asked import asked_study
+        from rbdyn.scene import Scene
+
+        loaded = Scene.load(scene, assignments or [])
+        given = {
+            "turns": trajectory,
+            "scenes": scenes,
+            "repeats": repeats,
+            "sought": None if sought is None else 0.01 * sought,
+        }
+        limits = {key: value for key, value in given.items() if value is not None}
+        name = asked_study(asked, limits, loaded)
+        folder = output_folder(out, "rbdyn accuracy", scene) if out else None
+        with progress_bar(name, quiet or as_json) as progress:
+            found = studies.study(name, loaded, progress, **limits)
+        files = studies.write(found, folder) if folder else []
+        if as_json:
+            print_json(found.record)
+        else:
+            studies.show(found, verbose)
+            if folder:
+                print(f"written to {folder}: {', '.join(files)}")
+    if found.failed:
+        raise typer.Exit(FAILED)
+
+
+def _write_map(found: SlipMap, folder: Path) -> list[str]:
+    """Write map.json, map.csv and map.png; returns the file names."""
+    from rbdyn.plots.slip_map import draw
+    from rbdyn.result import write_json
+
+    write_json(folder / "map.json", found.as_dict())
+    found.table().to_csv(folder / "map.csv", index=False)
+    draw(found, folder / "map.png")
+    return ["map.json", "map.csv", "map.png"]
+
+
+@app.command("map")
+def slip_map(
+    scene: SceneFile,
+    speed: Annotated[str, typer.Option(metavar="RPM", help="Inner speeds: start:stop:count or a,b,c.")],
+    load: Annotated[str, typer.Option(metavar="N", help="Radial loads: start:stop:count or a,b,c.")],
+    assignments: Set = None,
+    turns: Turns = None,
+    replicates: Replicates = None,
+    seed: Seed = None,
+    workers: Workers = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write map.json, map.csv and map.png here, and keep finished points."),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Map cage slip, power loss, impact and whirl over speed and load."""
+    with guarded(as_json):
+        loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
+        folder = output_folder(out, "rbdyn map", scene) if out else None
+        from rbdyn.cli.ranges import axis_values
+        from rbdyn.dynamics import slip_map as study
+
+        axes = axis_values(speed, "--speed"), axis_values(load, "--load")
+        points = folder / study.POINTS if folder else None
+        with keeping(points), progress_bar("mapping", quiet or as_json) as progress:
+            found = study.slip_map(loaded, *axes, workers, progress, points)
+        files = _write_map(found, folder) if folder else []
+        if as_json:
+            print_json(found.as_dict())
+        else:
+            header = ("load [N]", *(f"{value:g} rpm" for value in found.speeds_rpm))
+            rows = [
+                (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
+                for value, row in zip(found.loads_N, found.grid("cage_slip"), strict=True)
+            ]
+            print_table("cage slip", header, rows)
+            print(f"{len(found.points)} points in {found.wall_s:.1f} s, seed {found.seed}")
+            if folder:
+                print(f"written to {folder}: {', '.join(files)}")
+        for point in found.failed:
+            print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
+    if found.failed:
+        raise typer.Exit(FAILED)
+
+
+def _rollers(path: Path, overrides: list[str]) -> Scene:
+    """Scene of a roller bearing. Raises InputError for any other."""
+    from rbdyn.scene import Scene, rollers_only
+
+    return rollers_only(Scene.load(path, overrides))
+
+
+def _overrides(
+    assignments: list[str] | None, turns: float | None, replicates: int | None, seed: int | None
+) -> list[str]:
+    shorthand = {"turns": turns, "replicates": replicates, "seed": seed}
+    return [*(assignments or []), *(f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None)]
+
+
+def _aim(target: str, turns: float | None, replicates: int | None) -> float:
+    """Relative error that ``--target`` asks for. Raises InputError."""
+    from rbdyn.dynamics.target import target_of
+    from rbdyn.faults import InputError
+
+    if turns is not None or replicates is not None:
+        raise InputError([f"--target {target}: chooses turns and replicates itself; drop --turns and --replicates"])
+    return target_of(target)
+
+
+def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:
+    from rbdyn import plots
+    from rbdyn.dynamics.motion.history import history, most_turns
+
+    result.save(folder / "result.json")
+    turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
+    shown = history(scene, turns)
+    shown.table().to_csv(folder / "history.csv", index=False, float_format="%.6g")
+    title = f"first {turns:g} counted shaft turns"
+    plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
+    plots.pocket_forces({title: shown}, folder / "pocket_forces.png")
+
+
+def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
+    def shown(error: float | None) -> str:
+        return "not estimated" if error is None else f"± {error:.2g}"
+
+    contact = {"largest of it by contact alone, without the film [N]": result.impact_contact_force}
+    figures = {
+        f"largest roller/cage force in {result.impact_window_turns:g} shaft turns [N]": result.impact_force,
+        **({} if result.impact_contact_force == result.impact_force else contact),
+        "whirl deviation ratio": result.whirl_deviation_ratio,
+        "power loss [W]": result.power_loss,
+        "cage speed [rpm]": result.cage_speed_rpm,
+        "cage slip": result.cage_slip,
+    }
+    header = ["figure", "value", "statistical error (95 %)", "numerical error (95 %)"]
+    rows = [
+        [label, f"{figure.value:.5g}", shown(figure.statistical_error), shown(figure.numerical_error)]
+        for label, figure in figures.items()
+    ]
+    if verbose:
+        header.append("effective samples")
+        for row, figure in zip(rows, figures.values(), strict=True):
+            row.append(f"{figure.effective_samples:.0f}")
+    print_table("", header, rows)
+    if result.target is not None:
+        _print_target(result.target)
+    print(
+        f"race loads up to {result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer); power balance "
+        f"closes to {100.0 * result.power_gap:.2g} %; {result.replicates} replicates, seed {result.seed}; "
+        f"{result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to load or compile"
+    )
+    for race, at in result.races.items():
+        film = f", film {at['central_film_um']:.2g} um, lambda {at['lambda_ratio']:.2g}" if "lambda_ratio" in at else ""
+        print(
+            f"{race} race at its largest load: {at['max_pressure_MPa']:.0f} MPa over {at['half_width_um']:.0f} um each way"
+            + film
+        )
+    if len(result.clearance) > 2:
+        parts = ", ".join(f"{name.replace('_', ' ')} {value:+.1f} um" for name, value in result.clearance.items())
+        print(f"clearance: {parts}")
+    if verbose:
+        if result.transient_turns is not None:
+            print(f"transient: {result.transient_turns:g} shaft turns")
+        terms = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
+        gap = result.power_gap * result.power_loss.value
+        print_table(f"power lost, each to ± {gap:.2g} W (gap of the power balance)", ("term", "W"), terms)
+        print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
+    if not quiet:
+        for note in result.notes:
+            print(f"note: {note}")
+
+
+def _print_target(target: dict[str, Any]) -> None:
+    chosen, cost = target["chosen"], target["cost"]
+    reached = ", ".join(
+        f"{name} {'unknown' if error is None else f'{100.0 * error:.2g} %'}"
+        for name, error in target["relative_error"].items()
+    )
+    print(
+        f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached}) by "
+        f"{chosen['replicates']} replicates of {chosen['turns']:g} turns at rtol {chosen['rtol']:g}; "
+        f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides, "
+        f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots; the seconds are those of pilots and all runs"
+    )
+
+
+@app.command()
+def show(
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write here; by default in 'show' beside the result.")
+    ] = None,
+    turns: Annotated[float | None, typer.Option(help="Counted shaft turns to show; at most 20 unless given.")] = None,
+    replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
+    animate: Annotated[bool, typer.Option("--animate", help="Also a moving picture and a player.")] = False,
+    lyapunov: Annotated[bool, typer.Option("--lyapunov", help="Also the largest Lyapunov exponent.")] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also peaks of the spectra.")] = False,
+) -> None:
+    """Show how the bearing of a saved result moves: pictures, history.csv and orbit.json."""
+    with guarded(as_json):
+        from rbdyn.cli import show as motion
+
+        asked = motion.ask(result, turns, replicate)
+        folder = output_folder(out or asked.path.parent / "show", "rbdyn show", asked.path)
+        with progress_bar("showing", quiet or as_json) as progress:
+            record = motion.write(asked, folder, animate, lyapunov, progress)
+        if as_json:
+            print_json(record)
+        else:
+            motion.print_record(record, folder, quiet, verbose)

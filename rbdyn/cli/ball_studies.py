@@ -1,0 +1,194 @@
+"""Studies of a ball bearing beside its equilibrium: runout over a turn, preload, clearance, limits of race errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast, get_args
+
+import numpy as np
+
+from rbdyn.cli.ball_sweep import print_points
+from rbdyn.cli.ranges import axis_values
+from rbdyn.cli.terminal import output_folder, print_json, print_table
+from rbdyn.faults import InputError
+from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
+from rbdyn.quasistatic.remarks import remarks, tipping
+from rbdyn.quasistatic.row.equilibrium import OK
+from rbdyn.quasistatic.runout.classes import ToleranceClass, running_accuracy
+from rbdyn.quasistatic.runout.lots import Lot
+from rbdyn.quasistatic.runout.model import bench_of, follow_ring, single_row
+from rbdyn.quasistatic.runout.tolerance_design import RaceLimits, design
+from rbdyn.quasistatic.runout.turn import Followed
+from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
+from rbdyn.quasistatic.sweep.result import SweepResult
+from rbdyn.quasistatic.sweep.run import grouped
+from rbdyn.result import write_json
+from rbdyn.scene import BallScene
+from rbdyn.scene.ball import SingleRowScene
+
+# What a study sweeps: function, unit of the values and that unit in SI.
+SWEPT = {
+    "preload": (over_preload, "N", 1.0),
+    "clearance": (over_clearance, "um", 1e-6),
+    "wear": (over_wear, "um", 1e-6),
+}
+# What its record tells of a point, by column of the table.
+TOLD = {"inner_stress_MPa": "inner_pressure_MPa", "outer_stress_MPa": "outer_pressure_MPa", "L10_Mrev": "L10_Mrev"}
+# Bearings of a lot that are solved in full to size the limits of race errors.
+SOLVED = 100
+
+
+def runout_record(scene: BallScene) -> tuple[dict[str, Any], Followed]:
+    """Runout of the turning ring over the form errors of its scene [um], and the path. Raises InputError, RunError."""
+    followed = follow_ring(scene)
+    told = asdict(followed.runout(bench_of(scene).face_radius))
+    turns = told.pop("turns")
+    return {**{f"{name}_um": 1e6 * value for name, value in told.items()}, "turns": turns}, followed
+
+
+def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> dict[str, Any]:
+    """Peak pressure and life over preload [N], clearance or wear of the balls [um], and where each is best.
+
+    Raises InputError for a double-decker, or where the sweep is refused.
+    """
+    return _optimum(scene, swept, values)[0]
+
+
+def _optimum(scene: BallScene, swept: str, values: Sequence[float]) -> tuple[dict[str, Any], SweepResult]:
+    """Record of a study, and its points as a sweep tells them."""
+    run, unit, si = SWEPT[swept]
+    try:
+        found = run(_single(scene, swept), [si * value for value in values])
+    except ValueError as error:
+        raise InputError([f"--{swept}: {error}"]) from None
+    table = _table(scene, f"{swept}_{unit}", values, found)
+    names = {"value": f"{swept}_{unit}", **TOLD, "status": "status"}
+    points = [{name: point[column] for name, column in names.items() if column in point} for point in table.points()]
+    return {
+        "swept": f"{swept}_{unit}",
+        "points": points,
+        "least_stress": _best(found, "least_stress", si),
+        "longest_life": _best(found, "longest_life", si),
+        "notes": [*found.notes, *(f"{table.where(note['points'])}: {note['note']}" for note in table.notes)],
+    }, table
+
+
+def _table(scene: BallScene, key: str, values: Sequence[float], found: Sweep) -> SweepResult:
+    """Figures, balls and notes of the points scanned."""
+    points, places = found.points, np.arange(len(values))
+    solutions, ratings = [point.solution for point in points], [point.rating for point in points]
+    balls, displacement, reaction, stiffness = (
+        np.array([getattr(solution, name) for solution in solutions])
+        for name in ("told", "displacement", "reaction", "stiffness")
+    )
+    statuses = tuple(solution.status for solution in solutions)
+    columns = ring_columns(displacement, reaction, stiffness) | row_columns(balls, ratings)
+    for column in columns.values():
+        column[[status != OK for status in statuses]] = np.nan
+    told = [(0, remark) for remark in (*remarks(balls, ratings), tipping(displacement[:, 3:], scene))]
+    notes, rows = grouped(told, places, statuses), {"row": [(places, balls)]}
+    return SweepResult({key: tuple(values)}, columns, statuses, 0, 0.0, scene.model_dump(mode="json"), rows, notes)
+
+
+def _best(found: Sweep, which: str, si: float) -> dict[str, float]:
+    point = getattr(found, which)
+    return {"value": point.value / si, "max_stress_MPa": 1e-6 * point.peak_pressure, "L10_Mrev": point.million_turns}
+
+
+def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int = 1) -> dict[str, Any]:
+    """Limits of roundness and side-sway of both races with which bearings meet a class with a wanted yield.
+
+    The lot has amplitudes that fall as 1/order from order 1 to 40 (``runout_lots.Lot``). Raises InputError.
+    """
+    row = _single(scene, "race-limits")
+    if tolerance_class not in get_args(ToleranceClass):
+        known = ", ".join(get_args(ToleranceClass))
+        raise InputError([f"--race-limits {tolerance_class}: is no tolerance class; choose one of {known}"])
+    if row.bearing.bore_mm is None:
+        raise InputError(["bearing.bore_mm: missing; tolerance classes go by the bore, add it"])
+    try:
+        allowed = running_accuracy(cast(ToleranceClass, tolerance_class), 1e-3 * row.bearing.bore_mm)
+        if allowed.axial is None:
+            raise ValueError(f"class {tolerance_class} sets no limit on axial runout; choose P2, P4 or P5")
+        found = design(
+            bench_of(row),
+            Lot(),
+            radial_limit=allowed.radial,
+            axial_limit=allowed.axial,
+            wanted=wanted,
+            seed=seed,
+            solved=SOLVED,
+        )
+    except ValueError as error:
+        raise InputError([f"--race-limits {tolerance_class}: {error}"]) from None
+    return {"class": tolerance_class, "wanted": wanted, **_limits(found)}
+
+
+def _limits(found: RaceLimits) -> dict[str, Any]:
+    lengths = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "radial_limit", "axial_limit")
+    return {
+        **{f"{name}_um": 1e6 * getattr(found, name) for name in lengths},
+        "yield": found.yielded,
+        "standard_error": found.standard_error,
+        "yield_in_proportion": found.proportional,
+        "homogenisation": {"radial": found.homogenisation[0], "axial": found.homogenisation[1]},
+        "bearings": found.bearings,
+        "solved_in_full": SOLVED,
+        "seed": found.seed,
+    }
+
+
+def _single(scene: BallScene, option: str) -> SingleRowScene:
+    try:
+        return single_row(scene)
+    except InputError:
+        raise InputError([f"--{option}: is a study of one row of balls; a double-decker has two"]) from None
+
+
+def run(
+    scene: BallScene, name: str, value: str, wanted: float, out: Path | None, source: Path, as_json: bool, quiet: bool
+) -> int:
+    """Carry out the study ``name`` over ``value``, print and write it; returns the exit code. Raises InputError."""
+    folder, files = output_folder(out, "rbdyn ball", source) if out else None, [f"{name}.json"]
+    table: SweepResult | None = None
+    if name == "race_limits":
+        record = race_limits(scene, value, wanted)
+    else:
+        record, table = _optimum(scene, name, axis_values(value, f"--{name}"))
+    if folder:
+        write_json(folder / files[0], record)
+        if table is not None:
+            from rbdyn.plots.ball_sweep import pictures
+
+            table.save(folder / f"{name}.csv")
+            files += [f"{name}.csv", *pictures(table, folder)]
+    if as_json:
+        print_json(record)
+        return 0
+    if table is None:
+        _print_limits(record)
+    else:
+        print_points(table)
+        for best, title in (("least_stress", "least stress"), ("longest_life", "longest life")):
+            at = record[best]
+            print(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
+        for note in record["notes"] if not quiet else ():
+            print(f"note: {note}")
+    if folder:
+        print(f"written to {folder}: {', '.join(files)}")
+    return 0
+
+
+def _print_limits(record: dict[str, Any]) -> None:
+    rows = [
+        (race, f"{record[f'{race}_roundness_um']:.3g}", f"{record[f'{race}_sway_um']:.3g}")
+        for race in ("inner", "outer")
+    ]
+    title = f"class {record['class']}: {record['radial_limit_um']:g} um radial, {record['axial_limit_um']:g} um axial runout"
+    print_table(title, ("race", "roundness up to [um]", "side-sway up to [um]"), rows)
+    print(
+        f"yield {100.0 * record['yield']:.1f} +- {100.0 * record['standard_error']:.1f} % (standard error) of {record['bearings']} bearings, "
+        f"{record['solved_in_full']} of them solved in full, seed {record['seed']}"
+    )

@@ -1,0 +1,253 @@
+"""From a saved result to what its bearing does: pictures, a table of samples, the figures of the motion.
+
+A result keeps no motion. It keeps scene and seed, and equal scenes give equal bits: the history is computed anew.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from rbdyn.cli.terminal import print_table
+from rbdyn.faults import refuse
+from rbdyn.result import SimulationResult, versions, write_json
+from rbdyn.scene import Scene
+
+if TYPE_CHECKING:
+    from rbdyn.dynamics.motion.history import History
+    from rbdyn.dynamics.motion.orbit import Largest, Race, Spectrum
+
+FORMAT = "rbdyn.orbit/1"
+SHOWN_TURNS = 20.0
+LYAPUNOV_TURNS = 100.0
+# Fewer samples show no motion.
+FEWEST_SAMPLES = 32
+PEAKS = 5
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is to be shown: the result, its file, its scene, and how many turns of which replicate, from 0."""
+
+    result: SimulationResult
+    path: Path
+    scene: Scene
+    turns: float
+    replicate: int
+
+    @property
+    def notes(self) -> list[str]:
+        """Whether the motion may be another than that of the result."""
+        now = versions()
+        then = self.result.versions
+        other = [name for name in now if then.get(name) != now[name]]
+        if not other:
+            return []
+        change = ", ".join(f"{name} {then.get(name, 'unknown')} then and {now[name]} now" for name in other)
+        return [f"this motion may differ from that of the result, which was computed with other versions: {change}"]
+
+
+def ask(path: Path, turns: float | None, replicate: int) -> Asked:
+    """Read a result.json, or that of a folder. Raises InputError with every fault."""
+    if path.is_dir():
+        path = path / "result.json"
+    from rbdyn.dynamics.motion.history import most_turns
+
+    result = SimulationResult.load(path)
+    scene = Scene.from_dict(result.scene, f"{path}: scene")
+    numerics, faults = scene.numerics, []
+    fewest = FEWEST_SAMPLES / numerics.samples_per_turn
+    most = min(most_turns(scene), numerics.turns)
+    chosen = min(SHOWN_TURNS, most) if turns is None else turns
+    if turns is not None and not fewest <= turns <= numerics.turns:
+        faults.append(f"--turns {turns:g}: the result counted {numerics.turns:g} turns; choose from {fewest:g} to that")
+    elif chosen > most:
+        faults.append(f"--turns {turns:g}: memory has room for {most:.4g} turns of this scene; show no more")
+    if not 1 <= replicate <= numerics.replicates:
+        faults.append(f"--replicate {replicate}: the result has {numerics.replicates}; count from 1 to that")
+    refuse(faults)
+    return Asked(result, path, scene, chosen, replicate - 1)
+
+
+def write(
+    asked: Asked, folder: Path, animate: bool, lyapunov: bool, progress: Callable[[int, int], None]
+) -> dict[str, Any]:
+    """Compute the motion, write everything into ``folder``; returns the record that is also in orbit.json."""
+    from rbdyn.dynamics.motion.history import history
+
+    motion = history(asked.scene, asked.turns, asked.replicate)
+    tasks: list[Callable[[], list[str]]] = [
+        lambda: _table(motion, folder),
+        *(_picture_tasks(asked, motion, folder)),
+        *([lambda: _animation(motion, folder)] if animate else []),
+    ]
+    steps = 1 + len(tasks) + lyapunov
+    files: list[str] = []
+    for done, task in enumerate(tasks, 1):
+        progress(done, steps)
+        files += task()
+    record = {**_record(asked, motion), "notes": asked.notes, "versions": versions()}
+    if lyapunov:
+        from rbdyn.dynamics.motion.lyapunov import lyapunov_exponent
+
+        progress(steps - 1, steps)
+        turns = min(LYAPUNOV_TURNS, asked.scene.numerics.turns)
+        record["lyapunov"] = lyapunov_exponent(asked.scene, turns, asked.replicate).as_dict()
+    record["files"] = ["orbit.json", *files]
+    write_json(folder / "orbit.json", record)
+    progress(steps, steps)
+    return record
+
+
+def _table(motion: History, folder: Path) -> list[str]:
+    motion.table().to_csv(folder / "history.csv", index=False, float_format="%.6g")
+    return ["history.csv"]
+
+
+def _picture_tasks(asked: Asked, motion: History, folder: Path) -> list[Callable[[], list[str]]]:
+    from rbdyn import plots
+
+    title = f"{asked.turns:g} counted shaft turns, replicate {asked.replicate + 1}"
+    pictures: dict[str, Callable[[Path], object]] = {
+        "cage_orbit.png": partial(plots.cage_orbit, {title: motion}),
+        "forces.png": partial(plots.forces, motion),
+        "whirl.png": partial(plots.whirl, motion),
+        "poincare.png": partial(plots.section, motion),
+        "spectra.png": partial(plots.spectra, motion),
+        "roller_loads.png": partial(plots.roller_loads, motion),
+        "sliding.png": partial(plots.sliding, motion),
+        "power.png": partial(plots.power_by_loss, asked.result.power_terms),
+    }
+    return [partial(_picture, folder, name, draw) for name, draw in pictures.items()]
+
+
+def _picture(folder: Path, name: str, draw: Callable[[Path], object]) -> list[str]:
+    draw(folder / name)
+    return [name]
+
+
+def _animation(motion: History, folder: Path) -> list[str]:
+    from rbdyn.plots.animation import moving_bearing
+    from rbdyn.plots.player import player_html
+
+    film = moving_bearing(motion, folder / "bearing")
+    (folder / "bearing.html").write_text(player_html(motion), encoding="utf-8")
+    return [film.name, "bearing.html"]
+
+
+def _record(asked: Asked, motion: History) -> dict[str, Any]:
+    import numpy as np
+
+    from rbdyn.dynamics.motion import orbit
+
+    eccentricity = orbit.eccentricity(motion)
+    clearance = motion.scene.guide_clearance_m
+    quantiles = orbit.whirl_quantiles(motion)
+    return {
+        "format": FORMAT,
+        "status": "ok",
+        "turns": asked.turns,
+        "replicate": asked.replicate + 1,
+        "seed": motion.scene.numerics.seed,
+        "cage_speed_rpm": orbit.mean_cage_speed(motion) * 30.0 / np.pi,
+        "whirl_ratio": orbit.whirl_ratio(motion),
+        "whirl_ratio_quantiles": {f"{100.0 * share:g}%": value for share, value in quantiles.items()},
+        "eccentricity_um": {
+            "mean": float(eccentricity.mean()) * 1e6,
+            "standard_deviation": float(eccentricity.std()) * 1e6,
+            "guide_clearance": None if clearance is None else clearance * 1e6,
+        },
+        "largest": {
+            "pocket": _largest(orbit.largest(motion, motion.pocket_load)),
+            "dry_land": _largest(orbit.largest(motion, motion.land_load)),
+            "outer_race": _largest(orbit.largest(motion, motion.outer_load)),
+            "inner_race": _largest(orbit.largest(motion, motion.inner_load)),
+        },
+        "races": {race: _race(motion, race) for race in get_args(orbit.Race)},
+        "life": _life(motion),
+        "spectra": {
+            "eccentricity_um": _peaks(orbit.eccentricity_spectrum(motion), 1e6),
+            "cage_speed_rpm": _peaks(orbit.cage_speed_spectrum(motion), 30.0 / np.pi),
+        },
+    }
+
+
+def _race(motion: History, race: Race) -> dict[str, float]:
+    from rbdyn.dynamics.motion import orbit
+
+    return {
+        "pressure_GPa": float(orbit.contact_pressure(motion, race).max()) * 1e-9,
+        "pressure_velocity_MPa_m_s": float(orbit.pressure_velocity(motion, race).max()) * 1e-6,
+        "slip_m_s": float(abs(getattr(motion, f"{race}_slip")).max()),
+        "mean_heat_W": float(getattr(motion, f"{race}_heat").sum(axis=1).mean()),
+    }
+
+
+def _life(motion: History) -> dict[str, float | str | None]:
+    """Of the contact loads shown; None where nothing is loaded or nothing turns."""
+    life, operation = motion.life(), motion.scene.operation
+    hours = life.hours(operation.inner_speed_rpm * math.pi / 30.0, operation.outer_speed_rpm * math.pi / 30.0)
+    return {
+        "L10_Mrev": life.million_turns if math.isfinite(life.million_turns) else None,
+        "L10_h": hours if math.isfinite(hours) else None,
+        "equivalent_load_N": life.equivalent_load,
+        "method": "ISO/TS 16281 reference life from the contact loads over time",
+    }
+
+
+def _largest(hit: Largest) -> dict[str, float | int | None]:
+    """Where nothing ever touched there is no time and no roller."""
+    touched = hit.force > 0.0
+    roller = hit.roller + 1 if touched and hit.roller is not None else None
+    return {"force_N": hit.force, "time_ms": hit.time * 1e3 if touched else None, "roller": roller}
+
+
+def _peaks(spectrum: Spectrum, unit: float) -> list[dict[str, float]]:
+    return [{"frequency_Hz": f, "amplitude": unit * amplitude} for f, amplitude in spectrum.peaks(PEAKS)]
+
+
+def print_record(record: dict[str, Any], folder: Path, quiet: bool, verbose: bool) -> None:
+    """The figures a person looks for first; verbosely, the peaks of the spectra too."""
+    quantiles, away = record["whirl_ratio_quantiles"], record["eccentricity_um"]
+    of = "" if away["guide_clearance"] is None else f" of {away['guide_clearance']:.4g}"
+    rows = [
+        ("whirl speed over cage speed, mean", f"{record['whirl_ratio']:.4g}"),
+        ("  median, and 5 % to 95 %", f"{quantiles['50%']:.3g}, {quantiles['5%']:.3g} to {quantiles['95%']:.3g}"),
+        ("eccentricity of the cage [µm]", f"{away['mean']:.4g} ± {away['standard_deviation']:.2g}{of}"),
+    ]
+    for name, hit in record["largest"].items():
+        where = "" if hit["roller"] is None else f", roller {hit['roller']}"
+        when = "never touched" if hit["time_ms"] is None else f"{hit['force_N']:.4g} at {hit['time_ms']:.4g} ms{where}"
+        rows.append((f"largest load, {name.replace('_', ' ')} [N]", when))
+    for name, race in record["races"].items():
+        worst = f"{race['pressure_GPa']:.3g} GPa, {race['slip_m_s']:.3g} m/s, {race['pressure_velocity_MPa_m_s']:.3g} MPa m/s"
+        rows.append((f"largest pressure, slip, their product, {name} race", worst))
+    life = record["life"]
+    if life["L10_h"] is not None:
+        hours = f"{life['L10_h']:.4g} h, {life['L10_Mrev']:.4g} million turns"
+        rows.append(("reference life L10 of these loads", hours))
+    if "lyapunov" in record:
+        chaos = record["lyapunov"]
+        width = chaos["per_turn_half_width"]
+        error = "error not estimated" if width is None else f"± {width:.2g} (95 %)"
+        rows.append(
+            (
+                f"largest Lyapunov exponent a shaft turn, over {chaos['turns']:g} turns",
+                f"{chaos['per_turn']:.3g} {error}",
+            )
+        )
+    title = f"{record['turns']:g} shaft turns of replicate {record['replicate']}, seed {record['seed']}"
+    print_table(title, ("figure", "value"), rows)
+    if verbose:
+        for name, peaks in record["spectra"].items():
+            words, _, unit = name.rpartition("_")
+            cells = [(f"{peak['frequency_Hz']:.0f}", f"{peak['amplitude']:.3g}") for peak in peaks]
+            print_table("", (f"{words.replace('_', ' ')}: peaks [Hz]", f"amplitude [{unit}]"), cells)
+    if not quiet:
+        for note in record["notes"]:
+            print(f"note: {note}")
+    print(f"written to {folder}: {', '.join(record['files'])}")

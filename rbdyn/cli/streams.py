@@ -1,0 +1,106 @@
+"""How a command meets its streams and Ctrl-C: both commands run through here. Loads nothing heavy.
+
+What is written to a pipe whose reader has gone, or to a stream that is closed, is lost without a word: the command goes
+on, so that its files stand whole and its exit code is the usual one. A device that takes no more is told once.
+"""
+
+from __future__ import annotations
+
+import codecs
+import errno
+import io
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from rbdyn.cli.loading import INTERRUPTED
+
+FAILED = 1
+# What tables and sentences hold beyond ASCII, for streams that have no more.
+PLAIN = {"±": "+-", "×": "x", "−": "-", "–": "-", "µ": "u", "°": " deg", "²": "^2", "≤": "<=", "≥": ">=", "█": "#"}
+# Time [s] after which a swallowed Ctrl-C is raised again.
+AGAIN_S = 0.05
+
+
+class _Losing(io.FileIO):
+    """A stream that takes all; ``fault`` is why it began to lose what it takes."""
+
+    fault: OSError | None = None
+
+    def write(self, data: Any, /) -> int:
+        if self.fault is None:
+            try:
+                return super().write(data)
+            except OSError as error:
+                self.fault = error
+        return memoryview(data).nbytes
+
+
+def run(app: Callable[[], object]) -> NoReturn:
+    """Run a command to its exit code, whatever its streams are."""
+    code: Any = 0
+    out, swallowed = _standing(), _swallowed_interrupts()
+    try:
+        try:
+            app()
+        except SystemExit as end:
+            code = end.code
+        sys.stdout.flush()
+    except BaseException as error:
+        if not swallowed and not isinstance(error, KeyboardInterrupt):
+            raise
+        code = INTERRUPTED
+    if out is not None:
+        # All is done: no later Ctrl-C may spoil the code while the interpreter is taken down.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if out.fault is not None and out.fault.errno != errno.EPIPE:
+            print(f"standard output: {out.fault.strerror}; make room, or write elsewhere", file=sys.stderr)
+            code = code or FAILED
+        sys.stderr.flush()
+        if code == INTERRUPTED:
+            # An interrupt that passed through ``exec`` would have the interpreter end by the signal, not by this code.
+            os._exit(code)
+    sys.exit(code)
+
+
+def _swallowed_interrupts() -> list[object]:
+    """Where Ctrl-C falls into a callback, from which nothing can be raised: it is kept here and raised again soon."""
+    found: list[object] = []
+    usual = sys.unraisablehook
+
+    def hook(lost: Any) -> None:
+        if lost.exc_type is not KeyboardInterrupt:
+            return usual(lost)
+        found.append(lost.object)
+        threading.Timer(AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+    sys.unraisablehook = hook
+    return found
+
+
+def _standing() -> _Losing | None:
+    """Put streams that never fail in place of the standard ones; returns that of the output, None if it is redirected."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            # Closed: the next file that is opened would be given its number. The lowest one free is the first closed.
+            os.open(os.devnull, os.O_RDWR)
+    codecs.register_error("rbdyn.plain", _plain)
+    found = None
+    for number, name in ((2, "stderr"), (1, "stdout")):
+        given, found = getattr(sys, name), None
+        if given is getattr(sys, f"__{name}__"):
+            found = _Losing(number, "w", closefd=False)
+            lines, encoding = (given.line_buffering, given.encoding) if given else (True, "utf-8")
+            stream = io.TextIOWrapper(io.BufferedWriter(found), encoding, "rbdyn.plain", line_buffering=lines)
+            setattr(sys, name, stream)
+    return found
+
+
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    assert isinstance(error, UnicodeEncodeError)
+    return "".join(PLAIN.get(each, "?") for each in error.object[error.start : error.end]), error.end

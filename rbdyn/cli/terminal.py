@@ -1,0 +1,128 @@
+"""What the commands share: exit codes, messages, JSON, progress. Knows no physics."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
+
+import typer
+
+from rbdyn.cli.loading import INTERRUPTED
+from rbdyn.cli.streams import FAILED
+from rbdyn.faults import InputError, RunError
+from rbdyn.result import write_json
+
+BAD_INPUT = 2
+# Names what a folder of results was made of.
+MARK = "made_by.json"
+
+
+@contextmanager
+def guarded(as_json: bool) -> Iterator[None]:
+    """Turn faults into sentences on standard error and an exit code; with ``--json`` also into one object."""
+    try:
+        yield
+    except InputError as error:
+        _leave(as_json, BAD_INPUT, error.faults)
+    except RunError as error:
+        _leave(as_json, FAILED, [str(error)])
+    except KeyboardInterrupt as error:
+        _leave(as_json, INTERRUPTED, [f"interrupted; {str(error) or 'nothing was kept'}"])
+    except MemoryError as error:
+        _leave(
+            as_json, FAILED, [f"out of memory: {error or 'no more is left'}; ask for fewer points, samples or turns"]
+        )
+    except OSError as error:
+        sentence = f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
+        _leave(as_json, FAILED if error.errno == errno.ENOSPC else BAD_INPUT, [sentence])
+
+
+def _leave(as_json: bool, code: int, sentences: Sequence[str]) -> NoReturn:
+    for sentence in sentences:
+        print(sentence, file=sys.stderr)
+    failed = {"status": "interrupted" if code == INTERRUPTED else f"failed: {sentences[0]}"}
+    if as_json:
+        print_json({"status": "refused", "faults": sentences} if code == BAD_INPUT else failed)
+    raise typer.Exit(code)
+
+
+def print_json(record: dict[str, Any]) -> None:
+    """One JSON object on standard output."""
+    print(json.dumps(record, indent=1, allow_nan=False))
+
+
+@contextmanager
+def keeping(path: Path | None) -> Iterator[None]:
+    """Let Ctrl-C tell that what was finished lies in ``path``, once that is there; elsewhere nothing is kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if path is None or not path.exists():
+            raise
+        raise KeyboardInterrupt(f"what was finished is kept in {path}: start again to go on") from None
+
+
+def output_folder(path: Path, command: str, source: Path) -> Path:
+    """Make the folder that ``--out`` names, for what ``command`` makes of the file ``source``.
+
+    The rule of all commands: a folder belongs to one command and one file, noted in its ``made_by.json``. Results of the
+    same file, by its place or its content, are written over, those of another stay and the folder is refused. All commands
+    of ``doe`` count as one, for those on one study share its store. Raises InputError.
+    """
+    mark, source = path / MARK, source.resolve()
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        digest = hashlib.sha256(source.read_bytes()).hexdigest()
+        # From the folder on, so that both can be moved, or mounted elsewhere, together.
+        own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
+        found = json.loads(mark.read_text(encoding="utf-8")) if mark.exists() and len(os.listdir(path)) > 1 else own
+        if found["command"] != command or (own["file"] != found["file"] and digest != found["sha256"]):
+            whose = f"what {found['command']} made of {os.path.normpath(path / found['file'])}"
+            raise InputError([f"--out {path}: holds {whose}; name another folder or remove this one"])
+        write_json(mark, own)
+    except OSError as error:
+        raise InputError([f"--out {path}: is no folder to write to ({error.strerror}); name another"]) from None
+    except (ValueError, KeyError, TypeError):
+        raise InputError([f"--out {path}: its {MARK} cannot be read; name another folder or remove this one"]) from None
+    return path
+
+
+@contextmanager
+def progress_bar(title: str, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+    """Progress on a terminal, silence elsewhere; yields ``progress(done, total)``."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A plain table; the first column to the left, the others to the right."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD)
+    for index, column in enumerate(header):
+        table.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    # Wide enough for the table when the output is a file or a pipe, which has no width of its own.
+    console = Console(width=None if sys.stdout.isatty() else 160, highlight=False, markup=False)
+    # A title of the table's own would be broken at the table's width.
+    if title:
+        console.print(title, style="bold")
+    console.print(table)

@@ -1,0 +1,161 @@
+"""How compiled code is made here: plain kernels, laws chosen by type, and cached entry points.
+
+- ``@kernel``: a small pure function of floats and arrays, compiled as part of whatever calls it.
+- ``@law``: a function whose body is chosen, at compile time, by the type of its first argument (a
+  NamedTuple of parameters). A law that a scene leaves out is thus not compiled at all.
+- ``@entry``: the few functions called from Python, and large ones that several of these share. Their machine code is
+  kept on disk, in a folder named by a hash of every module that kernels are made of (``sources``), so that an edit can
+  never bring back stale code.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numba.extending
+from llvmlite.binding import get_host_cpu_features
+from numba import njit
+from numba.core import types
+
+from rbdyn.compiled.sources import compiled_digest
+
+# No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
+# arrays happen to lie: only when every operation is rounded by itself do both give the same bits. And NaN stays a signal.
+OPTIONS: dict[str, Any] = {"error_model": "numpy"}
+# Doubles in the widest vector register. Loops that run over whole vectors leave no scalar rest; results do not depend on
+# it, for every lane is rounded by itself.
+VECTOR = 8 if get_host_cpu_features().get("avx512f") else 4
+# Calls of compiled code return tuples through memory and carry an error status: small functions must vanish.
+INLINED: dict[str, Any] = {**OPTIONS, "forceinline": True}
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a small pure function into its callers; ``.py_func`` keeps the interpreted one."""
+    return njit(**INLINED)(function)
+
+
+def routine(function: Callable[..., Any]) -> Any:
+    """Compile a longer function that is called from several places and not copied into them."""
+    return njit(**OPTIONS)(function)
+
+
+def law(declaration: Callable[..., Any]) -> Any:
+    """Declare a law. Register a body for one or more parameter types with ``@declared.body(ParameterType)``; ``.bodies``
+    holds them by type.
+
+    Works compiled (the choice costs nothing) and interpreted. Raises TypeError where no body is registered.
+    """
+    bodies: dict[type, Callable[..., Any]] = {}
+
+    @functools.wraps(declaration)
+    def chosen(parameters: Any, *arguments: Any) -> Any:
+        if type(parameters) not in bodies:
+            raise TypeError(f"{declaration.__name__} has no body for {type(parameters).__name__}")
+        return bodies[type(parameters)](parameters, *arguments)
+
+    def body(*parameter_types: type) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+        def register(function: Callable[..., Any]) -> Callable[..., Any]:
+            bodies.update(dict.fromkeys(parameter_types, function))
+            return function
+
+        return register
+
+    def choose_at_compile_time(parameters: types.Type, *arguments: types.Type) -> Callable[..., Any] | None:
+        return bodies.get(getattr(parameters, "instance_class", type(None)))
+
+    chosen.body, chosen.bodies = body, bodies  # type: ignore[attr-defined]
+    overload: Any = numba.extending.overload
+    overload(chosen, jit_options=INLINED, strict=False)(choose_at_compile_time)
+    return chosen
+
+
+def _leaves(of: Any) -> list[types.Type]:
+    if isinstance(of, types.NamedTuple | types.NamedUniTuple):
+        return [leaf for field in of.types for leaf in _leaves(field)]
+    return [of]
+
+
+def alike(one: Any, other: Any) -> bool:
+    """Whether two sets of parameters are of one type, and made of numbers only; known at compile time."""
+    if isinstance(one, tuple) and type(one) is type(other):
+        return all(alike(x, y) for x, y in zip(one, other, strict=True))
+    return isinstance(one, float) and isinstance(other, float)
+
+
+@numba.extending.overload(alike, jit_options=INLINED)  # type: ignore[arg-type]
+def _alike(one, other):
+    answer = _mixable(one, other)
+
+    def body(one, other):
+        return answer
+
+    return body
+
+
+def either(first: bool, one: Any, other: Any) -> Any:
+    """``one`` or ``other``, number by number, so that neighbouring lanes may choose differently without a branch.
+
+    Where they are not alike they cannot be mixed: ``other``, whatever is asked for.
+    """
+    return one if first and alike(one, other) else other
+
+
+@numba.extending.overload(either, jit_options=INLINED)  # type: ignore[arg-type]
+def _either(first, one, other):
+    if not _mixable(one, other):
+
+        def body(first, one, other):
+            return other
+
+        return body
+    return _choice(one)
+
+
+def _mixable(one: Any, other: Any) -> bool:
+    return one == other and all(isinstance(leaf, types.Float) for leaf in _leaves(one))
+
+
+def _choice(of: Any) -> Callable[..., Any]:
+    if isinstance(of, types.Float):
+
+        def body(first, one, other):
+            return one if first else other
+
+        return body
+    fields = "".join(f"either(first, one.{name}, other.{name})," for name in of.fields)
+    made: dict[str, Any] = {"either": either, "made": of.instance_class, "__name__": __name__}
+    exec(f"def body(first, one, other): return made({fields})", made)
+    chosen: Callable[..., Any] = made["body"]
+    return chosen
+
+
+def entry(function: Callable[..., Any]) -> Any:
+    """Compile a function that Python calls: releases the GIL and keeps its machine code on disk."""
+    config: Any = numba.core.config
+    previous = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_folder())
+    try:
+        return njit(cache=True, nogil=True, **OPTIONS)(function)
+    finally:
+        config.CACHE_DIR = previous
+
+
+@functools.cache
+def cache_folder() -> Path:
+    """Folder of the compiled code of exactly these kernels; a temporary one where the home is read-only."""
+    digest = hashlib.sha256((numba.__version__ + compiled_digest()).encode())
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    folder = Path(base) / "rbdyn" / digest.hexdigest()[:16]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="rbdyn-"))

@@ -1,0 +1,74 @@
+"""The source code on which bits depend, as one hash: of compiled code, or of figures that are kept.
+
+Only what runs counts: modules that the roots import, directly or through others, without docstrings, comment lines and
+imports for typing. Editing a picture, a command or the description of a key leaves the hash as it was.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+SITE = Path(__file__).parents[2]
+# What draws or prints changes no figure.
+SILENT = ("rbdyn.plots", "rbdyn.cli")
+# A string in triple quotes that has its lines for itself is a docstring.
+_PROSE = re.compile(r'^[ \t]*#.*$|(?P<docstring>^[ \t]*)?"""[\s\S]*?"""(?P<rest>.*)', re.MULTILINE)
+_TYPING = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
+_IMPORT = re.compile(r"^[ \t]*from ([\w.]+) import (\([^)]*\)|.*)$", re.MULTILINE)
+# Where kernels are: what imports their decorators, and what gives a law its bodies.
+_KERNELS = re.compile(
+    r"^from rbdyn\.compiled\.kernel import .*\b(?:entry|kernel|law|routine|INLINED)\b|^@[\w.]+\.body\(", re.MULTILINE
+)
+
+
+@functools.cache
+def source_digest(*roots: str) -> str:
+    """SHA-256 of the code that modules such as ``rbdyn.dynamics.simulate`` run, as it lies on disk at the first call."""
+    digest = hashlib.sha256()
+    for module, code in sorted(code_behind(roots).items()):
+        digest.update(f"{module}\n{code}\n".encode())
+    return digest.hexdigest()
+
+
+@functools.cache
+def compiled_digest() -> str:
+    """SHA-256 of the code from which machine code is made: every module of kernels and what it imports."""
+    parts = [path for path in (SITE / "rbdyn").rglob("*.py") if _KERNELS.search(path.read_text(encoding="utf-8"))]
+    return source_digest(*sorted(".".join(path.relative_to(SITE).with_suffix("").parts) for path in parts))
+
+
+def code_behind(roots: Sequence[str]) -> dict[str, str]:
+    """Modules that the roots need, with what of their text runs; of these packages only."""
+    own = {"rbdyn", *(root.partition(".")[0] for root in roots)}
+    code: dict[str, str] = {}
+    waiting = list(roots)
+    while waiting:
+        module = waiting.pop()
+        path = _path(module)
+        if module in code or path is None or module.startswith(SILENT):
+            continue
+        code[module] = what_runs(path.read_text(encoding="utf-8"))
+        for package, names in _IMPORT.findall(code[module]):
+            if package.partition(".")[0] in own:
+                waiting += [package, *(f"{package}.{name}" for name in re.findall(r"\w+", names))]
+    return code
+
+
+def what_runs(text: str) -> str:
+    """Source text without docstrings, comment lines, empty lines and imports for typing only."""
+
+    def kept(found: re.Match[str]) -> str:
+        return found[0] if found["rest"] or (found["rest"] is not None and found["docstring"] is None) else ""
+
+    bare = _PROSE.sub(kept, text)
+    return "\n".join(line for line in _TYPING.sub("", bare).splitlines() if line.strip())
+
+
+def _path(module: str) -> Path | None:
+    """File of a module or package, None where there is none."""
+    base = SITE.joinpath(*module.split("."))
+    return next((path for path in (base.with_suffix(".py"), base / "__init__.py") if path.is_file()), None)

@@ -1,0 +1,241 @@
+"""Equations of motion: forces gathered into accelerations, and the power each loss takes.
+
+Newton for rollers, cage and rings in Cartesian coordinates (Chen et al. 2022, eq 19-21 in the plane; free of their
+centrifugal terms because the frame does not turn), Euler for spins. The rings turn at prescribed speeds.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.compiled.elementary import fast_cos_sin
+from rbdyn.compiled.kernel import kernel, routine
+from rbdyn.dynamics.forces.cage_body import cage_acceleration
+from rbdyn.dynamics.forces.drag import drag_forces
+from rbdyn.dynamics.forces.drive import action, load_power, tick
+from rbdyn.dynamics.forces.gravity import add_weight
+from rbdyn.dynamics.forces.guide_land import guide_forces
+from rbdyn.dynamics.forces.pocket import pocket_contact, pocket_gap
+from rbdyn.dynamics.forces.race_lanes import race_forces
+from rbdyn.dynamics.forces.races import Race, roller_radius
+from rbdyn.dynamics.forces.ring_motion import RingMotion, outer_motion, support_motion
+from rbdyn.dynamics.forces.state import (
+    CAGE_ANGLE,
+    CAGE_SPEED,
+    CAGE_VX,
+    CAGE_VY,
+    CAGE_X,
+    CAGE_Y,
+    RING_VX,
+    RING_VY,
+    RING_X,
+    RING_Y,
+)
+
+# Powers lost, in the order of the power vector; behind them stand the powers that come in by the shafts and by loads
+# without a potential.
+LOSSES = (
+    "outer_race_traction",
+    "inner_race_traction",
+    "rolling_resistance",
+    "race_damping",
+    "pocket_friction",
+    "pocket_damping",
+    "pocket_film",
+    "land_film",
+    "land_friction",
+    "land_damping",
+    "roller_drag",
+    "support_damping",
+)
+SHAFT = len(LOSSES)
+LOAD = SHAFT + 1
+POWERS = SHAFT + 2
+# Extremes, in the order of the load vector. On a pocket wall: contact and film together, and contact alone.
+POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD = range(5)
+LOADS = 5
+
+
+class RollerBearing(NamedTuple):
+    """All that the compiled code reads. SI; laws are NamedTuples whose types choose the compiled bodies."""
+
+    rollers: int
+    sizes: Any
+    roller_mass: float
+    roller_inertia: float
+    outer: Race
+    inner: Race
+    pocket: Any
+    pocket_cos: NDArray[np.float64]
+    pocket_sin: NDArray[np.float64]
+    guide: Any
+    drag: Any
+    cage: Any
+    outer_ring: Any
+    inner_ring_mass: float
+    drive: Any
+    gravity: Any
+
+
+@kernel
+def roller_count(bearing):
+    """Number of rollers, known not to be negative: so neighbours are read and written as vectors, not one by one."""
+    return max(bearing.rollers, 0)
+
+
+@kernel
+def pocket_direction(bearing, cosine, sine, j):
+    """Unit vector of the mid-line of pocket ``j``, for the cosine and sine of the cage angle."""
+    ex = cosine * bearing.pocket_cos[j] - sine * bearing.pocket_sin[j]
+    ey = sine * bearing.pocket_cos[j] + cosine * bearing.pocket_sin[j]
+    return ex, ey
+
+
+@kernel
+def cage_motion(y, body):
+    """Motion of the cage, whose coordinates stand from ``body`` on; its mark is the mid-line of the first pocket."""
+    cosine, sine = fast_cos_sin(y[body + CAGE_ANGLE])
+    return RingMotion(
+        y[body + CAGE_X], y[body + CAGE_Y], y[body + CAGE_VX], y[body + CAGE_VY], y[body + CAGE_SPEED], cosine, sine
+    )
+
+
+@kernel
+def inner_motion(y, body, acting):
+    """Motion of the inner ring."""
+    return RingMotion(
+        y[body + RING_X],
+        y[body + RING_Y],
+        y[body + RING_VX],
+        y[body + RING_VY],
+        acting.inner_speed,
+        acting.inner_cos,
+        acting.inner_sin,
+    )
+
+
+@kernel
+def motions(bearing, y):
+    """What acts on the bearing in a state, and the motions of cage, inner and outer ring."""
+    body = 5 * roller_count(bearing)
+    acting = action(bearing.drive, y)
+    outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
+    return acting, cage_motion(y, body), inner_motion(y, body, acting), outer
+
+
+@kernel
+def roller_pocket(bearing, y, cage, j):
+    """``pocket_contact`` of roller ``j``."""
+    z = roller_count(bearing)
+    ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)
+    return pocket_contact(
+        bearing.pocket, roller_radius(bearing.sizes, j), ex, ey,
+        y[j] - cage.x, y[z + j] - cage.y, y[2 * z + j] - cage.vx, y[3 * z + j] - cage.vy, y[4 * z + j], cage.speed,
+    )  # fmt: skip
+
+
+@kernel
+def roller_gap(bearing, y, cage, j):
+    """``pocket_gap`` of roller ``j``."""
+    z = roller_count(bearing)
+    ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)
+    dx, dy = y[j] - cage.x, y[z + j] - cage.y
+    return pocket_gap(bearing.pocket, roller_radius(bearing.sizes, j), dy * ex - dx * ey, dx * ex + dy * ey)
+
+
+@kernel
+def derivative(bearing, y, row, dy, power, loads, scratch):
+    """Fill row ``row`` of ``dy``, of the powers [W] and of the largest loads [N], for the state ``y``."""
+    z = roller_count(bearing)
+    body = 5 * z
+    acting, cage, inner, outer = motions(bearing, y)
+    # A long chain of roots and quotients: begun first, it runs beside what follows.
+    land = guide_forces(bearing.guide, cage, inner, outer)
+    tick(bearing.drive, acting, row, dy)
+    cage_fx = cage_fy = cage_moment = pocket_friction = pocket_damping = pocket_film = 0.0
+    pocket_load = contact_load = 0.0
+    drag_loss = drag_forces(bearing.drag, z, y, row, dy)
+    for i in range(2 * z):
+        dy[row, i] = y[2 * z + i]
+    for i in range(4 * z, 5 * z):
+        dy[row, i] = 0.0
+    for j in range(z):
+        scratch.gap[j] = roller_gap(bearing, y, cage, j)
+    for j in range(z):
+        if scratch.gap[j] > 0.0:
+            continue
+        wall = roller_pocket(bearing, y, cage, j)
+        dy[row, 2 * z + j] += wall[0]
+        dy[row, 3 * z + j] += wall[1]
+        dy[row, 4 * z + j] += wall[2]
+        cage_fx -= wall[0]
+        cage_fy -= wall[1]
+        cage_moment += wall[3]
+        pocket_load = max(pocket_load, abs(wall[8]))
+        contact_load = max(contact_load, wall[4])
+        pocket_friction += wall[5]
+        pocket_damping += wall[6]
+        pocket_film += wall[7]
+    on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
+    per_mass, per_inertia = 1.0 / bearing.roller_mass, 1.0 / bearing.roller_inertia
+    for i in range(2 * z, 4 * z):
+        dy[row, i] *= per_mass
+    for i in range(4 * z, 5 * z):
+        dy[row, i] *= per_inertia
+    add_weight(bearing.gravity, 2 * z, z, row, dy)
+    ax, ay, spin_up = cage_acceleration(
+        bearing.cage,
+        cage_fx + land.cage_x,
+        cage_fy + land.cage_y,
+        cage_moment + land.cage_moment,
+        cage.cos,
+        cage.sin,
+        cage.speed,
+    )
+    dy[row, body + CAGE_X] = cage.vx
+    dy[row, body + CAGE_Y] = cage.vy
+    dy[row, body + CAGE_ANGLE] = cage.speed
+    dy[row, body + CAGE_VX] = ax
+    dy[row, body + CAGE_VY] = ay
+    dy[row, body + CAGE_SPEED] = spin_up
+    add_weight(bearing.gravity, body + CAGE_VX, 1, row, dy)
+    dy[row, body + RING_X] = inner.vx
+    dy[row, body + RING_Y] = inner.vy
+    dy[row, body + RING_VX] = (on_inner[0] + land.inner_x + acting.load_x) / bearing.inner_ring_mass
+    dy[row, body + RING_VY] = (on_inner[1] + land.inner_y + acting.load_y) / bearing.inner_ring_mass
+    add_weight(bearing.gravity, body + RING_VX, 1, row, dy)
+    support_loss = support_motion(
+        bearing.outer_ring, bearing.gravity, on_outer[0] + land.outer_x, on_outer[1] + land.outer_y, y, row, dy
+    )
+    power[row, 0] = on_outer[4]
+    power[row, 1] = on_inner[4]
+    power[row, 2] = on_outer[5] + on_inner[5]
+    power[row, 3] = on_outer[6] + on_inner[6]
+    power[row, 4] = pocket_friction
+    power[row, 5] = pocket_damping
+    power[row, 6] = pocket_film
+    power[row, 7] = land.film
+    power[row, 8] = land.friction
+    power[row, 9] = land.damping
+    power[row, 10] = drag_loss
+    power[row, 11] = support_loss
+    inner_moment, outer_moment = on_inner[2] + land.inner_moment, on_outer[2] + land.outer_moment
+    power[row, SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
+    power[row, LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
+    loads[row, POCKET_LOAD] = pocket_load
+    loads[row, OUTER_LOAD] = on_outer[3]
+    loads[row, INNER_LOAD] = on_inner[3]
+    loads[row, LAND_LOAD] = land.load
+    loads[row, POCKET_CONTACT_LOAD] = contact_load
+
+
+@routine
+def derivative_once(bearing, y, row, dy, power, loads, scratch):
+    """``derivative`` for calls outside the innermost loop, of which it would otherwise be a copy each.
+
+    Its parameters, more than a hundred numbers, are handed over one by one, which costs a quarter of the evaluation.
+    """
+    derivative(bearing, y, row, dy, power, loads, scratch)

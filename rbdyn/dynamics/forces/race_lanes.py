@@ -1,0 +1,251 @@
+"""Race contacts side by side: blocks of contacts in straight-line code, which the compiler turns into vector code.
+
+Whole vectors of rollers go through the outer race straight from the state. The rest of them, and the rollers that touch
+the inner race, are picked out and, where both races follow the same laws, share vectors.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.compiled.kernel import VECTOR, alike, either, kernel, law
+from rbdyn.contact.hertz_line import (
+    LineContact,
+    LogarithmicLineContact,
+    PowerLineContact,
+    SlicedLineContact,
+    TiltedLineContact,
+)
+from rbdyn.contact.traction import (
+    BlendedFourConstantTraction,
+    CoulombTraction,
+    FourConstantTraction,
+    MixedTraction,
+    NoTraction,
+    TractionSurface,
+)
+from rbdyn.dynamics.forces.race_form import RoundRace, WavyRace
+from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers, race_contact, roller_radius
+
+# Contacts are worked through in blocks of LANES, VECTOR at a time; each quantity is a row of a block. Rollers that are
+# picked out bring their coordinates, their radii and, as the last row, the side of the race: +1 outer, -1 inner.
+LANES, COORDINATES, OUTPUTS = 16, 5, 8
+RADII = COORDINATES * LANES
+SIDES = RADII + LANES
+
+
+class Scratch(NamedTuple):
+    """Work space of one thread."""
+
+    packed: NDArray[np.float64]  # ((COORDINATES + 2) * LANES,)
+    lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
+    roller: NDArray[np.int64]  # (LANES,) number of each packed roller
+    gap: NDArray[np.float64]  # (rollers,) way that each has left in its pocket [m]
+
+
+def scratch(rollers: int) -> Scratch:
+    """Work space for the contacts of so many rollers."""
+    return Scratch(
+        np.ones((COORDINATES + 2) * LANES), np.empty(OUTPUTS * LANES), np.zeros(LANES, np.int64), np.empty(rollers)
+    )
+
+
+@law
+def radii_in_order(sizes, unused):
+    """Where the radii of all rollers stand; ``unused`` where there are none to read."""
+
+
+@radii_in_order.body(EqualRollers)
+def _(sizes, unused):
+    return unused
+
+
+@radii_in_order.body(UnequalRollers)
+def _(sizes, unused):
+    return sizes.radii
+
+
+@law
+def lane_radius(sizes, radii, place):
+    """Radius of the roller in a lane, from ``radii`` where rollers differ [m]."""
+
+
+@lane_radius.body(EqualRollers)
+def _(sizes, radii, place):
+    return sizes.radius
+
+
+@lane_radius.body(UnequalRollers)
+def _(sizes, radii, place):
+    return radii[place]
+
+
+@law
+def in_vectors(parameters):
+    """Whether neighbouring contacts with this law share vector instructions."""
+
+
+@in_vectors.body(
+    LineContact,
+    PowerLineContact,
+    LogarithmicLineContact,
+    RoundRace,
+    NoTraction,
+    FourConstantTraction,
+    BlendedFourConstantTraction,
+)
+def _(parameters):
+    return True
+
+
+# Loops within, table look-ups and calls of the C library keep a contact to itself.
+@in_vectors.body(SlicedLineContact, TiltedLineContact, WavyRace, CoulombTraction, TractionSurface, MixedTraction)
+def _(parameters):
+    return False
+
+
+@kernel
+def runs_in_vectors(race):
+    """Whether contacts of this race share vector instructions."""
+    return in_vectors(race.contact) and in_vectors(race.form) and in_vectors(race.traction)
+
+
+@kernel
+def share_vectors(outer, inner):
+    """Whether contacts of both races may stand in one vector."""
+    return runs_in_vectors(inner) and alike(outer, inner)
+
+
+@kernel
+def lanes_to_fill(race, count):
+    """Whole vectors, where contacts run in vectors and a scalar rest would cost as much; else just ``count``."""
+    return (count + VECTOR - 1) // VECTOR * VECTOR if runs_in_vectors(race) else count
+
+
+@kernel
+def keep_lane(lanes, i, out):
+    """Write what ``race_contact`` found to lane ``i``."""
+    lanes[i] = out[0]
+    lanes[LANES + i] = out[1]
+    lanes[2 * LANES + i] = out[2]
+    lanes[3 * LANES + i] = out[3]
+    lanes[4 * LANES + i] = out[4]
+    lanes[5 * LANES + i] = out[5]
+    lanes[6 * LANES + i] = out[6]
+    lanes[7 * LANES + i] = out[7]
+
+
+@kernel
+def contact_in_lane(race, side, radius, ring, source, j, stride):
+    """``race_contact`` of the roller whose x, y, vx, vy and spin stand at ``source[j + row * stride]``."""
+    return race_contact(
+        race,
+        side,
+        radius,
+        source[j] - ring.x,
+        source[j + stride] - ring.y,
+        source[j + 2 * stride] - ring.vx,
+        source[j + 3 * stride] - ring.vy,
+        source[j + 4 * stride],
+        ring.speed,
+        ring.cos,
+        ring.sin,
+    )
+
+
+@kernel
+def outer_block(race, sizes, ring, y, first, rollers, lanes, count):
+    """Outer contacts of ``count`` rollers from ``first`` on, maybe rounded up to whole vectors, into ``lanes``.
+
+    The lanes past ``count`` hold nothing.
+    """
+    radii = radii_in_order(sizes, y)
+    for i in range(lanes_to_fill(race, count)):
+        j = first + i
+        radius = lane_radius(sizes, radii, j)
+        keep_lane(lanes, i, contact_in_lane(race, 1.0, radius, ring, y, j, rollers))
+
+
+@kernel
+def picked_block(outer, inner, sizes, outer_ring, inner_ring, packed, lanes, count):
+    """As ``outer_block``, for packed contacts: of either race where they share vectors, else of the inner one."""
+    for i in range(lanes_to_fill(inner, count)):
+        side = packed[SIDES + i]
+        race, ring = either(side > 0.0, outer, inner), either(side > 0.0, outer_ring, inner_ring)
+        radius = lane_radius(sizes, packed, RADII + i)
+        keep_lane(lanes, i, contact_in_lane(race, side, radius, ring, packed, i, LANES))
+
+
+@kernel
+def pack(sizes, rollers, y, j, side, scratch, lane):
+    """Copy the state of roller ``j`` to a lane."""
+    for row in range(COORDINATES):
+        scratch.packed[row * LANES + lane] = y[row * rollers + j]
+    scratch.packed[RADII + lane] = roller_radius(sizes, j)
+    scratch.packed[SIDES + lane] = side
+    scratch.roller[lane] = j
+
+
+@kernel
+def add_block(lanes, i, j, rollers, row, dy, sums):
+    """Add contact ``i`` of a block to roller ``j`` and to the sums of its race."""
+    force_x, force_y = lanes[i], lanes[LANES + i]
+    dy[row, 2 * rollers + j] += force_x
+    dy[row, 3 * rollers + j] += force_y
+    dy[row, 4 * rollers + j] += lanes[2 * LANES + i]
+    return (
+        sums[0] - force_x,
+        sums[1] - force_y,
+        sums[2] + lanes[3 * LANES + i],
+        max(sums[3], lanes[4 * LANES + i]),
+        sums[4] + lanes[5 * LANES + i],
+        sums[5] + lanes[6 * LANES + i],
+        sums[6] + lanes[7 * LANES + i],
+    )
+
+
+@kernel
+def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy, scratch):
+    """All contacts of both races: adds forces and moments on the rollers to row ``row`` of ``dy``.
+
+    Returns, for the outer and for the inner race, (force x, force y, moment on the ring, largest load, powers lost in
+    traction, rolling and damping). Nearly every roller touches the outer race; only those of the load zone touch the
+    inner one and are picked out first.
+    """
+    lanes, index = scratch.lanes, scratch.roller
+    on_outer = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    on_inner = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    in_order = rollers // VECTOR * VECTOR if share_vectors(outer, inner) else rollers
+    start = 0
+    while start < in_order:
+        count = min(LANES, in_order - start)
+        outer_block(outer, sizes, outer_ring, y, start, rollers, lanes, count)
+        for i in range(count):
+            on_outer = add_block(lanes, i, start + i, rollers, row, dy, on_outer)
+        start += LANES
+
+    left, reach2 = 0, inner.reach * inner.reach
+    start = in_order
+    while start < rollers or left < rollers:
+        count = 0
+        while start < rollers and count < LANES:
+            pack(sizes, rollers, y, start, 1.0, scratch, count)
+            start += 1
+            count += 1
+        outer_count = count
+        while left < rollers and count < LANES:
+            dx, dy_ = y[left] - inner_ring.x, y[rollers + left] - inner_ring.y
+            if dx * dx + dy_ * dy_ < reach2:
+                pack(sizes, rollers, y, left, -1.0, scratch, count)
+                count += 1
+            left += 1
+        if count > 0:
+            picked_block(outer, inner, sizes, outer_ring, inner_ring, scratch.packed, lanes, count)
+        for i in range(outer_count):
+            on_outer = add_block(lanes, i, index[i], rollers, row, dy, on_outer)
+        for i in range(outer_count, count):
+            on_inner = add_block(lanes, i, index[i], rollers, row, dy, on_inner)
+    return on_outer, on_inner

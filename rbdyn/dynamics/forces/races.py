@@ -1,0 +1,123 @@
+"""Roller against raceway: normal load, traction and rolling resistance as one wrench at the contact point.
+
+The wrench acts with opposite sign on roller and ring at the same point, so that force, moment and power balance
+exactly. ``side`` is +1 for the outer race (the ring encloses the roller) and -1 for the inner race.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.compiled.kernel import VECTOR, kernel, law
+from rbdyn.contact.damping import damped_load
+from rbdyn.contact.hertz_line import around, line_load, root_stiffness
+from rbdyn.contact.rolling_resistance import rolling_force
+from rbdyn.contact.traction import traction
+from rbdyn.dynamics.forces.race_form import form_at, sloped
+
+# Below this a speed is round-off; it keeps the roots of the laws finite.
+SMALLEST_SPEED = 1e-12
+
+
+class Race(NamedTuple):
+    """One raceway: its radius, the largest distance of ring and roller centres at which they may touch [m], its laws."""
+
+    radius: float
+    reach: float
+    form: Any
+    contact: Any
+    damping: Any
+    traction: Any
+    rolling: Any
+
+
+class EqualRollers(NamedTuple):
+    """Rollers of one radius [m]."""
+
+    radius: float
+
+
+class UnequalRollers(NamedTuple):
+    """Each roller with its own radius [m]; masses are those of the mean."""
+
+    radii: NDArray[np.float64]  # padded to whole vectors
+
+
+def unequal_rollers(radii: NDArray[np.float64]) -> UnequalRollers:
+    """Rollers of these radii [m]."""
+    return UnequalRollers(np.concatenate((radii, np.full(-len(radii) % VECTOR, radii[0]))))
+
+
+@law
+def roller_radius(sizes, number):
+    """Radius of a roller [m]."""
+
+
+@roller_radius.body(EqualRollers)
+def _(sizes, number):
+    return sizes.radius
+
+
+@roller_radius.body(UnequalRollers)
+def _(sizes, number):
+    return sizes.radii[number]
+
+
+@kernel
+def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin):
+    """Wrench of one race on one roller; zero, but for round-off, where they do not touch.
+
+    ``dx, dy, dvx, dvy``: position [m] and velocity [m/s] of the roller's centre less those of the ring's centre;
+    spins [rad/s]; ``ring_cos, ring_sin``: direction of the ring's mark. Returns (force x, force y, moment on the
+    roller, moment on the ring about its centre, load, powers lost in traction, in rolling and in damping, slip) in
+    N, N m, W and m/s. The force on the ring is the opposite.
+
+    Load: Chen et al. 2022, eq 5-6; slip at the point that halves the approach: eq 7-10; rolling resistance with
+    the pressure offset 2 F_R R_x/R_b: Biboulet and Houpert 2010. On a wavy race the load points along the gradient of
+    the overlap: through the roller's centre, past the ring's; so it does between tilted races, whose tilt, being
+    prescribed, bears the moment that this makes about the ring's centre.
+    """
+    distance = math.sqrt(dx * dx + dy * dy)
+    inverse = 1.0 / distance
+    nx, ny = dx * inverse, dy * inverse
+    rise, slope = form_at(race.form, nx, ny, ring_cos, ring_sin)
+    # Terms that a round race lacks are subtracted: x - 0 is the one sum with zero that the compiler may drop.
+    overlap = side * (distance - race.radius - rise) + radius
+    tangential = dvy * nx - dvx * ny
+    orbit_rate = tangential * inverse
+    elastic, stiffness, approach, lean = line_load(race.contact, overlap, nx, ny)
+    approach_rate = side * (dvx * nx + dvy * ny - sloped(race.form, slope, orbit_rate - ring_speed))
+    approach_rate -= around(race.contact, -lean, orbit_rate)
+    root = root_stiffness(race.contact, stiffness, approach)
+    damped = damped_load(race.damping, elastic, root, approach, approach_rate)
+    load = 0.0 if elastic == 0.0 else damped
+
+    roller_lever = side * (radius - 0.5 * approach)
+    ring_lever = distance + roller_lever
+    slip = ring_speed * ring_lever - tangential - roller_spin * roller_lever
+    traction_force = traction(race.traction, slip, load) * load
+
+    # Seen from the line of centres both surfaces run the same way at the entrainment speed.
+    roller_surface = (roller_spin - orbit_rate) * roller_lever
+    ring_surface = (ring_speed - orbit_rate) * ring_lever
+    entrainment = 0.5 * (roller_surface + ring_surface)
+    resistance = rolling_force(race.rolling, load, max(abs(entrainment), SMALLEST_SPEED))
+    rolling = math.copysign(resistance, entrainment)
+    normal = -side * load
+    along = traction_force + rolling * (ring_lever + roller_lever) * inverse
+    along -= sloped(race.form, slope, normal * inverse) + around(race.contact, lean, load * inverse)
+    return (
+        normal * nx - along * ny,
+        normal * ny + along * nx,
+        roller_lever * (traction_force - rolling),
+        -ring_lever * (traction_force + rolling) - sloped(race.form, slope, -normal),
+        load,
+        traction_force * slip,
+        2.0 * rolling * entrainment,
+        (load - elastic) * approach_rate,
+        slip,
+    )

@@ -1,0 +1,88 @@
+"""Quantities that are prescribed over time: constant, held steps, straight or smooth ramps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.compiled.kernel import kernel, law
+
+
+class Constant(NamedTuple):
+    """The same at all times."""
+
+    value: float
+
+
+class Steps(NamedTuple):
+    """Each value holds from its time to the next."""
+
+    time: NDArray[np.float64]  # rising [s]
+    value: NDArray[np.float64]
+
+
+class Ramps(NamedTuple):
+    """Straight lines between the points, constant before the first and after the last."""
+
+    time: NDArray[np.float64]
+    value: NDArray[np.float64]
+
+
+class SmoothRamps(NamedTuple):
+    """As ``Ramps``, with half cosines: no jump of the rate of change."""
+
+    time: NDArray[np.float64]
+    value: NDArray[np.float64]
+
+
+@kernel
+def segment(times, time):
+    """Number of the last point at or before ``time``; -1 before the first."""
+    low, high = -1, times.size
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle] <= time:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def share_of_segment(times, i, time):
+    """How far ``time`` is from point i to the next, 0 to 1."""
+    return (time - times[i]) / (times[i + 1] - times[i])
+
+
+@law
+def value_at(schedule, time):
+    """Value of a schedule at a time [s]."""
+
+
+@value_at.body(Constant)
+def _(schedule, time):
+    return schedule.value
+
+
+@value_at.body(Steps)
+def _(schedule, time):
+    return schedule.value[max(segment(schedule.time, time), 0)]
+
+
+@value_at.body(Ramps)
+def _(schedule, time):
+    i = segment(schedule.time, time)
+    if i < 0 or i == schedule.time.size - 1:
+        return schedule.value[max(i, 0)]
+    return schedule.value[i] + share_of_segment(schedule.time, i, time) * (schedule.value[i + 1] - schedule.value[i])
+
+
+@value_at.body(SmoothRamps)
+def _(schedule, time):
+    i = segment(schedule.time, time)
+    if i < 0 or i == schedule.time.size - 1:
+        return schedule.value[max(i, 0)]
+    share = 0.5 - 0.5 * np.cos(np.pi * share_of_segment(schedule.time, i, time))
+    return schedule.value[i] + share * (schedule.value[i + 1] - schedule.value[i])

@@ -1,0 +1,41 @@
+"""What the loop of ``runge_kutta`` asks of an embedded pair. Each is a law, so that stages and weights are compiled in.
+
+A pair is a NamedTuple of numbers: ``last``, the row of ``Carry.k`` at the end of the step, which is the first of the next
+one; ``free``, a row in which nothing is kept once the step is taken; the ``exponent`` of the error of this step and ``beta`` of
+the one before in the control of the step, ``rejected`` that of the error of a step that is refused; and h |eigenvalue|
+from which stability is said to hold a step, ``limit``.
+"""
+
+from __future__ import annotations
+
+from rbdyn.compiled.kernel import law
+
+
+@law
+def stage_weight(pair, s, j):
+    """Weight of row ``j`` in the state at which row ``s`` is evaluated."""
+
+
+@law
+def stage_time(pair, s):
+    """Time of row ``s`` since the start of the step, over its size."""
+
+
+@law
+def stage_state(pair, s, y, k, h, state):
+    """State at which row ``s`` is evaluated. One pass a stage: rows of weight zero may hold anything."""
+
+
+@law
+def mean_rate(pair, rows, i):
+    """Mean over the step of rate ``i``, by the main weights."""
+
+
+@law
+def rate_error(pair, k, i):
+    """Main less embedded mean of rate ``i``."""
+
+
+@law
+def quartic_rate(pair, k, i):
+    """What the dense output adds to the cubic through values and slopes at both ends: coefficient of theta^2 (1 - theta)^2."""

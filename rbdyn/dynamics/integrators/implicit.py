@@ -1,0 +1,82 @@
+"""From a scene to what the linearly implicit method works on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.compiled.kernel import VECTOR
+from rbdyn.dynamics.forces.equations import LOADS, POWERS, RollerBearing
+from rbdyn.dynamics.forces.race_lanes import scratch
+from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
+from rbdyn.dynamics.integrators.arrow_matrix import PARTS, arrow_matrix
+from rbdyn.dynamics.integrators.jacobian import Differences, OneRoller
+from rbdyn.dynamics.integrators.rosenbrock import STAGES, Workspace
+from rbdyn.dynamics.parameters.geometry import absolute_tolerance, kinematics, layout_of, shaft_speeds
+from rbdyn.scene import Scene
+
+
+def workspace(scene: Scene, bearing: RollerBearing) -> Workspace:
+    """Work space for a scene."""
+    layout = layout_of(scene)
+    n = layout.size
+    return Workspace(
+        np.zeros((STAGES, n)),
+        np.zeros((STAGES, POWERS)),
+        np.zeros((2, n)),
+        np.zeros(n),
+        differences(scene, bearing),
+        arrow_matrix(layout),
+    )
+
+
+def differences(scene: Scene, bearing: RollerBearing) -> Differences:
+    """Storage for the Jacobian of a scene."""
+    layout = layout_of(scene)
+    gradients = np.zeros((POWERS, layout.size))
+    return Differences(arrow_matrix(layout), gradients, increments(scene, bearing), one_roller(bearing, layout.size))
+
+
+def increments(scene: Scene, bearing: RollerBearing) -> NDArray[np.float64]:
+    """Increment of each state component: the geometric mean of its round-off and of the scale on which laws change,
+    so that round-off and truncation of a difference quotient are alike.
+    """
+    layout, motion = layout_of(scene), kinematics(scene)
+    length = 0.5e-3 * scene.bearing.pitch_diameter_mm
+    turning = max(abs(speed) for speed in shaft_speeds(scene))
+    speed = length * turning
+    spin = max(abs(motion.roller_spin), turning)
+    bodies = [length, length, 1.0, speed, speed, turning, length, length, speed, speed]
+    bodies += [length, length, speed, speed] if layout.support is not None else []
+    clock = [scene.turn_s, 1.0, 1.0] if layout.clock is not None else []
+    size = np.concatenate((np.repeat([length, length, speed, speed, spin], layout.rollers), bodies, clock))
+    scale = np.minimum(absolute_tolerance(scene, bearing, 1.0, "rosenbrock"), size)
+    return np.sqrt(np.finfo(float).eps * size * scale)
+
+
+def one_roller(bearing: RollerBearing, size: int) -> OneRoller:
+    """The same bearing, of the same types of laws, with room for one roller."""
+    moved = PARTS * (bearing.rollers - 1)
+    single = bearing._replace(
+        rollers=1,
+        sizes=_room_for_one(bearing.sizes),
+        pocket_cos=np.ones(1),
+        pocket_sin=np.zeros(1),
+        drive=_moved(bearing.drive, moved),
+        outer_ring=_moved(bearing.outer_ring, moved),
+    )
+    rows = size - moved
+    return OneRoller(
+        single, np.zeros(rows), np.zeros((2, rows)), np.zeros((2, POWERS)), np.zeros((2, LOADS)), scratch(1)
+    )
+
+
+def _room_for_one(sizes: EqualRollers | UnequalRollers) -> EqualRollers | UnequalRollers:
+    return sizes if isinstance(sizes, EqualRollers) else UnequalRollers(np.zeros(VECTOR))
+
+
+def _moved(part: Any, by: int) -> Any:
+    """A part whose coordinates stand further forward by ``by``, where it has any."""
+    return part._replace(start=part.start - by) if hasattr(part, "start") else part

@@ -1,0 +1,154 @@
+"""A time history of one replicate, on request: motions, and every contact's load, slip and heat, at uniform samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.forces import observe as row
+from rbdyn.dynamics.forces.observe import OBSERVED, observe
+from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, RING_X, RING_Y
+from rbdyn.dynamics.parameters.geometry import layout_of
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.run import Run
+from rbdyn.scene import Scene
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from rbdyn.life.rollers import ReferenceLife
+
+Array = NDArray[np.float64]
+# Numbers of a history, 0.8 GB: with its table and pictures 2 GB. 1000 turns of 10 rollers at 512 samples are 0.7e8.
+MOST_NUMBERS = 1e8
+
+
+@dataclass(frozen=True)
+class History:
+    """Samples at equal intervals after the discarded turns. Arrays over (samples,) or (samples, rollers); SI.
+
+    ``azimuth``: of the rollers from the load direction [rad], growing without bound; ``pocket_load``: contact and
+    film on the more loaded wall, positive on the front one, where the roller drives the cage; slips: ring surface less roller surface; heats: traction and rolling.
+    """
+
+    scene: Scene
+    time: Array
+    inner_angle: Array
+    cage_x: Array
+    cage_y: Array
+    cage_vx: Array
+    cage_vy: Array
+    cage_angle: Array
+    cage_speed: Array
+    ring_x: Array
+    ring_y: Array
+    outer_x: Array
+    outer_y: Array
+    roller_x: Array
+    roller_y: Array
+    roller_spin: Array
+    azimuth: Array
+    outer_load: Array
+    inner_load: Array
+    pocket_load: Array
+    outer_slip: Array
+    inner_slip: Array
+    outer_heat: Array
+    inner_heat: Array
+    land_load: Array
+
+    @property
+    def guide_eccentricity(self) -> tuple[Array, Array]:
+        """Cage centre less that of the ring that guides it, x and y [m]."""
+        if self.scene.cage.guidance == "inner":
+            return self.cage_x - self.ring_x, self.cage_y - self.ring_y
+        return self.cage_x - self.outer_x, self.cage_y - self.outer_y
+
+    def life(self) -> ReferenceLife:
+        """Reference rating life of ISO/TS 16281 from the loads of this history."""
+        from rbdyn.dynamics.motion.rating import rating_life
+
+        return rating_life(self.scene, self.azimuth, self.inner_load, self.outer_load)
+
+    def table(self) -> pd.DataFrame:
+        """A row a sample, units in the column names."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {
+            "time_s": self.time,
+            "cage_x_um": self.cage_x * 1e6,
+            "cage_y_um": self.cage_y * 1e6,
+            "cage_speed_rpm": self.cage_speed * 30.0 / np.pi,
+            "inner_ring_x_um": self.ring_x * 1e6,
+            "inner_ring_y_um": self.ring_y * 1e6,
+            "land_N": self.land_load,
+        }
+        for name, unit in (("pocket_load", "N"), ("outer_load", "N"), ("inner_load", "N")):
+            for j, values in enumerate(getattr(self, name).T):
+                columns[f"{name.removesuffix('_load')}_{j + 1}_{unit}"] = values
+        for name in ("outer_slip", "inner_slip"):
+            for j, values in enumerate(getattr(self, name).T):
+                columns[f"{name}_{j + 1}_m_s"] = values
+        return pd.DataFrame(columns)
+
+
+def most_turns(scene: Scene) -> float:
+    """Shaft turns for whose history there is memory."""
+    sample = layout_of(scene).size + OBSERVED * scene.bearing.rollers
+    return MOST_NUMBERS / (sample * scene.numerics.samples_per_turn)
+
+
+def history(
+    scene: Scene, turns: float, replicate: int = 0, samples_per_turn: int | None = None, stop: Stop | None = None
+) -> History:
+    """History of one replicate over the first ``turns`` counted turns. Raises RunError."""
+    bearing = roller_bearing(scene)
+    z = bearing.rollers
+    run = Run(scene, bearing, replicate, scene.numerics.rtol, stop or Stop())
+    run.to(scene.numerics.warm_up_turns)
+    run.forget()
+    per_turn = samples_per_turn or scene.numerics.samples_per_turn
+    states = np.empty((int(turns * per_turn), run.carry.y.size))
+    clock = np.empty((len(states), 2))
+    for sample, state in enumerate(states):
+        # Steps end at the samples: what is recorded is what was integrated.
+        run.to(scene.numerics.warm_up_turns + sample / per_turn)
+        state[:] = run.carry.y
+        clock[sample] = run.clock_angles()
+    seen = np.empty((OBSERVED, len(states), z))
+    land = np.empty(len(states))
+    observe(bearing, states, seen, land)
+    body, support = 5 * z, run.layout.support
+    x, y = states[:, :z], states[:, z : 2 * z]
+    still = np.zeros(len(states))
+    return History(
+        scene=scene,
+        time=np.arange(len(states)) * scene.turn_s / per_turn,
+        inner_angle=clock[:, 0],
+        cage_x=states[:, body + CAGE_X],
+        cage_y=states[:, body + CAGE_Y],
+        cage_vx=states[:, body + CAGE_VX],
+        cage_vy=states[:, body + CAGE_VY],
+        cage_angle=states[:, body + CAGE_ANGLE],
+        cage_speed=states[:, body + CAGE_SPEED],
+        ring_x=states[:, body + RING_X],
+        ring_y=states[:, body + RING_Y],
+        outer_x=still if support is None else states[:, support],
+        outer_y=still if support is None else states[:, support + 1],
+        roller_x=x,
+        roller_y=y,
+        roller_spin=states[:, 4 * z : 5 * z],
+        azimuth=np.unwrap(np.arctan2(y, x), axis=0),
+        outer_load=seen[row.OUTER_LOAD],
+        inner_load=seen[row.INNER_LOAD],
+        pocket_load=seen[row.POCKET_LOAD],
+        outer_slip=seen[row.OUTER_SLIP],
+        inner_slip=seen[row.INNER_SLIP],
+        outer_heat=seen[row.OUTER_HEAT],
+        inner_heat=seen[row.INNER_HEAT],
+        land_load=land,
+    )

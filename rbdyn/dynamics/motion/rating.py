@@ -1,0 +1,45 @@
+"""Rating life of a simulated bearing: ISO/TS 16281 with the loads that every roller saw instead of static ones."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.dynamics.forces.slice_loads import slice_loads
+from rbdyn.dynamics.parameters.model import race_contact_law
+from rbdyn.life.rollers import ReferenceLife, Turning, dynamic_capacity, reference_life
+from rbdyn.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+def rating_life(scene: Scene, azimuth: Array, inner_load: Array, outer_load: Array) -> ReferenceLife:
+    """Reference life from loads [N] of every roller over time at azimuths [rad], (rows, rollers) each; they should span
+    whole cage turns.
+
+    Loads spread over the slices as at rest. Edge stresses count where the roller has a profile; a plain cylinder's
+    ends would need a half-space solution. Rings that turn see the mean over all rollers, a ring at rest each place.
+    """
+    drawing = scene.bearing
+    diameter, pitch = drawing.roller_diameter_mm * 1e-3, drawing.pitch_diameter_mm * 1e-3
+    capacity = drawing.dynamic_capacity_N or dynamic_capacity(
+        drawing.rollers, diameter, drawing.effective_length_mm * 1e-3, pitch
+    )
+    nx, ny = np.cos(azimuth), np.sin(azimuth)
+    inner, outer = (
+        slice_loads(race_contact_law(scene, race), scene.slices, 0.5 * diameter, loads, nx, ny)
+        for race, loads in (("inner", inner_load), ("outer", outer_load))
+    )
+    inner_turns, outer_turns = scene.operation.inner_speed_rpm != 0.0, scene.operation.outer_speed_rpm != 0.0
+    turning: Turning = "inner" if not outer_turns else "both" if inner_turns else "outer"
+    return reference_life(
+        inner,
+        outer,
+        capacity=capacity,
+        gamma=diameter / pitch,
+        turning=turning,
+        angle=np.mod(azimuth, 2.0 * math.pi),
+        edges=drawing.roller_profile != "cylinder",
+    )

@@ -1,0 +1,178 @@
+"""What the model leaves out, in one list: what each item would change, and how large it is by an estimate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from rbdyn.contact.hertz_line import palmgren
+from rbdyn.dynamics.forces.drag import AIR_DENSITY
+from rbdyn.dynamics.parameters.geometry import cage_rim_diameter, kinematics, reduced_radii
+from rbdyn.properties.materials import equivalent_modulus
+from rbdyn.scene import Scene
+
+# Share of the power loss from which a result speaks of power that was left out.
+TOLD_SHARE = 0.03
+# Bronze and steel cages have 100 GPa and more, polymers and laminates up to 20.
+SOFT_CAGE = 20e9  # [Pa]
+# An oil jet carried 1.4 kW off a 35 mm ball bearing at 72 000 rpm with seats, pi B (D + d), of 4270 mm^2 (NASA TP-2275) [W/m^2];
+# some times as much is beyond any cooling. Oil takes up 27 W/K a litre a minute (SKF), over at most some 100 K [W min/L].
+JET_COOLED, TOO_HOT, OIL_HEAT = 0.33e6, 10.0, 2700.0
+
+
+class LeftOut(NamedTuple):
+    """One item: its name, what it would change, how it is estimated, and where it matters.
+
+    ``power``: its estimate for a scene [W], None where there is none; ``matters``: whether a scene without such an
+    estimate calls for it.
+    """
+
+    name: str
+    changes: str
+    estimate: str
+    power: Callable[[Scene], float] | None = None
+    matters: Callable[[Scene], bool] | None = None
+
+
+def disc_moment(density: float, viscosity: float, speed: float, radius: float) -> float:
+    """Moment on both faces of a disc that turns at ``speed`` [rad/s] in a fluid at rest [N m].
+
+    rho w^2 r^5 C_n/2 with C_n = 3.87/Re^0.5 below Re = rho r^2 w/eta = 3e5, 0.146/Re^0.2 above (von Karman 1921).
+    """
+    reynolds = density * radius**2 * speed / viscosity
+    if reynolds == 0.0:
+        return 0.0
+    factor = 3.87 / math.sqrt(reynolds) if reynolds < 3e5 else 0.146 / reynolds**0.2
+    return 0.5 * density * speed**2 * radius**5 * factor
+
+
+def friction_factor(reynolds: float) -> float:
+    """Shear over dynamic pressure at the surface of a cylinder that turns freely, Re = rho w r^2/eta > 0.
+
+    Laminar 4/Re, exact; else 1/sqrt(f) = -0.6 + 4.07 log10(Re sqrt(f)), measured by Theodorsen and Regier 1944.
+    """
+    root = 0.1
+    for _ in range(40):
+        # Below Re = 80 the curve lies under the laminar line, and far below it has no root: any large one will do.
+        root = 1.0 / max(-0.6 + 4.07 * math.log10(max(reynolds * root, 1.0)), 4.0)
+    return max(root**2, 4.0 / reynolds)
+
+
+def cylinder_moment(density: float, viscosity: float, speed: float, radius: float, length: float) -> float:
+    """Moment on the surface of a cylinder that turns in a fluid at rest, rho w^2 r^2 f/2 over 2 pi r l [N m]."""
+    reynolds = density * radius**2 * speed / viscosity
+    if reynolds == 0.0:
+        return 0.0
+    stress = 0.5 * density * (speed * radius) ** 2 * friction_factor(reynolds)
+    return stress * 2.0 * math.pi * radius**2 * length
+
+
+def spin_windage(scene: Scene) -> float:
+    """Power of rollers that spin and a cage that turns in the oil-air mixture, beside the rollers' orbital drag [W].
+
+    Ends and surfaces of rollers, which turn against pockets that turn with the cage; side faces of the cage, and its rim
+    off the land over the width of its lands. The mixture has the density X rho_oil + (1 - X) rho_air and the viscosity
+    of the oil.
+    """
+    drawing, cage, motion = scene.bearing, scene.cage, kinematics(scene)
+    oil, share = scene.lubricant.in_service, scene.lubricant.oil_fraction
+    mixture = share * oil.density + (1.0 - share) * AIR_DENSITY, oil.viscosity
+    spin, turning = abs(motion.roller_spin - motion.cage_speed), abs(motion.cage_speed)
+    radius, length = 0.5e-3 * drawing.roller_diameter_mm, drawing.roller_length_mm * 1e-3
+    roller = disc_moment(*mixture, spin, radius) + cylinder_moment(*mixture, spin, radius, length)
+    rim, land = 0.5e-3 * cage_rim_diameter(scene), 0.5e-3 * scene.land_diameter_mm
+    faces = disc_moment(*mixture, turning, max(rim, land)) - disc_moment(*mixture, turning, min(rim, land))
+    off_land = cylinder_moment(*mixture, turning, rim, cage.lands * cage.land_width_mm * 1e-3)
+    return drawing.rollers * roller * spin + (faces + off_land) * turning
+
+
+def open_inner_films(scene: Scene) -> float:
+    """Power of the oil films between inner race and the rollers that it does not load [W].
+
+    2 u times 4.601 eta u l sqrt(R/h) each, with the gap h = c - (c + d) cos psi of a ring that has come down by the
+    radial clearance c and the approach d of the most loaded roller (Stribeck: 5 F/Z), averaged over the circle.
+    """
+    clearance = 0.5e-3 * scene.mounted_clearance_mm
+    if clearance <= 0.0:
+        return 0.0
+    drawing, count = scene.bearing, scene.bearing.rollers
+    length = drawing.effective_length_mm * 1e-3
+    modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
+    load = 5.0 * scene.operation.largest_load_N / count
+    approach = 2.0 * (load / palmgren(modulus, length).stiffness) ** 0.9
+    angle = (np.arange(2000) + 0.5) * math.pi / 2000
+    gap = clearance - (clearance + approach) * np.cos(angle)
+    speed, oil = kinematics(scene).entrainment, scene.lubricant.in_service
+    each = 2.0 * 4.601 * oil.viscosity * speed**2 * length * np.sqrt(reduced_radii(scene)[1] / gap[gap > 0.0])
+    return count * float(each.sum()) / angle.size
+
+
+LEFT_OUT = (
+    LeftOut(
+        "windage of spinning rollers and cage",
+        "more power loss",
+        "discs M = rho w^2 r^5 C_n/2 and cylinders M = f rho w^2 r^2/2 2 pi r^2 l in the oil-air mixture",
+        power=spin_windage,
+    ),
+    LeftOut(
+        "oil films at unloaded inner contacts",
+        "more power loss, and a pull on the rollers outside the load zone that lessens cage slip",
+        "2 u 4.601 eta u l sqrt(R/h) a roller, h its gap",
+        power=open_inner_films,
+    ),
+    LeftOut(
+        "churning of a sump",
+        "more power loss",
+        "none: lubrication is by jet or mist, and lubricant.oil_fraction holds what rollers plough through",
+    ),
+    LeftOut(
+        "skew of rollers",
+        "axial sliding in the races and forces on the cage off its middle plane",
+        "none: it asks for motion out of the plane; tilted rings cause it",
+        matters=lambda scene: scene.bearing.tilt_mrad != 0.0,
+    ),
+    LeftOut(
+        "contact of roller ends and flanges",
+        "friction at the flanges, which holds rollers against skew",
+        "none: it asks for motion along the axis; tilted rings load the flanges",
+        matters=lambda scene: scene.bearing.tilt_mrad != 0.0,
+    ),
+    LeftOut(
+        "elastic deformation of the cage ring",
+        "lower impacts and load shared by several pockets; bars bend by model.pocket_bar_stiffness_N_m, the ring does not",
+        f"none: it counts in cages below {SOFT_CAGE * 1e-9:g} GPa",
+        matters=lambda scene: scene.material("cage").elastic_modulus < SOFT_CAGE,
+    ),
+)
+
+
+def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
+    """Notes on what the model leaves out and this scene would show, ``power_loss`` being the measured one [W]."""
+    notes = []
+    for item in LEFT_OUT:
+        if item.power is not None:
+            power = item.power(scene)
+            if power > TOLD_SHARE * power_loss > 0.0:
+                notes.append(
+                    f"left out: {item.name}, by an estimate {power:.2g} W ({100.0 * power / power_loss:.2g} % of the power "
+                    f"loss); {item.changes}"
+                )
+        elif item.matters is not None and item.matters(scene):
+            notes.append(f"left out: {item.name}; {item.changes}")
+    return tuple(notes)
+
+
+def heat_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
+    """A note where a power loss [W] is more than any oil carries off: the model leaves out what it would warm."""
+    drawing, oil = scene.bearing, scene.lubricant
+    heat = power_loss / (2.0 * math.pi * drawing.pitch_diameter_mm * drawing.roller_length_mm * 1e-6)
+    if heat <= TOO_HOT * JET_COOLED:
+        return ()
+    return (
+        f"power loss: {power_loss:.3g} W are {heat / JET_COOLED:.2g} times what a jet has carried off such a surface and take "
+        f"{power_loss / OIL_HEAT:.2g} L/min of oil that warms by 100 K: no bearing sheds them; check the speed and "
+        f"lubricant.temperature_C = {oil.temperature_C:g}, at which the oil has {1e3 * oil.in_service.viscosity:.3g} mPa s",
+    )

@@ -1,0 +1,311 @@
+"""From a scene to what the kernels read: geometry, masses and the chosen laws, in SI.
+
+What only some scenes need is imported where it is built: a scene without it never loads it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
+from rbdyn.contact.film import short_journal_film
+from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, sliced
+from rbdyn.contact.rolling_resistance import NoRollingResistance, aihara_thermal_factor, biboulet_houpert, starved
+from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
+from rbdyn.dynamics.forces.cage_body import BalancedCage, UnbalancedCage
+from rbdyn.dynamics.forces.drag import NoDrag, cylinder_drag
+from rbdyn.dynamics.forces.drive import SteadyDrive, TwoSpeedDrive
+from rbdyn.dynamics.forces.equations import RollerBearing
+from rbdyn.dynamics.forces.gravity import Gravity, NoGravity
+from rbdyn.dynamics.forces.guide_land import DryContact, InnerGuide, NoFilm, NoGuide, OuterGuide
+from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, NoPocket, Pocket
+from rbdyn.dynamics.forces.race_form import RoundRace, largest_rise, wavy_race
+from rbdyn.dynamics.forces.races import EqualRollers, Race, unequal_rollers
+from rbdyn.dynamics.forces.ring_motion import HeldRing
+from rbdyn.dynamics.parameters.geometry import (
+    cage_inertia,
+    kinematics,
+    layout_of,
+    raceway_radii,
+    reduced_radii,
+    roller_mass,
+    roller_radii,
+    shaft_speeds,
+)
+from rbdyn.dynamics.parameters.race_traction import race_traction
+from rbdyn.properties.lubricants import Oil
+from rbdyn.properties.materials import equivalent_modulus
+from rbdyn.scene import Scene
+from rbdyn.scene.bearing import Harmonic
+
+if TYPE_CHECKING:
+    from rbdyn.dynamics.forces.clock import ClockedDrive
+    from rbdyn.dynamics.forces.support import SupportedRing
+
+# The largest contact load that a traction surface must cover, in multiples of the largest load on the shaft.
+TRACTION_RANGE = 4.0
+
+
+def roller_bearing(scene: Scene) -> RollerBearing:
+    """Parameters of the equations of motion."""
+    drawing = scene.bearing
+    diameter, mass = drawing.roller_diameter_mm * 1e-3, roller_mass(scene)
+    angles = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
+    oil = scene.lubricant.in_service
+    radii = roller_radii(scene)
+    return RollerBearing(
+        rollers=drawing.rollers,
+        sizes=EqualRollers(0.5 * diameter) if radii is None else unequal_rollers(radii),
+        roller_mass=mass,
+        roller_inertia=mass * diameter**2 / 8.0,
+        outer=_race(scene, oil, "outer"),
+        inner=_race(scene, oil, "inner"),
+        pocket=_pocket(scene, oil),
+        pocket_cos=np.cos(angles),
+        pocket_sin=np.sin(angles),
+        guide=_guide(scene, oil),
+        drag=_drag(scene, oil),
+        cage=_cage(scene),
+        outer_ring=_outer_ring(scene),
+        inner_ring_mass=drawing.inner_ring_mass_kg,
+        drive=_drive(scene),
+        gravity=_gravity(scene),
+    )
+
+
+def _modulus(scene: Scene, first: str, second: str) -> float:
+    return equivalent_modulus(scene.material(first), scene.material(second))
+
+
+def _race(scene: Scene, oil: Oil, which: str) -> Race:
+    place = ("outer", "inner").index(which)
+    radius, reduced = raceway_radii(scene)[place], reduced_radii(scene)[place]
+    form = _form(getattr(scene.bearing, f"{which}_waviness"))
+    radii, tilt = roller_radii(scene), abs(scene.bearing.tilt_mrad) * 1e-3
+    largest_roller = 0.5e-3 * scene.bearing.roller_diameter_mm if radii is None else float(radii.max())
+    # A tilt may close the ends of a contact whose middle is open.
+    end_rise = 0.5e-3 * scene.bearing.effective_length_mm * tilt
+    return Race(
+        radius=radius,
+        reach=radius + largest_roller + largest_rise(form) + end_rise,
+        form=form,
+        contact=race_contact_law(scene, which),
+        damping=_race_damping(scene),
+        traction=race_traction(
+            scene,
+            reduced,
+            abs(kinematics(scene).entrainment),
+            oil,
+            _modulus(scene, "roller", "rings"),
+            scene.bearing.effective_length_mm * 1e-3,
+            TRACTION_RANGE * max(scene.operation.largest_load_N, 1.0),
+        ),
+        rolling=rolling_law(scene, oil, reduced),
+    )
+
+
+def _form(harmonics: list[Harmonic]) -> Any:
+    if not harmonics:
+        return RoundRace()
+    return wavy_race(
+        np.array([harmonic.order for harmonic in harmonics]),
+        np.array([harmonic.amplitude_um * 1e-6 for harmonic in harmonics]),
+        np.radians([harmonic.phase_deg for harmonic in harmonics]),
+    )
+
+
+def race_contact_law(scene: Scene, which: str) -> Any:
+    """Load law of a roller on the "outer" or the "inner" race."""
+    length = scene.bearing.effective_length_mm * 1e-3
+    modulus = _modulus(scene, "roller", "rings")
+    gamma = scene.bearing.roller_diameter_mm / scene.bearing.pitch_diameter_mm
+    law = scene.model.line_contact
+    whole: Any = palmgren(modulus, length)
+    if law == "iso16281":
+        whole = iso_16281(modulus, length)
+    elif law == "houpert":
+        whole = houpert(modulus, length, reduced_radii(scene)[("outer", "inner").index(which)])
+    elif law == "dowson_higginson":
+        whole = dowson_higginson(modulus, length, gamma if which == "outer" else -gamma)
+    if scene.slices == 1:
+        return whole
+    from rbdyn.contact.profile import slice_centres
+
+    share = scene.bearing.inner_tilt_share if which == "inner" else 1.0 - scene.bearing.inner_tilt_share
+    return sliced(
+        whole,
+        roller_relief(scene, scene.slices),
+        slice_centres(scene.slices, length),
+        scene.bearing.tilt_mrad * 1e-3 * share,
+        math.radians(scene.bearing.tilt_direction_deg),
+    )
+
+
+def roller_relief(scene: Scene, slices: int) -> NDArray[np.float64]:
+    """Profile drop of the roller at its slice centres [m]."""
+    from rbdyn.contact import profile
+
+    drawing = scene.bearing
+    length = drawing.effective_length_mm * 1e-3
+    position = profile.slice_centres(slices, length)
+    if drawing.crown_radius_mm is not None:
+        return profile.crowned_relief(position, drawing.crown_radius_mm * 1e-3)
+    if drawing.lundberg_load_N is not None:
+        return profile.lundberg_relief(position, length, drawing.lundberg_load_N, _modulus(scene, "roller", "rings"))
+    if drawing.profile_table_mm_um is not None:
+        return profile.table_relief(position, [(x * 1e-3, drop * 1e-6) for x, drop in drawing.profile_table_mm_um])
+    if drawing.roller_profile == "logarithmic":
+        return profile.logarithmic_relief(position, drawing.roller_diameter_mm * 1e-3, length)
+    return np.zeros(slices)
+
+
+def _race_damping(scene: Scene) -> NoDamping | ViscousDamping | HuntCrossleyDamping:
+    laws = scene.model
+    if laws.race_damping == "viscous":
+        scale = 2.0 * laws.race_damping_ratio * math.sqrt(roller_mass(scene))
+        return ViscousDamping(scale, 1e6 / laws.race_damping_engagement_um)
+    if laws.race_damping == "hunt_crossley":
+        return HuntCrossleyDamping(laws.race_damping_alpha_s_m)
+    return NoDamping()
+
+
+def _friction(scene: Scene, coefficient: float) -> NoTraction | CoulombTraction:
+    return dry_friction(coefficient, scene.traction.blend_speed_m_s)
+
+
+def _hunt_crossley(alpha: float) -> NoDamping | HuntCrossleyDamping:
+    return HuntCrossleyDamping(alpha) if alpha > 0.0 else NoDamping()
+
+
+def rolling_law(scene: Scene, oil: Oil, reduced_radius: float) -> Any:
+    """Rolling resistance of a race contact of this reduced radius [m]."""
+    if scene.model.rolling_resistance == "off":
+        return NoRollingResistance()
+    # The entrainment speed varies little: the heating of the inlet is that at the kinematic speed.
+    entrainment = abs(kinematics(scene).entrainment)
+    heating = aihara_thermal_factor(oil.viscosity_slope, oil.conductivity, entrainment)
+    modulus, length = _modulus(scene, "roller", "rings"), scene.bearing.effective_length_mm * 1e-3
+    reduction = heating * scene.model.rolling_resistance_factor
+    flooded = biboulet_houpert(oil.viscosity, modulus, reduced_radius, length, reduction)
+    distance = scene.lubricant.inlet_distance
+    if distance is None:
+        return flooded
+    return starved(flooded, oil.viscosity, oil.pressure_coefficient, modulus, reduced_radius, length, distance)
+
+
+def _pocket(scene: Scene, oil: Oil) -> Any:
+    laws, cage = scene.model, scene.cage
+    if laws.pocket == "off":
+        return NoPocket()
+    touching = cage.pocket_contact_length_mm or scene.bearing.effective_length_mm
+    plain = palmgren(_modulus(scene, "roller", "cage"), touching * 1e-3)
+    bar = laws.pocket_bar_stiffness_N_m
+    contact = plain if bar == "rigid" else LineContactOnBar(plain.stiffness, float(bar))
+    damping, friction = _hunt_crossley(laws.alpha("pocket")), _friction(scene, laws.pocket_friction)
+    clearance = 0.5e-3 * cage.pocket_clearance_mm
+    radius = 0.5e-3 * scene.bearing.roller_diameter_mm
+    pocket: Any = Pocket(clearance, radius, contact, damping, friction)
+    if laws.pocket_film:
+        from rbdyn.contact.pocket_film import pocket_film
+
+        floor = laws.pocket_film_floor_um * 1e-6
+        covered = cage.pocket_contact_length_mm or scene.bearing.roller_length_mm
+        film = pocket_film(oil.viscosity, radius, covered * 1e-3, floor, laws.pocket_fill)
+        walls = Pocket(clearance - floor, radius, contact, damping, friction)
+        pocket = LubricatedPocket(walls, film, clearance, radius)
+    if cage.lip_clearance_mm is None:
+        return pocket
+    outer, inner = raceway_radii(scene)
+    play = 0.5e-3 * cage.lip_clearance_mm
+    return LippedPocket(pocket, 0.5 * (outer + inner), play, radius, contact, damping, friction)
+
+
+def _guide(scene: Scene, oil: Oil) -> NoGuide | OuterGuide | InnerGuide:
+    laws, cage = scene.model, scene.cage
+    if laws.guide_land == "off" or cage.guidance == "roller":
+        return NoGuide()
+    clearance = 0.5e-3 * cage.guide_clearance_mm
+    land = 0.5e-3 * scene.land_diameter_mm
+    journal = land - clearance if cage.guidance == "outer" else land
+    film: Any = NoFilm()
+    play = clearance
+    if laws.guide_land == "film":
+        floor = laws.land_film_floor_um * 1e-6
+        play -= floor
+        film = short_journal_film(
+            oil.viscosity, journal, cage.land_width_mm * 1e-3, cage.lands, clearance, floor, laws.land_fill
+        )
+    dry = DryContact(
+        play,
+        palmgren(_modulus(scene, "cage", "rings"), cage.lands * cage.land_width_mm * 1e-3),
+        _hunt_crossley(laws.alpha("land")),
+        _friction(scene, laws.land_friction),
+    )
+    return OuterGuide(journal, film, dry) if cage.guidance == "outer" else InnerGuide(journal, film, dry)
+
+
+def _drag(scene: Scene, oil: Oil) -> Any:
+    laws, drawing = scene.model, scene.bearing
+    if laws.drag == "off" or laws.drag_coefficient == 0.0:
+        return NoDrag()
+    return cylinder_drag(
+        oil.density,
+        scene.lubricant.oil_fraction,
+        laws.drag_coefficient,
+        drawing.roller_diameter_mm * 1e-3,
+        drawing.roller_length_mm * 1e-3,
+    )
+
+
+def _cage(scene: Scene) -> BalancedCage | UnbalancedCage:
+    mass, inertia = scene.cage.mass_g * 1e-3, cage_inertia(scene)
+    if scene.cage.imbalance_um == 0.0:
+        return BalancedCage(mass, inertia)
+    return UnbalancedCage(mass, inertia, scene.cage.imbalance_um * 1e-6)
+
+
+def _outer_ring(scene: Scene) -> HeldRing | SupportedRing:
+    support, start = scene.support, layout_of(scene).support
+    if support is None or start is None:
+        return HeldRing()
+    from rbdyn.dynamics.forces.support import SupportedRing
+
+    return SupportedRing(start, support.outer_ring_mass_kg, float(support.stiffness_N_m), float(support.damping_N_s_m))
+
+
+def _gravity(scene: Scene) -> NoGravity | Gravity:
+    size, direction = scene.operation.gravity_m_s2, math.radians(scene.operation.gravity_direction_deg)
+    return Gravity(size * math.cos(direction), size * math.sin(direction)) if size > 0.0 else NoGravity()
+
+
+def _drive(scene: Scene) -> SteadyDrive | TwoSpeedDrive | ClockedDrive:
+    operation, clock = scene.operation, layout_of(scene).clock
+    inner, outer = shaft_speeds(scene)
+    load = float(operation.radial_load_N)
+    if clock is None:
+        return SteadyDrive(inner, load) if outer == 0.0 else TwoSpeedDrive(inner, outer, load)
+    from rbdyn.dynamics.forces.clock import ClockedDrive
+
+    return ClockedDrive(
+        clock,
+        _schedule(scene, "inner_speed_rpm", inner, math.pi / 30.0),
+        outer,
+        _schedule(scene, "radial_load_N", load, 1.0),
+        float(operation.rotating_load_N),
+        operation.unbalance_g_mm * 1e-6,
+    )
+
+
+def _schedule(scene: Scene, key: str, otherwise: float, unit: float) -> Any:
+    from rbdyn.dynamics.forces.schedule import Constant, Ramps, SmoothRamps, Steps
+
+    schedule = scene.operation.schedule
+    values = getattr(schedule, key, None)
+    if schedule is None or values is None:
+        return Constant(otherwise)
+    kinds: dict[str, Any] = {"step": Steps, "linear": Ramps, "smooth": SmoothRamps}
+    return kinds[schedule.shape](np.array(schedule.time_s, float), unit * np.array(values, float))

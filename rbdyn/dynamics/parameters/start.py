@@ -1,0 +1,60 @@
+"""Where a run starts: static load share at epicyclic speed, rollers at seeded offsets in their pockets."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.dynamics.forces.drive import action
+from rbdyn.dynamics.forces.equations import RollerBearing
+from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_X, CAGE_Y, RING_X
+from rbdyn.dynamics.parameters.geometry import kinematics, layout_of
+from rbdyn.dynamics.parameters.static_load import static_share
+from rbdyn.scene import Scene
+
+
+def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Generator) -> NDArray[np.float64]:
+    """State at time zero.
+
+    The cage stands at any angle, rollers within +-20 % of the pocket clearance of their pockets' middles and the cage a
+    tenth of the guide (or pocket) clearance off centre, all at random; all move as if they rolled without slip. With one
+    angle for all, replicates would share the passage of the rollers through the load zone, which no mean over them
+    takes away.
+    """
+    z = bearing.rollers
+    state = layout_of(scene)
+    y = np.zeros(state.size)
+    acting = action(bearing.drive, y)
+    motion = kinematics(scene, acting.inner_speed, acting.outer_speed)
+    pitch_radius = 0.5e-3 * scene.bearing.pitch_diameter_mm
+    pocket = 1e-3 * scene.cage.pocket_clearance_mm
+    offsets = generator.uniform(-0.2, 0.2, z) * pocket / pitch_radius
+    direction, cage_angle = generator.uniform(0.0, 2.0 * np.pi, 2)
+    angles = cage_angle + 2.0 * np.pi * np.arange(z) / z + offsets
+    offset = 0.1 * min(0.5e-3 * scene.cage.guide_clearance_mm, 0.5 * pocket)
+    radii = np.empty(z)
+    ring_x = static_share(bearing, angles, motion.cage_speed, acting.load_x, radii)
+    cosine, sine = np.cos(angles), np.sin(angles)
+    y[: 5 * z] = np.concatenate(
+        (
+            radii * cosine,
+            radii * sine,
+            -radii * motion.cage_speed * sine,
+            radii * motion.cage_speed * cosine,
+            np.full(z, motion.roller_spin),
+        )
+    )
+    body = y[5 * z :]  # cage, ring and what the scene adds, which starts at rest at time zero
+    body[CAGE_X], body[CAGE_Y] = offset * math.cos(direction), offset * math.sin(direction)
+    body[CAGE_ANGLE], body[CAGE_SPEED] = cage_angle, motion.cage_speed
+    body[RING_X] = ring_x
+    if state.support is not None:
+        # All sits on the outer ring, which gives way under the load.
+        sag = acting.load_x / bearing.outer_ring.stiffness
+        y[:z] += sag
+        y[state.support] = sag
+        body[CAGE_X] += sag
+        body[RING_X] += sag
+    return y

@@ -1,0 +1,147 @@
+"""Slow regimes: whether the figures have settled over the counted turns, and what slow change may add to their errors.
+
+Cages have slow regimes: loose ones change the way they whirl over 20 to 400 shaft turns, jumping at random moments, so no
+curve fitted to a start tells where it leads. What can be tested is whether the counted turns drift. Each replicate
+gives one difference between the figure of the later half and that of the earlier half; replicates are independent,
+so Student's t of these differences needs no memory of the series (Heidelberger and Welch 1983, *Operations Research* 31,
+1109, test a single series against its spectrum). The test is made on each figure and on the mean speed of the cage's
+centre, which shows a change of regime first; a drift of less than a thousandth of a figure is left to its error.
+
+A drift d with standard error s that passes still hides a bias. Of a transient that at least halves from one half to the
+next, the mean over both is off by at most 3 d/2; what of d stands above its noise, max(|d| - s, 0), counts so.
+
+Some regimes last for good: of the replicates of the bearing of Chen et al. 2022 one in 25 ends in another one, at loose
+clearances one in 8. One that none of n replicates is in has a share of about 1/(n + 1) (Laplace's rule of succession);
+how far it may be away is gauged by the stretch of two impact windows, of any replicate, whose figure lies farthest from
+the mean of all. Their product counts too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD
+from rbdyn.dynamics.statistics.batch_means import estimate, student_factor
+from rbdyn.dynamics.statistics.metrics import (
+    CAGE_SLIP,
+    CAGE_SPEED,
+    POWER_LOSS,
+    WHIRL_DEVIATION_RATIO,
+    Figure,
+    Replicate,
+    mean,
+)
+
+Array = NDArray[np.float64]
+
+# Replicates from which their differences are tested as such; fewer are tested by batch means.
+FEWEST_REPLICATES = 3
+# Share of settled runs that a test of one figure lengthens in vain is one less this.
+LEVEL = 0.95
+# Drift of a figure, over the figure, for which no run is lengthened.
+NEGLIGIBLE = 1e-3
+# Impact windows that make a stretch.
+STRETCH = 2
+# Mean of a transient that halves from half to half, over the difference of the halves: (1 + q)/(2 (1 - q)), q = 1/2.
+BIAS_OF_DRIFT = 1.5
+
+
+def _largest(force: int) -> Figure:
+    """Mean of the largest load of each batch: of impact windows a run may hold one or two."""
+    return Figure(
+        lambda run: np.column_stack((run.durations, run.durations * run.largest[:, force]))[run.first :], mean
+    )
+
+
+WHIRL_SPEED = Figure(lambda run: run.whirl[run.first :, :2], mean)
+TESTED = {
+    "impact_force_N": _largest(POCKET_LOAD),
+    "impact_contact_force_N": _largest(POCKET_CONTACT_LOAD),
+    "whirl_deviation_ratio": WHIRL_DEVIATION_RATIO,
+    "power_loss_W": POWER_LOSS,
+    "cage_speed_rpm": CAGE_SPEED,
+    "cage_slip": CAGE_SLIP,
+    "whirl speed": WHIRL_SPEED,
+}
+
+
+class Drift(NamedTuple):
+    """Later half of the counted part less the earlier one: mean over the replicates, its standard error, the degrees of
+    freedom of that, and the size of the figure."""
+
+    size: float
+    error: float
+    freedom: int
+    figure: float
+
+    @property
+    def significant(self) -> bool:
+        """Whether the halves differ by more than their scatter, and enough to matter."""
+        least = max(student_factor(self.freedom, LEVEL) * self.error, NEGLIGIBLE * self.figure)
+        return abs(self.size) > least
+
+    @property
+    def bias(self) -> float:
+        """What the drift leaves in the mean of both halves."""
+        return BIAS_OF_DRIFT * max(abs(self.size) - self.error, 0.0)
+
+
+def drift_of(figure: Figure, runs: Sequence[Replicate]) -> Drift | None:
+    """Drift of a figure over what is counted; None where that is too short to tell."""
+    moments = [figure.moments(run) for run in runs]
+    rows = min(len(part) for part in moments)
+    half = rows // 2
+    if half == 0:
+        return None
+    size = abs(float(figure.of_sums(np.sum([part.sum(axis=0) for part in moments], axis=0))))
+    early, late = ([part[rows - 2 * half : rows - half] for part in moments], [part[-half:] for part in moments])
+    if len(runs) >= FEWEST_REPLICATES:
+        change = np.array(
+            [figure.of_sums(b.sum(axis=0)) - figure.of_sums(a.sum(axis=0)) for a, b in zip(early, late, strict=True)]
+        )
+        error = float(change.std(ddof=1)) / math.sqrt(len(runs))
+        return Drift(float(change.mean()), error, len(runs) - 1, size)
+    before, after = (estimate(part, figure.of_sums) for part in (early, late))
+    if before.half_width is None or after.half_width is None:
+        return None
+    freedom = max(len(runs) * half - 1, 1)
+    error = math.hypot(before.half_width, after.half_width) / student_factor(freedom)
+    return Drift(after.value - before.value, error, freedom, size)
+
+
+def drifts(runs: Sequence[Replicate]) -> dict[str, Drift]:
+    """Drift of every figure tested that can be told, by name."""
+    found = {name: drift_of(figure, runs) for name, figure in TESTED.items()}
+    return {name: drift for name, drift in found.items() if drift is not None}
+
+
+def drifting(runs: Sequence[Replicate]) -> bool:
+    """Whether any figure drifts beyond its scatter."""
+    return any(drift.significant for drift in drifts(runs).values())
+
+
+def unseen_regime(figure: Figure, runs: Sequence[Replicate], since: int) -> float:
+    """What a regime in which no replicate is counted may add to the mean, gauged by all stretches from batch ``since`` on."""
+    counted = np.sum([figure.moments(run).sum(axis=0) for run in runs], axis=0)
+    middle, farthest = float(figure.of_sums(counted)), 0.0
+    for run in runs:
+        whole = run.counted_from(since)
+        moments = figure.moments(whole)
+        stretches = max(len(whole.durations[since:]) // (STRETCH * whole.per_window), 1)
+        for part in np.array_split(moments, min(stretches, len(moments))):
+            farthest = max(farthest, abs(float(figure.of_sums(part.sum(axis=0))) - middle))
+    return farthest / (len(runs) + 1)
+
+
+def slow_change(figure: Figure, tested: Figure, runs: Sequence[Replicate], since: int, *, steady: bool) -> float:
+    """Half-width that slow change adds to a figure: drift left over and regimes unseen, as root sum of squares; none in a
+    run that is not ``steady``, whose figures change with its schedule."""
+    if not steady:
+        return 0.0
+    drift = drift_of(tested, runs)
+    return math.hypot(0.0 if drift is None else drift.bias, unseen_regime(figure, runs, since))

@@ -1,0 +1,109 @@
+"""From the mounting table of a scene to rings, fits and the clearance in operation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rbdyn.mounting.rings import MountedClearance, Ring, interface_pressure, loosening_speed, mounted_clearance
+from rbdyn.properties.materials import Material
+from rbdyn.scene.bearing import Bearing, Materials
+from rbdyn.scene.mounting import Mounting, Raceways, material_of
+
+
+@dataclass(frozen=True)
+class MountedRings:
+    """Shaft, both rings and housing at their temperatures and speeds; interferences are diametral [m], positive tight.
+
+    ``element_temperature_rise``: of balls or rollers above the drawing [K].
+    """
+
+    shaft: Ring
+    inner_ring: Ring
+    outer_ring: Ring
+    housing: Ring
+    inner_interference: float
+    outer_interference: float
+    element_temperature_rise: float
+
+    @property
+    def inner_pressure(self) -> float:
+        """Pressure between shaft and inner ring [Pa]; 0 where rotation or heat has loosened the fit."""
+        return interface_pressure(self.shaft, self.inner_ring, self.inner_interference)
+
+    @property
+    def outer_pressure(self) -> float:
+        """Pressure between outer ring and housing [Pa]."""
+        return interface_pressure(self.outer_ring, self.housing, self.outer_interference)
+
+    @property
+    def loosening_speed(self) -> float:
+        """Speed [rad/s] at which rotation loosens the inner ring from its shaft; 0 if loose at rest, or infinite."""
+        return loosening_speed(self.shaft, self.inner_ring, self.inner_interference)
+
+
+def mounted_rings(
+    mounting: Mounting,
+    bearing: Raceways,
+    inner_material: Material,
+    outer_material: Material,
+    inner_speed: float,
+    outer_speed: float = 0.0,
+) -> MountedRings:
+    """Rings of a scene's bearing, of rollers or balls, as mounted, at speeds [rad/s] of shaft and housing.
+
+    Raises ValueError where ``rbdyn.scene.mounting.faults`` finds any.
+    """
+    reference = mounting.reference_temperature_C
+    inner_rise = _rise(mounting.inner_ring_temperature_C, reference, 0.0)
+    outer_rise = _rise(mounting.outer_ring_temperature_C, reference, 0.0)
+    shaft_rise = _rise(mounting.shaft_temperature_C, reference, inner_rise)
+    housing_rise = _rise(mounting.housing_temperature_C, reference, outer_rise)
+    element_rise = _rise(mounting.roller_temperature_C, reference, 0.5 * (inner_rise + outer_rise))
+    inner_speed, outer_speed = (inner_speed, outer_speed) if mounting.rotation else (0.0, 0.0)
+
+    shaft_bore, bore, outside, housing_outside = (
+        0.5e-3 * diameter
+        for diameter in (
+            mounting.shaft_bore_mm,
+            mounting.bore_mm,
+            mounting.outside_diameter_mm,
+            mounting.housing_diameter_mm,
+        )
+    )
+    inner_race, outer_race = (0.5e-3 * diameter for diameter in bearing.raceway_diameters_mm)
+    return MountedRings(
+        shaft=Ring(shaft_bore, bore, material_of(mounting.shaft_material), shaft_rise, inner_speed),
+        inner_ring=Ring(bore, inner_race, inner_material, inner_rise, inner_speed),
+        outer_ring=Ring(outer_race, outside, outer_material, outer_rise, outer_speed),
+        housing=Ring(outside, housing_outside, material_of(mounting.housing_material), housing_rise, outer_speed),
+        inner_interference=mounting.inner_interference_um * 1e-6,
+        outer_interference=mounting.outer_interference_um * 1e-6,
+        element_temperature_rise=element_rise,
+    )
+
+
+def operating_clearance(
+    mounting: Mounting, bearing: Bearing, materials: Materials, inner_speed: float, outer_speed: float = 0.0
+) -> MountedClearance:
+    """Diametral clearance of a scene's roller bearing as mounted, at speeds [rad/s] of shaft and housing.
+
+    ``bearing.radial_clearance_mm`` is the clearance before mounting. Raises ValueError as ``mounted_rings``.
+    """
+    material = material_of(materials.rings)
+    rings = mounted_rings(mounting, bearing, material, material, inner_speed, outer_speed)
+    return mounted_clearance(
+        bearing.radial_clearance_mm * 1e-3,
+        shaft=rings.shaft,
+        inner_ring=rings.inner_ring,
+        outer_ring=rings.outer_ring,
+        housing=rings.housing,
+        inner_interference=rings.inner_interference,
+        outer_interference=rings.outer_interference,
+        roller_diameter=bearing.roller_diameter_mm * 1e-3,
+        roller_material=material_of(materials.roller),
+        roller_temperature_rise=rings.element_temperature_rise,
+    )
+
+
+def _rise(temperature: float | None, reference: float, otherwise: float) -> float:
+    return otherwise if temperature is None else temperature - reference

@@ -1,0 +1,158 @@
+"""Growth of bearing rings: fits, rotation and temperature, and the clearance they leave.
+
+Rings are thick cylinders of one length in plane stress, shaft and housing too: flanges and shoulders are left out.
+Radii are of the drawing; growths are radial, clearances and interferences diametral [m].
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from rbdyn.properties.materials import Material
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A ring, a solid (inner radius 0) or hollow shaft, or a housing.
+
+    Radii [m]; ``temperature_rise`` above the temperature of the drawing [K], uniform; ``speed`` [rad/s].
+    Raises ValueError unless 0 <= inner radius < outer radius.
+    """
+
+    inner_radius: float
+    outer_radius: float
+    material: Material
+    temperature_rise: float = 0.0
+    speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.inner_radius < self.outer_radius:
+            raise ValueError(
+                f"a ring from {self.inner_radius:g} to {self.outer_radius:g} m has no wall; mend its diameters"
+            )
+
+    def pressure_growth(self, radius: float, inside: float = 0.0, outside: float = 0.0) -> float:
+        """Growth at ``radius`` [m] under pressures on bore and outside [Pa] (Lamé)."""
+        a, b, nu = self.inner_radius, self.outer_radius, self.material.poisson_ratio
+        uniform = (1.0 - nu) * (inside * a**2 - outside * b**2)
+        sheared = (1.0 + nu) * (inside - outside) * self._bore_term(radius)
+        return radius * (uniform + sheared) / (self.material.elastic_modulus * (b**2 - a**2))
+
+    def rotation_growth(self, radius: float) -> float:
+        """Growth at ``radius`` [m] of the ring turning free (Timoshenko and Goodier, rotating disk).
+
+        u = rho w^2 r/(8E) [(3+nu)(1-nu)(a^2+b^2) + (1+nu)(3+nu) a^2 b^2/r^2 - (1-nu^2) r^2].
+        """
+        a, b, nu = self.inner_radius, self.outer_radius, self.material.poisson_ratio
+        shape = (
+            (3.0 + nu) * (1.0 - nu) * (a**2 + b**2)
+            + (1.0 + nu) * (3.0 + nu) * self._bore_term(radius)
+            - (1.0 - nu**2) * radius**2
+        )
+        load = self.material.density * self.speed**2
+        return load * radius / (8.0 * self.material.elastic_modulus) * shape
+
+    def thermal_growth(self, radius: float) -> float:
+        """Growth at ``radius`` [m] by free expansion."""
+        return self.material.thermal_expansion * self.temperature_rise * radius
+
+    def growth(self, radius: float, inside: float = 0.0, outside: float = 0.0) -> float:
+        """Whole growth at ``radius`` [m]: temperature, rotation and pressures [Pa]."""
+        free = self.thermal_growth(radius) + self.rotation_growth(radius)
+        return free + self.pressure_growth(radius, inside, outside)
+
+    def _bore_term(self, radius: float) -> float:
+        # a^2 b^2/r^2, which a solid disk lacks even at its centre.
+        return (self.inner_radius * self.outer_radius / radius) ** 2 if self.inner_radius > 0.0 else 0.0
+
+
+def interface_pressure(inner: Ring, outer: Ring, interference: float) -> float:
+    """Pressure [Pa] between two fitted rings at their temperature and speed; 0 where the fit has come loose.
+
+    ``interference``: diametral, at the temperature of the drawing and at rest [m], positive tight. From
+    compatibility: growth of the outer bore less growth of the inner outside is half the interference.
+    Raises ValueError when the rings do not share the nominal radius.
+    """
+    if not math.isclose(inner.outer_radius, outer.inner_radius, rel_tol=1e-9):
+        raise ValueError(
+            f"radii of {inner.outer_radius:g} and {outer.inner_radius:g} m are not those of one fit; "
+            "give the nominal radius to both and the rest as interference"
+        )
+    radius = outer.inner_radius
+    overlap = 0.5 * interference + inner.growth(radius) - outer.growth(radius)
+    compliance = outer.pressure_growth(radius, inside=1.0) - inner.pressure_growth(radius, outside=1.0)
+    return max(overlap / compliance, 0.0)
+
+
+def loosening_speed(inner: Ring, outer: Ring, interference: float) -> float:
+    """Speed [rad/s] of both rings together at which their fit comes loose, whatever speeds they have themselves.
+
+    Rotation widens the outer more: overlap at rest = (difference of the growths at 1 rad/s) times speed^2. 0 where the
+    fit is loose at rest, infinite where the inner ring grows as much as the outer. Raises ValueError as
+    ``interface_pressure``.
+    """
+    if interface_pressure(replace(inner, speed=0.0), replace(outer, speed=0.0), interference) == 0.0:
+        return 0.0
+    radius = outer.inner_radius
+    overlap = 0.5 * interference + inner.thermal_growth(radius) - outer.thermal_growth(radius)
+    opening = replace(outer, speed=1.0).rotation_growth(radius) - replace(inner, speed=1.0).rotation_growth(radius)
+    return math.sqrt(overlap / opening) if opening > 0.0 else math.inf
+
+
+@dataclass(frozen=True)
+class MountedClearance:
+    """Where the clearance goes. Changes of the diametral clearance [m], negative where they take some.
+
+    ``operating`` is the sum of ``initial`` and the four changes. The fits count with the pressures [Pa] that
+    temperature and rotation leave them; temperature and rotation count as if the rings were free.
+    """
+
+    initial: float
+    inner_fit: float
+    outer_fit: float
+    temperature: float
+    rotation: float
+    operating: float
+    inner_pressure: float
+    outer_pressure: float
+
+
+def mounted_clearance(
+    initial: float,
+    *,
+    shaft: Ring,
+    inner_ring: Ring,
+    outer_ring: Ring,
+    housing: Ring,
+    inner_interference: float,
+    outer_interference: float,
+    roller_diameter: float,
+    roller_material: Material,
+    roller_temperature_rise: float = 0.0,
+) -> MountedClearance:
+    """Diametral clearance of a mounted roller bearing as it runs, from ``initial`` of the loose parts [m].
+
+    ``inner_ring`` ends at its raceway outside, ``outer_ring`` at its raceway inside; each turns at its own speed.
+    Interferences are diametral [m], positive tight. Raises ValueError as ``interface_pressure``.
+    """
+    inner_pressure = interface_pressure(shaft, inner_ring, inner_interference)
+    outer_pressure = interface_pressure(outer_ring, housing, outer_interference)
+    inner_race, outer_race = inner_ring.outer_radius, outer_ring.inner_radius
+    # A growth takes its double from a diameter; each roller stands in the gap twice across the bearing.
+    inner_fit = -2.0 * inner_ring.pressure_growth(inner_race, inside=inner_pressure)
+    outer_fit = 2.0 * outer_ring.pressure_growth(outer_race, outside=outer_pressure)
+    rollers = 2.0 * roller_material.thermal_expansion * roller_temperature_rise * roller_diameter
+    races = 2.0 * (outer_ring.thermal_growth(outer_race) - inner_ring.thermal_growth(inner_race))
+    temperature = races - rollers
+    rotation = 2.0 * (outer_ring.rotation_growth(outer_race) - inner_ring.rotation_growth(inner_race))
+    return MountedClearance(
+        initial=initial,
+        inner_fit=inner_fit,
+        outer_fit=outer_fit,
+        temperature=temperature,
+        rotation=rotation,
+        operating=initial + inner_fit + outer_fit + temperature + rotation,
+        inner_pressure=inner_pressure,
+        outer_pressure=outer_pressure,
+    )

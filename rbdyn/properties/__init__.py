@@ -1,0 +1,1 @@
+"""Properties by name: ``materials`` (elastic constants, density, expansion) and ``lubricants`` (oils over temperature)."""

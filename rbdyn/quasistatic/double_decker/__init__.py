@@ -1,0 +1,1 @@
+"""Two rows with a floating ring between: ``equilibrium``, ``speed_split`` (speed of the middle ring), ``model`` (from a scene)."""

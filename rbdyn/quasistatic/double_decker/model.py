@@ -1,0 +1,150 @@
+"""From a scene to the two rows of a double-decker bearing and its middle ring, and what is reported of that ring."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.contact.hertz_point import PointContact, peak_pressure
+from rbdyn.mounting.ball_rings import layer_changes
+from rbdyn.mounting.ring_growth import GrooveChange
+from rbdyn.quasistatic.double_decker.equilibrium import DoubleDeckerSolution, Layer, Stack
+from rbdyn.quasistatic.double_decker.speed_split import (
+    LayerFriction,
+    SpeedSplit,
+    Status,
+    balanced_split,
+    load_torque,
+    oil_share,
+)
+from rbdyn.quasistatic.result import displacement_record
+from rbdyn.quasistatic.row.model import RPM, RowModel, contacts, row_model
+from rbdyn.scene.ball import DoubleDeckerScene
+from rbdyn.scene.ball_bearing import BallRow
+
+# ISO 76: pressure under the static capacity, and its most loaded ball, 5 C0/(Z cos a_0).
+STATIC_PRESSURE, STRIBECK = 4.2e9, 5.0
+
+
+class DoubleDeckerModel(NamedTuple):
+    """Two rows as the solver takes them, and what became of middle ring and races.
+
+    ``middle_given`` (5,): what is prescribed of the middle ring, NaN where it floats. ``split``: its speed; ``changes``: of
+    the grooves of inner and outer row.
+    """
+
+    stack: Stack
+    inner: RowModel
+    outer: RowModel
+    middle_given: NDArray[np.float64]
+    split: SpeedSplit
+    changes: tuple[GrooveChange, GrooveChange]
+
+
+def double_decker_of(scene: DoubleDeckerScene) -> DoubleDeckerModel:
+    """Both rows of a scene, its rings grown as far as the scene asks for."""
+    below, above, middle = scene.bearing.inner, scene.bearing.outer, scene.bearing.middle
+    ball, ring = scene.material("ball"), scene.material("middle_ring")
+    inner_speed, outer_speed = scene.operation.inner_speed_rpm * RPM, scene.operation.outer_speed_rpm * RPM
+    split = middle_speed(scene)
+    changes = layer_changes(scene, split.speed)
+    inner = row_model(
+        below, scene.model, ball, scene.material("inner_ring"), ring, inner_speed, split.speed, changes[0]
+    )
+    outer = row_model(
+        above, scene.model, ball, ring, scene.material("outer_ring"), split.speed, outer_speed, changes[1]
+    )
+    diameter = 1e-3 * below.ball_diameter_mm
+    back = (below.outer_groove_factor - 0.5) * diameter
+    offset = 1e-3 * middle.axial_offset_mm
+    # Planes of groove centres, from the ball plane of the outer row.
+    plane_0 = offset + (below.inner_groove_factor - 0.5) * diameter * math.sin(below.contact_angle)
+    plane_1 = offset - back * math.sin(below.contact_angle)
+    plane_2 = (above.inner_groove_factor - 0.5) * 1e-3 * above.ball_diameter_mm * math.sin(above.contact_angle)
+    stack = Stack(
+        inner=Layer(inner.row, inner.control),
+        outer=Layer(outer.row, outer.control),
+        outer_lever=0.5e-3 * below.pitch_diameter_mm - back * math.cos(below.contact_angle),
+        outer_groove_radius=below.outer_groove_factor * diameter,
+        arm_0=plane_0 - plane_2,
+        arm_1=plane_1 - plane_2,
+    )
+    middle_given = np.full(5, math.nan)
+    if (middle.tilt or scene.operation.tilt) == "fixed":
+        middle_given[3:] = 0.0
+    return DoubleDeckerModel(stack, inner, outer, middle_given, split, changes)
+
+
+def middle_speed(scene: DoubleDeckerScene) -> SpeedSplit:
+    """Speed of the middle ring: as given, of oil alone (Hu et al., eq 13), or from the torques of oil and load."""
+    below, above, middle = scene.bearing.inner, scene.bearing.outer, scene.bearing.middle
+    inner_speed, outer_speed = scene.operation.inner_speed_rpm * RPM, scene.operation.outer_speed_rpm * RPM
+    whole = inner_speed - outer_speed
+    if middle.speed_rpm is not None:
+        speed = middle.speed_rpm * RPM
+        share = (speed - outer_speed) / whole if whole != 0.0 else math.nan
+        return SpeedSplit(speed, share, math.nan, "given")
+    if middle.speed_split == "oil":
+        share = oil_share(below.pitch_diameter_mm, above.pitch_diameter_mm)
+        status: Status = "shared" if whole != 0.0 else "no relative speed"
+        return SpeedSplit(outer_speed + share * whole, share, math.nan, status)
+    return balanced_split(*layer_frictions(scene), inner_speed, outer_speed)
+
+
+def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFriction]:
+    """Friction of inner and outer row under the scene's load, which both carry; prescribed displacements give none."""
+    assert scene.lubricant is not None
+    oil = scene.lubricant.in_service
+    viscosity = oil.viscosity / oil.density
+    x, y, axial = scene.operation.load
+    middle = scene.bearing.middle
+    rows = ("inner", "middle", scene.bearing.inner), ("middle", "outer", scene.bearing.outer)
+    frictions = []
+    for (under, over, row), factor in zip(rows, (middle.inner_oil_factor, middle.outer_oil_factor), strict=True):
+        materials = (scene.material(part) for part in ("ball", f"{under}_ring", f"{over}_ring"))
+        torque = load_torque(
+            math.hypot(x, y),
+            axial,
+            row.contact_angle,
+            1e-3 * row.pitch_diameter_mm,
+            static_capacity(row, contacts(row, *materials)),
+        )
+        frictions.append(LayerFriction(1e-3 * row.pitch_diameter_mm, viscosity, torque, factor))
+    return frictions[0], frictions[1]
+
+
+def static_capacity(row: BallRow, races: tuple[PointContact, PointContact]) -> float:
+    """Static capacity C0 [N], of the catalogue or from the pressure that defines it (ISO 76), at the race that has it first.
+
+    The outer race up to some D cos a_0/dm = 0.09, the inner one beyond.
+    """
+    if row.static_capacity_N is not None:
+        return row.static_capacity_N
+    sharpest = max(float(peak_pressure(contact, 1.0)) for contact in races)
+    return row.balls * math.cos(row.contact_angle) * (STATIC_PRESSURE / sharpest) ** 3 / STRIBECK
+
+
+def middle_record(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> dict[str, Any]:
+    """What is reported of the middle ring."""
+    split = model.split
+
+    def or_null(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return {
+        **displacement_record(solution.middle_displacement),
+        "speed_rpm": split.speed / RPM,
+        "speed_share": or_null(split.share),
+        "speed_status": split.status,
+        "friction_torque_Nmm": or_null(1e3 * split.torque),
+        **load_record(solution.middle_load),
+    }
+
+
+def load_record(load: NDArray[np.float64]) -> dict[str, Any]:
+    """Load (5,) on a ring."""
+    force, moment = load[:3].tolist(), load[3:].tolist()
+    return {"load_N": dict(zip("xyz", force, strict=True)), "moment_Nm": dict(zip("xy", moment, strict=True))}

@@ -1,0 +1,146 @@
+"""All equations of equilibrium at once, dense: two a ball and one for every free component of the ring.
+
+The unknowns are (axial, radial) of every ball, then the free ones of the ring's displacement (x, y, z, R theta_x, R theta_y),
+all in m; the residuals are in N: what each ball lacks, then the load less what the ring takes. This is what a solver sees
+that knows nothing of their structure.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.compiled.kernel import entry, routine
+from rbdyn.quasistatic.row.ball import ball_forces, deflection
+from rbdyn.quasistatic.row.control import Control
+from rbdyn.quasistatic.row.equilibrium import TOLD, Solution, tell, told_solution
+from rbdyn.quasistatic.row.newton import COUNTERS, space
+from rbdyn.quasistatic.row.place import groove_centre
+from rbdyn.quasistatic.row.ring import BALL, LOADED, RING, assemble
+from rbdyn.quasistatic.row.row import Row, component_lengths
+
+
+class System(NamedTuple):
+    """A row and what holds its ring. Moments over the lever, tilts times the lever.
+
+    ``load`` (5,) [N]; ``held`` (5,): the prescribed displacements, 0 where the load rules [m]; ``free``: places of the
+    components that the load rules.
+    """
+
+    row: Row
+    load: NDArray[np.float64]
+    held: NDArray[np.float64]
+    free: NDArray[np.int64]
+
+    @property
+    def size(self) -> int:
+        """Number of equations."""
+        return 2 * self.row.cosine.size + self.free.size
+
+
+def system_of(row: Row, load: NDArray[np.float64], given: NDArray[np.float64] | None = None) -> System:
+    """The system of ``equilibrium.solve(row, ..., load, given)``."""
+    unit = component_lengths(row.lever)
+    held = np.full(RING, np.nan) if given is None else np.asarray(given, float)
+    return System(
+        row, np.asarray(load, float) / unit, np.where(np.isnan(held), 0.0, held) * unit, np.flatnonzero(np.isnan(held))
+    )
+
+
+def unknowns(system: System, q: NDArray[np.float64], balls: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vector of the unknowns with the ring at ``q`` (5,) [m] and the balls at ``balls`` (Z, 2 or more)."""
+    return np.concatenate((balls[:, :2].ravel(), q[system.free]))
+
+
+def ring_of(system: System, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Displacement (5,) of the ring [m] in the unknowns ``u``."""
+    q = system.held.copy()
+    q[system.free] = u[2 * system.row.cosine.size :]
+    return q
+
+
+@routine
+def forces(control: Any, system: Any, u: Any, residual: Any, jacobian: Any) -> tuple[float, float]:
+    """Fill ``residual`` (n,) [N] and its derivative ``jacobian`` (n, n) [N/m] at ``u``.
+
+    Returns the largest residual and the largest force [N].
+    """
+    row, load, free = system.row, system.load, system.free
+    ring, count = 2 * row.cosine.size, free.size
+    q = system.held.copy()
+    jacobian[:, :] = 0.0
+    worst, largest = 0.0, 0.0
+    for k in range(count):
+        q[free[k]] = u[ring + k]
+        residual[ring + k] = load[free[k]]
+        largest = max(largest, abs(load[free[k]]))
+    one = 1.0 / row.lever
+    for j in range(row.cosine.size):
+        c, s = row.cosine[j], row.sine[j]
+        # What a ball's axial force, radial force and couple are worth along each component.
+        axial, radial, couple = ((0.0, 0.0, 1.0, s, -c), (c, s, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, s * one, -c * one))
+        a_axial, a_radial = groove_centre(row, q, j)
+        x, y = u[2 * j], u[2 * j + 1]
+        inner = deflection(a_axial - x, a_radial - y, row.inner_reach[j])
+        outer = deflection(x, y, row.outer_reach[j])
+        (ra, rr), (fa, fr, fm), by_a, by_x, ring_a, ring_x, pull, _ = ball_forces(
+            control, 1.0, row, a_axial, a_radial, x, y, inner, outer
+        )
+        residual[2 * j], residual[2 * j + 1] = ra, rr
+        largest = max(largest, abs(fa), abs(fr), abs(pull))
+        jacobian[2 * j, 2 * j], jacobian[2 * j, 2 * j + 1] = by_x[0], by_x[1]
+        jacobian[2 * j + 1, 2 * j], jacobian[2 * j + 1, 2 * j + 1] = by_x[2], by_x[3]
+        for k in range(count):
+            i = free[k]
+            ai, ri, ti = axial[i], radial[i], couple[i]
+            residual[ring + k] -= ai * fa + ri * fr + ti * fm
+            jacobian[2 * j, ring + k] = by_a[0] * ai + by_a[1] * ri
+            jacobian[2 * j + 1, ring + k] = by_a[2] * ai + by_a[3] * ri
+            jacobian[ring + k, 2 * j] = -(ai * ring_x[0] + ri * ring_x[2] + ti * ring_x[4])
+            jacobian[ring + k, 2 * j + 1] = -(ai * ring_x[1] + ri * ring_x[3] + ti * ring_x[5])
+            by_axial = ai * ring_a[0] + ri * ring_a[2] + ti * ring_a[4]
+            by_radial = ai * ring_a[1] + ri * ring_a[3] + ti * ring_a[5]
+            for m in range(count):
+                jacobian[ring + k, ring + m] -= by_axial * axial[free[m]] + by_radial * radial[free[m]]
+    for i in range(residual.size):
+        # A comparison that NaN cannot pass.
+        if not abs(residual[i]) <= worst:
+            worst = abs(residual[i])
+    return worst, largest
+
+
+@entry
+def evaluate(control: Any, system: Any, u: Any, residual: Any, jacobian: Any) -> tuple[float, float]:
+    """``forces``, called from Python."""
+    return forces(control, system, u, residual, jacobian)
+
+
+@entry
+def _finish(control: Any, row: Any, load: Any, q: Any, balls: Any, at: Any, told: Any) -> None:
+    """Stiffness and loads at a solution, lifted balls put to rest."""
+    at.work[:, LOADED] = 1.0
+    assemble(control, 1.0, False, row, load, q, balls, at.matrix, at.vector, at.work, at.sums)
+    tell(control, row, q, balls, at.work, told)
+
+
+def solution_at(
+    control: Control,
+    system: System,
+    u: NDArray[np.float64],
+    status: str,
+    steps: int,
+    evaluations: int,
+    residual: float,
+    searches: int | None = None,
+) -> Solution:
+    """What a solver of the full system found at ``u``, or where it stopped and why, with the ``residual`` [N] there."""
+    row, z = system.row, system.row.cosine.size
+    at, told, counts = space(z), np.zeros((z, TOLD)), np.zeros(COUNTERS, np.int64)
+    counts[0], counts[1] = steps, evaluations
+    q, balls = ring_of(system, u), np.zeros((z, BALL))
+    balls[:, :2] = u[: 2 * z].reshape(z, 2)
+    _finish(control, row, system.load, q, balls, at, told)
+    found = told_solution(row, at, q, balls, counts, told, 0, residual)
+    return found._replace(status=status, searches=searches)

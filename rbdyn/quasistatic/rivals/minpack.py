@@ -1,0 +1,89 @@
+"""MINPACK's solvers on all equations, by scipy, with our Jacobian: Powell's hybrid and More's Levenberg-Marquardt.
+
+They begin where plain Newton begins and are judged by the same residual. Their time includes the way from Python to the
+compiled forces and back.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.quasistatic.rivals.full_system import evaluate, solution_at, system_of
+from rbdyn.quasistatic.rivals.plain_newton import unloaded
+from rbdyn.quasistatic.row.control import Control
+from rbdyn.quasistatic.row.equilibrium import OK, Solution
+from rbdyn.quasistatic.row.newton import ACCEPTED
+from rbdyn.quasistatic.row.row import Row
+
+EVALUATIONS = 1000
+# As tight as MINPACK takes without a warning; the residual decides.
+TIGHTEST = 1e-15
+
+
+def hybrid(
+    row: Row,
+    control: Control,
+    load: NDArray[np.float64],
+    given: NDArray[np.float64] | None = None,
+    start: Solution | None = None,
+    limit: int = EVALUATIONS,
+) -> Solution:
+    """As ``equilibrium.solve``, by MINPACK's hybrj in at most ``limit`` evaluations. ``start`` is not used."""
+    return _solve("hybr", {"xtol": TIGHTEST, "maxfev": limit}, row, control, load, given)
+
+
+def levenberg_marquardt(
+    row: Row,
+    control: Control,
+    load: NDArray[np.float64],
+    given: NDArray[np.float64] | None = None,
+    start: Solution | None = None,
+    limit: int = EVALUATIONS,
+) -> Solution:
+    """As ``equilibrium.solve``, by MINPACK's lmder in at most ``limit`` evaluations. ``start`` is not used."""
+    tight = {"xtol": TIGHTEST, "ftol": TIGHTEST, "gtol": 0.0, "maxiter": limit}
+    return _solve("lm", tight, row, control, load, given)
+
+
+def _solve(
+    method: str,
+    options: dict[str, Any],
+    row: Row,
+    control: Control,
+    load: NDArray[np.float64],
+    given: NDArray[np.float64] | None,
+) -> Solution:
+    from scipy.optimize import root
+
+    system = system_of(row, load, given)
+    residual, jacobian = np.zeros(system.size), np.zeros((system.size, system.size))
+    calls = 0
+
+    def function(u: NDArray[np.float64]) -> NDArray[np.float64]:
+        nonlocal calls
+        calls += 1
+        evaluate(control, system, u, residual, jacobian)
+        return residual.copy()
+
+    def derivative(u: NDArray[np.float64]) -> NDArray[np.float64]:
+        evaluate(control, system, u, residual, jacobian)
+        return jacobian.copy()
+
+    first = unloaded(system)
+    try:
+        with np.errstate(all="ignore"):
+            u = np.asarray(root(function, first, jac=derivative, method=method, options=options).x)
+        why = f"MINPACK {method} stopped short of an equilibrium"
+    except np.linalg.LinAlgError:
+        # scipy inverts lmder's last matrix for a covariance that nobody asked for.
+        u, why = first, f"MINPACK {method} ended at a singular matrix"
+    worst, largest = evaluate(control, system, u, residual, jacobian)
+    if not math.isfinite(worst):
+        u = first
+        worst, largest = evaluate(control, system, u, residual, jacobian)
+    status = OK if worst <= ACCEPTED * largest else why
+    return solution_at(control, system, u, status, calls, calls, worst)

@@ -1,0 +1,7 @@
+"""One row of balls in equilibrium.
+
+- ``row``: its geometry in SI; ``control``: hypotheses of raceway control; ``model``: both from a scene
+- ``ball_motion``: orbit, spin, centrifugal force, gyroscopic moment; ``ball``: forces on one ball and their derivatives
+- ``place``: where the balls stand; ``ring``: forces on the inner ring, balls eliminated
+- ``start``: first guess; ``newton``: convex start and full equations; ``equilibrium``: what Python calls
+"""

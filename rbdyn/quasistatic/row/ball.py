@@ -1,0 +1,233 @@
+"""Forces on one ball and on the inner ring from it, with their derivatives (Jones 1960; Harris, *Rolling Bearing Analysis*).
+
+With T = lambda M_g/D the friction forces that take the gyroscopic moment:
+
+    axial   Q_i sin a_i - Q_o sin a_o - T_i cos a_i + T_o cos a_o = 0,
+    radial  Q_i cos a_i - Q_o cos a_o + T_i sin a_i - T_o sin a_o + F_c = 0;
+
+on the ring: axial Q_i sin a_i - T_i cos a_i, radial Q_i cos a_i + T_i sin a_i, and the couple f_i D T_i of the friction about
+the groove centre.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rbdyn.compiled.kernel import kernel, law
+from rbdyn.quasistatic.row.ball_motion import orbit_and_spin
+from rbdyn.quasistatic.row.control import CommonCage, FixedShare, FrictionShare
+
+# Share of the friction limit up to which a contact holds all of a gyroscopic moment.
+STICKING = 0.8
+# Cosine of the inner angle below which a ball begins to lie across the groove, where rolling on both races ends: 78 deg.
+ACROSS = 0.2
+
+
+@kernel
+def line(axial: float, radial: float) -> tuple[float, float, float]:
+    """1/length [1/m], sine and cosine of the angle of a line between two centres (axial, radial) [m] apart."""
+    inverse = 1.0 / math.sqrt(axial * axial + radial * radial)
+    return inverse, axial * inverse, radial * inverse
+
+
+@kernel
+def deflection(axial: float, radial: float, reach: float) -> float:
+    """How deep two bodies with centres (axial, radial) [m] apart touch; 0 where the contact is open."""
+    return max(math.sqrt(axial * axial + radial * radial) - reach, 0.0)
+
+
+@kernel
+def spring(depth: float, stiffness: float) -> tuple[float, float]:
+    """Load [N] and normal stiffness [N/m] of a Hertz contact ``depth`` [m] deep."""
+    root = stiffness * math.sqrt(depth)
+    return root * depth, 1.5 * root
+
+
+@kernel
+def tangent(load: float, normal: float, inverse: float, s: float, c: float) -> tuple[float, float, float]:
+    """Derivative of a contact's force by the place of its end: axial/axial, axial/radial, radial/radial [N/m]."""
+    side = load * inverse
+    return side + (normal - side) * s * s, (normal - side) * s * c, side + (normal - side) * c * c
+
+
+@kernel
+def gradually(part: float) -> tuple[float, float]:
+    """From 0 at 0 to 1 at 1 with no slope at either end, and the slope."""
+    part = min(part, 1.0)
+    return part * part * (3.0 - 2.0 * part), 6.0 * part * (1.0 - part)
+
+
+@kernel
+def held(force: float, limit: float) -> tuple[float, float, float]:
+    """What a contact holds of a friction ``force`` where at most ``limit`` > 0 is possible, by force and by limit.
+
+    The whole force up to STICKING of the limit, then a smooth approach to the limit.
+    """
+    beyond = (abs(force) / limit - STICKING) / (1.0 - STICKING)
+    if beyond <= 0.0:
+        return force, 1.0, 0.0
+    one = 1.0 / (1.0 + beyond)
+    part = STICKING + (1.0 - STICKING) * beyond * one
+    slope = one * one
+    side = 1.0 if force > 0.0 else -1.0
+    return side * part * limit, slope, side * (part - abs(force) / limit * slope)
+
+
+@law
+def spin_share(control: Any, inner_deflection: float, outer_deflection: float) -> Any:
+    """Inner share s of spin and gyroscopic moment, and its derivatives by the deflections [1/m]."""
+
+
+@spin_share.body(FixedShare)
+def _fixed(control: Any, inner_deflection: float, outer_deflection: float) -> tuple[float, float, float]:
+    return control.inner, 0.0, 0.0
+
+
+@spin_share.body(FrictionShare)
+def _by_friction(control: Any, inner_deflection: float, outer_deflection: float) -> tuple[float, float, float]:
+    inner = control.inner_weight * inner_deflection * inner_deflection
+    outer = outer_deflection * outer_deflection
+    share = inner / (inner + outer)
+    both = 2.0 * share * (1.0 - share)
+    return share, both / inner_deflection, -both / outer_deflection
+
+
+@law
+def rules(control: Any) -> Any:
+    """Whether there is more to the equilibrium than one common cage speed."""
+
+
+@rules.body(CommonCage)
+def _never(control: Any) -> bool:
+    return False
+
+
+@rules.body(FixedShare, FrictionShare)
+def _always(control: Any) -> bool:
+    return True
+
+
+@law
+def ball_forces(
+    control: Any, strength: float, row: Any, a_axial: float, a_radial: float, x: float, y: float, di: float, do: float
+) -> Any:
+    """A ball with its centre at (x, y), the inner groove centre at (a_axial, a_radial), contacts ``di`` and ``do`` deep [m].
+
+    The depths are unknowns of their own: the lines between the centres tell the angles only. Derivatives by place count a
+    change along a line as a change of depth.
+
+    ``strength``: 0 to 1, how far the race control rules orbit and moment; the rest is the common cage speed.
+    Returns (residual, ring, residual by A, residual by X, ring by A, ring by X): residual (axial, radial) [N]; ring
+    (axial, radial [N], couple [N m]); derivatives row by row [N/m, N]; then F_c [N], M_g [N m].
+    """
+
+
+@kernel
+def elastic_forces(row: Any, a_axial: float, a_radial: float, x: float, y: float, di: float, do: float) -> Any:
+    """What ``ball_forces`` returns for a ball that goes with the cage: springs and the common centrifugal force."""
+    one_i, si, ci = line(a_axial - x, a_radial - y)
+    one_o, so, co = line(x, y)
+    qi, ki = spring(di, row.inner_stiffness)
+    qo, ko = spring(do, row.outer_stiffness)
+    aa, ar, rr = tangent(qi, ki, one_i, si, ci)
+    oaa, oar, orr = tangent(qo, ko, one_o, so, co)
+    pull = row.centrifugal_force
+    return (
+        (qi * si - qo * so, qi * ci - qo * co + pull),
+        (qi * si, qi * ci, 0.0),
+        (aa, ar, ar, rr),
+        (-aa - oaa, -ar - oar, -ar - oar, -rr - orr),
+        (aa, ar, ar, rr, 0.0, 0.0),
+        (-aa, -ar, -ar, -rr, 0.0, 0.0),
+        pull,
+        0.0,
+    )
+
+
+@ball_forces.body(CommonCage)
+def _going_with_the_cage(control, strength, row, a_axial, a_radial, x, y, di, do):
+    return elastic_forces(row, a_axial, a_radial, x, y, di, do)
+
+
+@ball_forces.body(FixedShare, FrictionShare)
+def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
+    one_i, si, ci = line(a_axial - x, a_radial - y)
+    one_o, so, co = line(x, y)
+    qi, ki = spring(di, row.inner_stiffness)
+    qo, ko = spring(do, row.outer_stiffness)
+    spinning = control.spinning
+    if strength == 0.0 or qi <= 0.0 or qo <= 0.0 or ci <= 0.0:
+        return elastic_forces(row, a_axial, a_radial, x, y, di, do)
+    aa, ar, rr = tangent(qi, ki, one_i, si, ci)
+    oaa, oar, orr = tangent(qo, ko, one_o, so, co)
+    share, share_i, share_o = spin_share(control, di, do)
+    (f, f_i, f_o, f_s), (m, m_i, m_o, m_s) = orbit_and_spin(spinning, share, ci, si, co, so)
+    # A lightly loaded ball, or one across the groove, goes with the cage; otherwise the race control alone rules.
+    loaded, loaded_q = gradually(qi / spinning.blend_load)
+    level, level_c = gradually(ci / ACROSS)
+    follow = strength * loaded * level
+    follow_d = strength * level * loaded_q / spinning.blend_load * ki
+    follow_a = -strength * loaded * level_c / ACROSS * si
+    beyond = f - row.centrifugal_force
+    pull = row.centrifugal_force + follow * beyond
+    moment = follow * m
+    by_diameter = 2.0 / spinning.ball_diameter
+    ti, to = share * moment * by_diameter, (1.0 - share) * moment * by_diameter
+    # By inner angle, outer angle, inner deflection, outer deflection.
+    pull_1, pull_2 = follow * f_i + follow_a * beyond, follow * f_o
+    pull_3, pull_4 = follow_d * beyond + follow * f_s * share_i, follow * f_s * share_o
+    in_share = m * share * by_diameter
+    out_share = m * (1.0 - share) * by_diameter
+    grow_i = (m_s * share + m) * by_diameter
+    grow_o = (m_s * (1.0 - share) - m) * by_diameter
+    ti_1, ti_2 = follow * m_i * share * by_diameter + follow_a * in_share, follow * m_o * share * by_diameter
+    ti_3, ti_4 = follow_d * in_share + follow * grow_i * share_i, follow * grow_i * share_o
+    to_1 = follow * m_i * (1.0 - share) * by_diameter + follow_a * out_share
+    to_2 = follow * m_o * (1.0 - share) * by_diameter
+    to_3, to_4 = follow_d * out_share + follow * grow_o * share_i, follow * grow_o * share_o
+    # A contact holds no more than friction allows.
+    held_i, slope_i, by_load_i = held(ti, spinning.friction * qi)
+    held_o, slope_o, by_load_o = held(to, spinning.friction * qo)
+    by_load_i, by_load_o = by_load_i * spinning.friction * ki, by_load_o * spinning.friction * ko
+    ti, ti_1, ti_2, ti_3, ti_4 = (held_i, slope_i * ti_1, slope_i * ti_2, slope_i * ti_3 + by_load_i, slope_i * ti_4)
+    to, to_1, to_2, to_3, to_4 = (held_o, slope_o * to_1, slope_o * to_2, slope_o * to_3, slope_o * to_4 + by_load_o)
+    # Down to the places: an angle turns with (c, -s)/length, a deflection grows along (s, c).
+    ic, is_ = ci * one_i, si * one_i
+    oc, os_ = co * one_o, so * one_o
+    pull_ua, pull_ur = pull_1 * ic + pull_3 * si, -pull_1 * is_ + pull_3 * ci
+    pull_xa, pull_xr = pull_2 * oc + pull_4 * so, -pull_2 * os_ + pull_4 * co
+    ti_ua, ti_ur = ti_1 * ic + ti_3 * si, -ti_1 * is_ + ti_3 * ci
+    ti_xa, ti_xr = ti_2 * oc + ti_4 * so, -ti_2 * os_ + ti_4 * co
+    to_ua, to_ur = to_1 * ic + to_3 * si, -to_1 * is_ + to_3 * ci
+    to_xa, to_xr = to_2 * oc + to_4 * so, -to_2 * os_ + to_4 * co
+    # Ring, by the inner line u = A - X and by the outer line X.
+    ring_aa, ring_ar = aa - ti_ua * ci + ti * si * ic, ar - ti_ur * ci - ti * si * is_
+    ring_ra, ring_rr = ar + ti_ua * si + ti * ci * ic, rr + ti_ur * si - ti * ci * is_
+    ring_axa, ring_axr = -ti_xa * ci, -ti_xr * ci
+    ring_rxa, ring_rxr = ti_xa * si, ti_xr * si
+    res_aa, res_ar = ring_aa + to_ua * co, ring_ar + to_ur * co
+    res_ra, res_rr = ring_ra - to_ua * so + pull_ua, ring_rr - to_ur * so + pull_ur
+    res_axa = ring_axa - oaa + to_xa * co - to * so * oc
+    res_axr = ring_axr - oar + to_xr * co + to * so * os_
+    res_rxa = ring_rxa - oar - to_xa * so - to * co * oc + pull_xa
+    res_rxr = ring_rxr - orr - to_xr * so + to * co * os_ + pull_xr
+    couple = row.inner_groove_radius
+    ring_axial, ring_radial = qi * si - ti * ci, qi * ci + ti * si
+    return (
+        (ring_axial - qo * so + to * co, ring_radial - qo * co - to * so + pull),
+        (ring_axial, ring_radial, couple * ti),
+        (res_aa, res_ar, res_ra, res_rr),
+        (res_axa - res_aa, res_axr - res_ar, res_rxa - res_ra, res_rxr - res_rr),
+        (ring_aa, ring_ar, ring_ra, ring_rr, couple * ti_ua, couple * ti_ur),
+        (
+            ring_axa - ring_aa,
+            ring_axr - ring_ar,
+            ring_rxa - ring_ra,
+            ring_rxr - ring_rr,
+            couple * (ti_xa - ti_ua),
+            couple * (ti_xr - ti_ur),
+        ),
+        pull,
+        moment,
+    )

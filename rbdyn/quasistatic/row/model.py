@@ -1,0 +1,140 @@
+"""From a scene to the parameters of the kernels: the only module here that knows both."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.contact.hertz_point import PointContact, ball_on_race
+from rbdyn.mounting.ball_rings import row_change
+from rbdyn.mounting.ring_growth import UNCHANGED, GrooveChange
+from rbdyn.properties.materials import Material, equivalent_modulus
+from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.row.row import Row, at_rest
+from rbdyn.scene.ball import BallModel, BallScene, SingleRowScene
+from rbdyn.scene.ball_bearing import BallRow
+
+INNER_SHARE = {"outer": 0.0, "inner": 1.0, "half": 0.5}
+# Keeps a quotient finite where nothing turns.
+VANISHING = 1e-200
+RPM = math.pi / 30.0
+
+
+class RowModel(NamedTuple):
+    """One row as the solver takes it, and its contacts."""
+
+    row: Row
+    control: Control
+    inner_contact: PointContact
+    outer_contact: PointContact
+
+
+def contacts(drawing: BallRow, ball: Material, inner: Material, outer: Material) -> tuple[PointContact, PointContact]:
+    """Hertz contacts of a ball with the inner and the outer race."""
+    diameter = 1e-3 * drawing.ball_diameter_mm
+    gamma = drawing.ball_diameter_mm * math.cos(drawing.contact_angle) / drawing.pitch_diameter_mm
+    return (
+        ball_on_race(diameter, drawing.inner_groove_factor, gamma, equivalent_modulus(ball, inner)),
+        ball_on_race(diameter, drawing.outer_groove_factor, -gamma, equivalent_modulus(ball, outer)),
+    )
+
+
+def cage_speed(drawing: BallRow, inner_speed: float, outer_speed: float) -> float:
+    """Common cage speed at the unloaded contact angle [rad/s], the rings at speeds [rad/s]."""
+    gamma = drawing.ball_diameter_mm * math.cos(drawing.contact_angle) / drawing.pitch_diameter_mm
+    return 0.5 * (inner_speed * (1.0 - gamma) + outer_speed * (1.0 + gamma))
+
+
+def row_model(
+    drawing: BallRow,
+    model: BallModel,
+    ball: Material,
+    inner: Material,
+    outer: Material,
+    inner_speed: float,
+    outer_speed: float,
+    change: GrooveChange = UNCHANGED,
+) -> RowModel:
+    """One row of balls between two rings that turn at ``inner_speed`` and ``outer_speed`` [rad/s].
+
+    ``change``: of the grooves by rotation, fits and temperature.
+    """
+    z = drawing.balls
+    azimuth = 2.0 * math.pi * np.arange(z) / z
+    diameter, pitch = 1e-3 * drawing.ball_diameter_mm, 1e-3 * drawing.pitch_diameter_mm
+    angle, between = drawing.contact_angle, 1e-3 * drawing.groove_centre_distance_mm
+    to_inner, to_outer = contacts(drawing, ball, inner, outer)
+    mass = ball.density * math.pi * diameter**3 / 6.0
+    cage = cage_speed(drawing, inner_speed, outer_speed)
+    pull = 0.5 * mass * pitch * cage**2
+    resting = at_rest(pull, to_outer.stiffness)
+    row = Row(
+        cosine=np.cos(azimuth),
+        sine=np.sin(azimuth),
+        axial=np.full(z, between * math.sin(angle)),
+        radial=np.full(z, between * math.cos(angle) + drawing.interference_m + change.radial),
+        inner_reach=np.full(z, (drawing.inner_groove_factor - 0.5) * diameter + change.inner_reach),
+        outer_reach=np.full(z, (drawing.outer_groove_factor - 0.5) * diameter + change.outer_reach),
+        inner_stiffness=to_inner.stiffness,
+        outer_stiffness=to_outer.stiffness,
+        lever=0.5 * pitch + (drawing.inner_groove_factor - 0.5) * diameter * math.cos(angle),
+        inner_groove_radius=drawing.inner_groove_factor * diameter,
+        centrifugal_force=pull,
+        rest_deflection=resting[0],
+        rest_energy=resting[1],
+    )
+    spinning = Spinning(
+        ratio=diameter / pitch,
+        ball_diameter=diameter,
+        orbit_mass=0.5 * mass * pitch,
+        inertia=0.1 * mass * diameter**2 if model.gyroscopic else 0.0,
+        turning=1.0 if model.gyroscopic == "unsigned" else -1.0,
+        inner_speed=inner_speed,
+        outer_speed=outer_speed,
+        blend_load=max(model.light_load_share * pull, VANISHING),
+        friction=model.friction_limit,
+    )
+    return RowModel(row, control_of(model, spinning, cage, to_inner, to_outer), to_inner, to_outer)
+
+
+def control_of(
+    model: BallModel, spinning: Spinning, cage: float, to_inner: PointContact, to_outer: PointContact
+) -> Control:
+    """Parameters of the raceway control that the scene asks for."""
+    if model.raceway_control == "common_cage":
+        return CommonCage(cage)
+    if model.raceway_control == "hybrid":
+        weights = [
+            contact.semi_major * contact.elliptic_second * contact.stiffness ** (4.0 / 3.0)
+            for contact in (to_inner, to_outer)
+        ]
+        return FrictionShare(weights[0] / weights[1], spinning)
+    return FixedShare(INNER_SHARE[model.raceway_control], spinning)
+
+
+def row_of(scene: SingleRowScene) -> RowModel:
+    """The row of a single-row scene, its rings grown as far as the scene asks for."""
+    operation = scene.operation
+    return row_model(
+        scene.bearing,
+        scene.model,
+        scene.material("ball"),
+        scene.material("inner_ring"),
+        scene.material("outer_ring"),
+        operation.inner_speed_rpm * RPM,
+        operation.outer_speed_rpm * RPM,
+        row_change(scene),
+    )
+
+
+def load_of(scene: BallScene) -> NDArray[np.float64]:
+    """Load on the inner ring, (Fx, Fy, Fz [N], Mx, My [N m])."""
+    return np.array([*scene.operation.load, *scene.operation.moment])
+
+
+def given_of(scene: BallScene) -> NDArray[np.float64]:
+    """Prescribed displacements [m, rad], NaN where the load rules."""
+    return np.array([math.nan if value is None else 1e-3 * value for value in scene.operation.given])

@@ -1,0 +1,127 @@
+"""From a scene with form errors to the path of its turning ring."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rbdyn.faults import InputError
+from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.quasistatic.runout.race_errors import (
+    PERFECT,
+    RaceErrors,
+    Turning,
+    Waviness,
+    ball_path,
+    random_waviness,
+    rolling,
+    waviness,
+)
+from rbdyn.quasistatic.runout.tolerance_design import Bench
+from rbdyn.quasistatic.runout.turn import Followed, follow
+from rbdyn.scene.ball import BallScene, SingleRowScene
+from rbdyn.scene.bearing import Harmonic
+from rbdyn.scene.form_errors import FormErrors, RandomWaviness
+
+# Steps times balls of a path: 1.4 kB each while it is made.
+MOST_PLACES = 1_000_000
+
+
+def follow_ring(scene: BallScene) -> Followed:
+    """Follow the inner ring of a scene over its form errors, as many turns and steps as they say.
+
+    Raises InputError for a scene without form errors or of two rows, and RunError where an equilibrium is missing.
+    """
+    row = single_row(scene)
+    if row.errors is None:
+        raise InputError(["errors: missing; a bearing without form errors has no runout, add the table"])
+    steps, turns, balls = row.errors.steps, row.errors.turns, row.bearing.balls
+    if (places := steps * turns * balls) > MOST_PLACES:
+        told = f"errors.steps = {steps}, errors.turns = {turns}: of {balls} balls these make {places} places"
+        raise InputError([f"{told}, more than the {MOST_PLACES} that memory has room for; take fewer steps or turns"])
+    test = bench_of(row)
+    path = ball_path(errors_of(row.errors, balls), test.turning, steps, turns)
+    return follow(test.row, test.control, test.load, path, turns, test.given)
+
+
+def bench_of(scene: BallScene, face_radius: float | None = None, steps: int = 120, turns: int = 2) -> Bench:
+    """The nominal bearing of a scene under its load, and where its runout is read.
+
+    ``face_radius``: where an axial indicator touches the inner ring [m]; the radius of its groove bottom where left out.
+    Raises InputError for two rows.
+    """
+    row = single_row(scene)
+    model = row_of(row)
+    bottom = model.row.lever - model.row.inner_groove_radius
+    return Bench(
+        row=model.row,
+        control=model.control,
+        load=load_of(row),
+        turning=turning_of(row),
+        face_radius=bottom if face_radius is None else face_radius,
+        steps=steps,
+        turns=turns,
+        given=given_of(row),
+    )
+
+
+def single_row(scene: BallScene) -> SingleRowScene:
+    """The scene, if of one row. Raises InputError."""
+    if not isinstance(scene, SingleRowScene):
+        raise InputError(["bearing.kind = 'double_decker_ball': runout is followed for one row of balls only"])
+    return scene
+
+
+def turning_of(scene: SingleRowScene) -> Turning:
+    """Turns of the parts while the inner ring makes one against the outer; the outer ring stands where neither turns."""
+    operation, bearing = scene.operation, scene.bearing
+    inner, outer = operation.inner_speed_rpm, operation.outer_speed_rpm
+    against = inner - outer
+    return rolling(
+        1e-3 * bearing.ball_diameter_mm,
+        1e-3 * bearing.pitch_diameter_mm,
+        bearing.contact_angle,
+        outer / against if against != 0.0 else 0.0,
+    )
+
+
+def errors_of(errors: FormErrors, balls: int) -> RaceErrors:
+    """Form errors of a scene in SI, with what its seed draws.
+
+    Each kind of error draws from a stream of its own, so that adding one leaves the others as they were.
+    """
+    streams = [np.random.default_rng(child) for child in np.random.SeedSequence(errors.seed).spawn(8)]
+    forms = {
+        name: _form(getattr(errors, key), getattr(errors, f"{key}_random"), draw)
+        for (name, key), draw in zip(_RACES.items(), streams, strict=False)
+    }
+    given, spread = errors.ball_diameter_errors_um, errors.ball_diameter_spread_um
+    larger = np.array(given) if given is not None else spread * streams[6].standard_normal(balls)
+    sphericity = [PERFECT] * balls
+    for harmonic in errors.ball_sphericity:
+        drawn = streams[7].uniform(0.0, 2.0 * math.pi, balls)
+        for ball in range(balls) if harmonic.balls is None else [number - 1 for number in harmonic.balls]:
+            phase = drawn[ball] if harmonic.phase_deg is None else math.radians(harmonic.phase_deg)
+            wave = waviness((harmonic.order, 1e-6 * harmonic.amplitude_um, phase))
+            sphericity[ball] = sphericity[ball].plus(wave)
+    return RaceErrors(1e-6 * larger, tuple(sphericity), **forms)
+
+
+_RACES = {
+    "inner_roundness": "inner_roundness",
+    "outer_roundness": "outer_roundness",
+    "inner_sway": "inner_side_sway",
+    "outer_sway": "outer_side_sway",
+    "inner_groove_radius": "inner_groove_radius",
+    "outer_groove_radius": "outer_groove_radius",
+}
+
+
+def _form(given: list[Harmonic], drawn: RandomWaviness | None, draw: np.random.Generator) -> Waviness:
+    form = waviness(*((wave.order, 1e-6 * wave.amplitude_um, math.radians(wave.phase_deg)) for wave in given))
+    if drawn is None:
+        return form
+    return form.plus(
+        random_waviness(drawn.lowest_order, drawn.highest_order, 1e-6 * drawn.height_um, drawn.decay, draw)
+    )

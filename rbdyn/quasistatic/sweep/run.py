@@ -1,0 +1,255 @@
+"""Equilibria over one or several keys of a scene, each started from its neighbour.
+
+Grids are walked as a snake ploughs: along the last key there and back again, so that each point has a solved neighbour.
+A single row goes through one compiled loop; a double-decker, another solver, or a changing number of balls point by point.
+Where a row has several equilibria (see ``light_load_share``) a start from the neighbour may stay on another than a fresh start.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.quasistatic.bearing import equilibrium
+from rbdyn.quasistatic.fatigue import reference_capacities
+from rbdyn.quasistatic.remarks import Rating, Remark, overloads, remarks, tipping
+from rbdyn.quasistatic.result import BallResult
+from rbdyn.quasistatic.row.equilibrium import LOST, OK, SENTENCES, resolved
+from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
+from rbdyn.quasistatic.row.newton import CONVERGED, COUNTERS, space
+from rbdyn.quasistatic.row.ring import BALL, RING
+from rbdyn.quasistatic.sweep.figures import Columns, ring_columns, row_columns
+from rbdyn.quasistatic.sweep.march import LEVER, Found, Points, empty, leaves, march_through
+from rbdyn.quasistatic.sweep.points import Axis, axes_of, scenes, snake
+from rbdyn.quasistatic.sweep.result import SweepResult
+from rbdyn.scene import BallScene, Scene, balls_only
+from rbdyn.scene.ball import SingleRowScene
+
+# Keys that change only what loads the ring: the row stays as it is.
+LOAD_KEYS = (
+    "operation.radial_load_N",
+    "operation.axial_load_N",
+    "operation.load_N",
+    "operation.moment_Nm",
+    "operation.preload_",
+    "operation.prescribed.",
+)
+# Points between two reports of progress, and two looks for Ctrl-C.
+CHUNK = 2000
+Progress = Callable[[int, int], None]
+Vector = NDArray[np.float64]
+Group = tuple[NDArray[np.int64], Vector]
+
+
+class Walked(NamedTuple):
+    """What a sweep found, in the order in which it went; ``balls`` as ``SweepResult.told``, remarks with their first point."""
+
+    columns: Columns
+    statuses: list[str]
+    balls: Mapping[str, Sequence[Vector] | Vector]
+    cold: int
+    remarks: list[tuple[int, Remark]]
+
+
+def sweep(
+    scene: BallScene | Scene, keys: Mapping[str, Sequence[float]], progress: Progress | None = None
+) -> SweepResult:
+    """Equilibrium at every point of the grid of ``keys``: dotted names of numbers in the scene, and their values.
+
+    List items count from 1, ``operation.load_N[3]``. Values rise or fall. Points without an equilibrium are records of their cause.
+    Raises InputError for keys that cannot be swept and naming a point that the scene refuses.
+    """
+    scene = balls_only(scene)
+    axes = axes_of(scene, keys)
+    order = snake(axes)
+    began = time.perf_counter()
+    compiled = isinstance(scene, SingleRowScene) and scene.model.solver == "convex" and "bearing.balls" not in keys
+    walked = (_march if compiled else _one_by_one)(scene, axes, order, progress or (lambda done, total: None))
+    shape = tuple(len(axis.values) for axis in axes)
+    # From the order of the snake to that of the table.
+    visited = np.ravel_multi_index(np.array(order).T, shape)
+    back = np.argsort(visited)
+    failed = np.array([walked.statuses[place] != OK for place in back])
+    columns = {}
+    for name, column in walked.columns.items():
+        columns[name] = column[back]
+        columns[name][failed] = np.nan
+    return SweepResult(
+        {axis.key: axis.values for axis in axes},
+        columns,
+        tuple(walked.statuses[place] for place in back),
+        walked.cold,
+        time.perf_counter() - began,
+        scene.model_dump(mode="json"),
+        {name: _sorted(balls, back) for name, balls in walked.balls.items()},
+        grouped(walked.remarks, visited, walked.statuses),
+    )
+
+
+def grouped(
+    found: Sequence[tuple[int, Remark]], visited: NDArray[np.int64], statuses: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Notes by what they are about: the sentence of the first point in the table, and the points, counted from 0.
+
+    ``found``: remarks, each with the place of its first point on the walk; ``visited``: the table's place of each point walked.
+    """
+    groups: dict[str, list[tuple[int, int, Remark]]] = {}
+    for first, remark in found:
+        for k in np.flatnonzero(remark.where).tolist():
+            if statuses[first + k] == OK:
+                groups.setdefault(remark.word, []).append((int(visited[first + k]), k, remark))
+    notes = []
+    for word, group in groups.items():
+        _, k, remark = min(group, key=lambda one: one[0])
+        notes.append({"about": word, "note": remark.sentence(k), "points": sorted(place for place, _, _ in group)})
+    return notes
+
+
+def _sorted(balls: Sequence[Vector] | Vector, back: NDArray[np.int64]) -> list[Group]:
+    """Arrays (Z, 6) in the order of the table, those of equal Z together."""
+    if isinstance(balls, np.ndarray):
+        return [(np.arange(len(balls)), balls[back])]
+    sizes: dict[int, list[int]] = {}
+    for place, index in enumerate(back):
+        sizes.setdefault(len(balls[index]), []).append(place)
+    return [(np.array(places), np.array([balls[back[place]] for place in places])) for places in sizes.values()]
+
+
+def _march(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress) -> Walked:
+    """A single row through the compiled loop."""
+    assert isinstance(scene, SingleRowScene)
+    model, points, ratings = _packed(scene, axes, order)
+    row, size, count = model.row, model.row.cosine.size, len(order)
+    found, at, counts = empty(count, size), space(size), np.zeros(COUNTERS, np.int64)
+    q, balls, warm = np.zeros(RING), np.zeros((size, BALL)), False
+    for first in range(0, count, CHUNK):
+        last = min(first + CHUNK, count)
+        warm = march_through(
+            model.control, row.cosine, row.sine, points, first, last, warm, q, balls, at, counts, found
+        )
+        progress(last, count)
+    *ring, balls = resolved(found.displacement, found.taken, found.matrix, found.told, points.numbers[:, LEVER])
+    columns = _columns(points, found, ring, balls, ratings)
+    statuses = [OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST) for outcome in found.outcome.tolist()]
+    for k, why in overloads(balls, ratings).items():
+        if statuses[k] == OK:
+            statuses[k] = why
+    tilts = (ring[0] / _units(points.numbers))[:, 3:]
+    notes = [(0, remark) for remark in (*remarks(balls, ratings), tipping(tilts, scene))]
+    return Walked(columns, statuses, {"row": balls}, int(found.cold.sum()), notes)
+
+
+def _packed(
+    scene: SingleRowScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]]
+) -> tuple[RowModel, Points, list[Rating]]:
+    """The last row, and what changes from point to point; each part is made again only where a key that it depends on changes."""
+    loading = [place for place, axis in enumerate(axes) if axis.key.startswith(LOAD_KEYS)]
+    shaping = [place for place in range(len(axes)) if place not in loading]
+    drawing = [place for place in shaping if axes[place].key.startswith("bearing.")]
+    packed: list[tuple[Any, ...]] = []
+    made: RowModel | None = None
+    loaded = shaped = drawn = [math.nan]
+    for values, point in scenes(scene, axes, order):
+        assert isinstance(point, SingleRowScene)
+        now = [values[place] for place in shaping]
+        if made is None or now != shaped:
+            made, shaped = row_of(point), now
+            at_place, number, control = made.row[2:6], made.row[6:], leaves(made.control)
+            now = [values[place] for place in drawing]
+            if now != drawn:
+                capacities, drawn = reference_capacities(point.bearing), now
+            speeds = point.operation.inner_speed_rpm, point.operation.outer_speed_rpm
+            rating = Rating(point.bearing, made, capacities, speeds)
+        now = [values[place] for place in loading]
+        if now != loaded:
+            load, given, loaded = load_of(point), given_of(point), now
+        packed.append((at_place, number, control, rating, load, given))
+    assert made is not None
+    places, numbers, controls, ratings, loads, givens = zip(*packed, strict=True)
+    number_table, given_table = np.array(numbers), np.array(givens)
+    units = _units(number_table)
+    free = np.isnan(given_table)
+    points = Points(
+        np.ascontiguousarray(np.array(places).transpose(1, 0, 2)),
+        number_table,
+        np.array(controls),
+        np.array(loads) / units,
+        np.where(free, 0.0, given_table) * units,
+        free.astype(float),
+    )
+    return made, points, list(ratings)
+
+
+def _units(numbers: Vector) -> Vector:
+    """(n, 5): what tilts count over."""
+    units = np.ones((len(numbers), RING))
+    units[:, 3:] = numbers[:, [LEVER]]
+    return units
+
+
+def _columns(points: Points, found: Found, ring: Sequence[Vector], balls: Vector, ratings: Sequence[Rating]) -> Columns:
+    units, (displacement, taken, matrix) = _units(points.numbers), ring
+    return {
+        **ring_columns(displacement / units, taken * units, matrix * units[:, :, np.newaxis] * units[:, np.newaxis, :]),
+        **row_columns(balls, ratings),
+        "residual_N": found.residual,
+        "iterations": found.steps.astype(float),
+    }
+
+
+def _one_by_one(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress) -> Walked:
+    """Any bearing, through ``rbdyn.equilibrium``."""
+    rows: list[dict[str, float]] = []
+    statuses: list[str] = []
+    told_of: dict[str, list[Vector]] = {}
+    notes: list[tuple[int, Remark]] = []
+    before: BallResult | None = None
+    balls, cold = 0, 0
+    for place, (_, point) in enumerate(list(scenes(scene, axes, order))):
+        # A start needs as many balls; their number is only swept in a single row.
+        count = point.bearing.balls if isinstance(point, SingleRowScene) else 0
+        if count != balls:
+            before, balls = None, count
+        result = equilibrium(point, before)
+        started = before is not None
+        if started and not result.found:
+            result, started = equilibrium(point), False
+        cold += not started
+        statuses.append(result.status)
+        rows.append({})
+        if result.found:
+            rows[-1], told_rows, found = _figures(point, result)
+            notes += [(place, remark) for remark in found]
+        for name in ("row",) if isinstance(point, SingleRowScene) else ("inner", "outer"):
+            size = count or getattr(point.bearing, name).balls
+            told_of.setdefault(name, []).append(told_rows[name] if result.found else np.full((size, 6), np.nan))
+        before = result if result.found else None
+        progress(place + 1, len(order))
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+    return Walked(columns, statuses, told_of, cold, notes)
+
+
+def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Vector], list[Remark]]:
+    """Figures of one point, what is known of each ball by row, and remarks."""
+    record = result.record
+    load = record["reaction"]
+    reaction = np.array([*load["load_N"].values(), *load["moment_Nm"].values()])
+    stiffness = np.array(record["stiffness"]["matrix_SI"])
+    columns = ring_columns(result.displacement[np.newaxis], reaction[np.newaxis], stiffness[np.newaxis])
+    balls, found = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
+    names = ("row",) if len(result.rows) == 1 else ("inner", "outer")
+    for name, rating, solution in zip(names, result.ratings, result.rows, strict=True):
+        balls[name] = solution.told
+        found += remarks(solution.told[np.newaxis], [rating], name.removeprefix("row"))
+        prefix = "" if name == "row" else f"{name}_row_"
+        columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
+    figures = {name: float(value[0]) for name, value in columns.items()}
+    if "middle_ring" in record:
+        figures["middle_ring_speed_rpm"] = record["middle_ring"]["speed_rpm"]
+    return {**figures, "residual_N": record["residual_N"], "iterations": float(record["iterations"])}, balls, found

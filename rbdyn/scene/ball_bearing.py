@@ -1,0 +1,170 @@
+"""Drawing of a ball bearing: its row of balls, or two rows with a ring between."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from rbdyn.faults import Strict
+from rbdyn.fields import Positive, or_refuse
+from rbdyn.scene.operation import Speed
+
+# How far a contact angle and a clearance that are both given may differ before they contradict each other.
+AGREED_DEG = 0.2
+
+GrooveFactor = Annotated[float, Field(gt=0.5, le=1.0)]
+
+
+class BallRow(Strict):
+    """Geometry of one row of balls.
+
+    A groove factor is the groove's radius over the ball's diameter. Either the unloaded contact angle a_0 or the diametral
+    clearance P_d is given, one follows from the other: cos a_0 = 1 - P_d/(2 B), B = (f_i + f_o - 1) D. A negative
+    clearance, an interference, has a contact angle of 0.
+    """
+
+    balls: Annotated[int, Field(ge=3, le=500)]
+    ball_diameter_mm: Annotated[float, Field(ge=0.1, le=500.0)]
+    pitch_diameter_mm: Annotated[float, Field(ge=1.0, le=10000.0)]
+    inner_groove_factor: GrooveFactor
+    outer_groove_factor: GrooveFactor
+    contact_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] | None = None
+    radial_clearance_mm: Annotated[float, Field(ge=-2.0, le=5.0)] | None = None
+    # What mounting changes of the diametral clearance after the contact angle was measured; negative takes clearance away.
+    clearance_change_um: Annotated[float, Field(ge=-2000.0, le=2000.0)] = 0.0
+    # Basic dynamic capacity of the catalogue; by ISO 281 from the dimensions where left out.
+    dynamic_capacity_N: Positive | None = None  # noqa: N815
+    # Load at which the most loaded ball has a pressure of 4200 MPa (ISO 76); by Hertz from the dimensions where left out.
+    static_capacity_N: Positive | None = None  # noqa: N815
+    # Bore of the inner and outside diameter of the outer ring: only for the growth of rotating rings.
+    bore_mm: Positive | None = None
+    outside_diameter_mm: Positive | None = None
+
+    @model_validator(mode="after")
+    def _fits(self) -> BallRow:
+        faults = []
+        chord = self.pitch_diameter_mm * math.sin(math.pi / self.balls)
+        if chord <= self.ball_diameter_mm:
+            faults.append(
+                f"balls = {self.balls}: balls of {self.ball_diameter_mm:g} mm do not fit on a pitch circle of "
+                f"{self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm; take fewer or smaller ones"
+            )
+        if self.ball_diameter_mm >= self.pitch_diameter_mm:
+            faults.append(
+                f"ball_diameter_mm = {self.ball_diameter_mm:g}: leaves no inner raceway on a pitch circle of "
+                f"{self.pitch_diameter_mm:g} mm; make the ball smaller"
+            )
+        # Only a contact angle that is known tells where the races are.
+        return or_refuse(self, faults + (self._clearance_faults() or self._ring_faults()))
+
+    def _clearance_faults(self) -> list[str]:
+        angle, clearance = self.contact_angle_deg, self.radial_clearance_mm
+        if angle is None and clearance is None:
+            return ["contact_angle_deg: missing; give it or radial_clearance_mm"]
+        if clearance is None:
+            return []
+        gap = self.groove_centre_distance_mm
+        if clearance >= 2.0 * gap:
+            return [
+                f"radial_clearance_mm = {clearance:g}: grooves with centres {gap:.4g} mm apart cannot hold a ball with "
+                f"that much; make it less than {2.0 * gap:.4g}"
+            ]
+        if angle is None:
+            return []
+        implied = math.degrees(math.acos(min(1.0 - clearance / (2.0 * gap), 1.0)))
+        if abs(implied - angle) > AGREED_DEG:
+            clearance_of_angle = 2.0 * gap * (1.0 - math.cos(math.radians(angle)))
+            return [
+                f"contact_angle_deg = {angle:g} and radial_clearance_mm = {clearance:g} contradict each other: that clearance "
+                f"gives {implied:.4g} deg, that angle {clearance_of_angle:.4g} mm; leave one out, and give what mounting "
+                "changes as clearance_change_um"
+            ]
+        return []
+
+    def _ring_faults(self) -> list[str]:
+        faults = []
+        reach = self.ball_diameter_mm * math.cos(self.contact_angle)
+        if self.bore_mm is not None and self.bore_mm >= self.pitch_diameter_mm - reach:
+            faults.append(
+                f"bore_mm = {self.bore_mm:g}: leaves no inner ring under a raceway of "
+                f"{self.pitch_diameter_mm - reach:.4g} mm; make it smaller"
+            )
+        if self.outside_diameter_mm is not None and self.outside_diameter_mm <= self.pitch_diameter_mm + reach:
+            faults.append(
+                f"outside_diameter_mm = {self.outside_diameter_mm:g}: leaves no outer ring over a raceway of "
+                f"{self.pitch_diameter_mm + reach:.4g} mm; make it larger"
+            )
+        return faults
+
+    @property
+    def groove_centre_distance_mm(self) -> float:
+        """B = (f_i + f_o - 1) D: distance of the groove centres where a ball just touches both [mm]."""
+        return (self.inner_groove_factor + self.outer_groove_factor - 1.0) * self.ball_diameter_mm
+
+    @property
+    def contact_angle(self) -> float:
+        """Unloaded contact angle [rad], given or from the clearance; 0 for an interference."""
+        if self.radial_clearance_mm is None:
+            assert self.contact_angle_deg is not None
+            return math.radians(self.contact_angle_deg)
+        return math.acos(min(1.0 - self.radial_clearance_mm / (2.0 * self.groove_centre_distance_mm), 1.0))
+
+    @property
+    def raceway_diameters_mm(self) -> tuple[float, float]:
+        """Circles on which balls touch both races at the unloaded contact angle."""
+        reach = self.ball_diameter_mm * math.cos(self.contact_angle)
+        return self.pitch_diameter_mm - reach, self.pitch_diameter_mm + reach
+
+    @property
+    def interference_m(self) -> float:
+        """What the inner groove is pushed outward by interference and mounting, radially [m]; negative with clearance."""
+        given = self.radial_clearance_mm or 0.0
+        return 0.5e-3 * max(-given, 0.0) - 0.5e-6 * self.clearance_change_um
+
+
+class BallBearing(BallRow):
+    """A single row: angular contact or deep groove."""
+
+    kind: Literal["angular_contact_ball", "deep_groove_ball"]
+
+
+class MiddleRing(Strict):
+    """The ring between the rows of a double-decker bearing: it floats, and only friction turns it."""
+
+    # Its speed, where it is known; otherwise by speed_split.
+    speed_rpm: Speed | None = None
+    # "oil": rows of equal oil friction (Hu et al., eq 13); "torque_balance": oil and load after Palmgren; needs [lubricant].
+    speed_split: Literal["oil", "torque_balance"] = "oil"
+    # Palmgren's f0 of each row: oil mist 1.7, grease 2, oil bath 3.3, oil jet 6.6 as commonly cited.
+    inner_oil_factor: Positive = 3.3
+    outer_oil_factor: Positive = 3.3
+    # fixed: it stays square to the outer ring; as operation.tilt where left out.
+    tilt: Literal["free", "fixed"] | None = None
+    # Axial distance of the inner row's ball plane from the outer row's, the bearing unloaded.
+    axial_offset_mm: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
+
+
+class DoubleDecker(Strict):
+    """Two rows one inside the other; the ring between them floats."""
+
+    kind: Literal["double_decker_ball"]
+    inner: BallRow
+    outer: BallRow
+    middle: MiddleRing = MiddleRing()
+
+    @model_validator(mode="after")
+    def _nests(self) -> DoubleDecker:
+        below, above = self.inner.raceway_diameters_mm[1], self.outer.raceway_diameters_mm[0]
+        if below < above:
+            return self
+        raise ValueError(
+            f"bearing.outer.pitch_diameter_mm = {self.outer.pitch_diameter_mm:g}: leaves no middle ring between raceways of "
+            f"{below:.4g} and {above:.4g} mm; make it larger, or the inner row smaller"
+        )
+
+    @property
+    def raceway_diameters_mm(self) -> tuple[float, float]:
+        """Race of the inner ring and race of the outer ring."""
+        return self.inner.raceway_diameters_mm[0], self.outer.raceway_diameters_mm[1]
