@@ -13,7 +13,7 @@ rows with a floating ring between: ``double_decker`` (equilibrium), ``speed_spli
 ``elimination``, ``plain_newton``, ``minpack``, ``levenberg_marquardt`` and ``finite_search`` (Hu et al. 2021), ``limited``
 (ours, stopped early), ``solvers`` (by name), ``battery`` (random scenes for all). From scenes: ``model``, ``growth_model``, ``double_decker_model``,
 ``runout_model``; ``bearing`` puts all together. Over keys of a scene: ``sweep``, its points (``sweep_points``), compiled loop
-(``sweep_march``), figures (``sweep_figures``) and result (``sweep_result``).
+(``sweep_march``), figures (``sweep_figures``), what to beware of (``remarks``) and result (``sweep_result``).
 
 x is radial along the load, z axial; ball j stands at psi_j = 2 pi j/Z from x. The inner ring moves, the outer ring is
 the reference. In the plane of a ball the centre of curvature of the outer groove is the origin, places are (axial,
