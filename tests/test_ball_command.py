@@ -178,6 +178,8 @@ def test_invariant_what_symmetry_makes_zero_is_told_as_zero(file, changes, zeros
     ring |= {f"force_{axis}_N": value for axis, value in record["reaction"]["load_N"].items()}
     ring |= {f"moment_{axis}_Nm": value for axis, value in record["reaction"]["moment_Nm"].items()}
     assert all(ring[name] == 0.0 and math.copysign(1.0, ring[name]) == 1.0 for name in zeros)
+    matrix = np.abs(np.array(record["stiffness"]["matrix_SI"]))
+    assert not matrix[1, [0, 2, 4]].any() and not np.signbit(record["stiffness"]["matrix_SI"][0][1])
     balls = record["balls"] if "balls" in record else record["inner"]["balls"] + record["outer"]["balls"]
     angles = np.array([[ball["inner_angle_deg"], ball["outer_angle_deg"]] for ball in balls])
     assert ((angles == 0.0) | (np.abs(angles) > 1e-9)).all() and (file[:4] != "deep" or (angles == 0.0).all())

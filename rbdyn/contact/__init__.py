@@ -1,7 +1,7 @@
 """Contact laws that rollers and balls share.
 
 - ``hertz_line``: load of a line contact against approach (Palmgren and rivals), whole, in slices, on an elastic bar
-- ``hertz_point``: load of a point contact against approach, its ellipse and pressure (exact Hertz)
+- ``hertz_point``: load of a point contact against approach, its ellipse and pressure (exact Hertz); ``static_limit``: dents
 - ``profile``: roller profiles as drops over the length
 - ``damping``: what a closing or opening contact adds to the elastic load; restitution
 - ``traction``: friction coefficient against sliding speed and load, as compiled

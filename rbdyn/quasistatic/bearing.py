@@ -45,8 +45,7 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
     if not solution.found:
         return BallResult({**head, **tail})
     rating, table = row_rating(scene, model), solution.told[np.newaxis]
-    why = overloads(table, [rating])
-    if why:
+    if why := overloads(table, [rating]):
         return BallResult({**head, "status": why[0], **tail})
     record = row_record(rating, solution, film_record(scene, rating, solution, ("inner_ring", "outer_ring")))
     record["reaction"] = load_record(solution.reaction)
@@ -96,8 +95,7 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
     layers: dict[str, Any] = {}
     told: list[str] = []
     for name, rating, row in zip(rings, ratings, rows, strict=True):
-        why = overloads(row.told[np.newaxis], [rating])
-        if why:
+        if why := overloads(row.told[np.newaxis], [rating]):
             return BallResult({**head, "status": f"{name} row {why[0]}", **tail})
         layers[name] = row_record(rating, row, film_record(scene, rating, row, rings[name]))
         told += sentences(remarks(row.told[np.newaxis], [rating], name))

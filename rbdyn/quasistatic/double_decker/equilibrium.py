@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare
-from rbdyn.quasistatic.row.equilibrium import OK, Solution, solve
+from rbdyn.quasistatic.row.equilibrium import OK, Solution, solve, without_noise
 from rbdyn.quasistatic.row.row import Row, component_lengths
 
 Vector = NDArray[np.float64]
@@ -101,7 +101,8 @@ class DoubleDeckerSolution(NamedTuple):
         whole = (self.outer.stiffness + onto_by @ to_inner)[np.ix_(free, free)]
         follows = np.zeros((5, 5))
         follows[free] = np.linalg.lstsq(whole, onto_by[free], rcond=1e-12)[0]
-        return self.inner.stiffness @ (np.eye(5) - to_inner @ follows)
+        found = self.inner.stiffness @ (np.eye(5) - to_inner @ follows)
+        return without_noise(found, np.abs(found).max())
 
 
 def outer_friction(layer: Layer, solution: Solution) -> Vector:
@@ -279,7 +280,7 @@ def _result(
         outer=outer,
         displacement=inner.displacement + to_inner @ outer.displacement,
         middle_displacement=outer.displacement,
-        middle_load=onto,
+        middle_load=without_noise(onto, _largest(inner, outer)),
         reaction=inner.reaction,
         residual=residual,
         steps=steps,

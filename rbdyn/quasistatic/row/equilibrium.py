@@ -67,7 +67,8 @@ class Solution(NamedTuple):
         return np.stack(self[3:9], axis=1)
 
 
-def _resolved(values: Any, largest: Any) -> Any:
+def without_noise(values: Any, largest: Any) -> Any:
+    """``values`` with 0 for those below the resolution of the ``largest`` of their kind, which broadcasts."""
     return np.where(np.abs(values) <= RESOLUTION * largest, 0.0, values)
 
 
@@ -82,10 +83,10 @@ def resolved(q: Any, taken: Any, matrix: Any, told: Any, lever: Any) -> Any:
     largest = np.zeros(told.shape)
     largest[..., [INNER_ANGLE, OUTER_ANGLE]], largest[..., MOMENT] = 1.0, pull[..., np.newaxis]
     return (
-        _resolved(q, np.abs(q).max(axis=-1, keepdims=True)),
-        _resolved(taken, most[..., np.newaxis]),
-        _resolved(matrix, np.abs(matrix).max(axis=(-2, -1), keepdims=True)),
-        _resolved(told, largest),
+        without_noise(q, np.abs(q).max(axis=-1, keepdims=True)),
+        without_noise(taken, most[..., np.newaxis]),
+        without_noise(matrix, np.abs(matrix).max(axis=(-2, -1), keepdims=True)),
+        without_noise(told, largest),
     )
 
 
