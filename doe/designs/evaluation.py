@@ -10,15 +10,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
+from doe.arrays import Array, Rows
 from doe.designs.design import Region
 from doe.designs.model import term_columns
 from doe.designs.region import directions, lattice, moment_matrix, sample
 from doe.designs.replicates import replicate_groups
-
-Array = NDArray[np.float64]
 
 SIGNIFICANCE = 0.05  # of the tests whose power is given
 RADII = 11  # of the variance dispersion graph
@@ -135,7 +134,7 @@ class _Variances:
         return np.einsum("...i,...i->...", columns, columns)
 
 
-def untold_terms(coded: Array, terms: Sequence[str], block: NDArray[np.intp] | None = None) -> list[str]:
+def untold_terms(coded: Array, terms: Sequence[str], block: Rows | None = None) -> list[str]:
     """Terms that the runs cannot tell from blocks and the terms before them."""
     groups = np.zeros(len(coded), dtype=np.intp) if block is None else block
     columns = np.column_stack([block_contrasts(groups), term_columns(coded, terms)])
@@ -145,7 +144,7 @@ def untold_terms(coded: Array, terms: Sequence[str], block: NDArray[np.intp] | N
     return [term for term, rise in zip(terms, np.diff(ranks), strict=True) if rise == 0]
 
 
-def block_contrasts(block: NDArray[np.intp]) -> Array:
+def block_contrasts(block: Rows) -> Array:
     """Columns (n, b - 1) of the blocks but the last, each of mean zero, so that "1" is the mean over all runs."""
     indicator = (block[:, None] == np.unique(block)[None, :-1]).astype(float)
     return indicator - indicator.mean(axis=0)
@@ -158,7 +157,7 @@ def _inflation(matrix: Array, covariance: Array, terms: Sequence[str]) -> dict[s
     return {term: value for term, value in zip(terms, inflation, strict=True) if term != "1"}
 
 
-def _degrees_of_freedom(points: Array, groups: NDArray[np.intp], terms: int, blocks: int) -> dict[str, int]:
+def _degrees_of_freedom(points: Array, groups: Rows, terms: int, blocks: int) -> dict[str, int]:
     residual = len(points) - terms - blocks
     pure = len(points) - len(np.unique(replicate_groups(points, groups)))
     return {
@@ -170,7 +169,7 @@ def _degrees_of_freedom(points: Array, groups: NDArray[np.intp], terms: int, blo
     }
 
 
-def _blocks(matrix: Array, contrasts: Array, groups: NDArray[np.intp]) -> dict[str, Any] | None:
+def _blocks(matrix: Array, contrasts: Array, groups: Rows) -> dict[str, Any] | None:
     if contrasts.shape[1] == 0:
         return None
     unit = matrix / np.linalg.norm(matrix, axis=0)

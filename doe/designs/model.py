@@ -8,9 +8,9 @@ from itertools import combinations
 from string import ascii_uppercase
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from doe.arrays import Array, Rows
 
 
 def model_terms(factors: int, model: str) -> tuple[str, ...]:
@@ -24,7 +24,7 @@ def model_terms(factors: int, model: str) -> tuple[str, ...]:
     return ("1", *letters, *products, *squares)
 
 
-def term_powers(terms: Sequence[str], factors: int) -> NDArray[np.intp]:
+def term_powers(terms: Sequence[str], factors: int) -> Rows:
     """Power of each factor in each term, shape (p, k)."""
     powers = np.zeros((len(terms), factors), dtype=np.intp)
     for row, term in enumerate(terms):

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from doe.arrays import Array
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import ClosingFunction, NoValueError
 from doe.dimension_chain.contributions import contributions
 from doe.dimension_chain.cost import total_cost
 from doe.dimension_chain.faults import faults
 from doe.dimension_chain.intervals import interval, linear_interval
-from doe.dimension_chain.links import DIGITS, SLACK, Array, Chain, Distribution, Interval, Part
+from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part
 from doe.dimension_chain.monte_carlo import ALIKE, Assemblies, draw
 from doe.dimension_chain.parts import given_parts, has_deviations
 from doe.dimension_chain.selective_assembly import SelectiveAssembly, selective_assembly

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from doe.arrays import Array, Mask, Rows
 from doe.pareto.archive import dominates, spread
 from doe.pareto.dominance import dominance, error_aware_dominance, order, ranks
 from doe.pareto.goals import Goals
@@ -23,7 +24,6 @@ from doe.pareto.indicators import normalised
 from doe.pareto.nsga2 import check_search
 from doe.pareto.picks import NAMES, Rule, pick_all
 
-Array = NDArray[np.float64]
 Evaluate = Callable[[Array], tuple[Array, Array]]
 
 FAILED = 1e30  # cost of a point whose run failed: behind every other
@@ -39,7 +39,7 @@ class Samples(NamedTuple):
     errors: Array
 
     @property
-    def failed(self) -> NDArray[np.bool_]:
+    def failed(self) -> Mask:
         """Whether each point's run failed, (n,)."""
         return np.asarray(np.isnan(self.values).any(axis=1))
 
@@ -236,17 +236,16 @@ def _repeated(evaluate: Evaluate, points: Array, times: int) -> Samples:
 def _broken(batch: Samples, goals: Goals) -> Array:
     """Sum of the broken limits (n,), each in shares of the limit."""
     scale = np.array([abs(limit) or 1.0 for _, _, limit in goals.limited])
-    total: Array = (goals.violations(batch.values, batch.values) / scale).sum(axis=1)
-    return total
+    return (goals.violations(batch.values, batch.values) / scale).sum(axis=1)
 
 
-def _behind(place: NDArray[np.intp], broken: Array) -> NDArray[np.intp]:
+def _behind(place: Rows, broken: Array) -> Rows:
     """Places with those that break a limit or failed behind all others, by how far."""
     _, far = np.unique(broken, return_inverse=True)
     return np.where(broken > 0.0, place.max() + 1 + far.reshape(-1), place)
 
 
-def _allowed(batch: Samples, goals: Goals) -> NDArray[np.intp]:
+def _allowed(batch: Samples, goals: Goals) -> Rows:
     good = ~batch.failed
     good[good] &= _broken(batch.rows(good), goals) <= 0.0
     rows = np.flatnonzero(good)
@@ -255,7 +254,7 @@ def _allowed(batch: Samples, goals: Goals) -> NDArray[np.intp]:
     return rows
 
 
-def _candidates(archive: Samples, goals: Goals, confidence: float, count: int) -> NDArray[np.intp]:
+def _candidates(archive: Samples, goals: Goals, confidence: float, count: int) -> Rows:
     """Rows of the archive for fresh runs: the best places first, spread out in the last of them."""
     rows = _allowed(archive, goals)
     costs, errors = goals.costs(archive.values[rows]), archive.errors[rows][:, goals.objectives]
@@ -273,7 +272,7 @@ def _candidates(archive: Samples, goals: Goals, confidence: float, count: int) -
     return rows[np.array(chosen)]
 
 
-def _finalists(fresh: Samples, goals: Goals, count: int) -> NDArray[np.intp]:
+def _finalists(fresh: Samples, goals: Goals, count: int) -> Rows:
     """Rows of the candidates that their fresh runs leave non-dominated, by ascending first cost."""
     rows = _allowed(fresh, goals)
     costs = goals.costs(fresh.values[rows])

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from doe.arrays import Array
 from doe.pareto.archive import spread
 from doe.pareto.goals import Goals
 from doe.pareto.indicators import hypervolume, normalised
@@ -20,8 +21,6 @@ from doe.pareto.picks import NAMES, Rule, knee_depth, pick_all
 if TYPE_CHECKING:
     from doe.pareto.tolerance_aware import ToleranceAware
     from doe.pareto.uncertainty import FrontUncertainty
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

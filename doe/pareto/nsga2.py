@@ -12,11 +12,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.pareto.archive import Archive, archives
 
-Array = NDArray[np.float64]
 Objectives = Callable[[Array], Array]
 # How far below and above (n, m) what is foretold of points (n, k) their responses may be when limits are judged.
 Doubt = Callable[[Array], tuple[Array, Array]]
@@ -97,8 +96,7 @@ def _evaluate(objectives: Objectives, points: Array) -> Array:
 def _scaled(violations: Array) -> Array:
     """Violations (n, c) in shares of their largest, so that no unit outweighs another."""
     largest = violations.max(axis=0, initial=0.0)
-    shares: Array = violations / np.where(largest > 0.0, largest, 1.0)
-    return shares
+    return violations / np.where(largest > 0.0, largest, 1.0)
 
 
 def _evolve(

@@ -9,13 +9,12 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.pareto.archive import dominates
 from doe.pareto.goals import Goals
 from doe.pareto.indicators import normalised
 
-Array = NDArray[np.float64]
 Rule = Literal["knee", "desirability", "weights"]
 
 RULES: tuple[Rule, ...] = get_args(Rule)
@@ -37,8 +36,7 @@ def knee_depth(values: Array) -> Array:
     if np.linalg.cond(extremes) < 1e8:
         solved = np.linalg.solve(extremes, normal)
         normal = solved if (solved > 0).all() else normal
-    depth: Array = (1 - scaled @ normal) / np.linalg.norm(normal)
-    return depth
+    return (1 - scaled @ normal) / np.linalg.norm(normal)
 
 
 def desirability(costs: Array, goals: Goals) -> Array:
@@ -57,8 +55,7 @@ def desirability(costs: Array, goals: Goals) -> Array:
             reach = min(high - goals.target[index], goals.target[index] - low)
             best[column], worst[column] = ends.get(goals.kinds[index], (0.0, reach))
     each = (1.0 - normalised(costs, best, worst)).clip(0.0, 1.0)
-    overall: Array = np.prod(each**goals.cost_weight, axis=1)
-    return overall
+    return np.prod(each**goals.cost_weight, axis=1)
 
 
 def tchebycheff(costs: Array, weight: Array) -> Array:
@@ -67,8 +64,7 @@ def tchebycheff(costs: Array, weight: Array) -> Array:
     The largest of the weighted normalised costs, and `AUGMENTATION` of their sum. Source: Steuer and Choo (1983).
     """
     scaled = weight * normalised(costs, costs.min(axis=0), costs.max(axis=0))
-    distance: Array = scaled.max(axis=1) + AUGMENTATION * scaled.sum(axis=1)
-    return distance
+    return scaled.max(axis=1) + AUGMENTATION * scaled.sum(axis=1)
 
 
 def score(rule: Rule, costs: Array, goals: Goals) -> Array:

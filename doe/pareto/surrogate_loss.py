@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.pareto.archive import non_dominated
 from doe.pareto.direct import DirectFront
 from doe.pareto.indicators import hypervolume
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.pareto.archive import Archive, dominates, spread
 from doe.pareto.goals import Goals
 from doe.pareto.indicators import hypervolume, normalised
@@ -26,7 +26,6 @@ from doe.pareto.nsga2 import Doubt, Judged, check_search, search
 from doe.pareto.picks import NAMES, Rule, pick_all
 from doe.pareto.quadratic import Quadratic
 
-Array = NDArray[np.float64]
 Kind = Literal["worst_case", "quantile"]
 
 SURVIVAL_PARTS = 4096  # even offsets from which the share of surviving parts is counted

@@ -13,13 +13,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array, Mask
 from doe.pareto.archive import dominates
 from doe.pareto.goals import Goals
 from doe.pareto.picks import Rule, pick_all
-
-Array = NDArray[np.float64]
 
 SELECTIONS = 300  # draws on which the rule picks anew; its own error then hides in that of the gain
 
@@ -54,11 +52,10 @@ def draw_coefficients(
     root = vectors * np.sqrt(values.clip(0.0))
     normal = random.standard_normal((draws, coefficients.size)) @ root.T
     chi_square = random.chisquare(dof, (draws, 1)) if dof > 0 else np.full((draws, 1), 1.0)
-    drawn: Array = coefficients + normal / np.sqrt(chi_square / max(dof, 1))
-    return drawn
+    return coefficients + normal / np.sqrt(chi_square / max(dof, 1))
 
 
-def share(hits: NDArray[np.bool_]) -> tuple[Array, Array]:
+def share(hits: Mask) -> tuple[Array, Array]:
     """Share of the draws (d, ...) that hit and its Monte Carlo standard error.
 
     The error is that of the share with one hit and one miss more, lest a few hundred hits of as many pass for sure.
@@ -134,8 +131,7 @@ def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals,
     for drawn, base in zip(costs, baseline, strict=True):
         row = pick_all(drawn, goals, base)[0][rule]
         excess.append(base - drawn[row] - real[row])
-    mean: Array = np.mean(excess, axis=0)
-    return mean
+    return np.mean(excess, axis=0)
 
 
 def contrast_error(jacobian: Array, covariance: Array) -> float:

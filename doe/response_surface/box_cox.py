@@ -12,10 +12,10 @@ import math
 from typing import TypedDict
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import linalg, optimize, special, stats
 
-Array = NDArray[np.float64]
+from doe.arrays import Array
 
 USUAL = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 SEARCHED = (-5.0, 5.0)
@@ -80,7 +80,7 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
         best, height = float(peak.x), float(-peak.fun)
     threshold = height - stats.chi2.ppf(level, 1) / 2
 
-    def end(outwards: NDArray[np.float64]) -> float:
+    def end(outwards: Array) -> float:
         """Where the likelihood first falls to the threshold on the way from the best exponent."""
         inner = best
         for outer in outwards:
@@ -118,8 +118,7 @@ def forward(values: ArrayLike, exponent: float) -> Array:
     Raises ValueError when a value is not positive.
     """
     check_positive(values, "transform")
-    transformed: Array = special.boxcox(np.asarray(values, float), exponent)
-    return transformed
+    return special.boxcox(np.asarray(values, float), exponent)
 
 
 def backward(transformed: ArrayLike, exponent: float) -> Array:
@@ -137,8 +136,7 @@ def backward(transformed: ArrayLike, exponent: float) -> Array:
 
 def slope(values: ArrayLike, exponent: float) -> Array:
     """dt/dy = y^(lambda - 1) at positive values of y: a small standard error of y times it is that of t."""
-    derivative: Array = np.asarray(values, float) ** (exponent - 1.0)
-    return derivative
+    return np.asarray(values, float) ** (exponent - 1.0)
 
 
 def _sentence(name: str, best: float, interval: list[float], recommended: float, level: float) -> str:

@@ -9,13 +9,11 @@ from __future__ import annotations
 from typing import Literal, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from doe.arrays import Array
 from doe.designs import to_actual
 from doe.response_surface.terms import letters, model_matrix, second_order
-
-Array = NDArray[np.float64]
 
 FLAT = 1e-10  # curvature as a share of the largest coefficient below which it is rounding
 SURE = 0.95  # probability of the intervals of the eigenvalues
@@ -119,8 +117,7 @@ def _errors(terms: tuple[str, ...], vectors: Array, covariance: Array, dof: int)
     second = np.array([len(term) > 1 for term in terms])
     slopes = model_matrix(vectors.T, terms) * second
     variance = np.einsum("ij,jk,ik->i", slopes, covariance, slopes)
-    errors: Array = special.stdtrit(dof, (1 + SURE) / 2) * np.sqrt(variance.clip(0.0))
-    return errors
+    return special.stdtrit(dof, (1 + SURE) / 2) * np.sqrt(variance.clip(0.0))
 
 
 def _inside(place: Array, points: Array) -> bool:

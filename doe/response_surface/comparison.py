@@ -7,14 +7,12 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
+from doe.arrays import Array, Rows
 from doe.designs.replicates import replicate_groups
 from doe.response_surface.gaussian_process import THREADS, fit_gaussian
-
-Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 # More points than these are left out in groups.
 MOST_SINGLY, FOLDS = 60, 20
@@ -134,8 +132,7 @@ def _folds(firsts: Rows, seed: int) -> list[Rows]:
 
 def _leverage(matrix: Array) -> Array:
     orthogonal = np.linalg.qr(matrix)[0]
-    diagonal: Array = (orthogonal**2).sum(axis=1)
-    return diagonal
+    return (orthogonal**2).sum(axis=1)
 
 
 def _difference(paired: Array) -> dict[str, Any]:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from doe.arrays import Array, Rows, Whole
 from doe.designs.evaluation import block_contrasts
 from doe.response_surface.least_squares import dependent_columns
-
-Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +29,7 @@ class Data:
     centre: Array
     step: Array
 
-    def rows(self, rows: NDArray[np.intp]) -> Data:
+    def rows(self, rows: Rows) -> Data:
         """The runs of these rows alone."""
         errors = None if self.standard_errors is None else self.standard_errors[rows]
         per_run = self.points[rows], self.values[rows], errors, self.replicates[rows], self.block[rows]

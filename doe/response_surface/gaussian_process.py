@@ -18,14 +18,14 @@ from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import optimize
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from threadpoolctl import ThreadpoolController
 
-Array = NDArray[np.float64]
+from doe.arrays import Array
 
 # Bounds of the hyperparameters: lengths in coded units, variances relative to that of the values. Beyond
 # 100 units a factor has no effect within any design; below 0.1 no two runs know of each other.
@@ -73,8 +73,7 @@ class GaussianSurface:
             deviation = self.regressor.predict(points.reshape(-1, points.shape[-1]), return_std=True)[1]
         # The white kernel counts the scatter of a new run in; the mean response has none.
         variance = self.scale**2 * deviation**2 - (self.noise or 0.0) ** 2
-        error: Array = np.sqrt(variance.clip(0.0)).reshape(points.shape[:-1])
-        return error
+        return np.sqrt(variance.clip(0.0)).reshape(points.shape[:-1])
 
     def as_dict(self) -> dict[str, Any]:
         """Hyperparameters, ready for JSON; length scales by letter of the factor."""

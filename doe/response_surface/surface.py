@@ -14,9 +14,10 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
+from doe.arrays import Array, Rows
 from doe.designs.model import model_terms
 from doe.designs.replicates import replicate_groups
 from doe.response_surface.anova import AnovaRow, anova, find
@@ -30,7 +31,6 @@ from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import ModelError, model_error
 from doe.response_surface.terms import MODELS, Model, in_actual_units, model_matrix, second_order
 
-Array = NDArray[np.float64]
 Weighting = Literal["equal", "replicates"]
 Transform = Literal["none", "box_cox"] | float
 
@@ -122,7 +122,7 @@ class Surface:
         """Lower and upper limit of a single new run at coded points (..., k), by Student's t."""
         return self._interval(coded, self.observation_variance, level)
 
-    def refit(self, rows: NDArray[np.intp]) -> Surface:
+    def refit(self, rows: Rows) -> Surface:
         """The same kind of surface through these runs alone. Raises ValueError when they do not suffice."""
         transform: Transform = "none" if self.transform is None else self.transform
         return _fit(self.name, self.data.rows(rows), self.model, self.weighting, transform)

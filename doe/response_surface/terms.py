@@ -10,9 +10,10 @@ from string import ascii_uppercase
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from doe.arrays import Array
+
 Model = Literal["linear", "interaction", "quadratic", "reduced"]
 MODELS: tuple[str, ...] = get_args(Model)
 
@@ -32,8 +33,7 @@ def model_matrix(coded: ArrayLike, terms: tuple[str, ...]) -> Array:
     points = np.asarray(coded, float)
     first, second = _pairs(terms)
     padded = np.concatenate([np.ones((*points.shape[:-1], 1)), points], axis=-1)
-    matrix: Array = padded[..., first] * padded[..., second]
-    return matrix
+    return padded[..., first] * padded[..., second]
 
 
 def second_order(terms: tuple[str, ...], coefficients: Array, factors: int) -> tuple[float, Array, Array]:

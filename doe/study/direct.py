@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_actual
 from doe.running.failure import Failure, grouped
 from doe.study.goals import goals_of, region_of
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from doe.pareto.surrogate_loss import SurrogateLoss
     from doe.study.runs import Progress
     from doe.study.simulations import Simulations
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_coded
 from doe.study.back_off import Conditioned, Missed, standard_errors_of
 from doe.study.confirmation import Confirmed
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from doe.pareto.direct_tolerance import DirectAware, Neighbourhood
     from doe.pareto.tolerance_aware import ToleranceBox
     from doe.response_surface import Surface
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,13 +7,12 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from doe.arrays import Array
 
 if TYPE_CHECKING:
     from doe.pareto.quadratic import Quadratic
     from doe.response_surface import Surface
-
-Array = NDArray[np.float64]
 
 
 def predict_all(surfaces: Sequence[Surface], coded: Array) -> Array:

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_actual, to_coded
 from doe.study.back_off import Doubt, surfaces_doubt
 from doe.study.confirmation import Confirmed
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from doe.pareto.uncertainty import FrontUncertainty
     from doe.response_surface import Surface
 
-Array = NDArray[np.float64]
 Found = TypeVar("Found", "ParetoFront", "ToleranceAware")
 
 
@@ -110,8 +109,7 @@ def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
     factors = [
         float(stats.t.ppf(0.975, surface.interval_dof)) if surface.interval_dof > 0 else np.nan for surface in surfaces
     ]
-    widths: Array = np.array(factors) * standard_errors
-    return widths
+    return np.array(factors) * standard_errors
 
 
 def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) -> FrontUncertainty:

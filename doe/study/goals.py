@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.study.design import design_of
 from doe.study_file import Study
 from rbdyn.faults import InputError, refuse
 
 if TYPE_CHECKING:
     from doe.pareto import Goals
-
-Array = NDArray[np.float64]
 
 
 def goals_of(study: Study) -> Goals:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_coded
 from doe.study.drawn import jacobian, predict_all
 from doe.study.goals import goals_of
@@ -17,8 +17,6 @@ from doe.study_file import Study
 
 if TYPE_CHECKING:
     from doe.response_surface import Surface
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

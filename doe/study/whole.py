@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from doe.arrays import Array
 from doe.running.failure import Failure
 from doe.study.chains import solve_chains
 from doe.study.checked import check_study
@@ -36,8 +34,6 @@ if TYPE_CHECKING:
     from doe.pareto import ParetoFront
     from doe.pareto.tolerance import WidestTolerances
     from doe.response_surface import Surface
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Annotated, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from doe.arrays import Array
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Design, Factor, Name
 from doe.study_file.fit_section import Fitted
@@ -18,8 +18,6 @@ from doe.study_file.front_section import Direct, Front, Goal, Tolerances
 from doe.study_file.table import COUNT, LABELS, Table, read_table
 from rbdyn.faults import Strict, read_toml, validated
 from rbdyn.fields import or_refuse
-
-Array = NDArray[np.float64]
 
 
 class SceneFile(Strict):

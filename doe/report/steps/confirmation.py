@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.study.confirmation import Confirmed, Gain, statement
 from doe.study.limits import Limit, limits_of
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from doe.study.direct import Direct
     from doe.study.edge import Edge
     from doe.study_file import Study
-
-Array = NDArray[np.float64]
 
 
 def confirmation_record(outcome: Outcome) -> dict[str, Any]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_coded
 from doe.pareto.indicators import REFERENCE
 from doe.report.steps.tolerance_aware import print_tolerance_aware, tolerance_aware_record
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from doe.pareto import ParetoFront
     from doe.response_surface import Surface
     from doe.study_file import Study
-
-Array = NDArray[np.float64]
 
 
 def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
