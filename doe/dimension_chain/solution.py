@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -108,17 +108,14 @@ class ChainResult:
             "allocation": {part.name: {key: getattr(part, key) for key in shown} for part in self.allocation},
             "status": self.status,
             "distribution": {
-                "mean_mm": self.mean_mm,
-                "standard_deviation_mm": self.standard_deviation_mm,
-                "cp": self.cp,
-                "cpk": self.cpk,
+                **{key: getattr(self, key) for key in ("mean_mm", "standard_deviation_mm", "cp", "cpk")},
                 "quantiles_mm": {f"{share:g}": size for share, size in self.quantiles_mm.items()},
             },
             "yield_standard_errors": self.standard_errors,
             "rejected": self.rejected,
             "exact_yield": self.exact_yields,
             "normal_yield": self.normal_yield,
-            "linearisation": None if self.linearisation is None else _plain(self.linearisation),
+            "linearisation": None if self.linearisation is None else asdict(self.linearisation),
             "cost": self.cost,
             "selective_assembly": None if self.selective is None else self.selective.as_dict(),
             "samples": self.samples,
@@ -188,10 +185,6 @@ def _solved(search: Allocation, samples: int, seed: int, threads: int | None) ->
         samples=samples,
         seed=seed,
     )
-
-
-def _plain(record: Linearisation) -> dict[str, Any]:
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in vars(record).items()}
 
 
 def _quantiles(values: Array) -> dict[float, float]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from doe.arrays import Array, Mask, Rows
+from doe.pareto.indicators import normalised
 
 
 class Archive(NamedTuple):
@@ -44,10 +45,11 @@ def archives(history: Sequence[Archive]) -> list[Archive]:
     return kept
 
 
-def spread(scaled: Array, keep: int, wanted: Sequence[int]) -> Rows:
-    """Rows to keep, ascending: the extremes and the wanted first, then always the row farthest from all."""
-    if len(scaled) <= keep:
-        return np.arange(len(scaled))
+def spread(costs: Array, keep: int, wanted: Sequence[int] = ()) -> Rows:
+    """Rows of normalised costs (n, q) to keep, ascending: extremes and wanted first, then the row farthest from all."""
+    if len(costs) <= keep:
+        return np.arange(len(costs))
+    scaled = normalised(costs, costs.min(axis=0), costs.max(axis=0))
     chosen = sorted({*scaled.argmin(axis=0).tolist(), *scaled.argmax(axis=0).tolist(), *wanted})
     gap = np.min([np.linalg.norm(scaled - scaled[row], axis=1) for row in chosen], axis=0)
     while len(chosen) < keep:

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from doe.arrays import Array, Mask, Rows
+from doe.pareto.archive import dominates
 
 
 def dominance(costs: Array) -> Mask:
     """Whether row i of ``costs`` (n, q) dominates row j, taken at their word: (n, n)."""
-    difference = costs[None, :] - costs[:, None]
-    return np.all(difference >= 0.0, axis=-1) & np.any(difference > 0.0, axis=-1)
+    return dominates(costs[:, None], costs[None, :])
 
 
 def error_aware_dominance(costs: Array, errors: Array, confidence: float) -> Mask:

@@ -6,12 +6,13 @@ of several response variables (1980); Steuer and Choo, An interactive weighted T
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from collections.abc import Sequence
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from doe.arrays import Array
-from doe.pareto.archive import dominates
+from doe.arrays import Array, Rows
+from doe.pareto.archive import dominates, spread
 from doe.pareto.goals import Goals
 from doe.pareto.indicators import normalised
 
@@ -75,6 +76,21 @@ def score(rule: Rule, costs: Array, goals: Goals) -> Array:
         # Where all are undesirable, the distance from the ideal point decides.
         return desirability(costs, goals) - 1e-9 * tchebycheff(costs, goals.cost_weight)
     return -tchebycheff(costs, goals.cost_weight)
+
+
+class Thinned(NamedTuple):
+    """A front thinned to ``rows`` (f,), the places among them of the pick of every rule, and what they were picked of."""
+
+    rows: Rows
+    picks: dict[Rule, int]
+    among: str
+
+
+def thinned(costs: Array, goals: Goals, baseline: Array | None, keep: int, wanted: Sequence[int] = ()) -> Thinned:
+    """About ``keep`` evenly spread rows of costs (n, q), with the best and worst of each, the picks and the wanted."""
+    picks, among = pick_all(costs, goals, baseline)
+    rows = spread(costs, keep, [*wanted, *picks.values()])
+    return Thinned(rows, {rule: int(np.searchsorted(rows, row)) for rule, row in picks.items()}, among)
 
 
 def pick_all(costs: Array, goals: Goals, baseline: Array | None) -> tuple[dict[Rule, int], str]:

@@ -34,7 +34,6 @@ class FrontUncertainty:
 
     half_widths: Array
     non_dominated: Array
-    non_dominated_error: Array
     pick_dominates: float | None
     pick_dominates_error: float | None
     optimism: Array | None
@@ -66,8 +65,8 @@ def share(hits: Mask) -> tuple[Array, Array]:
     return mean, np.sqrt(careful * (1.0 - careful) / count)
 
 
-def non_dominated_share(costs: Array) -> tuple[Array, Array]:
-    """Probability (f,) that a point is dominated by no other, and its error, from drawn costs (d, f, q)."""
+def non_dominated_share(costs: Array) -> Array:
+    """Probability (f,) that a point is dominated by no other, from drawn costs (d, f, q)."""
     kept = np.empty(costs.shape[:2], dtype=bool)
     for row, drawn in zip(kept, costs, strict=True):
         better = np.ones((len(drawn), len(drawn)), dtype=bool)
@@ -76,7 +75,7 @@ def non_dominated_share(costs: Array) -> tuple[Array, Array]:
         # Equal points do not dominate each other.
         equal = better & better.T
         row[:] = ~(better & ~equal).any(axis=0)
-    return share(kept)
+    return kept.mean(axis=0)
 
 
 def front_uncertainty(
@@ -102,7 +101,6 @@ def front_uncertainty(
         None.
     """
     costs = goals.costs(drawn)
-    kept, kept_error = non_dominated_share(costs)
     wins: tuple[Array, Array] | tuple[None, None] = (None, None)
     optimism = None
     if baseline is not None and baseline_values is not None:
@@ -112,8 +110,7 @@ def front_uncertainty(
         optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
     return FrontUncertainty(
         half_widths=half_widths,
-        non_dominated=kept,
-        non_dominated_error=kept_error,
+        non_dominated=non_dominated_share(costs),
         pick_dominates=None if wins[0] is None else float(wins[0]),
         pick_dominates_error=None if wins[1] is None else float(wins[1]),
         optimism=optimism,

@@ -9,6 +9,8 @@ Source: Box and Cox, An analysis of transformations, J. R. Stat. Soc. B 26 (1964
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from operator import itemgetter
 from typing import TypedDict
 
 import numpy as np
@@ -56,18 +58,7 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
         raise ValueError(f"{name}: {runs} runs leave no residual beside {terms} terms; add runs")
     if np.ptp(response) == 0.0:
         raise ValueError(f"{name}: all values are equal, so no transform can be judged; leave it out")
-    basis = linalg.qr(columns, mode="economic")[0]
-    # Taken relative to the geometric mean, residuals of different exponents compare without a Jacobian.
-    logarithm = np.log(response)
-    logarithm -= logarithm.mean()
-
-    def log_likelihood(exponent: float) -> float:
-        transformed = special.boxcox(np.exp(logarithm), exponent)
-        residual = transformed - basis @ (basis.T @ transformed)
-        # An exact fit is as good as round-off lets it be, not infinitely good.
-        floor = (1e-14 * np.abs(transformed).max()) ** 2
-        return -0.5 * runs * math.log(max(float(residual @ residual) / runs, floor))
-
+    log_likelihood = _log_likelihood(columns, response)
     grid = np.union1d(np.linspace(*SEARCHED, 81), USUAL)
     heights = np.array([log_likelihood(each) for each in grid])
     top = int(heights.argmax())
@@ -75,9 +66,7 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
     peak = optimize.minimize_scalar(
         lambda exponent: -log_likelihood(exponent), bounds=bracket, method="bounded", options={"xatol": 1e-7}
     )
-    best, height = (float(grid[top]), float(heights[top]))
-    if -peak.fun > height:
-        best, height = float(peak.x), float(-peak.fun)
+    height, best = max((float(heights[top]), float(grid[top])), (float(-peak.fun), float(peak.x)), key=itemgetter(0))
     threshold = height - stats.chi2.ppf(level, 1) / 2
 
     def end(outwards: Array) -> float:
@@ -101,6 +90,23 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
         "recommended": recommended,
         "sentence": _sentence(name, best, interval, recommended, level),
     }
+
+
+def _log_likelihood(columns: Array, response: Array) -> Callable[[float], float]:
+    """Of an exponent, for a positive ``response`` (n,) fitted by ``columns`` (n, p), but for a constant."""
+    basis = linalg.qr(columns, mode="economic")[0]
+    # Taken relative to the geometric mean, residuals of different exponents compare without a Jacobian.
+    logarithm = np.log(response)
+    logarithm -= logarithm.mean()
+
+    def log_likelihood(exponent: float) -> float:
+        transformed = special.boxcox(np.exp(logarithm), exponent)
+        residual = transformed - basis @ (basis.T @ transformed)
+        # An exact fit is as good as round-off lets it be, not infinitely good.
+        floor = (1e-14 * np.abs(transformed).max()) ** 2
+        return -0.5 * len(response) * math.log(max(float(residual @ residual) / len(response), floor))
+
+    return log_likelihood
 
 
 def check_positive(values: ArrayLike, name: str) -> None:

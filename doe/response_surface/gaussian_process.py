@@ -26,6 +26,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from threadpoolctl import ThreadpoolController
 
 from doe.arrays import Array
+from doe.response_surface.data import points_and_values
 
 # Bounds of the hyperparameters: lengths in coded units, variances relative to that of the values. Beyond
 # 100 units a factor has no effect within any design; below 0.1 no two runs know of each other.
@@ -116,10 +117,7 @@ def fit_gaussian(
     ------
     ValueError when shapes differ, a number is not finite or a standard error is negative.
     """
-    points, response = np.asarray(coded, float), np.asarray(values, float)
-    if points.ndim != 2 or response.shape != (len(points),):
-        shapes = f"points of shape {points.shape} and values of shape {response.shape}"
-        raise ValueError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
+    points, response = points_and_values(name, coded, values)
     if not (np.isfinite(points).all() and np.isfinite(response).all()):
         raise ValueError(f"{name}: a factor or value is not a finite number; mend or leave out that run")
     if start is None and len(points) > MOST_SEARCHED:

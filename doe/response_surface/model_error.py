@@ -14,7 +14,7 @@ Variance Components (1992), for the estimate.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -24,7 +24,7 @@ from doe.response_surface.anova import AnovaRow, find
 from doe.response_surface.known_variance import KnownVariance
 from doe.response_surface.least_squares import LeastSquares
 
-Told = Literal["repeats", "known variance"]
+Source = Literal["repeats", "known variance"]
 
 SIGNIFICANT = 0.05
 REACH = 1.0  # coded units within which what a surface misses stays alike: half the edge of the cube of a design
@@ -36,12 +36,11 @@ class ModelError:
 
     variance: float
     dof: int
-    told_by: Told
+    told_by: Source
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
-        deviation = float(np.sqrt(self.variance))
-        return {"variance": self.variance, "standard_deviation": deviation, "dof": self.dof, "told_by": self.told_by}
+        return asdict(self) | {"standard_deviation": float(np.sqrt(self.variance))}
 
 
 def model_error(

@@ -83,7 +83,6 @@ def find_direct(study: Study, found: ParetoFront, simulations: Simulations) -> D
     """
     from doe.pareto.archive import spread
     from doe.pareto.direct import direct_front
-    from doe.pareto.indicators import normalised
     from doe.pareto.surrogate_loss import compare_with_surrogate
 
     settings, reach = study.file.direct, region_of(study)
@@ -104,8 +103,7 @@ def find_direct(study: Study, found: ParetoFront, simulations: Simulations) -> D
             pick=study.file.front.pick,
         )
         searched = time.perf_counter()
-        scaled = normalised(found.costs, found.costs.min(axis=0), found.costs.max(axis=0))
-        rows = spread(scaled, len(front.points), [found.pick])[: len(front.points)]
+        rows = spread(found.costs, len(front.points), [found.pick])[: len(front.points)]
         points = found.points[rows]
         # As many runs a point as a finalist of the direct front has.
         values, errors = evaluate(np.tile(points, (front.repeats, 1)))

@@ -76,8 +76,8 @@ def link_of(surface: Surface) -> Callable[[Array], Array]:
 
 def quadratics(surfaces: Sequence[Surface], factors: int) -> list[Quadratic]:
     """The surfaces as quadratics of the coded factors."""
+    from doe.designs.model import second_order
     from doe.pareto.quadratic import Quadratic
-    from doe.response_surface.terms import second_order
 
     return [
         Quadratic(*second_order(surface.terms, surface.coefficients, factors), link_of(surface)) for surface in surfaces

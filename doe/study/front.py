@@ -14,13 +14,13 @@ from doe.designs import to_actual, to_coded
 from doe.study.back_off import Doubt, surfaces_doubt
 from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
-from doe.study.goals import check_goals, goals_of, region_of, tolerances_of
+from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
 from doe.study_file import Study
 from rbdyn.faults import InputError
 
 if TYPE_CHECKING:
     from doe.pareto import Goals, ParetoFront
-    from doe.pareto.tolerance_aware import ToleranceAware
+    from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox
     from doe.pareto.uncertainty import FrontUncertainty
     from doe.response_surface import Surface
 
@@ -48,7 +48,7 @@ def find_front(
 
     goals, settings, reach = goals_of(study), study.file.front, region_of(study)
     check_goals(study)
-    half = None if settings.tolerance_aware == "none" else tolerances_of(study)
+    box = tolerance_box(study)
 
     def coded(points: Array) -> Array:
         return to_coded(points, study.centre, study.step)
@@ -75,10 +75,10 @@ def find_front(
     with _named(study, goals, np.zeros(1), np.ones(1), ""):
         found = _backed_off(study, plain, failed)
     found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
-    if half is None:
+    if box is None:
         return found
     with _named(study, goals, study.centre, study.step, " after manufacture"):
-        aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, half, doubt(share)), failed)
+        aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt(share)), failed)
     return replace(found, tolerance_aware=aware)
 
 
@@ -132,18 +132,15 @@ def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) 
 
 
 def _tolerance_aware(
-    study: Study, surfaces: Sequence[Surface], found: ParetoFront, half: Array, doubt: Doubt
+    study: Study, surfaces: Sequence[Surface], found: ParetoFront, box: ToleranceBox, doubt: Doubt
 ) -> ToleranceAware:
     from doe.pareto.archive import Archive
-    from doe.pareto.tolerance_aware import ToleranceBox, tolerance_aware_front
+    from doe.pareto.tolerance_aware import tolerance_aware_front
 
     settings, reach = study.file.front, region_of(study)
-    assert settings.tolerance_aware != "none"
     return tolerance_aware_front(
         quadratics(surfaces, len(study.factors)),
-        ToleranceBox(
-            half, settings.tolerance_aware, settings.quantile, settings.distribution, settings.tolerance_samples
-        ),
+        box,
         -reach,
         reach,
         found.goals,

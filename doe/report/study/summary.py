@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from doe.report.steps.confirmation import confirmation_record, direct_record, edge_record, gains_record, limits_record
 from doe.report.steps.fit import fit_record
-from doe.report.steps.front import front_record, point_record
+from doe.report.steps.front import front_record, predicted_record
 from doe.report.study.asked import asked_record, design_record
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
@@ -33,7 +33,7 @@ def summary(outcome: Outcome) -> dict[str, Any]:
         "design": design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),
-        "pick_on_surfaces": point_record(study, outcome.surfaces, outcome.pick.point),
+        "pick_on_surfaces": predicted_record(study, outcome.surfaces, outcome.pick.point),
         "pick": dict(zip(study.factors, outcome.pick.point.tolist(), strict=True)),
         "confirmation": confirmation_record(outcome),
         "gains": gains_record(gains),
