@@ -20,7 +20,7 @@ import numpy as np
 
 from doe.arrays import Array, Whole
 from doe.running.failure import Failure
-from doe.running.runner import Give, Outcome, Ran, Take, run_points
+from doe.running.runner import Give, Ran, RunResult, Take, run_points
 from doe.running.store import Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
@@ -192,7 +192,7 @@ def sound(result: dict[str, Any]) -> bool:
     return False
 
 
-def _result(point: Point, found: Outcome) -> SimulationResult | Failure:
+def _result(point: Point, found: RunResult) -> SimulationResult | Failure:
     if isinstance(found, Failure):
         return replace(found, label=point.label, run=point.run, factors=dict(point.factors))
     return SimulationResult.from_dict(found)

@@ -94,13 +94,9 @@ def find_direct(study: Study, found: ParetoFront, simulations: Simulations) -> D
             to_actual(-reach, study.centre, study.step),
             to_actual(reach, study.centre, study.step),
             goals=goals_of(study),
-            evaluations=settings.evaluations,
-            population=settings.population,
-            seed=settings.seed,
             baseline=study.baseline,
-            confidence=settings.confidence,
-            resample=settings.resample,
             pick=study.file.front.pick,
+            **settings.model_dump(include={"evaluations", "population", "seed", "confidence", "resample"}),
         )
         searched = time.perf_counter()
         rows = spread(found.costs, len(front.points), [found.pick])[: len(front.points)]

@@ -29,6 +29,8 @@ Found = TypeVar("Found", "ParetoFront", "ToleranceAware")
 
 # Shares of the back-off from limits that are tried: where no point keeps all of it, the largest that any point keeps.
 SHARES = (1.0, 0.5, 0.25, 0.0)
+# Keys of [front] that the searches know by the same names.
+SEARCH = {"population", "generations", "seed", "pick"}
 
 
 def find_front(
@@ -61,11 +63,8 @@ def find_front(
             to_actual(-reach, study.centre, study.step),
             to_actual(reach, study.centre, study.step),
             goals=goals,
-            population=settings.population,
-            generations=settings.generations,
-            seed=settings.seed,
             baseline=study.baseline,
-            pick=settings.pick,
+            **settings.model_dump(include=SEARCH),
             standard_errors=lambda points: np.column_stack(
                 [surface.prediction_standard_error(coded(points)) for surface in surfaces]
             ),
@@ -137,7 +136,7 @@ def _tolerance_aware(
     from doe.pareto.archive import Archive
     from doe.pareto.tolerance_aware import tolerance_aware_front
 
-    settings, reach = study.file.front, region_of(study)
+    reach = region_of(study)
     return tolerance_aware_front(
         quadratics(surfaces, len(study.factors)),
         box,
@@ -147,11 +146,8 @@ def _tolerance_aware(
         baseline=to_coded(study.baseline, study.centre, study.step),
         plain=Archive(to_coded(found.points, study.centre, study.step), found.costs),
         plain_pick=found.pick,
-        population=settings.population,
-        generations=settings.generations,
-        seed=settings.seed,
-        pick=settings.pick,
         doubt=doubt,
+        **study.file.front.model_dump(include=SEARCH),
     )
 
 

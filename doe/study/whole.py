@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class StudyResult:
     """Everything a report needs.
 
     ``inputs`` is the hash of all it follows from. ``confirmed`` and ``gains`` by name of the point, "baseline" (without
@@ -99,7 +99,7 @@ def run_study(
     scheduler: str | None = None,
     retry: bool = False,
     direct: bool = False,
-) -> Outcome:
+) -> StudyResult:
     """All of it; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster to run on.
 
     ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself. Raises
@@ -135,7 +135,7 @@ def run_study(
     if reference is not None:
         reference = reference.only(runs.places)
     lost = () if searched is None else searched.failures
-    return Outcome(
+    return StudyResult(
         study=study,
         inputs=inputs,
         design=design_of(study),

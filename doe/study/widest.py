@@ -78,9 +78,5 @@ def widest_of(
             *(f"the gain of {study.responses[index]}" for index in goals.objectives),
             *(f"{study.responses[index]} {sense} {limit:g}" for index, sense, limit in goals.limited),
         ],
-        probability=settings.probability,
-        distribution=settings.distribution,
-        samples=settings.samples,
-        seed=settings.seed,
-        aim=settings.aim,
+        **settings.model_dump(include={"probability", "distribution", "samples", "seed", "aim"}),
     )

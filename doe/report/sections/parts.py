@@ -8,6 +8,7 @@ from typing import Any
 
 from doe.report.sections.answer import allocation, record_table
 from doe.report.sections.blocks import Block, Figures, Heading, Section, Table, Words
+from doe.report.sections.plot import wide_svg
 from doe.report.sections.record import Record, part
 from doe.report.words import dimension, label, shown
 
@@ -83,10 +84,7 @@ def contributions(name: str, shares: Record) -> str:
         v = ROW * len(known) + 16.0 + 18.0 * number
         drawn.append(f'<rect class="share c{number % COLOURS}" x="{LEFT}" y="{v - 9:g}" width="12" height="12"/>')
         drawn.append(f'<text x="{LEFT + 18}" y="{v + 2:g}">{number + 1}: {escape(label(each))}</text>')
-    return (
-        f'<svg class="plot wide" viewBox="0 0 {WIDE:g} {high:g}" role="img" '
-        f'aria-label="{escape(f"Contributions to the chain {label(name)}")}">{"".join(drawn)}</svg>'
-    )
+    return wide_svg(WIDE, high, f"Contributions to the chain {label(name)}", drawn)
 
 
 def _percent(value: float | None) -> str:

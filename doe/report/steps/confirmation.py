@@ -13,13 +13,13 @@ from doe.study.confirmation import Confirmed, Gain, statement
 from doe.study.limits import Limit, limits_of
 
 if TYPE_CHECKING:
-    from doe.study import Outcome
+    from doe.study import StudyResult
     from doe.study.direct import Direct
     from doe.study.edge import Edge
     from doe.study_file import Study
 
 
-def confirmation_record(outcome: Outcome) -> dict[str, Any]:
+def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
     """Every confirmed point by name, with its gains over the baseline and whether they are real."""
     return {
         name: {

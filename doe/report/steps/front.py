@@ -56,10 +56,8 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         "statement": statement(gains),
         "constraints": _limits(study, front.values[front.pick]),
         "archive": front.archive_size,
-        "evaluations": front.evaluations,
         "feasible_share": front.feasible,
-        "generations": front.generations,
-        "seed": front.seed,
+        **{key: getattr(front, key) for key in ("evaluations", "generations", "seed")},
     }
     if record["pick"]["beyond_runs"]:
         record["statement"] += " The pick lies farther out than any run: the surfaces extrapolate there."

@@ -18,7 +18,7 @@ from doe.study.design import design_of
 
 if TYPE_CHECKING:
     from doe.response_surface import Surface
-    from doe.study import Outcome
+    from doe.study import StudyResult
     from doe.study_file import Study
 
 
@@ -65,7 +65,7 @@ def _bounds(study: Study, name: str) -> list[float]:
     return [bound for bound in (response.lower, response.upper) if bound is not None]
 
 
-def pareto_front(outcome: Outcome, path: Path) -> None:
+def pareto_front(outcome: StudyResult, path: Path) -> None:
     """Every pair of responses: the fronts, baseline and pick on the surfaces, and both as they were simulated."""
     study, surfaces = outcome.study, outcome.surfaces
     clouds = [("front on the surfaces", outcome.front.values, "tab:blue")]

@@ -13,13 +13,13 @@ from doe.study.confirmation import statement
 from rbdyn.result import versions
 
 if TYPE_CHECKING:
-    from doe.study import Outcome
+    from doe.study import StudyResult
     from doe.study.direct_pick import DirectPick
 
 FORMAT = "doe.study/1"
 
 
-def summary(outcome: Outcome) -> dict[str, Any]:
+def summary(outcome: StudyResult) -> dict[str, Any]:
     """JSON of ``doe study``."""
     study, gains = outcome.study, outcome.gains["pick"]
     record: dict[str, Any] = {
@@ -67,7 +67,7 @@ def _chosen_record(pick: DirectPick) -> dict[str, Any]:
     }
 
 
-def _beside_record(outcome: Outcome) -> dict[str, Any]:
+def _beside_record(outcome: StudyResult) -> dict[str, Any]:
     return {
         row.response: {
             "ours_min_mean_max": [float(x) for x in row.our_range],
