@@ -24,7 +24,7 @@ def chains(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     for name, chain in (part(summary, "chains") or {}).items():
         blocks.append(Heading(label(name)))
         blocks += _chain(name, chain)
-    return Section("chains", "Dimension chains", blocks) if blocks else None
+    return Section("chains", "Dimension chains", blocks)
 
 
 def _chain(name: str, chain: Record) -> list[Block]:
@@ -35,9 +35,8 @@ def _chain(name: str, chain: Record) -> list[Block]:
          *(_percent(part(shares, each, kind)) for kind, _ in KINDS))
         for each, dimensions in allocation(chain).items()
     ]  # fmt: skip
-    if rows:
-        header = ("part", "dimension [mm]", "grade", "share of variance", "share of worst case")
-        blocks.append(Table(f"Parts of the chain {label(name)}", header, rows, text_columns=(2,)))
+    header = ("part", "dimension [mm]", "grade", "share of variance", "share of worst case")
+    blocks.append(Table(f"Parts of the chain {label(name)}", header, rows, text_columns=(2,)))
     if shares:
         blocks.append(
             Figures([contributions(name, shares)], "What each part contributes to the scatter of the closing link.")
@@ -59,8 +58,7 @@ def _chain(name: str, chain: Record) -> list[Block]:
         note = f"Share of assemblies within the limits, standard error {shown(error, 1)}." if error else ""
         blocks.append(Table("Yield", ("distribution of the parts", "yield"), rows, note))
     rest = {key: value for key, value in chain.items() if key not in TOLD}
-    if table := record_table("Further figures of the chain", rest, folded=True):
-        blocks.append(table)
+    blocks.append(record_table("Further figures of the chain", rest, folded=True))
     return blocks
 
 
