@@ -10,9 +10,9 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import ClosingFunction, NoValueError
-from doe.dimension_chain.contributions import contributions
+from doe.dimension_chain.closing import ClosingFunction, NoValueError, middle
 from doe.dimension_chain.cost import total_cost
+from doe.dimension_chain.distributions import moments
 from doe.dimension_chain.faults import faults
 from doe.dimension_chain.intervals import interval, linear_interval
 from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part
@@ -168,7 +168,7 @@ def _solved(search: Allocation, samples: int, seed: int, threads: int | None) ->
         rss_mm=interval(function, parts, "rss"),
         yields=yields,
         standard_errors={law: standard_error(share, samples) for law, share in yields.items()},
-        contributions=contributions(function, parts),
+        contributions=_contributions(function, parts),
         allocation=tuple(allocation),
         status=_status(search, parts, allocation, yields["as_given"], given),
         mean_mm=mean,
@@ -185,6 +185,20 @@ def _solved(search: Allocation, samples: int, seed: int, threads: int | None) ->
         samples=samples,
         seed=seed,
     )
+
+
+def _contributions(function: ClosingFunction, parts: Sequence[Part]) -> dict[str, dict[str, float]]:
+    """Percent of the variance, by each part's own distribution, and of the worst case; sensitivities at the middle."""
+    slopes = function.sensitivities(middle(parts))
+    spread = [slopes[part.name] ** 2 * moments(part, part.distribution)[1] for part in parts]
+    reach = [abs(slopes[part.name]) * part.tolerance_mm for part in parts]
+    return {
+        part.name: {
+            "variance_percent": 100 * variance / (sum(spread) or 1.0),
+            "worst_case_percent": 100 * width / (sum(reach) or 1.0),
+        }
+        for part, variance, width in zip(parts, spread, reach, strict=True)
+    }
 
 
 def _quantiles(values: Array) -> dict[float, float]:

@@ -68,17 +68,14 @@ def diagnostics(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     if not fitted:
         return None
     rows = [
-        [label(name), *(shown(each.get(key)) for key, _ in STATISTICS), *_lack(each)] for name, each in fitted.items()
+        [label(name), *(shown(each.get(key)) for key, _ in STATISTICS), probability(part(each, "lack_of_fit", "p"))]
+        for name, each in fitted.items()
     ]
     header = ["response", *(words for _, words in STATISTICS), "p of lack of fit"]
     blocks: list[Block] = [Table("Quality of the fits", header, rows)]
     for name, each in fitted.items():
         blocks += _one(name, each)
     return Section("diagnostics", "Diagnostics", blocks)
-
-
-def _lack(fitted: Record) -> list[str]:
-    return [probability(part(fitted, "lack_of_fit", "p"))]
 
 
 def _one(name: str, fitted: Record) -> list[Block]:

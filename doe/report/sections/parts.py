@@ -51,7 +51,7 @@ def _chain(name: str, chain: Record) -> list[Block]:
     if yields := chain.get("yield"):
         error = yields.get("standard_error")
         rows = [
-            (_kind(kind), f"{share:.6f}")
+            (kind.replace("_", " "), f"{share:.6f}")
             for kind, share in yields.items()
             if isinstance(share, float) and kind != "standard_error"
         ]
@@ -91,10 +91,6 @@ def _percent(value: float | None) -> str:
 
 def _length(value: Any) -> str:
     return " to ".join(f"{each:.4f}" for each in value) if isinstance(value, list | tuple) else f"{value:.4f}"
-
-
-def _kind(kind: str) -> str:
-    return kind.replace("_", " ")
 
 
 def _first_upper(text: str) -> str:

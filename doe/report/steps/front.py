@@ -35,6 +35,7 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         )
     ]
     gains = predicted_gains(study, surfaces, front.points[front.pick])
+    beyond = beyond_runs(study, to_coded(front.points[front.pick], study.centre, study.step))
     picks: dict[str, Any] = {rule: points[row] for rule, row in front.picks.items()}
     record: dict[str, Any] = {
         "front": points,
@@ -44,7 +45,7 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         "ideal": _extreme(study, front, front.costs.argmin(axis=0)),
         "nadir": _extreme(study, front, front.costs.argmax(axis=0)),
         "knee": points[front.knee],
-        "pick": {**points[front.pick], "reason": front.pick_reason, "beyond_runs": _far(study, front)},
+        "pick": {**points[front.pick], "reason": front.pick_reason, "beyond_runs": beyond},
         "picks": picks,
         "baseline": predicted_record(study, surfaces, study.baseline),
         "pick_dominates_baseline": {
@@ -59,16 +60,12 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         "feasible_share": front.feasible,
         **{key: getattr(front, key) for key in ("evaluations", "generations", "seed")},
     }
-    if record["pick"]["beyond_runs"]:
+    if beyond:
         record["statement"] += " The pick lies farther out than any run: the surfaces extrapolate there."
     if front.tolerance_aware is not None:
         record["tolerance_aware"] = tolerance_aware_record(study, surfaces, front.tolerance_aware)
         picks["tolerance_aware"] = record["tolerance_aware"]["pick"]
     return record
-
-
-def _far(study: Study, front: ParetoFront) -> bool:
-    return beyond_runs(study, to_coded(front.points[front.pick], study.centre, study.step))
 
 
 def predicted_record(study: Study, surfaces: list[Surface], point: Array) -> dict[str, Any]:
