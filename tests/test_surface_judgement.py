@@ -9,6 +9,7 @@ from surface_intervals import new_run_interval
 
 from doe.designs import central_composite
 from doe.designs.model import model_terms
+from doe.report.steps.fit import fit_record
 from doe.response_surface import describe, fit, model_matrix
 from doe.response_surface.least_squares import solve
 from doe.study.runs import Runs
@@ -196,7 +197,7 @@ def test_the_recommended_transform_is_taken_or_advised():
 def test_rival_is_compared_and_told():
     values = 5 + POINTS @ [1.0, 2.0, 3.0] + noise(16, deviation=0.1)
     (surface,) = with_rivals([surface_of(values, model="linear")])
-    record = surface.as_dict()
+    record = fit_record([surface])["responses"][surface.name]
     assert record["rival"]["recommended"] == "polynomial"
     assert record["rival"]["sentence"] in record["sentences"]
     assert json.loads(json.dumps(record, allow_nan=False)) == record
