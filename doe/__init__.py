@@ -1,5 +1,6 @@
 """Designed experiments: design, response surface, Pareto front, dimension chain, and the study that joins them.
 
+- ``arrays``: kinds of arrays by name
 - ``designs``, ``response_surface``, ``pareto``, ``dimension_chain``: methods that know no bearing
 - ``study_file``: STUDY.toml, checked
 - ``running``: where points run and how they are kept

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array, Whole
 from doe.running.failure import Failure
-from doe.running.runner import Give, Outcome, Ran, Take, run_points
+from doe.running.runner import Give, Ran, RunResult, Take, run_points
 from doe.running.store import Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from rbdyn.dynamics.ensemble import Stop
     from rbdyn.dynamics.motion.history import History
 
-Array = NDArray[np.float64]
 
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
 # Confirmation runs use seeds that no design run has.
@@ -193,7 +192,7 @@ def sound(result: dict[str, Any]) -> bool:
     return False
 
 
-def _result(point: Point, found: Outcome) -> SimulationResult | Failure:
+def _result(point: Point, found: RunResult) -> SimulationResult | Failure:
     if isinstance(found, Failure):
         return replace(found, label=point.label, run=point.run, factors=dict(point.factors))
     return SimulationResult.from_dict(found)
@@ -265,7 +264,7 @@ def attempt_text(text: str, version: str) -> Ran:
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
-def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array, NDArray[np.int64]]:
+def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
     """Values, 95 % statistical half-widths (NaN where there is none), and about how many independent values are behind
     each, each of shape (runs, responses)."""
     from rbdyn.dynamics.statistics.batch_means import MOST_BATCHES

@@ -11,7 +11,7 @@ from doe.designs import axial_distance, box_behnken, central_composite, central_
 from doe.designs.central_composite import centre_shares
 from doe.designs.cube import RESOLUTION_V, corner_blocks, cube_points
 from doe.designs.evaluation import block_contrasts
-from doe.designs.model import model_terms, term_columns
+from doe.designs.model import model_matrix, model_terms
 from doe.response_surface import fit
 
 # Axial distances of Lenth, Response-Surface Methods in R, Using rsm, J. Stat. Softw. 32 (2009) 7, the designs of
@@ -45,7 +45,7 @@ def prediction_errors(points: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 def cosines_of_blocks(design) -> float:
     """Largest cosine between a block contrast and a column of the full second-order model."""
-    columns = term_columns(design.coded, model_terms(design.coded.shape[1], "quadratic"))
+    columns = model_matrix(design.coded, model_terms(design.coded.shape[1], "quadratic"))
     contrasts = block_contrasts(design.block)
     norms = np.outer(np.linalg.norm(columns, axis=0), np.linalg.norm(contrasts, axis=0))
     return float(np.abs(columns.T @ contrasts / norms).max())
@@ -161,7 +161,7 @@ def test_another_alpha_is_not_rotatable():
 def test_fractions_confuse_no_term_of_second_order(factors, corners):
     cube = cube_points(factors, "resolution_v")
     terms = model_terms(factors, "interaction")
-    columns = term_columns(cube, terms)
+    columns = model_matrix(cube, terms)
     assert cube.shape == (corners, factors)
     assert columns.T @ columns == pytest.approx(corners * np.eye(len(terms)))
 

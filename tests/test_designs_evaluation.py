@@ -12,7 +12,7 @@ from statsmodels.stats.outliers_influence import variance_inflation_factor
 
 from doe.designs import box_behnken, central_composite, central_composite_design, full_factorial, latin_hypercube, sobol
 from doe.designs.evaluation import evaluate, untold_terms
-from doe.designs.model import model_terms, term_columns
+from doe.designs.model import model_matrix, model_terms
 from doe.designs.region import moment_matrix, sample
 from doe.response_surface import fit
 
@@ -58,7 +58,7 @@ def test_rotatable_means_one_variance_by_radius():
 
 @pytest.mark.parametrize(("region", "reach"), [("ball", 1.7), ("box", 1.2)])
 def test_moments_agree_with_a_sample_of_the_region(region, reach):
-    columns = term_columns(sample(3, region, reach), QUADRATIC)
+    columns = model_matrix(sample(3, region, reach), QUADRATIC)
     expected = columns.T @ columns / len(columns)
     assert moment_matrix(QUADRATIC, 3, region, reach) == pytest.approx(expected, abs=0.02)
 
@@ -67,7 +67,7 @@ def test_oracle_variance_inflation_leverage_and_errors():
     """Oracle: statsmodels for the inflation; our own least squares for the errors of predictions."""
     points = np.random.default_rng(4).uniform(-1, 1, (24, 3))
     found = evaluate(points, QUADRATIC, region="ball", reach=0.5)
-    matrix = term_columns(points, QUADRATIC)
+    matrix = model_matrix(points, QUADRATIC)
     expected = [variance_inflation_factor(matrix, column) for column in range(1, 10)]
     assert list(found["vif"].values()) == pytest.approx(expected)
     hat = matrix @ np.linalg.pinv(matrix)
@@ -79,7 +79,7 @@ def test_oracle_variance_inflation_leverage_and_errors():
 
 
 def test_oracle_power_by_the_noncentral_t_distribution():
-    matrix = term_columns(central_composite(3), QUADRATIC)
+    matrix = model_matrix(central_composite(3), QUADRATIC)
     found = evaluate(central_composite(3), QUADRATIC)
     covariance = np.linalg.inv(matrix.T @ matrix)
     limit = stats.t.isf(0.025, 10)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import special
+from surface_intervals import interval
 
 from doe.designs import central_composite
 from doe.response_surface import describe, fit
@@ -33,7 +34,7 @@ def coverage(points, size, repeats=40, **keywords):
         new = random.uniform(-1.0, 1.0, (200, 3))
         shares = []
         for each in (replace(surface, model_error=None), surface):
-            low, high = each.confidence_interval(new)
+            low, high = interval(each, new)
             shares.append(np.mean((low <= truth(new)) & (truth(new) <= high)))
         found.append((*shares, surface.model_error is not None))
     return np.mean(found, axis=0)
@@ -57,7 +58,7 @@ def test_interval_of_a_true_model_is_that_of_the_textbook():
     assert told < 0.15 and 0.9 < before <= after < 0.99
     surface = fit(POINTS, wavy(1, 0.0, 1.0)(POINTS) + NOISE * np.random.default_rng(1).normal(size=20), **KEYWORDS)
     assert surface.model_error is None and surface.interval_dof == surface.residual_dof == 10
-    low, high = surface.confidence_interval([0.5, 0.5, 0.5])
+    low, high = interval(surface, [0.5, 0.5, 0.5])
     half = special.stdtrit(10, 0.975) * surface.prediction_standard_error([0.5, 0.5, 0.5])
     assert (high - low) / 2 == pytest.approx(half, rel=1e-12)
 

@@ -11,6 +11,7 @@ import statsmodels.formula.api as smf
 from statsmodels.stats.anova import anova_lm
 
 from doe.designs import central_composite, to_coded
+from doe.report.steps.fit import fit_record
 from doe.response_surface import describe, fit
 
 TABLE = Path(__file__).parents[1] / "examples" / "ccd_table4.csv"
@@ -167,7 +168,8 @@ def test_published_picture_of_the_data_behind_the_paper(behind_the_paper):
 
 
 def test_json_has_the_contract_keys_and_no_nan(printed):
-    result = fitted(printed, 1, "quadratic").as_dict()
+    surface = fitted(printed, 1, "quadratic")
+    result = fit_record([surface])["responses"][surface.name]
     assert list(result) == [
         *("model", "coefficients", "anova", "lack_of_fit", "pure_error", "r2", "adjusted_r2", "predicted_r2"),
         *("press", "cv_percent", "adequate_precision", "stationary_point", "terms", "standard_errors", "vif"),

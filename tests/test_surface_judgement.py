@@ -5,9 +5,11 @@ import json
 import numpy as np
 import pytest
 from scipy import stats
+from surface_intervals import new_run_interval
 
 from doe.designs import central_composite
 from doe.designs.model import model_terms
+from doe.report.steps.fit import fit_record
 from doe.response_surface import describe, fit, model_matrix
 from doe.response_surface.least_squares import solve
 from doe.study.runs import Runs
@@ -177,9 +179,7 @@ def test_transformed_fit_is_the_fit_of_the_transform():
     assert ours.r2 == pytest.approx(logarithm.r2)
     new = np.random.default_rng(13).uniform(-1, 1, (5, 3))
     assert np.log(ours.predict(new)) == pytest.approx(logarithm.predict(new))
-    assert np.log(np.array(ours.prediction_interval(new))) == pytest.approx(
-        np.array(logarithm.prediction_interval(new))
-    )
+    assert np.log(np.array(new_run_interval(ours, new))) == pytest.approx(np.array(new_run_interval(logarithm, new)))
     error = ours.prediction_standard_error(new)
     assert error == pytest.approx(ours.predict(new) * logarithm.prediction_standard_error(new))
     assert np.log(ours.draws(new, [ours.coefficients])) == pytest.approx(logarithm.predict(new)[None])
@@ -197,7 +197,7 @@ def test_the_recommended_transform_is_taken_or_advised():
 def test_rival_is_compared_and_told():
     values = 5 + POINTS @ [1.0, 2.0, 3.0] + noise(16, deviation=0.1)
     (surface,) = with_rivals([surface_of(values, model="linear")])
-    record = surface.as_dict()
+    record = fit_record([surface])["responses"][surface.name]
     assert record["rival"]["recommended"] == "polynomial"
     assert record["rival"]["sentence"] in record["sentences"]
     assert json.loads(json.dumps(record, allow_nan=False)) == record

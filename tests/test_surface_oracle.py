@@ -11,6 +11,7 @@ import statsmodels.formula.api as smf
 from scipy import stats
 from statsmodels.stats.anova import anova_lm
 from statsmodels.stats.outliers_influence import variance_inflation_factor
+from surface_intervals import interval, new_run_interval
 
 from doe.designs import central_composite_design, to_coded
 from doe.response_surface import fit
@@ -132,8 +133,8 @@ def test_intervals_of_predictions(pair):
     assert ours.predict(NEW) == close(theirs["mean"])
     assert ours.prediction_standard_error(NEW) == close(theirs["mean_se"])
     for ends, names in (
-        (ours.confidence_interval(NEW, 0.9), ("mean_ci_lower", "mean_ci_upper")),
-        (ours.prediction_interval(NEW, 0.9), ("obs_ci_lower", "obs_ci_upper")),
+        (interval(ours, NEW, 0.9), ("mean_ci_lower", "mean_ci_upper")),
+        (new_run_interval(ours, NEW, 0.9), ("obs_ci_lower", "obs_ci_upper")),
     ):
         # The oracle gives a new run the weight 1; we give it the mean variance of the runs.
         if ours.weighting == "equal" or names[0].startswith("mean"):

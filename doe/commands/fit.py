@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from doe.commands.options import Data, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
-from doe.commands.steps import fitted, keeping_runs, save
+from doe.commands.steps import Effort, fitted, keeping_runs, save
 from rbdyn.cli.terminal import guarded, print_json
 
 
@@ -29,7 +29,7 @@ def fit(
         from doe.report.steps.fit import fit_record, fit_tables, print_fit
         from doe.study.surfaces import with_rivals
 
-        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)
+        loaded, surfaces = fitted(path, data, Effort(out, workers, scheduler, retry, quiet or as_json))
         surfaces = with_rivals(surfaces)
         record = fit_record(surfaces)
         save(out, path, "fit.json", record)

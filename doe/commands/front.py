@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from doe.commands.options import Data, Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
-from doe.commands.steps import fitted, keeping_runs, save, searched
+from doe.commands.steps import Effort, fitted, keeping_runs, save, searched
 from rbdyn.cli.terminal import guarded, print_json
 from rbdyn.faults import InputError, refuse
 
@@ -46,7 +46,8 @@ def front(
         asked = Study.load(path)
         check_goals(asked)
         values = None if point is None else _point(asked, point)
-        loaded, surfaces = fitted(path, data, out, workers, quiet or as_json, scheduler, retry)
+        effort = Effort(out, workers, scheduler, retry, quiet or as_json)
+        loaded, surfaces = fitted(path, data, effort)
         found = find_front(loaded, surfaces)
         record = front_record(loaded, surfaces, found)
         if values is not None:
@@ -56,9 +57,7 @@ def front(
         if direct:
             from doe.report.steps.confirmation import direct_record
 
-            record["direct"] = direct_record(
-                loaded, searched(loaded, found, out, workers, quiet or as_json, scheduler, retry)
-            )
+            record["direct"] = direct_record(loaded, searched(loaded, found, effort))
         save(out, path, "front.json", record)
         if as_json:
             print_json(record)

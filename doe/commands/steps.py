@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbdyn.cli.terminal import keeping, output_folder, progress_bar
 
@@ -34,15 +34,17 @@ def keeping_runs(out: Path | None) -> Iterator[None]:
         yield
 
 
-def fitted(
-    path: Path,
-    data: Path | None,
-    out: Path | None,
-    workers: int | None,
-    quiet: bool,
-    scheduler: str | None,
-    retry: bool,
-) -> tuple[Study, list[Surface]]:
+class Effort(NamedTuple):
+    """Where and how the runs of a command are made: its options ``--out``, ``--workers``, ``--scheduler``, ``--retry``."""
+
+    out: Path | None
+    workers: int | None
+    scheduler: str | None
+    retry: bool
+    quiet: bool
+
+
+def fitted(path: Path, data: Path | None, effort: Effort) -> tuple[Study, list[Surface]]:
     """The study and its surfaces, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
     from doe.study.runs import read_runs, run_design
     from doe.study.surfaces import fit_surfaces
@@ -51,25 +53,19 @@ def fitted(
     loaded = Study.load(path)
     if data is not None:
         return loaded, fit_surfaces(loaded, read_runs(loaded, data))
+    out, workers, scheduler, retry, quiet = effort
     with _store_folder(out, path) as folder, progress_bar("design runs", quiet) as progress:
         return loaded, fit_surfaces(loaded, run_design(loaded, folder, workers, progress, scheduler, retry))
 
 
-def searched(
-    study: Study,
-    found: ParetoFront,
-    out: Path | None,
-    workers: int | None,
-    quiet: bool,
-    scheduler: str | None,
-    retry: bool,
-) -> Direct:
+def searched(study: Study, found: ParetoFront, effort: Effort) -> Direct:
     """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
     from doe.running.store import Store
     from doe.study.direct import find_direct
     from doe.study.runs import STORE
     from doe.study.simulations import Simulations
 
+    out, workers, scheduler, retry, quiet = effort
     with (
         _store_folder(out, study.path) as folder,
         Store(folder / STORE, study.path.stem) as store,

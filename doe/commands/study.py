@@ -35,13 +35,10 @@ def study(
         from doe.study.finished import finished, inputs_digest
 
         if not (verbose or retry) and (record := finished(folder, inputs_digest(loaded, direct))):
-            if as_json:
-                print_json(record)
-                _leave_by(record)
-                return
-            print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
-            print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
-            _leave_by(record)
+            if not as_json:
+                print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
+                print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
+            _leave_by(record, as_json)
             return
         from doe.report.steps.fit import print_fit
         from doe.report.study.answer import print_outcome, print_verdict
@@ -59,21 +56,20 @@ def study(
         )
         bars.close()
         record = write(outcome, folder)
-        if as_json:
-            print_json(record)
-            _leave_by(record)
-            return
-        print_verdict(outcome)
-        if verbose:
-            print_fit(outcome.surfaces, factors=loaded.factors)
-        print_outcome(outcome, quiet)
-        print(f"{outcome.cost['total_s']:.1f} s, of which design runs {outcome.cost['design_s']:.1f} s")
-        print(f"written to {folder}: {', '.join(record['files'])}")
-        _leave_by(record)
+        if not as_json:
+            print_verdict(outcome)
+            if verbose:
+                print_fit(outcome.surfaces, factors=loaded.factors)
+            print_outcome(outcome, quiet)
+            print(f"{outcome.cost['total_s']:.1f} s, of which design runs {outcome.cost['design_s']:.1f} s")
+            print(f"written to {folder}: {', '.join(record['files'])}")
+        _leave_by(record, as_json)
 
 
-def _leave_by(record: dict[str, Any]) -> None:
-    """A study whose pick did not keep its limits has failed."""
+def _leave_by(record: dict[str, Any], as_json: bool) -> None:
+    """With the record printed where that is asked for; a study whose pick did not keep its limits has failed."""
+    if as_json:
+        print_json(record)
     if record["status"] != "ok":
         print(record["limits_sentence"], file=sys.stderr)
         raise typer.Exit(FAILED)

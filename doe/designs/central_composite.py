@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs.cube import corner_blocks, cube_points
 from doe.designs.design import Design, assembled
-
-Array = NDArray[np.float64]
 
 WORDS = ("rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "face_centred", "inscribed")
 

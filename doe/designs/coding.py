@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from doe.arrays import Array
 
 
 def to_actual(coded: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
     """Actual factor values of coded points (..., k); ``centre`` and ``step`` (k,) are in actual units."""
-    actual: Array = np.asarray(centre, float) + np.asarray(coded, float) * np.asarray(step, float)
-    return actual
+    return np.asarray(centre, float) + np.asarray(coded, float) * np.asarray(step, float)
 
 
 def to_coded(actual: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
@@ -22,5 +21,4 @@ def to_coded(actual: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
     step = np.asarray(step, float)
     if np.any(step == 0):
         raise ValueError(f"step = {step.tolist()}: every step must differ from zero")
-    coded: Array = (np.asarray(actual, float) - np.asarray(centre, float)) / step
-    return coded
+    return (np.asarray(actual, float) - np.asarray(centre, float)) / step

@@ -5,9 +5,8 @@ from __future__ import annotations
 from itertools import combinations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from doe.arrays import Array, Rows
 
 # Generators of the smallest regular fractions of resolution V or more: each added factor is the product of
 # the named ones. Box and Hunter, The 2^(k-p) fractional factorial designs II, Technometrics 3 (1961).
@@ -35,7 +34,7 @@ def cube_points(factors: int, cube: str = "full") -> Array:
     return np.column_stack([corners, *added])
 
 
-def corner_blocks(corners: Array, blocks: int) -> NDArray[np.intp]:
+def corner_blocks(corners: Array, blocks: int) -> Rows:
     """Block (n,) of each corner, such that no block effect is confused with a term up to second order.
 
     Blocks are told by the signs of interactions of three or more factors, the longest that serve; their

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from doe.arrays import Array, Rows
+
 Region = Literal["ball", "box"]
 
 
@@ -25,9 +25,9 @@ class Design:
     """
 
     coded: Array
-    block: NDArray[np.intp]
+    block: Rows
     kind: tuple[str, ...]
-    order: NDArray[np.intp]
+    order: Rows
     reach: float
     region: Region
 

@@ -10,15 +10,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
+from doe.arrays import Array, Rows
 from doe.designs.design import Region
-from doe.designs.model import term_columns
+from doe.designs.model import model_matrix
 from doe.designs.region import directions, lattice, moment_matrix, sample
 from doe.designs.replicates import replicate_groups
-
-Array = NDArray[np.float64]
 
 SIGNIFICANCE = 0.05  # of the tests whose power is given
 RADII = 11  # of the variance dispersion graph
@@ -65,36 +64,59 @@ def evaluate(
     J. Qual. Technol. 35 (2003) (fraction of design space).
     """
     points = np.asarray(coded, float)
-    runs, factors = points.shape
+    runs = len(points)
     groups = np.zeros(runs, dtype=np.intp) if block is None else np.unique(block, return_inverse=True)[1]
     lost = untold_terms(points, terms, groups)
     if lost:
         raise ValueError(f"the {runs} runs cannot tell {', '.join(lost)} from the other terms")
-    widest = float(np.abs(points).max())
-    farthest = float(np.linalg.norm(points, axis=1).max())
-    if region is None:
-        region = "box" if farthest > 0.999 * widest * math.sqrt(factors) else "ball"
-    if reach is None:
-        reach = widest if region == "box" else farthest
-    matrix, contrasts = term_columns(points, terms), block_contrasts(groups)
+    region, reach = _where(points, region, reach)
+    # A row a run in memory too: sums over columns then have the same bits whatever made the columns.
+    matrix, contrasts = np.ascontiguousarray(model_matrix(points, terms)), block_contrasts(groups)
     whole = np.column_stack([matrix, contrasts])
     size = matrix.shape[1]
     covariance = np.asarray(np.linalg.inv(whole.T @ whole)[:size, :size], float)
-    variances = _Variances(covariance, terms, runs)
-    mean = runs * float(np.trace(covariance @ moment_matrix(terms, factors, region, reach)))
-    spread = variances(sample(factors, region, reach))
-    radii = np.linspace(0.0, reach, RADII)
-    shells = variances(radii[:, None, None] * directions(factors)[None])
-    edges = shells.ravel() if region == "ball" else variances(lattice(factors, reach))
-    largest = max(float(spread.max()), float(edges.max()))
-    per_width = np.abs(term_columns(np.full(factors, widest), terms))
-    scaled = covariance * np.outer(per_width, per_width)
     freedom = _degrees_of_freedom(points, groups, size, contrasts.shape[1])
     orthogonal = np.linalg.qr(whole)[0]
     return {
         "terms": list(terms),
         "runs": runs,
         "region": {"shape": region, "reach": reach},
+        **_precision(points, terms, covariance, region, reach),
+        "vif": _inflation(matrix, covariance, terms),
+        "leverage": (orthogonal**2).sum(axis=1).tolist(),
+        "condition_number": float(np.linalg.cond(matrix / np.linalg.norm(matrix, axis=0))),
+        "degrees_of_freedom": freedom,
+        "blocks": _blocks(matrix, contrasts, groups),
+        "power_percent": _power(covariance, terms, freedom["residual"]),
+    }
+
+
+def _where(points: Array, region: Region | None, reach: float | None) -> tuple[Region, float]:
+    """Region and reach of a design at coded points (n, k), unless given."""
+    widest, farthest = float(np.abs(points).max()), float(np.linalg.norm(points, axis=1).max())
+    if region is None:
+        region = "box" if farthest > 0.999 * widest * math.sqrt(points.shape[1]) else "ball"
+    return region, reach if reach is not None else widest if region == "box" else farthest
+
+
+def _precision(points: Array, terms: Sequence[str], covariance: Array, region: Region, reach: float) -> dict[str, Any]:
+    """Efficiencies and scaled prediction variances, from the covariance (p, p) of the coefficients over sigma^2."""
+    (runs, factors), size, widest = points.shape, len(terms), float(np.abs(points).max())
+    root = math.sqrt(runs) * np.linalg.cholesky(covariance)
+
+    def variances(places: Array) -> Array:
+        columns = model_matrix(places, terms) @ root
+        return np.einsum("...i,...i->...", columns, columns)
+
+    mean = runs * float(np.trace(covariance @ moment_matrix(terms, factors, region, reach)))
+    spread = variances(sample(factors, region, reach))
+    radii = np.linspace(0.0, reach, RADII)
+    shells = variances(radii[:, None, None] * directions(factors)[None])
+    edges = shells.ravel() if region == "ball" else variances(lattice(factors, reach))
+    largest = max(float(spread.max()), float(edges.max()))
+    per_width = np.abs(model_matrix(np.full(factors, widest), terms))
+    scaled = covariance * np.outer(per_width, per_width)
+    return {
         "efficiency_percent": {
             "d": 100.0 * math.exp(-float(np.linalg.slogdet(scaled)[1]) / size) / runs,
             "a": 100.0 * size / (runs * float(np.trace(scaled))),
@@ -114,38 +136,20 @@ def evaluate(
         "fraction_of_design_space": [
             {"percent": percent, "variance": float(np.percentile(spread, percent))} for percent in range(0, 101, 5)
         ],
-        "vif": _inflation(matrix, covariance, terms),
-        "leverage": (orthogonal**2).sum(axis=1).tolist(),
-        "condition_number": float(np.linalg.cond(matrix / np.linalg.norm(matrix, axis=0))),
-        "degrees_of_freedom": freedom,
-        "blocks": _blocks(matrix, contrasts, groups),
-        "power_percent": _power(covariance, terms, freedom["residual"]),
     }
 
 
-class _Variances:
-    """Scaled prediction variance at coded points (..., k)."""
-
-    def __init__(self, covariance: Array, terms: Sequence[str], runs: int) -> None:
-        self._root = math.sqrt(runs) * np.linalg.cholesky(covariance)
-        self._terms = terms
-
-    def __call__(self, points: Array) -> Array:
-        columns: Array = term_columns(points, self._terms) @ self._root
-        return np.einsum("...i,...i->...", columns, columns)
-
-
-def untold_terms(coded: Array, terms: Sequence[str], block: NDArray[np.intp] | None = None) -> list[str]:
+def untold_terms(coded: Array, terms: Sequence[str], block: Rows | None = None) -> list[str]:
     """Terms that the runs cannot tell from blocks and the terms before them."""
     groups = np.zeros(len(coded), dtype=np.intp) if block is None else block
-    columns = np.column_stack([block_contrasts(groups), term_columns(coded, terms)])
+    columns = np.column_stack([block_contrasts(groups), model_matrix(coded, terms)])
     columns = columns / np.linalg.norm(columns, axis=0).clip(1e-300)
     first = columns.shape[1] - len(terms)
     ranks = [np.linalg.matrix_rank(columns[:, :end], tol=1e-9) for end in range(first, columns.shape[1] + 1)]
     return [term for term, rise in zip(terms, np.diff(ranks), strict=True) if rise == 0]
 
 
-def block_contrasts(block: NDArray[np.intp]) -> Array:
+def block_contrasts(block: Rows) -> Array:
     """Columns (n, b - 1) of the blocks but the last, each of mean zero, so that "1" is the mean over all runs."""
     indicator = (block[:, None] == np.unique(block)[None, :-1]).astype(float)
     return indicator - indicator.mean(axis=0)
@@ -158,7 +162,7 @@ def _inflation(matrix: Array, covariance: Array, terms: Sequence[str]) -> dict[s
     return {term: value for term, value in zip(terms, inflation, strict=True) if term != "1"}
 
 
-def _degrees_of_freedom(points: Array, groups: NDArray[np.intp], terms: int, blocks: int) -> dict[str, int]:
+def _degrees_of_freedom(points: Array, groups: Rows, terms: int, blocks: int) -> dict[str, int]:
     residual = len(points) - terms - blocks
     pure = len(points) - len(np.unique(replicate_groups(points, groups)))
     return {
@@ -170,7 +174,7 @@ def _degrees_of_freedom(points: Array, groups: NDArray[np.intp], terms: int, blo
     }
 
 
-def _blocks(matrix: Array, contrasts: Array, groups: NDArray[np.intp]) -> dict[str, Any] | None:
+def _blocks(matrix: Array, contrasts: Array, groups: Rows) -> dict[str, Any] | None:
     if contrasts.shape[1] == 0:
         return None
     unit = matrix / np.linalg.norm(matrix, axis=0)

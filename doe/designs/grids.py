@@ -5,11 +5,9 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs.design import Design, assembled
-
-Array = NDArray[np.float64]
 
 MOST_RUNS = 10_000
 # More runs of a Latin hypercube are even enough by themselves, and exchanges among them take seconds.

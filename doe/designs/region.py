@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs.design import Region
 from doe.designs.model import term_powers
-
-Array = NDArray[np.float64]
 
 SAMPLE = 12  # base-2 logarithm of the size of the quasi-random sample of a region
 
@@ -33,8 +31,7 @@ def moment_matrix(terms: Sequence[str], factors: int, region: Region, reach: flo
         on_sphere = gammaln(factors / 2) - gammaln((factors + degree) / 2)
         on_sphere += (gammaln((both + 1) / 2) - gammaln(0.5)).sum(axis=-1)
         means = np.exp(on_sphere) * factors / (factors + degree)
-    matrix: Array = np.where((both % 2 == 1).any(axis=-1), 0.0, means * reach**degree)
-    return matrix
+    return np.where((both % 2 == 1).any(axis=-1), 0.0, means * reach**degree)
 
 
 def directions(factors: int) -> Array:
@@ -52,8 +49,7 @@ def sample(factors: int, region: Region, reach: float) -> Array:
     unit = qmc.Sobol(factors + 1, seed=0).random_base2(SAMPLE)
     normal = norm.ppf(unit[:, :-1].clip(1e-12, 1 - 1e-12))
     radius = reach * unit[:, -1:] ** (1.0 / factors)
-    points: Array = radius * normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    return points
+    return radius * normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
 def lattice(factors: int, reach: float) -> Array:

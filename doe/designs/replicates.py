@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from doe.arrays import Array, Whole
 
 SAME_POINT = 1e-9  # coded units within which two runs are replicates
 
 
-def replicate_groups(points: Array, block: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+def replicate_groups(points: Array, block: Whole | None = None) -> Whole:
     """For each run (n, k) the first run at the same point, and in the same block where blocks are given, shape (n,)."""
     first = np.empty(len(points), np.int64)
     for place, point in enumerate(points):

@@ -134,10 +134,7 @@ def fit_factor(fit: PressFit, bore_nominal: float) -> float:
         raceway_mm=fit.raceway_mm,
         shaft_bore_mm=shaft_bore,
         outside_mm=outside,
-        shaft_modulus_GPa=fit.shaft_modulus_GPa,
-        bore_modulus_GPa=fit.bore_modulus_GPa,
-        shaft_poisson=fit.shaft_poisson,
-        bore_poisson=fit.bore_poisson,
+        **fit.model_dump(include={"shaft_modulus_GPa", "bore_modulus_GPa", "shaft_poisson", "bore_poisson"}),
     )
 
 

@@ -11,7 +11,8 @@ from math import exp, pi, sqrt
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from doe.dimension_chain.links import Array, Distribution, Part
+from doe.arrays import Array
+from doe.dimension_chain.links import Distribution, Part
 
 NORMAL_REACH = 9.0  # standard deviations beyond which a normal part has a share below 1e-18
 

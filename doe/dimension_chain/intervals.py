@@ -13,8 +13,9 @@ from math import sqrt
 
 import numpy as np
 
+from doe.arrays import Array
 from doe.dimension_chain.closing import ClosingFunction, middle
-from doe.dimension_chain.links import DIGITS, Array, Interval, Mode, Part
+from doe.dimension_chain.links import DIGITS, Interval, Mode, Part
 
 CORNERS = 12  # functions of more parts are looked at in as many random corners as those have
 BETWEEN = 512  # points between the corners

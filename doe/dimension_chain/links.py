@@ -10,14 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from rbdyn.faults import Strict
 from rbdyn.fields import NonNegative, Positive
 
-Array = NDArray[np.float64]
 Distribution = Literal["normal", "truncated_normal", "uniform", "triangular"]
 Mode = Literal["worst_case", "rss", "yield"]
 Interval = tuple[float, float]

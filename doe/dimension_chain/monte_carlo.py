@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from doe.arrays import Array
 from doe.dimension_chain.closing import ClosingFunction
 from doe.dimension_chain.distributions import standard_limits
-from doe.dimension_chain.links import SLACK, Array, ClosingLink, Distribution, Part
+from doe.dimension_chain.links import SLACK, ClosingLink, Distribution, Part
 
 CHUNK = 1 << 14  # assemblies: a handful of columns of them stays in the second-level cache
 RARE = 0.3  # share within the limits below which drawing again would last too long

@@ -14,12 +14,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array, Rows
 from doe.dimension_chain.closing import ClosingFunction, middle
 from doe.dimension_chain.distributions import quantile
 from doe.dimension_chain.intervals import interval
-from doe.dimension_chain.links import DIGITS, SLACK, Array, ClosingLink, Interval, Part, Selective
+from doe.dimension_chain.links import DIGITS, SLACK, ClosingLink, Interval, Part, Selective
 from doe.dimension_chain.yields import standard_error
 
 MOST_CLASSES = 100
@@ -147,9 +147,7 @@ def _opposed(function: ClosingFunction, parts: Sequence[Part], pair: Sequence[Pa
     return first * second < 0
 
 
-def _matches(
-    sizes: Sequence[Array], edges: Sequence[Array], opposed: bool
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _matches(sizes: Sequence[Array], edges: Sequence[Array], opposed: bool) -> tuple[Rows, Rows]:
     """Indices of the first and second parts that go together, class by class, the surplus left out."""
     classes = len(edges[0]) - 1
     sorted_in = [np.searchsorted(edge[1:-1], size) for edge, size in zip(edges, sizes, strict=True)]
@@ -157,7 +155,7 @@ def _matches(
         sorted_in[1] = classes - 1 - sorted_in[1]
     order = [np.argsort(each, kind="stable") for each in sorted_in]
     starts = [np.concatenate(([0], np.bincount(each, minlength=classes).cumsum())) for each in sorted_in]
-    found: tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]] = ([], [])
+    found: tuple[list[Rows], list[Rows]] = ([], [])
     for index in range(classes):
         scarce = min(int(start[index + 1] - start[index]) for start in starts)
         for taken, each, start in zip(found, order, starts, strict=True):

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
+from doe.arrays import Array
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import ClosingFunction, NoValueError
-from doe.dimension_chain.contributions import contributions
+from doe.dimension_chain.closing import ClosingFunction, NoValueError, middle
 from doe.dimension_chain.cost import total_cost
+from doe.dimension_chain.distributions import moments
 from doe.dimension_chain.faults import faults
 from doe.dimension_chain.intervals import interval, linear_interval
-from doe.dimension_chain.links import DIGITS, SLACK, Array, Chain, Distribution, Interval, Part
+from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part
 from doe.dimension_chain.monte_carlo import ALIKE, Assemblies, draw
 from doe.dimension_chain.parts import given_parts, has_deviations
 from doe.dimension_chain.selective_assembly import SelectiveAssembly, selective_assembly
@@ -107,17 +108,14 @@ class ChainResult:
             "allocation": {part.name: {key: getattr(part, key) for key in shown} for part in self.allocation},
             "status": self.status,
             "distribution": {
-                "mean_mm": self.mean_mm,
-                "standard_deviation_mm": self.standard_deviation_mm,
-                "cp": self.cp,
-                "cpk": self.cpk,
+                **{key: getattr(self, key) for key in ("mean_mm", "standard_deviation_mm", "cp", "cpk")},
                 "quantiles_mm": {f"{share:g}": size for share, size in self.quantiles_mm.items()},
             },
             "yield_standard_errors": self.standard_errors,
             "rejected": self.rejected,
             "exact_yield": self.exact_yields,
             "normal_yield": self.normal_yield,
-            "linearisation": None if self.linearisation is None else _plain(self.linearisation),
+            "linearisation": None if self.linearisation is None else asdict(self.linearisation),
             "cost": self.cost,
             "selective_assembly": None if self.selective is None else self.selective.as_dict(),
             "samples": self.samples,
@@ -170,7 +168,7 @@ def _solved(search: Allocation, samples: int, seed: int, threads: int | None) ->
         rss_mm=interval(function, parts, "rss"),
         yields=yields,
         standard_errors={law: standard_error(share, samples) for law, share in yields.items()},
-        contributions=contributions(function, parts),
+        contributions=_contributions(function, parts),
         allocation=tuple(allocation),
         status=_status(search, parts, allocation, yields["as_given"], given),
         mean_mm=mean,
@@ -189,8 +187,18 @@ def _solved(search: Allocation, samples: int, seed: int, threads: int | None) ->
     )
 
 
-def _plain(record: Linearisation) -> dict[str, Any]:
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in vars(record).items()}
+def _contributions(function: ClosingFunction, parts: Sequence[Part]) -> dict[str, dict[str, float]]:
+    """Percent of the variance, by each part's own distribution, and of the worst case; sensitivities at the middle."""
+    slopes = function.sensitivities(middle(parts))
+    spread = [slopes[part.name] ** 2 * moments(part, part.distribution)[1] for part in parts]
+    reach = [abs(slopes[part.name]) * part.tolerance_mm for part in parts]
+    return {
+        part.name: {
+            "variance_percent": 100 * variance / (sum(spread) or 1.0),
+            "worst_case_percent": 100 * width / (sum(reach) or 1.0),
+        }
+        for part, variance, width in zip(parts, spread, reach, strict=True)
+    }
 
 
 def _quantiles(values: Array) -> dict[float, float]:

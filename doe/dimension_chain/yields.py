@@ -8,9 +8,10 @@ from math import sqrt
 import numpy as np
 from scipy.special import ndtr
 
+from doe.arrays import Array
 from doe.dimension_chain.closing import ClosingFunction, middle
 from doe.dimension_chain.distributions import moments, share_below, support
-from doe.dimension_chain.links import SLACK, Array, ClosingLink, Distribution, Interval, Part
+from doe.dimension_chain.links import SLACK, ClosingLink, Distribution, Interval, Part
 from doe.dimension_chain.monte_carlo import Assemblies
 
 LATTICE = 1 << 13  # points over the reach of the closing link

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from doe.arrays import Array, Mask, Rows
+from doe.pareto.indicators import normalised
 
 
 class Archive(NamedTuple):
@@ -18,21 +18,19 @@ class Archive(NamedTuple):
     costs: Array
 
 
-def non_dominated(values: Array) -> NDArray[np.intp]:
+def non_dominated(values: Array) -> Rows:
     """Row numbers of the non-dominated of ``values`` (n, m), by ascending first objective, no repeats."""
     from pymoo.util.nds.non_dominated_sorting import find_non_dominated
 
     unique, rows = np.unique(values, axis=0, return_index=True)
     if not len(unique):
         return rows
-    chosen: NDArray[np.intp] = rows[find_non_dominated(unique)]
-    return chosen
+    return rows[find_non_dominated(unique)]
 
 
-def dominates(better: Array, worse: Array) -> NDArray[np.bool_]:
+def dominates(better: Array, worse: Array) -> Mask:
     """Whether costs (..., q) are nowhere larger than others and somewhere smaller."""
-    found: NDArray[np.bool_] = np.all(better <= worse, axis=-1) & np.any(better < worse, axis=-1)
-    return found
+    return np.all(better <= worse, axis=-1) & np.any(better < worse, axis=-1)
 
 
 def archives(history: Sequence[Archive]) -> list[Archive]:
@@ -47,10 +45,11 @@ def archives(history: Sequence[Archive]) -> list[Archive]:
     return kept
 
 
-def spread(scaled: Array, keep: int, wanted: Sequence[int]) -> NDArray[np.intp]:
-    """Rows to keep, ascending: the extremes and the wanted first, then always the row farthest from all."""
-    if len(scaled) <= keep:
-        return np.arange(len(scaled))
+def spread(costs: Array, keep: int, wanted: Sequence[int] = ()) -> Rows:
+    """Rows of normalised costs (n, q) to keep, ascending: extremes and wanted first, then the row farthest from all."""
+    if len(costs) <= keep:
+        return np.arange(len(costs))
+    scaled = normalised(costs, costs.min(axis=0), costs.max(axis=0))
     chosen = sorted({*scaled.argmin(axis=0).tolist(), *scaled.argmax(axis=0).tolist(), *wanted})
     gap = np.min([np.linalg.norm(scaled - scaled[row], axis=1) for row in chosen], axis=0)
     while len(chosen) < keep:

@@ -14,16 +14,15 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from doe.pareto.archive import dominates, spread
+from doe.arrays import Array, Mask, Rows
+from doe.pareto.archive import spread
 from doe.pareto.dominance import dominance, error_aware_dominance, order, ranks
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import normalised
 from doe.pareto.nsga2 import check_search
 from doe.pareto.picks import NAMES, Rule, pick_all
 
-Array = NDArray[np.float64]
 Evaluate = Callable[[Array], tuple[Array, Array]]
 
 FAILED = 1e30  # cost of a point whose run failed: behind every other
@@ -39,7 +38,7 @@ class Samples(NamedTuple):
     errors: Array
 
     @property
-    def failed(self) -> NDArray[np.bool_]:
+    def failed(self) -> Mask:
         """Whether each point's run failed, (n,)."""
         return np.asarray(np.isnan(self.values).any(axis=1))
 
@@ -53,9 +52,8 @@ class DirectFront:
     """Front of a noisy simulator, in ascending order of the first cost as it was selected.
 
     ``points`` (f, k); ``values`` and ``standard_errors`` (f, m) of ``repeats`` fresh runs each, which had no part in
-    the selection, and their ``costs`` (f, q) and ``cost_errors`` (f, q). ``searched_values`` (f, m) is what the
-    search believed of them; ``optimism`` (q,) how much too small that was on average, in shares of the range of the
-    costs. ``searched`` are all runs of the search. ``pick`` is a row. ``failures`` (x, k) are the points where a run failed.
+    the selection, and their ``costs`` (f, q) and ``cost_errors`` (f, q). ``optimism`` (q,) is how much too small the
+    search believed these to be on average, in shares of their range. ``searched`` are all runs of the search. ``pick`` is a row. ``failures`` (x, k) are the points where a run failed.
     """
 
     points: Array
@@ -63,12 +61,10 @@ class DirectFront:
     standard_errors: Array
     costs: Array
     cost_errors: Array
-    searched_values: Array
     optimism: Array
     pick: int
     pick_reason: str
     baseline_values: Array | None
-    baseline_errors: Array | None
     repeats: int
     failures: Array
     evaluations: int
@@ -99,13 +95,11 @@ def direct_front(
     evaluate : runs points (n, k), a generation at once, and gives responses (n, m) and their standard errors (n, m),
         NaN where a run failed. Every row of every call must be a run of its own (a fresh seed, such as a running
         number), even at a point that was run before.
-    lower, upper : bounds of the factors, shape (k,).
-    goals : what is wanted of the m responses.
+    lower, upper : bounds of the factors, shape (k,). goals : what is wanted of the m responses.
     evaluations : budget of rows, never exceeded. population, seed : of NSGA-II.
     baseline : a point (k,) to improve on, run like a finalist.
     confidence : at which a difference counts while the search sorts.
-    resample : share of the budget for fresh runs at the end.
-    pick : rule that makes the pick.
+    resample : share of the budget for fresh runs at the end. pick : rule that makes the pick.
 
     Raises
     ------
@@ -113,6 +107,46 @@ def direct_front(
     every run at the points of a stage failed or breaks a limit.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
+    _check(low, high, evaluations, population, resample, confidence)
+    generations = int(evaluations * (1.0 - resample)) // population
+    archive = _search(evaluate, low, high, goals, population, generations, seed, confidence)
+    left = evaluations - len(archive.points)
+    candidates = archive.rows(_candidates(archive, goals, confidence, max(left // (2 * SELECTING), 1)))
+    fresh = _repeated(evaluate, candidates.points, SELECTING)
+    left -= SELECTING * len(candidates.points)
+    chosen = _finalists(fresh, goals, max(left // REPORTING - 1, 1))
+    original = np.empty((0, low.size)) if baseline is None else np.asarray(baseline, float)[None]
+    repeats = max(left // (len(chosen) + len(original)), 1)
+    final = _repeated(evaluate, np.vstack([candidates.points[chosen], original]), repeats)
+    ours, base = final.rows(slice(len(chosen))), final.rows(slice(len(chosen), None)).values
+    kept = np.flatnonzero(~ours.failed)
+    if not kept.size:
+        raise ValueError("every run at the finalists failed; see the failures of the runs")
+    ours, believed = ours.rows(kept), goals.costs(candidates.values[chosen][kept])
+    base_costs = goals.costs(base[0]) if len(base) and not np.isnan(base).any() else None
+    picks, among = pick_all(goals.costs(fresh.values[chosen][kept]), goals, base_costs)
+    costs = goals.costs(ours.values)
+    return DirectFront(
+        points=ours.points,
+        values=ours.values,
+        standard_errors=ours.errors,
+        costs=costs,
+        cost_errors=ours.errors[:, goals.objectives],
+        optimism=(costs - believed).mean(axis=0) / np.where(np.ptp(costs, axis=0) > 0.0, np.ptp(costs, axis=0), 1.0),
+        pick=picks[pick],
+        pick_reason=f"{NAMES[pick]} {among}",
+        baseline_values=base[0] if len(base) else None,
+        repeats=repeats,
+        failures=np.unique(np.vstack([batch.points[batch.failed] for batch in (archive, fresh, final)]), axis=0),
+        evaluations=len(archive.points) + SELECTING * len(candidates.points) + repeats * len(final.points),
+        generations=generations,
+        seed=seed,
+        goals=goals,
+        searched=archive,
+    )
+
+
+def _check(low: Array, high: Array, evaluations: int, population: int, resample: float, confidence: float) -> None:
     check_search(low, high, population, 1, 2)
     if not 0.1 <= resample <= 0.9 or not 0.5 < confidence < 1.0:
         raise ValueError(f"resample = {resample}, confidence = {confidence}: must be in [0.1, 0.9] and (0.5, 1)")
@@ -121,48 +155,6 @@ def direct_front(
             f"evaluations = {evaluations}: must be at least five populations ({5 * population}); give more runs "
             "or a smaller population"
         )
-    generations = int(evaluations * (1.0 - resample)) // population
-    archive = _search(evaluate, low, high, goals, population, generations, seed, confidence)
-    left = evaluations - len(archive.points)
-    candidates = archive.rows(_candidates(archive, goals, confidence, max(left // (2 * SELECTING), 1)))
-    fresh = _repeated(evaluate, candidates.points, SELECTING)
-    left -= SELECTING * len(candidates.points)
-    chosen = _finalists(fresh, goals, max(left // REPORTING - 1, 1))
-    finalists, selected = candidates.rows(chosen), goals.costs(fresh.values[chosen])
-    extra = np.empty((0, low.size)) if baseline is None else np.asarray(baseline, float)[None]
-    repeats = max(left // (len(chosen) + len(extra)), 1)
-    final = _repeated(evaluate, np.vstack([finalists.points, extra]), repeats)
-    failed = [batch.points[batch.failed] for batch in (archive, fresh, final)]
-    ours, base = final.rows(slice(len(chosen))), final.rows(slice(len(chosen), None))
-    kept = np.flatnonzero(~ours.failed)
-    if not kept.size:
-        raise ValueError("every run at the finalists failed; see the failures of the runs")
-    ours, finalists, selected = ours.rows(kept), finalists.rows(kept), selected[kept]
-    base_costs = goals.costs(base.values[0]) if len(extra) and not base.failed[0] else None
-    picks, among = pick_all(selected, goals, base_costs)
-    costs = goals.costs(ours.values)
-    span = np.ptp(costs, axis=0)
-    gap = (costs - goals.costs(finalists.values)).mean(axis=0)
-    return DirectFront(
-        points=ours.points,
-        values=ours.values,
-        standard_errors=ours.errors,
-        costs=costs,
-        cost_errors=ours.errors[:, goals.objectives],
-        searched_values=finalists.values,
-        optimism=gap / np.where(span > 0.0, span, 1.0),
-        pick=picks[pick],
-        pick_reason=f"{NAMES[pick]} {among}",
-        baseline_values=base.values[0] if len(extra) else None,
-        baseline_errors=base.errors[0] if len(extra) else None,
-        repeats=repeats,
-        failures=np.unique(np.vstack(failed), axis=0),
-        evaluations=len(archive.points) + SELECTING * len(candidates.points) + repeats * len(final.points),
-        generations=generations,
-        seed=seed,
-        goals=goals,
-        searched=archive,
-    )
 
 
 def _search(
@@ -236,17 +228,16 @@ def _repeated(evaluate: Evaluate, points: Array, times: int) -> Samples:
 def _broken(batch: Samples, goals: Goals) -> Array:
     """Sum of the broken limits (n,), each in shares of the limit."""
     scale = np.array([abs(limit) or 1.0 for _, _, limit in goals.limited])
-    total: Array = (goals.violations(batch.values, batch.values) / scale).sum(axis=1)
-    return total
+    return (goals.violations(batch.values, batch.values) / scale).sum(axis=1)
 
 
-def _behind(place: NDArray[np.intp], broken: Array) -> NDArray[np.intp]:
+def _behind(place: Rows, broken: Array) -> Rows:
     """Places with those that break a limit or failed behind all others, by how far."""
     _, far = np.unique(broken, return_inverse=True)
     return np.where(broken > 0.0, place.max() + 1 + far.reshape(-1), place)
 
 
-def _allowed(batch: Samples, goals: Goals) -> NDArray[np.intp]:
+def _allowed(batch: Samples, goals: Goals) -> Rows:
     good = ~batch.failed
     good[good] &= _broken(batch.rows(good), goals) <= 0.0
     rows = np.flatnonzero(good)
@@ -255,7 +246,7 @@ def _allowed(batch: Samples, goals: Goals) -> NDArray[np.intp]:
     return rows
 
 
-def _candidates(archive: Samples, goals: Goals, confidence: float, count: int) -> NDArray[np.intp]:
+def _candidates(archive: Samples, goals: Goals, confidence: float, count: int) -> Rows:
     """Rows of the archive for fresh runs: the best places first, spread out in the last of them."""
     rows = _allowed(archive, goals)
     costs, errors = goals.costs(archive.values[rows]), archive.errors[rows][:, goals.objectives]
@@ -263,21 +254,18 @@ def _candidates(archive: Samples, goals: Goals, confidence: float, count: int) -
     level = ranks(dominance(costs[open_ones]))
     chosen: list[int] = []
     for each in np.unique(level):
-        found = open_ones[level == each]
         room = count - len(chosen)
         if room <= 0:
             break
-        scaled = normalised(costs[found], costs[found].min(axis=0), costs[found].max(axis=0))
-        part = found[spread(scaled, max(room, 1), [])] if room < len(found) else found
-        chosen += part[:room].tolist()
+        alike = open_ones[level == each]
+        chosen += alike[spread(costs[alike], room)][:room].tolist()
     return rows[np.array(chosen)]
 
 
-def _finalists(fresh: Samples, goals: Goals, count: int) -> NDArray[np.intp]:
+def _finalists(fresh: Samples, goals: Goals, count: int) -> Rows:
     """Rows of the candidates that their fresh runs leave non-dominated, by ascending first cost."""
     rows = _allowed(fresh, goals)
     costs = goals.costs(fresh.values[rows])
-    kept = np.array([row for row in range(len(rows)) if not dominates(costs, costs[row]).any()])
-    scaled = normalised(costs[kept], costs[kept].min(axis=0), costs[kept].max(axis=0))
-    kept = kept[spread(scaled, count, [])][:count]
+    kept = np.flatnonzero(~dominance(costs).any(axis=0))
+    kept = kept[spread(costs[kept], count)][:count]
     return rows[kept[np.argsort(costs[kept, 0], kind="stable")]]

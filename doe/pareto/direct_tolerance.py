@@ -13,16 +13,14 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.pareto.archive import dominates, non_dominated
 from doe.pareto.goals import Goals
 from doe.pareto.manufacture import even_offsets
 from doe.pareto.picks import NAMES, Rule, pick_all
 from doe.pareto.quadratic import Quadratic
 from doe.pareto.tolerance_aware import SURVIVAL_PARTS, ToleranceBox
-
-Array = NDArray[np.float64]
 
 NEIGHBOURS = 10  # runs a coefficient of a local line: with tricube weights the half of them counts
 HARDLY_VARIED = 0.1  # of the largest spread of the neighbours: along directions with less they tell no slope
@@ -53,10 +51,7 @@ class Neighbourhood:
         shape = [
             surface.around(self.points, offsets) - surface.predict(self.points)[:, None] for surface in self.surfaces
         ]
-        told: Array = (
-            self.values[:, None, :] + np.stack(shape, axis=-1) + np.einsum("sk,nkm->nsm", offsets, self.slopes)
-        )
-        return told
+        return self.values[:, None, :] + np.stack(shape, axis=-1) + np.einsum("sk,nkm->nsm", offsets, self.slopes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,5 +131,4 @@ def _slope(apart: Array, missed: Array) -> Array:
     weight = np.sqrt((1.0 - (far[nearest] / reach) ** 3) ** 3)[:, None]
     mean = (weight**2 / (weight**2).sum()).T
     across, up = (weight * (part - mean @ part) for part in (apart[nearest], missed[nearest]))
-    slope: Array = np.linalg.lstsq(across, up, rcond=HARDLY_VARIED)[0]
-    return slope
+    return np.linalg.lstsq(across, up, rcond=HARDLY_VARIED)[0]

@@ -7,17 +7,14 @@ with uncertain objectives (2001): one dominates another only where the noise can
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from doe.arrays import Array, Mask, Rows
+from doe.pareto.archive import dominates
 
 
 def dominance(costs: Array) -> Mask:
     """Whether row i of ``costs`` (n, q) dominates row j, taken at their word: (n, n)."""
-    difference = costs[None, :] - costs[:, None]
-    found: Mask = np.all(difference >= 0.0, axis=-1) & np.any(difference > 0.0, axis=-1)
-    return found
+    return dominates(costs[:, None], costs[None, :])
 
 
 def error_aware_dominance(costs: Array, errors: Array, confidence: float) -> Mask:
@@ -30,11 +27,10 @@ def error_aware_dominance(costs: Array, errors: Array, confidence: float) -> Mas
 
     difference = costs[None, :] - costs[:, None]
     combined = np.sqrt(errors[None, :] ** 2 + errors[:, None] ** 2)
-    found: Mask = (difference > norm.ppf(confidence) * combined).all(axis=-1)
-    return found
+    return (difference > norm.ppf(confidence) * combined).all(axis=-1)
 
 
-def ranks(dominating: Mask) -> NDArray[np.intp]:
+def ranks(dominating: Mask) -> Rows:
     """Front number (n,) of each row: 0 for those that none dominates, 1 for those that only these do, and so on."""
     rank = np.full(len(dominating), -1, dtype=np.intp)
     dominators = dominating.sum(axis=0)
@@ -50,7 +46,7 @@ def ranks(dominating: Mask) -> NDArray[np.intp]:
     return rank
 
 
-def order(costs: Array, errors: Array, confidence: float) -> NDArray[np.intp]:
+def order(costs: Array, errors: Array, confidence: float) -> Rows:
     """Place (n,) of each row: by its front beyond errors, and within that by its front at its word."""
     outer = ranks(error_aware_dominance(costs, errors, confidence))
     inner = np.empty_like(outer)

@@ -6,22 +6,21 @@ Responses stay in their own units; the search minimises the costs that their goa
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from doe.pareto.archive import spread
+from doe.arrays import Array
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume, normalised
-from doe.pareto.nsga2 import Doubt, Judged, Objectives, _evaluate, check_search, search
-from doe.pareto.picks import NAMES, Rule, knee_depth, pick_all
+from doe.pareto.indicators import hypervolume
+from doe.pareto.nsga2 import Doubt, Judged, Objectives, check_search, search
+from doe.pareto.picks import NAMES, Rule, knee_depth, thinned
 
 if TYPE_CHECKING:
     from doe.pareto.tolerance_aware import ToleranceAware
     from doe.pareto.uncertainty import FrontUncertainty
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,42 +100,57 @@ def front(
     if baseline is not None and np.shape(baseline) != low.shape:
         raise ValueError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
     if goals is None:
-        goals = Goals.of(["min"] * _evaluate(objectives, (low + high)[None, :] / 2).shape[1])
-    wanted = goals
-
-    def judge(points: Array) -> Judged:
-        values = _evaluate(objectives, points)
-        below, above = (0.0, 0.0) if doubt is None else doubt(points)
-        return Judged(wanted.costs(values), wanted.violations(values - below, values + above))
-
-    found = search(judge, low, high, population, generations, seed)
-    points, costs = found.archives[-1]
+        goals = Goals.of(["min"] * _values(objectives, (low + high)[None, :] / 2).shape[1])
+    searched = search(partial(_judged, objectives, goals, doubt), low, high, population, generations, seed)
+    points, costs = searched.archives[-1]
     ideal, nadir = costs.min(axis=0), costs.max(axis=0)
-    baseline_values = None if baseline is None else _evaluate(objectives, np.atleast_2d(baseline))[0]
+    baseline_values = None if baseline is None else _values(objectives, np.atleast_2d(baseline))[0]
     baseline_costs = None if baseline_values is None else goals.costs(baseline_values)
     best = int(knee_depth(costs).argmax())
-    picks, among = pick_all(costs, goals, baseline_costs)
-    kept = spread(normalised(costs, ideal, nadir), keep, [best, *picks.values()])
-    places = {rule: int(np.searchsorted(kept, row)) for rule, row in picks.items()}
+    kept, picks, among = thinned(costs, goals, baseline_costs, keep, [best])
     return ParetoFront(
         points=points[kept],
-        values=_evaluate(objectives, points[kept]),
+        values=_values(objectives, points[kept]),
         costs=costs[kept],
         hypervolume=hypervolume(costs, ideal, nadir),
-        hypervolume_history=np.array([hypervolume(each.costs, ideal, nadir) for each in found.archives]),
+        hypervolume_history=np.array([hypervolume(each.costs, ideal, nadir) for each in searched.archives]),
         ideal=ideal,
         nadir=nadir,
         knee=int(np.searchsorted(kept, best)),
-        pick=places[pick],
-        picks=places,
+        pick=picks[pick],
+        picks=picks,
         pick_reason=f"{NAMES[pick]} {among}",
         baseline_values=baseline_values,
         baseline_costs=baseline_costs,
         archive_size=len(costs),
-        evaluations=found.evaluations,
-        feasible=found.feasible,
+        evaluations=searched.evaluations,
+        feasible=searched.feasible,
         generations=generations,
         seed=seed,
         goals=goals,
         standard_errors=None if standard_errors is None else standard_errors(points[kept]),
     )
+
+
+def _judged(objectives: Objectives, goals: Goals, doubt: Doubt | None, points: Array) -> Judged:
+    values = _values(objectives, points)
+    below, above = (0.0, 0.0) if doubt is None else doubt(points)
+    return Judged(goals.costs(values), goals.violations(values - below, values + above))
+
+
+def _values(objectives: Objectives, points: Array) -> Array:
+    """Responses (n, m) of points. Raises ValueError unless they are finite, a row a point, two or more in a row."""
+    values = np.asarray(objectives(points), float)
+    if values.ndim != 2 or len(values) != len(points) or values.shape[1] < 2:
+        raise ValueError(
+            f"objectives gave shape {values.shape} for {len(points)} points; give one row a point and at "
+            "least two objectives"
+        )
+    bad = np.argwhere(~np.isfinite(values))
+    if bad.size:
+        row, column = bad[0]
+        raise ValueError(
+            f"objective {column + 1} is {values[row, column]} at {points[row].tolist()}; narrow the bounds "
+            "or mend the objective"
+        )
+    return values

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from doe.arrays import Array, Rows
+
 Kind = Literal["min", "max", "target", "none"]
 
 
@@ -65,7 +65,7 @@ class Goals:
         return goals
 
     @property
-    def objectives(self) -> NDArray[np.intp]:
+    def objectives(self) -> Rows:
         """Column numbers of the responses that have a cost."""
         return np.array([index for index, kind in enumerate(self.kinds) if kind != "none"], dtype=np.intp)
 

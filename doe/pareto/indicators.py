@@ -7,9 +7,8 @@ to `REFERENCE` in each of them.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from doe.arrays import Array
 
 REFERENCE = 1.1  # reference point of the hypervolume: the nadir and a tenth of each range beyond it
 
@@ -17,8 +16,7 @@ REFERENCE = 1.1  # reference point of the hypervolume: the nadir and a tenth of 
 def normalised(values: Array, ideal: Array, nadir: Array) -> Array:
     """Costs (..., q) on the scale from ideal 0 to nadir 1; a cost without range stays at 0."""
     span = nadir - ideal
-    scaled: Array = (values - ideal) / np.where(span > 0, span, 1.0)
-    return scaled
+    return (values - ideal) / np.where(span > 0, span, 1.0)
 
 
 def hypervolume(values: Array, ideal: Array, nadir: Array) -> float:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from doe.arrays import Array
+
 Distribution = Literal["normal", "uniform"]
 
 SIGMAS = 3.0  # standard deviations in a half width: the tolerance is six of them
@@ -19,13 +19,11 @@ def offsets(shares: Array, distribution: Distribution) -> Array:
     "normal": mean at mid tolerance, tolerance of 6 standard deviations, parts outside it sorted out; "uniform".
     """
     if distribution == "uniform":
-        uniform: Array = 2.0 * shares - 1.0
-        return uniform
+        return 2.0 * shares - 1.0
     from scipy.stats import norm
 
     outside = norm.cdf(-SIGMAS)
-    normal: Array = norm.ppf(outside + shares * (1.0 - 2.0 * outside)) / SIGMAS
-    return normal
+    return norm.ppf(outside + shares * (1.0 - 2.0 * outside)) / SIGMAS
 
 
 def even_offsets(count: int, factors: int, distribution: Distribution) -> Array:

@@ -12,11 +12,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.pareto.archive import Archive, archives
 
-Array = NDArray[np.float64]
 Objectives = Callable[[Array], Array]
 # How far below and above (n, m) what is foretold of points (n, k) their responses may be when limits are judged.
 Doubt = Callable[[Array], tuple[Array, Array]]
@@ -58,7 +57,7 @@ def search(
     if not any(rows.any() for rows in allowed):
         points = np.vstack([points for points, _ in history])
         violations = np.vstack([judged.violations for _, judged in history])
-        closest = _scaled(violations).sum(axis=1).argmin()
+        closest = (violations / _scale(violations)).sum(axis=1).argmin()
         raise InfeasibleError(points[closest], violations[closest])
     kept = [Archive(points[rows], judged.costs[rows]) for (points, judged), rows in zip(history, allowed, strict=True)]
     return Search(archives(kept), count, sum(int(rows.sum()) for rows in allowed) / count)
@@ -77,28 +76,10 @@ def check_search(low: Array, high: Array, population: int, generations: int, kee
             raise ValueError(f"{name} = {value}: must be at least {least}")
 
 
-def _evaluate(objectives: Objectives, points: Array) -> Array:
-    values = np.asarray(objectives(points), float)
-    if values.ndim != 2 or len(values) != len(points) or values.shape[1] < 2:
-        raise ValueError(
-            f"objectives gave shape {values.shape} for {len(points)} points; give one row a point and at "
-            "least two objectives"
-        )
-    bad = np.argwhere(~np.isfinite(values))
-    if bad.size:
-        row, column = bad[0]
-        raise ValueError(
-            f"objective {column + 1} is {values[row, column]} at {points[row].tolist()}; narrow the bounds "
-            "or mend the objective"
-        )
-    return values
-
-
-def _scaled(violations: Array) -> Array:
-    """Violations (n, c) in shares of their largest, so that no unit outweighs another."""
+def _scale(violations: Array) -> Array:
+    """The largest of violations (n, c), shares of which no unit outweighs; 1 where there is none."""
     largest = violations.max(axis=0, initial=0.0)
-    shares: Array = violations / np.where(largest > 0.0, largest, 1.0)
-    return shares
+    return np.where(largest > 0.0, largest, 1.0)
 
 
 def _evolve(
@@ -112,16 +93,15 @@ def _evolve(
     history: list[tuple[Array, Judged]] = []
     # The scale of the violations is that of points all over the box.
     sample = judge(np.random.default_rng(seed).uniform(low, high, (population, low.size)))
-    largest = sample.violations.max(axis=0, initial=0.0)
-    scale = np.where(largest > 0.0, largest, 1.0)
+    scale = _scale(sample.violations)
 
     class Recorded(Problem):
         def _evaluate(self, x: Array, out: dict[str, Array]) -> None:
-            found = judge(x)
-            out["F"] = found.costs
+            judged = judge(x)
+            out["F"] = judged.costs
             if scale.size:
-                out["G"] = found.violations / scale
-            history.append((x.copy(), Judged(found.costs.copy(), found.violations.copy())))
+                out["G"] = judged.violations / scale
+            history.append((x.copy(), Judged(judged.costs.copy(), judged.violations.copy())))
 
     count = sample.costs.shape[1]
     problem = Recorded(n_var=low.size, n_obj=count, n_ieq_constr=scale.size, xl=low, xu=high)

@@ -6,16 +6,16 @@ of several response variables (1980); Steuer and Choo, An interactive weighted T
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from collections.abc import Sequence
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-from doe.pareto.archive import dominates
+from doe.arrays import Array, Rows
+from doe.pareto.archive import dominates, spread
 from doe.pareto.goals import Goals
 from doe.pareto.indicators import normalised
 
-Array = NDArray[np.float64]
 Rule = Literal["knee", "desirability", "weights"]
 
 RULES: tuple[Rule, ...] = get_args(Rule)
@@ -37,8 +37,7 @@ def knee_depth(values: Array) -> Array:
     if np.linalg.cond(extremes) < 1e8:
         solved = np.linalg.solve(extremes, normal)
         normal = solved if (solved > 0).all() else normal
-    depth: Array = (1 - scaled @ normal) / np.linalg.norm(normal)
-    return depth
+    return (1 - scaled @ normal) / np.linalg.norm(normal)
 
 
 def desirability(costs: Array, goals: Goals) -> Array:
@@ -57,8 +56,7 @@ def desirability(costs: Array, goals: Goals) -> Array:
             reach = min(high - goals.target[index], goals.target[index] - low)
             best[column], worst[column] = ends.get(goals.kinds[index], (0.0, reach))
     each = (1.0 - normalised(costs, best, worst)).clip(0.0, 1.0)
-    overall: Array = np.prod(each**goals.cost_weight, axis=1)
-    return overall
+    return np.prod(each**goals.cost_weight, axis=1)
 
 
 def tchebycheff(costs: Array, weight: Array) -> Array:
@@ -67,8 +65,7 @@ def tchebycheff(costs: Array, weight: Array) -> Array:
     The largest of the weighted normalised costs, and `AUGMENTATION` of their sum. Source: Steuer and Choo (1983).
     """
     scaled = weight * normalised(costs, costs.min(axis=0), costs.max(axis=0))
-    distance: Array = scaled.max(axis=1) + AUGMENTATION * scaled.sum(axis=1)
-    return distance
+    return scaled.max(axis=1) + AUGMENTATION * scaled.sum(axis=1)
 
 
 def score(rule: Rule, costs: Array, goals: Goals) -> Array:
@@ -79,6 +76,21 @@ def score(rule: Rule, costs: Array, goals: Goals) -> Array:
         # Where all are undesirable, the distance from the ideal point decides.
         return desirability(costs, goals) - 1e-9 * tchebycheff(costs, goals.cost_weight)
     return -tchebycheff(costs, goals.cost_weight)
+
+
+class Thinned(NamedTuple):
+    """A front thinned to ``rows`` (f,), the places among them of the pick of every rule, and what they were picked of."""
+
+    rows: Rows
+    picks: dict[Rule, int]
+    among: str
+
+
+def thinned(costs: Array, goals: Goals, baseline: Array | None, keep: int, wanted: Sequence[int] = ()) -> Thinned:
+    """About ``keep`` evenly spread rows of costs (n, q), with the best and worst of each, the picks and the wanted."""
+    picks, among = pick_all(costs, goals, baseline)
+    rows = spread(costs, keep, [*wanted, *picks.values()])
+    return Thinned(rows, {rule: int(np.searchsorted(rows, row)) for rule, row in picks.items()}, among)
 
 
 def pick_all(costs: Array, goals: Goals, baseline: Array | None) -> tuple[dict[Rule, int], str]:

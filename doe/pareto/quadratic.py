@@ -12,9 +12,8 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from doe.arrays import Array
 
 EXACT_FACTORS = 4  # up to here every face of a box is searched; beyond, its corners and lines along the factors
 
@@ -55,8 +54,7 @@ class Quadratic:
         return np.minimum(*ends), np.maximum(*ends)
 
     def _form(self, points: Array) -> Array:
-        form: Array = self.constant + points @ self.linear + np.einsum("...j,jk,...k->...", points, self.matrix, points)
-        return form
+        return self.constant + points @ self.linear + np.einsum("...j,jk,...k->...", points, self.matrix, points)
 
 
 def _extremes(surface: Quadratic, centres: Array, half: Array) -> tuple[Array, Array]:
@@ -113,5 +111,4 @@ def _climb(slopes: Array, bend: Array, sweeps: int = 20) -> Array:
         offset[:, axis] = np.take_along_axis(
             tries, (gradient * tries + curvature * tries**2).argmax(axis=0)[None], axis=0
         )[0]
-    change: Array = (offset * slopes).sum(axis=1) + np.einsum("nj,jk,nk->n", offset, bend, offset)
-    return change
+    return (offset * slopes).sum(axis=1) + np.einsum("nj,jk,nk->n", offset, bend, offset)

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.pareto.archive import non_dominated
 from doe.pareto.direct import DirectFront
 from doe.pareto.indicators import hypervolume
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,15 +24,15 @@ class SurrogateLoss:
     surrogate_hypervolume: float
     surrogate_hypervolume_error: float
     loss_percent: float | None
-    error_percent: float | None
+    loss_error_percent: float | None
 
     @property
     def sentence(self) -> str:
         """Whether the surfaces lose anything that can be told from noise."""
-        if self.loss_percent is None or self.error_percent is None:
+        if self.loss_percent is None or self.loss_error_percent is None:
             return "The direct front lies wholly behind that of the surfaces; give the direct search more runs."
-        figure = f"{self.loss_percent:+.1f} ± {self.error_percent:.1f} % of the direct front's hypervolume"
-        if abs(self.loss_percent) <= self.error_percent:
+        figure = f"{self.loss_percent:+.1f} ± {self.loss_error_percent:.1f} % of the direct front's hypervolume"
+        if abs(self.loss_percent) <= self.loss_error_percent:
             return f"The surfaces lose {figure}: nothing that can be told from the noise."
         if self.loss_percent > 0.0:
             return f"The surfaces lose {figure}."
@@ -51,8 +49,8 @@ def noisy_hypervolume(
     """
     random = np.random.default_rng(seed)
     believed = hypervolume(costs, ideal, nadir)
-    drawn = [hypervolume(costs + errors * random.standard_normal(costs.shape), ideal, nadir) for _ in range(draws)]
-    return 2.0 * believed - float(np.mean(drawn)), float(np.std(drawn, ddof=1))
+    noisy = [hypervolume(costs + errors * random.standard_normal(costs.shape), ideal, nadir) for _ in range(draws)]
+    return 2.0 * believed - float(np.mean(noisy)), float(np.std(noisy, ddof=1))
 
 
 def compare_with_surrogate(
@@ -84,5 +82,5 @@ def compare_with_surrogate(
         surrogate_hypervolume=theirs,
         surrogate_hypervolume_error=1.96 * their_error,
         loss_percent=None if ratio is None else 100.0 * (1.0 - ratio),
-        error_percent=error,
+        loss_error_percent=error,
     )

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from doe.arrays import Array, Mask
 from doe.pareto.manufacture import Distribution, random_offsets
 
-Array = NDArray[np.float64]
 Costs = Callable[[Array], Array]
 Aim = Literal["ratios", "product", "sum"]
 
@@ -34,7 +34,7 @@ class WidestTolerances:
     probability: float
     standard_error: float
     limited_by: str
-    at_rim: NDArray[np.bool_]
+    at_rim: Mask
     sentence: str
 
     def as_dict(self, factors: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -127,8 +127,7 @@ class _Parts:
     def broken(self, half: Array) -> Array:
         """How many parts break each limit, (c,)."""
         costs = self.objectives(self.centre + half * self.offsets)
-        count: Array = (~(costs <= self.limits)).sum(axis=0).astype(float)
-        return count
+        return (~(costs <= self.limits)).sum(axis=0).astype(float)
 
     def kept(self, half: Array) -> float:
         """Share of the parts that keep all limits."""
@@ -142,8 +141,7 @@ class _Parts:
 
     def half(self, ratios: Array, scale: float) -> Array:
         """Half widths at a scale, none beyond the region."""
-        widths: Array = np.minimum(ratios * scale, self.room)
-        return widths
+        return np.minimum(ratios * scale, self.room)
 
     def widest(self, ratios: Array, probability: float, march: int = MARCH) -> float:
         """Largest scale up to which the limits are kept."""

@@ -13,20 +13,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from doe.pareto.archive import Archive, dominates, spread
+from doe.arrays import Array
+from doe.pareto.archive import Archive, dominates
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume, normalised
+from doe.pareto.indicators import hypervolume
 from doe.pareto.manufacture import Distribution, even_offsets
 from doe.pareto.nsga2 import Doubt, Judged, check_search, search
-from doe.pareto.picks import NAMES, Rule, pick_all
+from doe.pareto.picks import NAMES, Rule, thinned
 from doe.pareto.quadratic import Quadratic
 
-Array = NDArray[np.float64]
 Kind = Literal["worst_case", "quantile"]
 
 SURVIVAL_PARTS = 4096  # even offsets from which the share of surviving parts is counted
@@ -137,25 +137,20 @@ def tolerance_aware_front(
     """
     low, high = lower + box.half, upper - box.half
     check_search(low, high, population, generations, keep)
-    found = search(lambda points: box.judge(surfaces, goals, points, doubt), low, high, population, generations, seed)
-    points, costs = found.archives[-1]
+    judge = partial(box.judge, surfaces, goals)
+    history = search(partial(judge, doubt=doubt), low, high, population, generations, seed).archives
+    points, costs = history[-1]
     nominal_baseline = goals.costs(_nominal(surfaces, baseline[None]))[0]
-    baseline_costs = box.judge(surfaces, goals, baseline[None]).costs[0]
-    against = nominal_baseline if dominates(costs, nominal_baseline).any() else baseline_costs
-    picks, among = pick_all(costs, goals, against)
-    if against is nominal_baseline:
-        among += " even after manufacture"
-    ideal, nadir = costs.min(axis=0), costs.max(axis=0)
-    kept = spread(normalised(costs, ideal, nadir), keep, list(picks.values()))
-    places = {rule: int(np.searchsorted(kept, row)) for rule, row in picks.items()}
+    baseline_costs = judge(baseline[None]).costs[0]
+    survives_nominal = bool(dominates(costs, nominal_baseline).any())
+    kept, picks, among = thinned(costs, goals, nominal_baseline if survives_nominal else baseline_costs, keep)
     values = _nominal(surfaces, points[kept])
-
     inside = ((plain.points >= low - 1e-12) & (plain.points <= high + 1e-12)).all(axis=1)
-    robust_plain = box.judge(surfaces, goals, plain.points[inside]).costs if inside.any() else costs[:0]
-    spans = plain.costs.min(axis=0), plain.costs.max(axis=0)
+    robust_plain = judge(plain.points[inside]).costs if inside.any() else costs[:0]
+    spans, robust_spans = ((each.min(axis=0), each.max(axis=0)) for each in (plain.costs, costs))
     losing = hypervolume(goals.costs(values), *spans), hypervolume(plain.costs, *spans)
-    gaining = hypervolume(costs[kept], ideal, nadir), hypervolume(robust_plain, ideal, nadir)
-    candidates = np.vstack([plain.points[plain_pick], points[picks[pick]]])
+    gaining = hypervolume(costs[kept], *robust_spans), hypervolume(robust_plain, *robust_spans)
+    candidates = np.vstack([plain.points[plain_pick], points[kept[picks[pick]]]])
     made = goals.costs(box.parts(surfaces, candidates, SURVIVAL_PARTS))
     survives = np.mean(dominates(made, nominal_baseline), axis=1).tolist()
     return ToleranceAware(
@@ -163,14 +158,14 @@ def tolerance_aware_front(
         points=points[kept],
         costs=costs[kept],
         values=values,
-        picks=places,
-        pick=places[pick],
-        pick_reason=f"{NAMES[pick]} {among}",
+        picks=picks,
+        pick=picks[pick],
+        pick_reason=f"{NAMES[pick]} {among}{' even after manufacture' if survives_nominal else ''}",
         baseline_costs=baseline_costs,
-        hypervolume=hypervolume(costs, ideal, nadir),
+        hypervolume=hypervolume(costs, *robust_spans),
         nominal_loss_percent=100.0 * (1.0 - losing[0] / losing[1]) if losing[1] > 0.0 else 0.0,
         robust_gain_percent=100.0 * (gaining[0] / gaining[1] - 1.0) if gaining[1] > 0.0 else np.inf,
-        plain_pick_costs=box.judge(surfaces, goals, plain.points[[plain_pick]]).costs[0],
+        plain_pick_costs=judge(plain.points[[plain_pick]]).costs[0],
         plain_inside=bool(np.take(inside, plain_pick)),
         plain_survives=survives[0],
         pick_survives=survives[1],

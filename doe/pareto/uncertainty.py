@@ -13,13 +13,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array, Mask
 from doe.pareto.archive import dominates
 from doe.pareto.goals import Goals
 from doe.pareto.picks import Rule, pick_all
-
-Array = NDArray[np.float64]
 
 SELECTIONS = 300  # draws on which the rule picks anew; its own error then hides in that of the gain
 
@@ -36,7 +34,6 @@ class FrontUncertainty:
 
     half_widths: Array
     non_dominated: Array
-    non_dominated_error: Array
     pick_dominates: float | None
     pick_dominates_error: float | None
     optimism: Array | None
@@ -54,11 +51,10 @@ def draw_coefficients(
     root = vectors * np.sqrt(values.clip(0.0))
     normal = random.standard_normal((draws, coefficients.size)) @ root.T
     chi_square = random.chisquare(dof, (draws, 1)) if dof > 0 else np.full((draws, 1), 1.0)
-    drawn: Array = coefficients + normal / np.sqrt(chi_square / max(dof, 1))
-    return drawn
+    return coefficients + normal / np.sqrt(chi_square / max(dof, 1))
 
 
-def share(hits: NDArray[np.bool_]) -> tuple[Array, Array]:
+def share(hits: Mask) -> tuple[Array, Array]:
     """Share of the draws (d, ...) that hit and its Monte Carlo standard error.
 
     The error is that of the share with one hit and one miss more, lest a few hundred hits of as many pass for sure.
@@ -69,8 +65,8 @@ def share(hits: NDArray[np.bool_]) -> tuple[Array, Array]:
     return mean, np.sqrt(careful * (1.0 - careful) / count)
 
 
-def non_dominated_share(costs: Array) -> tuple[Array, Array]:
-    """Probability (f,) that a point is dominated by no other, and its error, from drawn costs (d, f, q)."""
+def non_dominated_share(costs: Array) -> Array:
+    """Probability (f,) that a point is dominated by no other, from drawn costs (d, f, q)."""
     kept = np.empty(costs.shape[:2], dtype=bool)
     for row, drawn in zip(kept, costs, strict=True):
         better = np.ones((len(drawn), len(drawn)), dtype=bool)
@@ -79,7 +75,7 @@ def non_dominated_share(costs: Array) -> tuple[Array, Array]:
         # Equal points do not dominate each other.
         equal = better & better.T
         row[:] = ~(better & ~equal).any(axis=0)
-    return share(kept)
+    return kept.mean(axis=0)
 
 
 def front_uncertainty(
@@ -105,7 +101,6 @@ def front_uncertainty(
         None.
     """
     costs = goals.costs(drawn)
-    kept, kept_error = non_dominated_share(costs)
     wins: tuple[Array, Array] | tuple[None, None] = (None, None)
     optimism = None
     if baseline is not None and baseline_values is not None:
@@ -115,8 +110,7 @@ def front_uncertainty(
         optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
     return FrontUncertainty(
         half_widths=half_widths,
-        non_dominated=kept,
-        non_dominated_error=kept_error,
+        non_dominated=non_dominated_share(costs),
         pick_dominates=None if wins[0] is None else float(wins[0]),
         pick_dominates_error=None if wins[1] is None else float(wins[1]),
         optimism=optimism,
@@ -134,8 +128,7 @@ def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals,
     for drawn, base in zip(costs, baseline, strict=True):
         row = pick_all(drawn, goals, base)[0][rule]
         excess.append(base - drawn[row] - real[row])
-    mean: Array = np.mean(excess, axis=0)
-    return mean
+    return np.mean(excess, axis=0)
 
 
 def contrast_error(jacobian: Array, covariance: Array) -> float:

@@ -1,11 +1,11 @@
 """Response surfaces: least-squares polynomials with the statistics to judge them.
 
-``surface`` fits and predicts; ``terms`` builds its matrix, ``least_squares`` solves, ``anova``, ``elimination``,
+``surface`` fits and predicts; ``least_squares`` solves, ``anova``, ``elimination``,
 ``canonical``, ``diagnostics`` and ``known_variance`` judge, ``words`` says it in sentences.
 """
 
+from doe.designs.model import model_matrix
 from doe.response_surface.surface import Surface, fit
-from doe.response_surface.terms import model_matrix
 from doe.response_surface.words import describe
 
 __all__ = ["Surface", "describe", "fit", "model_matrix"]

@@ -12,13 +12,11 @@ import math
 from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from doe.arrays import Array, Whole
 from doe.designs.replicates import replicate_groups
 from doe.response_surface.least_squares import LeastSquares
-
-Array = NDArray[np.float64]
 
 
 class AnovaRow(TypedDict):
@@ -51,7 +49,7 @@ def term_rows(terms: tuple[str, ...], solution: LeastSquares) -> list[AnovaRow]:
 
 
 def anova(
-    terms: tuple[str, ...], solution: LeastSquares, response: Array, points: Array, block: NDArray[np.int64]
+    terms: tuple[str, ...], solution: LeastSquares, response: Array, points: Array, block: Whole
 ) -> list[AnovaRow]:
     """The table: model, terms, blocks if any, residual, lack of fit, pure error, total.
 
@@ -79,7 +77,7 @@ def anova(
     ]
 
 
-def sum_within(values: Array, weights: Array, group: NDArray[np.int64]) -> float:
+def sum_within(values: Array, weights: Array, group: Whole) -> float:
     """Weighted sum of squares about the mean of each group; of equal values exactly zero."""
     total = 0.0
     for label in np.unique(group):
@@ -105,7 +103,7 @@ def complement(part: float, whole: float) -> float | None:
     return None if share is None else 1.0 - share
 
 
-def _lack_of_fit(response: Array, solution: LeastSquares, groups: NDArray[np.int64]) -> tuple[AnovaRow, AnovaRow]:
+def _lack_of_fit(response: Array, solution: LeastSquares, groups: Whole) -> tuple[AnovaRow, AnovaRow]:
     pure_df = len(response) - len(np.unique(groups))
     if pure_df == 0:
         return row("lack_of_fit", None, solution.dof), row("pure_error", None, 0)

@@ -9,13 +9,15 @@ Source: Box and Cox, An analysis of transformations, J. R. Stat. Soc. B 26 (1964
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from operator import itemgetter
 from typing import TypedDict
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import linalg, optimize, special, stats
 
-Array = NDArray[np.float64]
+from doe.arrays import Array
 
 USUAL = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 SEARCHED = (-5.0, 5.0)
@@ -56,18 +58,7 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
         raise ValueError(f"{name}: {runs} runs leave no residual beside {terms} terms; add runs")
     if np.ptp(response) == 0.0:
         raise ValueError(f"{name}: all values are equal, so no transform can be judged; leave it out")
-    basis = linalg.qr(columns, mode="economic")[0]
-    # Taken relative to the geometric mean, residuals of different exponents compare without a Jacobian.
-    logarithm = np.log(response)
-    logarithm -= logarithm.mean()
-
-    def log_likelihood(exponent: float) -> float:
-        transformed = special.boxcox(np.exp(logarithm), exponent)
-        residual = transformed - basis @ (basis.T @ transformed)
-        # An exact fit is as good as round-off lets it be, not infinitely good.
-        floor = (1e-14 * np.abs(transformed).max()) ** 2
-        return -0.5 * runs * math.log(max(float(residual @ residual) / runs, floor))
-
+    log_likelihood = _log_likelihood(columns, response)
     grid = np.union1d(np.linspace(*SEARCHED, 81), USUAL)
     heights = np.array([log_likelihood(each) for each in grid])
     top = int(heights.argmax())
@@ -75,12 +66,10 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
     peak = optimize.minimize_scalar(
         lambda exponent: -log_likelihood(exponent), bounds=bracket, method="bounded", options={"xatol": 1e-7}
     )
-    best, height = (float(grid[top]), float(heights[top]))
-    if -peak.fun > height:
-        best, height = float(peak.x), float(-peak.fun)
+    height, best = max((float(heights[top]), float(grid[top])), (float(-peak.fun), float(peak.x)), key=itemgetter(0))
     threshold = height - stats.chi2.ppf(level, 1) / 2
 
-    def end(outwards: NDArray[np.float64]) -> float:
+    def end(outwards: Array) -> float:
         """Where the likelihood first falls to the threshold on the way from the best exponent."""
         inner = best
         for outer in outwards:
@@ -103,6 +92,23 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
     }
 
 
+def _log_likelihood(columns: Array, response: Array) -> Callable[[float], float]:
+    """Of an exponent, for a positive ``response`` (n,) fitted by ``columns`` (n, p), but for a constant."""
+    basis = linalg.qr(columns, mode="economic")[0]
+    # Taken relative to the geometric mean, residuals of different exponents compare without a Jacobian.
+    logarithm = np.log(response)
+    logarithm -= logarithm.mean()
+
+    def log_likelihood(exponent: float) -> float:
+        transformed = special.boxcox(np.exp(logarithm), exponent)
+        residual = transformed - basis @ (basis.T @ transformed)
+        # An exact fit is as good as round-off lets it be, not infinitely good.
+        floor = (1e-14 * np.abs(transformed).max()) ** 2
+        return -0.5 * len(response) * math.log(max(float(residual @ residual) / len(response), floor))
+
+    return log_likelihood
+
+
 def check_positive(values: ArrayLike, name: str) -> None:
     """Raises ValueError, naming the first run at fault, unless all values are finite and positive."""
     response = np.asarray(values, float)
@@ -118,8 +124,7 @@ def forward(values: ArrayLike, exponent: float) -> Array:
     Raises ValueError when a value is not positive.
     """
     check_positive(values, "transform")
-    transformed: Array = special.boxcox(np.asarray(values, float), exponent)
-    return transformed
+    return special.boxcox(np.asarray(values, float), exponent)
 
 
 def backward(transformed: ArrayLike, exponent: float) -> Array:
@@ -137,8 +142,7 @@ def backward(transformed: ArrayLike, exponent: float) -> Array:
 
 def slope(values: ArrayLike, exponent: float) -> Array:
     """dt/dy = y^(lambda - 1) at positive values of y: a small standard error of y times it is that of t."""
-    derivative: Array = np.asarray(values, float) ** (exponent - 1.0)
-    return derivative
+    return np.asarray(values, float) ** (exponent - 1.0)
 
 
 def _sentence(name: str, best: float, interval: list[float], recommended: float, level: float) -> str:

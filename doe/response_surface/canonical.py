@@ -6,16 +6,15 @@ Standard errors for the eigenvalues in second-order response surface models (199
 
 from __future__ import annotations
 
+from string import ascii_uppercase
 from typing import Literal, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from doe.arrays import Array
 from doe.designs import to_actual
-from doe.response_surface.terms import letters, model_matrix, second_order
-
-Array = NDArray[np.float64]
+from doe.designs.model import model_matrix, second_order
 
 FLAT = 1e-10  # curvature as a share of the largest coefficient below which it is rounding
 SURE = 0.95  # probability of the intervals of the eigenvalues
@@ -94,7 +93,7 @@ def describe_canonical(name: str, found: Canonical, place: StationaryPoint | Non
     values = ", ".join(f"{value:.3g}" for value in found["eigenvalues"])
     if place is None:
         return f"{name}: no single stationary point, for a direction does not bend (eigenvalues {values})."
-    where = ", ".join(f"{letter} = {x:.3g}" for letter, x in zip(letters(26), place["coded"], strict=False))
+    where = ", ".join(f"{letter} = {x:.3g}" for letter, x in zip(ascii_uppercase, place["coded"], strict=False))
     region = "inside" if found["inside"] else "outside"
     head = f"{name}: stationary point at {where} (coded), {region} the region of the runs, "
     if "ridge" not in found["nature"]:
@@ -102,7 +101,7 @@ def describe_canonical(name: str, found: Canonical, place: StationaryPoint | Non
         return head + kind + ("." if found["inside"] else "; the best point lies on the border of the region.")
     axis = int(np.argmin(np.abs(found["eigenvalues"])))
     direction = " ".join(
-        f"{x:+.2f} {letter}" for letter, x in zip(letters(26), found["eigenvectors"][axis], strict=False)
+        f"{x:+.2f} {letter}" for letter, x in zip(ascii_uppercase, found["eigenvectors"][axis], strict=False)
     )
     return (
         f"{head}a {found['nature']}: an eigenvalue of {values} is within its error of zero, so the response "
@@ -119,8 +118,7 @@ def _errors(terms: tuple[str, ...], vectors: Array, covariance: Array, dof: int)
     second = np.array([len(term) > 1 for term in terms])
     slopes = model_matrix(vectors.T, terms) * second
     variance = np.einsum("ij,jk,ik->i", slopes, covariance, slopes)
-    errors: Array = special.stdtrit(dof, (1 + SURE) / 2) * np.sqrt(variance.clip(0.0))
-    return errors
+    return special.stdtrit(dof, (1 + SURE) / 2) * np.sqrt(variance.clip(0.0))
 
 
 def _inside(place: Array, points: Array) -> bool:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
+from doe.arrays import Array, Rows, Whole
 from doe.designs.replicates import replicate_groups
 from doe.response_surface.gaussian_process import THREADS, fit_gaussian
-
-Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 # More points than these are left out in groups.
 MOST_SINGLY, FOLDS = 60, 20
@@ -52,11 +52,10 @@ def compare(
     ----------
     coded, values : runs in coded units (n, k) and their response (n,).
     refit : the polynomial fitted to the runs of the given rows; it raises ValueError where they do not suffice.
-    name : name of the response, for the sentence.
+    name : of the response, for the sentence. seed : of the search for hyperparameters.
     matrix : model matrix of the polynomial (n, p), to find the points that it cannot do without (leverage of all
         replicates together above 0.95); without it only those whose absence makes ``refit`` fail.
     standard_errors : known standard error of each value (n,), for the process; else it estimates one.
-    seed : of the search for hyperparameters.
 
     Returns
     -------
@@ -76,52 +75,30 @@ def compare(
     errors = None if standard_errors is None else np.asarray(standard_errors, float)
     whole = fit_gaussian(points, response, name=name, standard_errors=errors, seed=seed)
     group = replicate_groups(points)
-    leverage = np.zeros(len(points)) if matrix is None else _leverage(np.asarray(matrix, float))
-    means, misses = [], []
+    basis = np.zeros((len(points), 1)) if matrix is None else np.linalg.qr(np.asarray(matrix, float))[0]
+    leverage = (basis**2).sum(axis=1)
     firsts = np.unique(group)
     folds = _folds(firsts, seed)
-    for fold in folds:
-        spared = np.array([first for first in fold if leverage[group == first].sum() <= INDISPENSABLE], int)
-        kept = np.flatnonzero(~np.isin(group, spared))
-        if not spared.size:
-            continue
-        with THREADS.limit(limits=1):
-            try:
-                polynomial = refit(kept)
-            except ValueError:
-                continue
-            process = fit_gaussian(
-                points[kept],
-                response[kept],
-                name=name,
-                standard_errors=None if errors is None else errors[kept],
-                seed=seed,
-                start=whole,
-                search=len(folds) == len(firsts),
-            )
-            foretold = np.column_stack([rival.predict(points[spared]) for rival in (polynomial, process)])
-        truth = np.array([response[group == first].mean() for first in spared])
-        means += truth.tolist()
-        misses += (truth[:, None] - foretold).tolist()
-    if len(misses) < 3:
-        raise ValueError(
-            f"{name}: only {len(misses)} points can be left out of the polynomial, too few to compare; "
-            "add design points or choose a simpler model"
-        )
-    squares = np.array(misses) ** 2
-    at_a_time = "" if len(folds) == len(firsts) else f" (in {len(folds)} groups)"
-    compared = f"{len(misses)} of {len(firsts)} points{at_a_time}"
+    singly = len(folds) == len(firsts)
+    gaussian = partial(fit_gaussian, name=name, seed=seed, start=whole, search=singly)
+
+    def process(kept: Rows) -> Predictor:
+        return gaussian(points[kept], response[kept], standard_errors=None if errors is None else errors[kept])
+
+    spared = [[first for first in fold if leverage[group == first].sum() <= INDISPENSABLE] for fold in folds]
+    truths, foretold = _left_out(name, points, response, group, [each for each in spared if each], (refit, process))
+    squares = (truths[:, None] - foretold) ** 2
+    compared = f"{len(truths)} of {len(firsts)} points{'' if singly else f' (in {len(folds)} groups)'}"
     difference = _difference(squares[:, 0] - squares[:, 1])
-    scores = [_score(each, np.array(means)) for each in squares.T]
-    low, high = difference["interval"]
+    scores = [_score(each, truths) for each in squares.T]
     return {
         "polynomial": scores[0],
         "gaussian_process": {**scores[1], **whole.as_dict()},
         "difference": difference,
-        "points": len(misses),
+        "points": len(truths),
         "folds": len(folds),
-        "recommended": "gaussian_process" if low > 0.0 else "polynomial",
-        "sentence": _sentence(name, compared, scores[0]["loo_rmse"], scores[1]["loo_rmse"], low, high),
+        "recommended": "gaussian_process" if difference["interval"][0] > 0.0 else "polynomial",
+        "sentence": _sentence(name, compared, *(each["loo_rmse"] for each in scores), *difference["interval"]),
     }
 
 
@@ -132,10 +109,30 @@ def _folds(firsts: Rows, seed: int) -> list[Rows]:
     return np.array_split(np.random.default_rng(seed).permutation(firsts), FOLDS)
 
 
-def _leverage(matrix: Array) -> Array:
-    orthogonal = np.linalg.qr(matrix)[0]
-    diagonal: Array = (orthogonal**2).sum(axis=1)
-    return diagonal
+def _left_out(
+    name: str,
+    points: Array,
+    response: Array,
+    group: Whole,
+    folds: Sequence[Sequence[int]],
+    rivals: tuple[Callable[[Rows], Predictor], ...],
+) -> tuple[Array, Array]:
+    """Mean responses (c,) of points left out a fold at a time, and what rivals fitted without them foretell (c, rivals).
+
+    A fold without which a rival cannot be fitted is passed over. Raises ValueError where fewer than three points are left.
+    """
+    truths, foretold = [np.empty(0)], [np.empty((0, len(rivals)))]
+    for fold in folds:
+        kept = np.flatnonzero(~np.isin(group, fold))
+        with THREADS.limit(limits=1), suppress(ValueError):
+            foretold.append(np.column_stack([fit(kept).predict(points[fold]) for fit in rivals]))
+            truths.append(np.array([response[group == first].mean() for first in fold]))
+    if (count := sum(map(len, truths))) < 3:
+        raise ValueError(
+            f"{name}: only {count} points can be left out of the polynomial, too few to compare; "
+            "add design points or choose a simpler model"
+        )
+    return np.concatenate(truths), np.vstack(foretold)
 
 
 def _difference(paired: Array) -> dict[str, Any]:

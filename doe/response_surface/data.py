@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from doe.arrays import Array, Rows, Whole
 from doe.designs.evaluation import block_contrasts
 from doe.response_surface.least_squares import dependent_columns
-
-Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +29,7 @@ class Data:
     centre: Array
     step: Array
 
-    def rows(self, rows: NDArray[np.intp]) -> Data:
+    def rows(self, rows: Rows) -> Data:
         """The runs of these rows alone."""
         errors = None if self.standard_errors is None else self.standard_errors[rows]
         per_run = self.points[rows], self.values[rows], errors, self.replicates[rows], self.block[rows]
@@ -57,10 +55,7 @@ def checked(
     block: ArrayLike | None,
 ) -> Data:
     """Runs as arrays. Raises ValueError when shapes differ, a number is not finite, or all values are equal."""
-    points, response = np.asarray(coded, float), np.asarray(values, float)
-    if points.ndim != 2 or response.shape != (len(points),):
-        shapes = f"points of shape {points.shape} and values of shape {response.shape}"
-        raise ValueError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
+    points, response = points_and_values(name, coded, values)
     if not np.isfinite(points).all():
         raise ValueError(f"{name}: a coded factor is not a finite number; mend or leave out that run")
     bad = np.flatnonzero(~np.isfinite(response))
@@ -78,6 +73,15 @@ def checked(
         centre=np.array(np.broadcast_to(centre, points.shape[1]), float),
         step=np.array(np.broadcast_to(step, points.shape[1]), float),
     )
+
+
+def points_and_values(name: str, coded: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
+    """Points (n, k) and values (n,) as arrays. Raises ValueError when their shapes do not match."""
+    points, response = np.asarray(coded, float), np.asarray(values, float)
+    if points.ndim != 2 or response.shape != (len(points),):
+        shapes = f"points of shape {points.shape} and values of shape {response.shape}"
+        raise ValueError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
+    return points, response
 
 
 def check_errors(name: str, standard_errors: ArrayLike | None) -> None:

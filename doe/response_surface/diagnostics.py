@@ -9,12 +9,10 @@ from __future__ import annotations
 from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from doe.arrays import Array, Mask
 from doe.response_surface.least_squares import LeastSquares
-
-Array = NDArray[np.float64]
 
 EXACT = 1e-12  # 1 - leverage below which a run is met exactly, whatever its value
 INFLUENTIAL = 1.0  # Cook's distance above which leaving a run out moves the surface beyond its own error
@@ -159,7 +157,7 @@ def _list(runs: list[int]) -> str:
     return f"run{'s' if len(runs) > 1 else ''} {', '.join(map(str, runs))}"
 
 
-def _where(condition: NDArray[np.bool_], values: Array) -> Array:
+def _where(condition: Mask, values: Array) -> Array:
     return np.where(condition, values, np.nan)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypedDict
 
+from doe.designs.model import needed
 from doe.response_surface.anova import term_rows
 from doe.response_surface.least_squares import LeastSquares
-from doe.response_surface.terms import needed
 
 KEEP_BELOW = 0.05  # p-value up to which a term stays
 

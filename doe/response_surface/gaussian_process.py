@@ -18,14 +18,15 @@ from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import optimize
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from threadpoolctl import ThreadpoolController
 
-Array = NDArray[np.float64]
+from doe.arrays import Array
+from doe.response_surface.data import points_and_values
 
 # Bounds of the hyperparameters: lengths in coded units, variances relative to that of the values. Beyond
 # 100 units a factor has no effect within any design; below 0.1 no two runs know of each other.
@@ -73,8 +74,7 @@ class GaussianSurface:
             deviation = self.regressor.predict(points.reshape(-1, points.shape[-1]), return_std=True)[1]
         # The white kernel counts the scatter of a new run in; the mean response has none.
         variance = self.scale**2 * deviation**2 - (self.noise or 0.0) ** 2
-        error: Array = np.sqrt(variance.clip(0.0)).reshape(points.shape[:-1])
-        return error
+        return np.sqrt(variance.clip(0.0)).reshape(points.shape[:-1])
 
     def as_dict(self) -> dict[str, Any]:
         """Hyperparameters, ready for JSON; length scales by letter of the factor."""
@@ -117,10 +117,7 @@ def fit_gaussian(
     ------
     ValueError when shapes differ, a number is not finite or a standard error is negative.
     """
-    points, response = np.asarray(coded, float), np.asarray(values, float)
-    if points.ndim != 2 or response.shape != (len(points),):
-        shapes = f"points of shape {points.shape} and values of shape {response.shape}"
-        raise ValueError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
+    points, response = points_and_values(name, coded, values)
     if not (np.isfinite(points).all() and np.isfinite(response).all()):
         raise ValueError(f"{name}: a factor or value is not a finite number; mend or leave out that run")
     if start is None and len(points) > MOST_SEARCHED:

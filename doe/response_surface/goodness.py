@@ -6,13 +6,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array, Whole
 from doe.response_surface.anova import complement, ratio, sum_within
 from doe.response_surface.diagnostics import press
 from doe.response_surface.least_squares import LeastSquares
-
-Array = NDArray[np.float64]
 
 
 def observation_variance(solution: LeastSquares) -> float:
@@ -20,7 +18,7 @@ def observation_variance(solution: LeastSquares) -> float:
     return solution.mean_square * float((1.0 / solution.weights).mean())
 
 
-def goodness(solution: LeastSquares, response: Array, predicted: Array, block: NDArray[np.int64]) -> dict[str, Any]:
+def goodness(solution: LeastSquares, response: Array, predicted: Array, block: Whole) -> dict[str, Any]:
     """R2 and its kin on the scatter within blocks; the others by the definitions of Myers et al."""
     within = sum_within(response, solution.weights, block)
     free = len(response) - len(np.unique(block))

@@ -14,14 +14,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from doe.arrays import Array, Whole
 from doe.response_surface.anova import AnovaRow, ratio, sum_within
 from doe.response_surface.diagnostics import p_text
 from doe.response_surface.least_squares import LeastSquares
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -61,8 +59,8 @@ def compare(
     matrix: Array,
     response: Array,
     variances: Array,
-    replicates: NDArray[np.int64],
-    groups: NDArray[np.int64],
+    replicates: Whole,
+    groups: Whole,
     count: int,
 ) -> KnownVariance:
     """Set the residual and the pure error of a fit against ``variances`` (n,) of the runs.
@@ -144,7 +142,7 @@ class _Spread:
 
 
 def _beside_pure_error(
-    solution: LeastSquares, response: Array, unit: Array, groups: NDArray[np.int64], spread: _Spread
+    solution: LeastSquares, response: Array, unit: Array, groups: Whole, spread: _Spread
 ) -> AnovaRow:
     labels, sizes = np.unique(groups, return_counts=True)
     df = len(groups) - len(labels)

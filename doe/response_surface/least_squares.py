@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from doe.arrays import Array
+
 Extended = NDArray[np.longdouble]
 
 DEPENDENT = 1e-9  # share of a column's length left over by the others below which it depends on them

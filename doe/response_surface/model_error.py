@@ -14,18 +14,17 @@ Variance Components (1992), for the estimate.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array, Whole
 from doe.response_surface.anova import AnovaRow, find
 from doe.response_surface.known_variance import KnownVariance
 from doe.response_surface.least_squares import LeastSquares
 
-Array = NDArray[np.float64]
-Told = Literal["repeats", "known variance"]
+Source = Literal["repeats", "known variance"]
 
 SIGNIFICANT = 0.05
 REACH = 1.0  # coded units within which what a surface misses stays alike: half the edge of the cube of a design
@@ -37,16 +36,15 @@ class ModelError:
 
     variance: float
     dof: int
-    told_by: Told
+    told_by: Source
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
-        deviation = float(np.sqrt(self.variance))
-        return {"variance": self.variance, "standard_deviation": deviation, "dof": self.dof, "told_by": self.told_by}
+        return asdict(self) | {"standard_deviation": float(np.sqrt(self.variance))}
 
 
 def model_error(
-    solution: LeastSquares, matrix: Array, groups: NDArray[np.int64], table: list[AnovaRow], known: KnownVariance | None
+    solution: LeastSquares, matrix: Array, groups: Whole, table: list[AnovaRow], known: KnownVariance | None
 ) -> ModelError | None:
     """The model error of a fit, None where no test at 5 % shows any.
 
@@ -71,8 +69,7 @@ def model_error(
 def correlation(one: Array, other: Array) -> Array:
     """Correlation (n, l) of what a surface misses at coded points (n, k) and (l, k)."""
     apart = ((one[:, None, :] - other[None, :, :]) ** 2).sum(axis=-1)
-    alike: Array = np.exp(-apart / REACH**2)
-    return alike
+    return np.exp(-apart / REACH**2)
 
 
 def draw_fields(error: ModelError | None, coded: Array, draws: int, random: np.random.Generator) -> Array | None:
@@ -82,11 +79,10 @@ def draw_fields(error: ModelError | None, coded: Array, draws: int, random: np.r
     values, vectors = np.linalg.eigh(correlation(coded, coded))
     root = vectors * np.sqrt(values.clip(0.0) * error.variance)
     wide = np.sqrt(error.dof / random.chisquare(error.dof, (draws, 1)))
-    fields: Array = wide * (random.standard_normal((draws, len(coded))) @ root.T)
-    return fields
+    return wide * (random.standard_normal((draws, len(coded))) @ root.T)
 
 
-def _share(solution: LeastSquares, matrix: Array, groups: NDArray[np.int64]) -> float:
+def _share(solution: LeastSquares, matrix: Array, groups: Whole) -> float:
     """How much of the residual sum a field of variance 1 makes: the trace of its part outside of the model."""
     member = (groups[:, None] == np.unique(groups)[None, :]) * np.sqrt(solution.weights)[:, None]
     scaled = matrix * np.sqrt(solution.weights)[:, None]

@@ -14,10 +14,11 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
-from doe.designs.model import model_terms
+from doe.arrays import Array, Rows
+from doe.designs.model import MODELS, Model, in_actual_units, model_matrix, model_terms, second_order
 from doe.designs.replicates import replicate_groups
 from doe.response_surface.anova import AnovaRow, anova, find
 from doe.response_surface.canonical import Canonical, StationaryPoint, canonical, stationary_point
@@ -28,9 +29,7 @@ from doe.response_surface.goodness import goodness, observation_variance
 from doe.response_surface.known_variance import KnownVariance, compare
 from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import ModelError, model_error
-from doe.response_surface.terms import MODELS, Model, in_actual_units, model_matrix, second_order
 
-Array = NDArray[np.float64]
 Weighting = Literal["equal", "replicates"]
 Transform = Literal["none", "box_cox"] | float
 
@@ -54,8 +53,7 @@ class Surface:
     effects by label, about the mean over all runs for which the surface stands. ``vif`` follows ``terms`` (NaN for "1").
     ``stationary_point`` is None for a surface that has none or no single one, ``canonical`` for one without
     curvature, ``known_variance`` where the errors of the runs are not known, ``model_error`` where lack of fit is not
-    significant, ``rival`` until
-    `doe.study.surfaces.with_rivals` has compared it with a Gaussian process.
+    significant, ``rival`` until `doe.study.surfaces.with_rivals` has compared it with a Gaussian process.
     """
 
     name: str
@@ -107,22 +105,16 @@ class Surface:
         A single new observation scatters by ``observation_variance`` more (as a variance). Of a transformed
         response it is that of the transform over the slope of the transform (first order).
         """
-        error = np.sqrt(self._variance(coded))
+        matrix = model_matrix(coded, self.terms)
+        variance = np.einsum("...j,jk,...k", matrix, self.covariance, matrix).clip(0.0)
+        error = np.sqrt(variance + (0.0 if self.model_error is None else self.model_error.variance))
         if self.transform is None:
             return error
         from doe.response_surface.box_cox import slope
 
         return error / slope(self.predict(coded), self.transform)
 
-    def confidence_interval(self, coded: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
-        """Lower and upper limit of the mean response at coded points (..., k), by Student's t."""
-        return self._interval(coded, 0.0, level)
-
-    def prediction_interval(self, coded: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
-        """Lower and upper limit of a single new run at coded points (..., k), by Student's t."""
-        return self._interval(coded, self.observation_variance, level)
-
-    def refit(self, rows: NDArray[np.intp]) -> Surface:
+    def refit(self, rows: Rows) -> Surface:
         """The same kind of surface through these runs alone. Raises ValueError when they do not suffice."""
         transform: Transform = "none" if self.transform is None else self.transform
         return _fit(self.name, self.data.rows(rows), self.model, self.weighting, transform)
@@ -204,16 +196,6 @@ class Surface:
     @cached_property
     def _polynomial(self) -> tuple[float, Array, Array]:
         return second_order(self.terms, self.coefficients, self.data.points.shape[1])
-
-    def _variance(self, coded: ArrayLike) -> Array:
-        matrix = model_matrix(coded, self.terms)
-        variance: Array = np.einsum("...j,jk,...k", matrix, self.covariance, matrix)
-        return variance.clip(0.0) + (0.0 if self.model_error is None else self.model_error.variance)
-
-    def _interval(self, coded: ArrayLike, extra: float, level: float) -> tuple[Array, Array]:
-        middle = model_matrix(coded, self.terms) @ self.coefficients
-        half = special.stdtrit(self.interval_dof, (1 + level) / 2) * np.sqrt(self._variance(coded) + extra)
-        return self._back(middle - half), self._back(middle + half)
 
     def _back(self, values: Array) -> Array:
         if self.transform is None:

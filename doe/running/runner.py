@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from doe.running.failure import Failure
-from doe.running.store import Outcome, Point, Sound, Store
+from doe.running.store import Point, RunResult, Sound, Store
 
 # What other processes have done is looked at as often as this [s].
 POLL_S = 0.25
@@ -41,14 +41,14 @@ Engine = Callable[[Sequence[Point], Take, Give], None]
 
 def run_points(
     points: Sequence[Point], store: Store, engine: Engine, progress: Progress, sound: Sound, retry: bool = False
-) -> dict[str, Outcome]:
+) -> dict[str, RunResult]:
     """Results and failures of points, by key. What other live processes are running is waited for, not run again.
 
     What is stored and not ``sound`` is run again; with ``retry`` also what failed. Raises RunError when the store cannot be
     written, KeyboardInterrupt on Ctrl-C; either way all finished runs stay stored and claims are given back.
     """
     wanted = {point.key: point for point in points}
-    found: dict[str, Outcome] = {}
+    found: dict[str, RunResult] = {}
 
     def take(free: Sequence[Point]) -> list[Point]:
         mine = store.claim(free, sound)
@@ -82,5 +82,5 @@ def run_points(
         store.release()
 
 
-def _left(wanted: dict[str, Point], found: dict[str, Outcome]) -> list[Point]:
+def _left(wanted: dict[str, Point], found: dict[str, RunResult]) -> list[Point]:
     return [point for key, point in wanted.items() if key not in found]

@@ -66,7 +66,7 @@ class EndedRun:
     owner: str | None
 
 
-Outcome = dict[str, Any] | Failure
+RunResult = dict[str, Any] | Failure
 # Whether a result is what the reader of the store takes it for; None: any is.
 Sound = Callable[[dict[str, Any]], bool] | None
 
@@ -90,12 +90,12 @@ class Store(Database):
         found = self.outcomes([Point(key, key)]).get(key)
         return found if isinstance(found, dict) else None
 
-    def outcomes(self, points: Sequence[Point], sound: Sound = None) -> dict[str, Outcome]:
+    def outcomes(self, points: Sequence[Point], sound: Sound = None) -> dict[str, RunResult]:
         """Results and failures of those points that have ended, by key.
 
         A row spoilt on the disk, or whose result is not ``sound``, is told on standard error and counts as not there.
         """
-        found, spoilt = dict[str, Outcome](), list[str]()
+        found, spoilt = dict[str, RunResult](), list[str]()
         query = "SELECT status, result, digest, cause FROM runs WHERE key = ? AND status != 'claimed'"
         with self._lock, self._faults():
             for point in points:
@@ -260,7 +260,7 @@ class Store(Database):
         return lives
 
 
-def _outcome(point: Point, sound: Sound, status: str, result: Any, digest: Any, cause: Any) -> Outcome | None:
+def _outcome(point: Point, sound: Sound, status: str, result: Any, digest: Any, cause: Any) -> RunResult | None:
     """What a row of an ended run tells; None where it is spoilt."""
     if status == "failed":
         return Failure(point.label, cause, point.run, dict(point.factors)) if isinstance(cause, str) else None

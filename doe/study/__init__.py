@@ -12,6 +12,6 @@
 - ``whole``: all of it in one go
 """
 
-from doe.study.whole import Outcome, run_study
+from doe.study.whole import StudyResult, run_study
 
-__all__ = ["Outcome", "run_study"]
+__all__ = ["StudyResult", "run_study"]

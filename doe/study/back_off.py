@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_coded
 from doe.study.confirmation import Confirmed
 from doe.study_file import Study
@@ -22,7 +22,6 @@ from doe.study_file import Study
 if TYPE_CHECKING:
     from doe.response_surface import Surface
 
-Array = NDArray[np.float64]
 # How far below and above what is foretold (n, m) the responses at coded points (n, k) may be.
 Doubt = Callable[[Array], tuple[Array, Array]]
 

@@ -6,8 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.study.goals import region_of
 from doe.study_file import Study
 from doe.study_file.chain_section import chain_table
@@ -16,8 +16,6 @@ from rbdyn.faults import InputError, check_all
 if TYPE_CHECKING:
     from doe.dimension_chain import Chain, ChainResult
     from doe.pareto.tolerance import WidestTolerances
-
-Array = NDArray[np.float64]
 
 
 def check_chains(study: Study) -> None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.running.failure import Failure
 from doe.study.goals import goals_of
 from doe.study_file import Study
@@ -17,8 +17,6 @@ from rbdyn.faults import RunError
 if TYPE_CHECKING:
     from doe.study.simulations import Simulations
     from rbdyn.result import SimulationResult
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Any
 from doe.designs import Design, box_behnken, central_composite_design, full_factorial, latin_hypercube, sobol
 from doe.designs.model import model_terms
 from doe.study_file import Study
+from doe.study_file.design_section import KEYS_OF
 from doe.study_file.design_section import Design as DesignSettings
 from rbdyn.faults import InputError, refuse
 
@@ -26,14 +27,8 @@ def _design(text: str, factors: int) -> Design:
     settings = DesignSettings.model_validate_json(text)
     centres = settings.centres
     if settings.kind == "central_composite":
-        design = central_composite_design(
-            factors,
-            alpha=settings.alpha,
-            centre_replicates=centres,
-            cube=settings.cube,
-            blocks=settings.blocks,
-            cube_blocks=settings.cube_blocks,
-        )
+        keys = settings.model_dump(include=KEYS_OF["central_composite"])
+        design = central_composite_design(factors, centre_replicates=centres, **keys)
     elif settings.kind == "box_behnken":
         design = box_behnken(factors, centre_replicates=centres, blocks=settings.blocks)
     elif settings.kind == "full_factorial":

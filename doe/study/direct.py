@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_actual
 from doe.running.failure import Failure, grouped
 from doe.study.goals import goals_of, region_of
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from doe.pareto.surrogate_loss import SurrogateLoss
     from doe.study.runs import Progress
     from doe.study.simulations import Simulations
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +83,6 @@ def find_direct(study: Study, found: ParetoFront, simulations: Simulations) -> D
     """
     from doe.pareto.archive import spread
     from doe.pareto.direct import direct_front
-    from doe.pareto.indicators import normalised
     from doe.pareto.surrogate_loss import compare_with_surrogate
 
     settings, reach = study.file.direct, region_of(study)
@@ -97,17 +94,12 @@ def find_direct(study: Study, found: ParetoFront, simulations: Simulations) -> D
             to_actual(-reach, study.centre, study.step),
             to_actual(reach, study.centre, study.step),
             goals=goals_of(study),
-            evaluations=settings.evaluations,
-            population=settings.population,
-            seed=settings.seed,
             baseline=study.baseline,
-            confidence=settings.confidence,
-            resample=settings.resample,
             pick=study.file.front.pick,
+            **settings.model_dump(include={"evaluations", "population", "seed", "confidence", "resample"}),
         )
         searched = time.perf_counter()
-        scaled = normalised(found.costs, found.costs.min(axis=0), found.costs.max(axis=0))
-        rows = spread(scaled, len(front.points), [found.pick])[: len(front.points)]
+        rows = spread(found.costs, len(front.points), [found.pick])[: len(front.points)]
         points = found.points[rows]
         # As many runs a point as a finalist of the direct front has.
         values, errors = evaluate(np.tile(points, (front.repeats, 1)))

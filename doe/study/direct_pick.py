@@ -7,22 +7,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_coded
 from doe.study.back_off import Conditioned, Missed, standard_errors_of
 from doe.study.confirmation import Confirmed
 from doe.study.direct import Direct
 from doe.study.drawn import quadratics
-from doe.study.goals import goals_of, rounded_within, tolerances_of
+from doe.study.goals import goals_of, rounded_within, tolerance_box
 from doe.study_file import Study
 
 if TYPE_CHECKING:
     from doe.pareto.direct_tolerance import DirectAware, Neighbourhood
-    from doe.pareto.tolerance_aware import ToleranceBox
     from doe.response_surface import Surface
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +55,12 @@ def direct_pick(
     baselines = [] if ran is None else [goals.costs(ran)]
     costs, violations = front.costs, goals.violations(front.values - below, front.values + above)
     aware, after = None, ""
-    if study.file.front.tolerance_aware != "none":
+    if (box := tolerance_box(study)) is not None:
         here, base = _neighbourhood(study, surfaces, direct, coded, front.values), None
         if ran is not None:
             at = to_coded(study.baseline, study.centre, study.step)[None]
             base = _neighbourhood(study, surfaces, direct, at, ran[None])
-        aware = direct_aware(_box(study), here, goals, base, below, above)
+        aware = direct_aware(box, here, goals, base, below, above)
         costs, violations = aware.costs, aware.violations
         if not (violations <= 0.0).all(axis=1).any():
             violations = goals.violations(front.values - below, front.values + above)
@@ -98,20 +95,6 @@ def local_of(study: Study, surfaces: Sequence[Surface], direct: Direct, pick: Co
     coded = to_coded(pick.point, study.centre, study.step)
     here = _neighbourhood(study, surfaces, direct, coded[None], pick.values[None])
     return Local(coded, pick.values, here.slopes[0], baseline.values)
-
-
-def _box(study: Study) -> ToleranceBox:
-    from doe.pareto.tolerance_aware import ToleranceBox
-
-    settings = study.file.front
-    assert settings.tolerance_aware != "none"
-    return ToleranceBox(
-        tolerances_of(study),
-        settings.tolerance_aware,
-        settings.quantile,
-        settings.distribution,
-        settings.tolerance_samples,
-    )
 
 
 def _neighbourhood(

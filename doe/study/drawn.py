@@ -7,13 +7,12 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from doe.arrays import Array
 
 if TYPE_CHECKING:
     from doe.pareto.quadratic import Quadratic
     from doe.response_surface import Surface
-
-Array = NDArray[np.float64]
 
 
 def predict_all(surfaces: Sequence[Surface], coded: Array) -> Array:
@@ -77,8 +76,8 @@ def link_of(surface: Surface) -> Callable[[Array], Array]:
 
 def quadratics(surfaces: Sequence[Surface], factors: int) -> list[Quadratic]:
     """The surfaces as quadratics of the coded factors."""
+    from doe.designs.model import second_order
     from doe.pareto.quadratic import Quadratic
-    from doe.response_surface.terms import second_order
 
     return [
         Quadratic(*second_order(surface.terms, surface.coefficients, factors), link_of(surface)) for surface in surfaces

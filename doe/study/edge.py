@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array, Whole
 from doe.designs import to_coded
 from doe.running.failure import Failure
 from doe.study.confirmation import Choice, Confirmed, confirmed_from
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from doe.response_surface import Surface
     from doe.study.simulations import Simulations
 
-Array = NDArray[np.float64]
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
@@ -114,7 +113,7 @@ def edge_of(
     return Edge(tuple(outward), share_at_edge(study, front), far)
 
 
-def _sides(study: Study, points: Array) -> NDArray[np.int64]:
+def _sides(study: Study, points: Array) -> Whole:
     """-1 at a lower bound, 1 at an upper one, else 0, for points (n, k)."""
     coded, reach = to_coded(points, study.centre, study.step), region_of(study)
     near = np.abs(coded) >= reach * (1.0 - 2.0 * NEAR)

@@ -8,28 +8,29 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_actual, to_coded
 from doe.study.back_off import Doubt, surfaces_doubt
 from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
-from doe.study.goals import check_goals, goals_of, region_of, tolerances_of
+from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
 from doe.study_file import Study
 from rbdyn.faults import InputError
 
 if TYPE_CHECKING:
     from doe.pareto import Goals, ParetoFront
-    from doe.pareto.tolerance_aware import ToleranceAware
+    from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox
     from doe.pareto.uncertainty import FrontUncertainty
     from doe.response_surface import Surface
 
-Array = NDArray[np.float64]
 Found = TypeVar("Found", "ParetoFront", "ToleranceAware")
 
 
 # Shares of the back-off from limits that are tried: where no point keeps all of it, the largest that any point keeps.
 SHARES = (1.0, 0.5, 0.25, 0.0)
+# Keys of [front] that the searches know by the same names.
+SEARCH = {"population", "generations", "seed", "pick"}
 
 
 def find_front(
@@ -49,7 +50,7 @@ def find_front(
 
     goals, settings, reach = goals_of(study), study.file.front, region_of(study)
     check_goals(study)
-    half = None if settings.tolerance_aware == "none" else tolerances_of(study)
+    box = tolerance_box(study)
 
     def coded(points: Array) -> Array:
         return to_coded(points, study.centre, study.step)
@@ -62,11 +63,8 @@ def find_front(
             to_actual(-reach, study.centre, study.step),
             to_actual(reach, study.centre, study.step),
             goals=goals,
-            population=settings.population,
-            generations=settings.generations,
-            seed=settings.seed,
             baseline=study.baseline,
-            pick=settings.pick,
+            **settings.model_dump(include=SEARCH),
             standard_errors=lambda points: np.column_stack(
                 [surface.prediction_standard_error(coded(points)) for surface in surfaces]
             ),
@@ -76,10 +74,10 @@ def find_front(
     with _named(study, goals, np.zeros(1), np.ones(1), ""):
         found = _backed_off(study, plain, failed)
     found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
-    if half is None:
+    if box is None:
         return found
     with _named(study, goals, study.centre, study.step, " after manufacture"):
-        aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, half, doubt(share)), failed)
+        aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt(share)), failed)
     return replace(found, tolerance_aware=aware)
 
 
@@ -110,8 +108,7 @@ def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
     factors = [
         float(stats.t.ppf(0.975, surface.interval_dof)) if surface.interval_dof > 0 else np.nan for surface in surfaces
     ]
-    widths: Array = np.array(factors) * standard_errors
-    return widths
+    return np.array(factors) * standard_errors
 
 
 def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) -> FrontUncertainty:
@@ -134,29 +131,23 @@ def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) 
 
 
 def _tolerance_aware(
-    study: Study, surfaces: Sequence[Surface], found: ParetoFront, half: Array, doubt: Doubt
+    study: Study, surfaces: Sequence[Surface], found: ParetoFront, box: ToleranceBox, doubt: Doubt
 ) -> ToleranceAware:
     from doe.pareto.archive import Archive
-    from doe.pareto.tolerance_aware import ToleranceBox, tolerance_aware_front
+    from doe.pareto.tolerance_aware import tolerance_aware_front
 
-    settings, reach = study.file.front, region_of(study)
-    assert settings.tolerance_aware != "none"
+    reach = region_of(study)
     return tolerance_aware_front(
         quadratics(surfaces, len(study.factors)),
-        ToleranceBox(
-            half, settings.tolerance_aware, settings.quantile, settings.distribution, settings.tolerance_samples
-        ),
+        box,
         -reach,
         reach,
         found.goals,
         baseline=to_coded(study.baseline, study.centre, study.step),
         plain=Archive(to_coded(found.points, study.centre, study.step), found.costs),
         plain_pick=found.pick,
-        population=settings.population,
-        generations=settings.generations,
-        seed=settings.seed,
-        pick=settings.pick,
         doubt=doubt,
+        **study.file.front.model_dump(include=SEARCH),
     )
 
 

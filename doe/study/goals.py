@@ -5,16 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.study.design import design_of
 from doe.study_file import Study
 from rbdyn.faults import InputError, refuse
 
 if TYPE_CHECKING:
     from doe.pareto import Goals
-
-Array = NDArray[np.float64]
+    from doe.pareto.tolerance_aware import ToleranceBox
 
 
 def goals_of(study: Study) -> Goals:
@@ -72,6 +71,18 @@ def known_tolerances(study: Study) -> dict[str, float]:
         elif given:
             known[factor.name] = min(given)
     return known
+
+
+def tolerance_box(study: Study) -> ToleranceBox | None:
+    """What the tolerance-aware front makes of the parts; None where the study asks for none. Raises as `tolerances_of`."""
+    from doe.pareto.tolerance_aware import ToleranceBox
+
+    front = study.file.front
+    if front.tolerance_aware == "none":
+        return None
+    return ToleranceBox(
+        tolerances_of(study), front.tolerance_aware, front.quantile, front.distribution, front.tolerance_samples
+    )
 
 
 def tolerances_of(study: Study) -> Array:

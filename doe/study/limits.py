@@ -58,17 +58,11 @@ def limits_of(study: Study, confirmed: Confirmed) -> list[Limit]:
     one_sided = NormalDist().inv_cdf(study.file.confirmation.limit_probability) / NormalDist().inv_cdf(0.975)
     worst: dict[int, Limit] = {}
     for index, sense, bound in goals_of(study).limited:
-        found = Limit(
-            study.responses[index],
-            sense,
-            bound,
-            float(confirmed.values[index]),
-            float(confirmed.error[index]),
-            one_sided,
-        )
+        value, error = float(confirmed.values[index]), float(confirmed.error[index])
+        limit = Limit(study.responses[index], sense, bound, value, error, one_sided)
         known = worst.get(index)
-        if known is None or _badness(found) > _badness(known):
-            worst[index] = found
+        if known is None or _badness(limit) > _badness(known):
+            worst[index] = limit
     return [worst[index] for index in sorted(worst)]
 
 

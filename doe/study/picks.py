@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_actual
 from doe.study.confirmation import Choice
 from doe.study.goals import rounded_within
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from doe.pareto import ParetoFront
     from doe.study.direct import Direct
     from doe.study.direct_pick import DirectPick
-
-Array = NDArray[np.float64]
 
 
 def choices(

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_coded
 from doe.study.drawn import jacobian, predict_all
 from doe.study.goals import goals_of
@@ -17,8 +17,6 @@ from doe.study_file import Study
 
 if TYPE_CHECKING:
     from doe.response_surface import Surface
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -124,19 +122,16 @@ def _missed(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
 
 def statement(gains: Sequence[PredictedGain]) -> str:
     """What the gains amount to, in a sentence."""
-    better = [gain.response for gain in gains if gain.verdict == "better"]
-    worse = [gain.response for gain in gains if gain.verdict == "worse"]
-    noise = [gain.response for gain in gains if gain.verdict == "within error"]
-    unknown = [gain.response for gain in gains if gain.verdict == "without error"]
+    words = {
+        "better": "better beyond its error",
+        "worse": "worse beyond its error",
+        "within error": "not told from noise",
+        "without error": "of unknown error",
+    }
     parts = [
-        f"{words}: {', '.join(names)}"
-        for words, names in (
-            ("better beyond its error", better),
-            ("worse beyond its error", worse),
-            ("not told from noise", noise),
-            ("of unknown error", unknown),
-        )
-        if names
+        f"{said}: {', '.join(names)}"
+        for verdict, said in words.items()
+        if (names := [gain.response for gain in gains if gain.verdict == verdict])
     ]
     hidden = [gain.response for gain in gains if gain.within_scatter]
     tail = f" One run each would not show: {', '.join(hidden)}." if hidden else ""

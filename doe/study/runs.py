@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array, Whole
 from doe.designs import Design, to_actual, to_coded
 from doe.designs.model import model_terms
 from doe.running.failure import Failure, alike, sentence, successes
@@ -20,7 +20,6 @@ from rbdyn.faults import RunError
 if TYPE_CHECKING:
     from rbdyn.scene import Scene
 
-Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 # Name of the store in the folder of a study.
 STORE = "study.sqlite"
@@ -40,8 +39,8 @@ class Runs:
     values: Array
     errors: Array
     notes: tuple[str, ...] = ()
-    replicates: NDArray[np.int64] | None = None
-    block: NDArray[np.int64] | None = None
+    replicates: Whole | None = None
+    block: Whole | None = None
     failures: tuple[Failure, ...] = ()
 
     @property

@@ -68,10 +68,7 @@ def _record(
 
 def _running(claim: Claim) -> dict[str, Any]:
     return {
-        "label": claim.label,
-        "run": claim.run,
-        "host": claim.host,
-        "pid": claim.pid,
+        **{key: getattr(claim, key) for key in ("label", "run", "host", "pid")},
         "since": datetime.fromtimestamp(claim.since, UTC).isoformat(timespec="seconds"),
         "for_s": max(0.0, time.time() - claim.since),
     }

@@ -7,16 +7,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array, Whole
 from doe.study.runs import Runs
 from doe.study_file import Study
 from rbdyn.faults import refuse
 
 if TYPE_CHECKING:
     from doe.response_surface import Surface
-
-Array = NDArray[np.float64]
 
 
 def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
@@ -78,14 +76,14 @@ def _with_rival(surface: Surface, seed: int) -> Surface:
     return replace(surface, rival=rival)
 
 
-def independent_values(runs: Runs) -> NDArray[np.int64]:
+def independent_values(runs: Runs) -> Whole:
     """How many are behind each half width, shape (n, m), from ``runs.replicates``: (n,), (n, m) or None; 0: unknown."""
     given = np.zeros(len(runs.values)) if runs.replicates is None else np.asarray(runs.replicates)
     per_response = given if given.ndim == 2 else given[:, None]
     return np.array(np.broadcast_to(per_response, runs.values.shape), np.int64)
 
 
-def standard_errors(half_widths: Array, number: NDArray[np.int64]) -> Array:
+def standard_errors(half_widths: Array, number: Whole) -> Array:
     """Standard errors of means from the half widths (n, m) of their 95 % intervals.
 
     The quantile is Student's with ``number`` - 1 degrees of freedom, where ``number`` (n, m) counts the independent
@@ -94,5 +92,4 @@ def standard_errors(half_widths: Array, number: NDArray[np.int64]) -> Array:
     from scipy import special
 
     student = special.stdtrit(np.maximum(number - 1, 1), 0.975)
-    errors: Array = half_widths / np.where(number > 1, student, special.ndtri(0.975))
-    return errors
+    return half_widths / np.where(number > 1, student, special.ndtri(0.975))

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from doe.arrays import Array
 from doe.running.failure import Failure
 from doe.study.chains import solve_chains
 from doe.study.checked import check_study
@@ -37,11 +35,9 @@ if TYPE_CHECKING:
     from doe.pareto.tolerance import WidestTolerances
     from doe.response_surface import Surface
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
-class Outcome:
+class StudyResult:
     """Everything a report needs.
 
     ``inputs`` is the hash of all it follows from. ``confirmed`` and ``gains`` by name of the point, "baseline" (without
@@ -103,7 +99,7 @@ def run_study(
     scheduler: str | None = None,
     retry: bool = False,
     direct: bool = False,
-) -> Outcome:
+) -> StudyResult:
     """All of it; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster to run on.
 
     ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself. Raises
@@ -139,7 +135,7 @@ def run_study(
     if reference is not None:
         reference = reference.only(runs.places)
     lost = () if searched is None else searched.failures
-    return Outcome(
+    return StudyResult(
         study=study,
         inputs=inputs,
         design=design_of(study),

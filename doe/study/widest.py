@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_coded
 from doe.study.drawn import draw_all, predict_all, predict_paired
 from doe.study.goals import goals_of, known_tolerances, region_of
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from doe.pareto.tolerance import WidestTolerances
     from doe.response_surface import Surface
     from doe.study.direct_pick import Local
-
-Array = NDArray[np.float64]
 
 
 def widest_of(
@@ -80,9 +78,5 @@ def widest_of(
             *(f"the gain of {study.responses[index]}" for index in goals.objectives),
             *(f"{study.responses[index]} {sense} {limit:g}" for index, sense, limit in goals.limited),
         ],
-        probability=settings.probability,
-        distribution=settings.distribution,
-        samples=settings.samples,
-        seed=settings.seed,
-        aim=settings.aim,
+        **settings.model_dump(include={"probability", "distribution", "samples", "seed", "aim"}),
     )

@@ -5,21 +5,18 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from doe.arrays import Array
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Design, Factor, Name
-from doe.study_file.fit_section import Fitted
 from doe.study_file.front_section import Direct, Front, Goal, Tolerances
 from doe.study_file.table import COUNT, LABELS, Table, read_table
 from rbdyn.faults import Strict, read_toml, validated
 from rbdyn.fields import or_refuse
-
-Array = NDArray[np.float64]
 
 
 class SceneFile(Strict):
@@ -27,6 +24,18 @@ class SceneFile(Strict):
 
     file: str
     set: list[str] = []
+
+
+class Fitted(Strict):
+    """How a surface is fitted to a response.
+
+    ``weighting``: "replicates" weighs each run by the inverse of its variance, known from the replicates of
+    the simulation. ``transform``: of Box and Cox, the recommended one or with the exponent given.
+    """
+
+    model: Literal["linear", "interaction", "quadratic", "reduced"] = "quadratic"
+    weighting: Literal["equal", "replicates"] = "equal"
+    transform: Literal["none", "box_cox"] | Annotated[float, Field(ge=-5.0, le=5.0)] = "none"
 
 
 class Response(Fitted, Goal):

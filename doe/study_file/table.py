@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array, Whole
 from rbdyn.faults import LONGEST_NAME, InputError, one_line, read_text, refuse
-
-Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 # As every program writes it: float() would also take 1_000, nan and the digits of other scripts.
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)

@@ -17,25 +17,15 @@ LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"
 
 def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Clearances, gains, whether they are real, and the parts to make."""
-    blocks: list[Block] = []
-    if text := part(summary, "limits_sentence"):
-        blocks.append(Words(str(text), "statement"))
+    blocks: list[Block] = [Words(part(summary, "limits_sentence") or "", "statement")]
     if pick := part(summary, "pick"):
         blocks.append(Tiles([_tile(summary, each, pick) for each in factors(summary) if each.name in pick]))
-    if text := statement(summary):
-        blocks.append(Words(text, "statement"))
-    if table := _gains(summary):
-        blocks.append(table)
-    if table := limits(summary, ("baseline", "pick")):
-        blocks.append(table)
-    if text := part(summary, "edge", "sentence"):
-        blocks.append(Words(str(text)))
-    if table := part_dimensions(summary):
-        blocks.append(table)
+    blocks += [Words(statement(summary), "statement"), _gains(summary), limits(summary, ("baseline", "pick"))]
+    blocks += [Words(part(summary, "edge", "sentence") or ""), part_dimensions(summary)]
     reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
     if reason:
         blocks.append(Words(f"Why this point: {reason}.", "note"))
-    return Section("answer", "The answer", blocks) if blocks else None
+    return Section("answer", "The answer", blocks)
 
 
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
@@ -64,10 +54,8 @@ def statement(summary: Record) -> str:
     return f"Of {len(verdicts)} responses, by more than their 95 % errors or within them: {', '.join(counts)}."
 
 
-def _gains(summary: Record) -> Table | None:
-    gains = part(summary, "gains")
-    if not gains:
-        return None
+def _gains(summary: Record) -> Table:
+    gains = part(summary, "gains") or {}
     columns = [part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick")]
     rows = [
         (label(name), *(_value(column.get(name)) for column in columns), percentage(gain), verdict(gain))
@@ -77,7 +65,7 @@ def _gains(summary: Record) -> Table | None:
     return Table("Gains confirmed by simulation (95 % intervals)", header, rows, text_columns=(4,))
 
 
-def limits(summary: Record, names: Sequence[str] = ()) -> Table | None:
+def limits(summary: Record, names: Sequence[str] = ()) -> Table:
     """Limits judged by simulation at the points of these names, at every confirmed point without any."""
     points = part(summary, "confirmation") or {}
     rows = [
@@ -90,8 +78,6 @@ def limits(summary: Record, names: Sequence[str] = ()) -> Table | None:
         for name in names or points
         for response, limit in (part(points, name, "limits") or {}).items()
     ]
-    if not rows:
-        return None
     note = "Kept or broken by more than the error; between the two a limit is undecided."
     header = ("point", "limit", "simulated", "verdict")
     return Table("Limits judged by simulation", header, rows, note, text_columns=(1, 3))
@@ -102,15 +88,13 @@ def verdict(gain: Record) -> str:
     return VERDICTS.get(str(gain.get("verdict")), str(gain.get("verdict") or ""))
 
 
-def part_dimensions(summary: Record) -> Table | None:
+def part_dimensions(summary: Record) -> Table:
     """Parts of every chain."""
     rows = []
     chains = part(summary, "chains") or {}
     for name, chain in chains.items():
         for each, dimensions in allocation(chain).items():
             rows.append((label(each), dimension(dimensions), dimensions.get("grade") or "", label(name)))
-    if not rows:
-        return None
     header = ("part", "dimension [mm]", "grade", "chain")
     return Table("Part dimensions", header, rows, _yields(chains), text_columns=(2, 3))
 
@@ -236,11 +220,9 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         caption = "Gains over the baseline at every confirmed point"
         note = "▲ better, ▼ worse, ● within its 95 % error."
         blocks.append(Table(caption, ["point", *(quantity(each)[0] for each in names)], rows, note))
-    if table := limits(summary):
-        blocks.append(table)
+    blocks.append(limits(summary))
     reasons = [(name.replace("_", " "), point["reason"]) for name, point in points.items() if point.get("reason")]
-    if reasons:
-        blocks.append(Table("Why these points", ("point", "reason"), reasons, text_columns=(1,)))
+    blocks.append(Table("Why these points", ("point", "reason"), reasons, text_columns=(1,)))
     return Section("confirmation", "Confirmation", blocks)
 
 
@@ -253,11 +235,9 @@ def _value(found: Record | None) -> str:
     return with_error(found.get("value"), half_width(found)) if found else ""
 
 
-def tolerances(summary: Record) -> Table | None:
+def tolerances(summary: Record) -> Table:
     """The widest tolerances that keep the gain."""
-    found = part(summary, "tolerances")
-    if not found:
-        return None
+    found = part(summary, "tolerances") or {}
     names = {each.name for each in factors(summary)}
     rows = [
         (
@@ -270,15 +250,15 @@ def tolerances(summary: Record) -> Table | None:
         if name in names and isinstance(each, Mapping)
     ]
     header = ("factor", "tolerance", "probability", "limited by")
-    return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,)) if rows else None
+    return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,))
 
 
 def _limit(limited_by: Any) -> str:
     return label(limited_by) if isinstance(limited_by, str) else shown(limited_by)
 
 
-def record_table(caption: str, record: Record | None, folded: bool = False) -> Table | None:
+def record_table(caption: str, record: Record | None, folded: bool = False) -> Table:
     """Everything in nested tables, a row each."""
     rows = list(scalars(record or {}))
     prose = (1,) if any(len(value) > LONG for _, value in rows) else ()
-    return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose) if rows else None
+    return Table(caption, ("", "value"), rows, folded=folded, text_columns=prose)

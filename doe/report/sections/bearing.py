@@ -48,4 +48,4 @@ def motion(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(Figures(drawn, caption))
     if any(part(each, "moving") for each in motion.values()):
         blocks.append(Widget("bearing"))
-    return Section("motion", "Motion of the bearing", blocks) if blocks else None
+    return Section("motion", "Motion of the bearing", blocks)

@@ -92,7 +92,7 @@ Block = Words | Heading | Bullets | Table | Tiles | Figures | Widget
 
 @dataclass(frozen=True)
 class Section:
-    """Part of a report; ``key`` is its anchor."""
+    """Part of a report; ``key`` is its anchor. Empty blocks are left out of the report."""
 
     key: str
     title: str

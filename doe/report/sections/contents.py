@@ -34,11 +34,16 @@ def sections(summary: Record, motion: Mapping[str, Any] | None = None) -> list[S
     found = [chapter(summary, motion or {}) for chapter in CHAPTERS]
     names = [*(each.name for each in factors(summary)), *(each["name"] for each in responses(summary))]
     words = {name: quantity(name)[0] for name in names}
-    return [
-        replace(section, blocks=[_readable(block, words) for block in section.blocks])
-        for section in found
-        if section is not None and section.blocks
-    ]
+    whole = [(each, [_readable(block, words) for block in each.blocks if _says(block)]) for each in found if each]
+    return [replace(section, blocks=blocks) for section, blocks in whole if blocks]
+
+
+def _says(block: Block) -> bool:
+    """Whether there is anything in a block: a table has rows, a list items, a paragraph words."""
+    match block:
+        case Table(rows=content) | Bullets(items=content) | Words(text=content):
+            return bool(content)
+    return True
 
 
 def _readable(block: Block, words: Mapping[str, str]) -> Block:

@@ -31,9 +31,8 @@ def reference(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         words.append(" ".join(filter(None, (each.get("verdict"), each.get("why")))))
     blocks: list[Block] = [Bullets([text for text in words if text])]
     blocks.append(Table("Levels", ("response", "least", "mean", "largest"), levels))
-    if effects:
-        header = ("response", "factor", "ours", "theirs", "sign")
-        blocks.append(Table("Linear effects a coded unit", header, effects, text_columns=(1, 4)))
+    header = ("response", "factor", "ours", "theirs", "sign")
+    blocks.append(Table("Linear effects a coded unit", header, effects, text_columns=(1, 4)))
     return Section("reference", "Beside the published table", blocks)
 
 
@@ -41,14 +40,10 @@ def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Seeds, versions and cost: what it takes to get the same numbers again."""
     captions = (("seeds", "Seeds"), ("versions", "Versions"), ("cost", "Cost, times in seconds"))
     tables = [record_table(caption, part(summary, key)) for key, caption in captions]
-    return Section("settings", "Settings, versions, cost", [table for table in tables if table])
+    return Section("settings", "Settings, versions, cost", tables)
 
 
 def notes(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Limits of the model that the runs met, and what failed."""
-    blocks: list[Block] = []
-    if said := part(summary, "notes"):
-        blocks.append(Bullets([str(note) for note in said]))
-    if failures := part(summary, "failures"):
-        blocks.append(failure_table(failures))
-    return Section("notes", "Notes and failures", blocks) if blocks else None
+    said = Bullets([str(note) for note in part(summary, "notes") or []])
+    return Section("notes", "Notes and failures", [said, failure_table(part(summary, "failures") or [])])

@@ -27,8 +27,7 @@ def design(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(_points(summary, points))
     if evaluation := record.get("evaluation"):
         blocks += _evaluation(evaluation)
-    if failures := record.get("failures"):
-        blocks.append(failure_table(failures))
+    blocks.append(failure_table(record.get("failures") or []))
     return Section("design", "Design", blocks)
 
 
@@ -62,8 +61,7 @@ def _evaluation(evaluation: Record) -> list[Block]:
         key: value for key, value in evaluation.items() if isinstance(value, Mapping) and {"A", "B"} <= set(value)
     }
     rest = {key: value for key, value in evaluation.items() if key not in by_term and not isinstance(value, list)}
-    tables = [record_table("How good the design is for the models asked", rest), _by_term(by_term)]
-    blocks: list[Block] = [table for table in tables if table]
+    blocks: list[Block] = [record_table("How good the design is for the models asked", rest), _by_term(by_term)]
     if pictures := evaluation_plots(evaluation):
         caption = (
             "Scaled prediction variance: least, mean and largest by radius; and what a share of the region stays below."
@@ -72,7 +70,7 @@ def _evaluation(evaluation: Record) -> list[Block]:
     return blocks
 
 
-def _by_term(columns: Mapping[str, Record]) -> Table | None:
+def _by_term(columns: Mapping[str, Record]) -> Table:
     """A column for each figure; a figure that has several kinds has a column for each."""
     flat: dict[str, dict[str, Any]] = defaultdict(dict)
     for key, terms in columns.items():
@@ -80,9 +78,8 @@ def _by_term(columns: Mapping[str, Record]) -> Table | None:
             kinds = value if isinstance(value, Mapping) else {"": value}
             for kind, each in kinds.items():
                 flat[label(f"{key}" if not kind else f"{kind}_{key}")][term] = each
-    if not flat:
-        return None
-    rows = [[term, *(shown(column.get(term), 3) for column in flat.values())] for term in next(iter(flat.values()))]
+    terms = next(iter(flat.values()), {})
+    rows = [[term, *(shown(column.get(term), 3) for column in flat.values())] for term in terms]
     return Table("By term", ["term", *flat], rows)
 
 

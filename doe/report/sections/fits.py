@@ -35,9 +35,7 @@ def surfaces(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     note = "± are standard errors." if any(errors.values()) else ""
     header = ["term", *(f"{label(name)}, {each.get('model', '')}" for name, each in fitted.items())]
     blocks: list[Block] = [Widget("surface")] if part(summary, "asked", "factors") else []
-    blocks.append(Table("Coefficients in coded units", header, rows, note))
-    if table := _stationary(summary, fitted):
-        blocks.append(table)
+    blocks += [Table("Coefficients in coded units", header, rows, note), _stationary(summary, fitted)]
     return Section("surfaces", "Response surfaces", blocks)
 
 
@@ -52,7 +50,7 @@ def _coefficient(value: float | None, error: float | None) -> str:
     return f"{shown(value)} ± {shown(error, 2)}" if error else shown(value)
 
 
-def _stationary(summary: Record, fitted: Record) -> Table | None:
+def _stationary(summary: Record, fitted: Record) -> Table:
     given = factors(summary)
     rows = []
     for name, each in fitted.items():
@@ -60,8 +58,6 @@ def _stationary(summary: Record, fitted: Record) -> Table | None:
         if len(actual) == len(given):
             places = [factor.text(x) for factor, x in zip(given, actual, strict=True)]
             rows.append([label(name), *places, str(part(each, "stationary_point", "nature") or "")])
-    if not rows:
-        return None
     header = ["response", *(label(each.name) for each in given), "nature"]
     return Table("Stationary points", header, rows, "A point outside the region is an extrapolation.", text_columns=(len(given) + 1,))  # fmt: skip
 
@@ -72,17 +68,14 @@ def diagnostics(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     if not fitted:
         return None
     rows = [
-        [label(name), *(shown(each.get(key)) for key, _ in STATISTICS), *_lack(each)] for name, each in fitted.items()
+        [label(name), *(shown(each.get(key)) for key, _ in STATISTICS), probability(part(each, "lack_of_fit", "p"))]
+        for name, each in fitted.items()
     ]
     header = ["response", *(words for _, words in STATISTICS), "p of lack of fit"]
     blocks: list[Block] = [Table("Quality of the fits", header, rows)]
     for name, each in fitted.items():
         blocks += _one(name, each)
     return Section("diagnostics", "Diagnostics", blocks)
-
-
-def _lack(fitted: Record) -> list[str]:
-    return [probability(part(fitted, "lack_of_fit", "p"))]
 
 
 def _one(name: str, fitted: Record) -> list[Block]:
@@ -102,16 +95,14 @@ def _one(name: str, fitted: Record) -> list[Block]:
         for row in fitted.get("anova") or []
         if "source" in row
     ]  # fmt: skip
-    if rows:
-        header = ("source", "sum of squares", "df", "mean square", "F", "p")
-        blocks.append(Table(f"Analysis of variance of {label(name)}", header, rows))
+    header = ("source", "sum of squares", "df", "mean square", "F", "p")
+    blocks.append(Table(f"Analysis of variance of {label(name)}", header, rows))
     rest = {
         key: {name: value for name, value in fitted[key].items() if name != "sentence"}
         for key in FURTHER
         if isinstance(fitted.get(key), Mapping)
     }
-    if table := record_table(f"Further figures of {label(name)}", rest, folded=True):
-        blocks.append(table)
+    blocks.append(record_table(f"Further figures of {label(name)}", rest, folded=True))
     return blocks
 
 

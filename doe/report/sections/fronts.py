@@ -95,11 +95,9 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         rows = [(label(name), percentage(gain), str(gain.get("verdict") or "")) for name, gain in gains.items()]
         header = ("response", "gain", "verdict")
         blocks.append(Table(f"Gains on the surfaces {where}", header, rows, text_columns=(2,)))
-    if record.get("statement"):
-        blocks.append(Words(str(record["statement"])))
-    blocks += [table for table in (_limits(record), tolerances(summary)) if table]
-    if text := part(summary, "tolerances_sentence"):
-        blocks.append(Words(str(text)))
+    blocks.append(Words(record.get("statement") or ""))
+    blocks += [_limits(record), tolerances(summary)]
+    blocks.append(Words(part(summary, "tolerances_sentence") or ""))
     blocks += _search(record)
     blocks += _beside(summary)
     return Section("front", "Pareto front", blocks)
@@ -125,7 +123,7 @@ def _picks(summary: Record, names: Sequence[str], marks: Mapping[str, Record]) -
     return Table("Picks on the surfaces", header, rows)
 
 
-def _limits(record: Record) -> Table | None:
+def _limits(record: Record) -> Table:
     rows = [
         (
             f"{label(limit['response'])} {limit['sense']} {shown(limit['limit'])}",
@@ -135,7 +133,7 @@ def _limits(record: Record) -> Table | None:
         for limit in record.get("constraints") or []
         if {"response", "sense", "limit", "value"} <= set(limit)
     ]
-    return Table("Limits at the pick on the surfaces", ("limit", "value", "kept"), rows) if rows else None
+    return Table("Limits at the pick on the surfaces", ("limit", "value", "kept"), rows)
 
 
 def _search(record: Record) -> list[Block]:
@@ -177,12 +175,9 @@ def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
         "pick with tolerances": part(aware, "pick", "robust"),
     }
     rows = [(point, *(shown(values.get(name)) for name in names)) for point, values in points.items() if values]
-    if rows:
-        header = ["point", *map(label, names)]
-        blocks.append(Table("What manufacture leaves of the responses", header, rows))
+    blocks.append(Table("What manufacture leaves of the responses", ["point", *map(label, names)], rows))
     costs = {key: aware.get(key) for key in ("survival", "nominal_loss_percent", "robust_gain_percent")}
-    if table := record_table("What the tolerances cost", costs):
-        blocks.append(table)
+    blocks.append(record_table("What the tolerances cost", costs))
     return blocks
 
 
@@ -195,6 +190,5 @@ def _on_the_simulator(direct: Record) -> list[Block]:
         for key, words, error in DIRECT
         if direct.get(key) is not None
     ]
-    if rows:
-        blocks.append(Table("Front searched on the simulator itself", ("", "value"), rows))
+    blocks.append(Table("Front searched on the simulator itself", ("", "value"), rows))
     return blocks

@@ -8,6 +8,7 @@ from typing import Any
 
 from doe.report.sections.answer import allocation, record_table
 from doe.report.sections.blocks import Block, Figures, Heading, Section, Table, Words
+from doe.report.sections.plot import wide_svg
 from doe.report.sections.record import Record, part
 from doe.report.words import dimension, label, shown
 
@@ -23,7 +24,7 @@ def chains(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     for name, chain in (part(summary, "chains") or {}).items():
         blocks.append(Heading(label(name)))
         blocks += _chain(name, chain)
-    return Section("chains", "Dimension chains", blocks) if blocks else None
+    return Section("chains", "Dimension chains", blocks)
 
 
 def _chain(name: str, chain: Record) -> list[Block]:
@@ -34,9 +35,8 @@ def _chain(name: str, chain: Record) -> list[Block]:
          *(_percent(part(shares, each, kind)) for kind, _ in KINDS))
         for each, dimensions in allocation(chain).items()
     ]  # fmt: skip
-    if rows:
-        header = ("part", "dimension [mm]", "grade", "share of variance", "share of worst case")
-        blocks.append(Table(f"Parts of the chain {label(name)}", header, rows, text_columns=(2,)))
+    header = ("part", "dimension [mm]", "grade", "share of variance", "share of worst case")
+    blocks.append(Table(f"Parts of the chain {label(name)}", header, rows, text_columns=(2,)))
     if shares:
         blocks.append(
             Figures([contributions(name, shares)], "What each part contributes to the scatter of the closing link.")
@@ -51,15 +51,14 @@ def _chain(name: str, chain: Record) -> list[Block]:
     if yields := chain.get("yield"):
         error = yields.get("standard_error")
         rows = [
-            (_kind(kind), f"{share:.6f}")
+            (kind.replace("_", " "), f"{share:.6f}")
             for kind, share in yields.items()
             if isinstance(share, float) and kind != "standard_error"
         ]
         note = f"Share of assemblies within the limits, standard error {shown(error, 1)}." if error else ""
         blocks.append(Table("Yield", ("distribution of the parts", "yield"), rows, note))
     rest = {key: value for key, value in chain.items() if key not in TOLD}
-    if table := record_table("Further figures of the chain", rest, folded=True):
-        blocks.append(table)
+    blocks.append(record_table("Further figures of the chain", rest, folded=True))
     return blocks
 
 
@@ -83,10 +82,7 @@ def contributions(name: str, shares: Record) -> str:
         v = ROW * len(known) + 16.0 + 18.0 * number
         drawn.append(f'<rect class="share c{number % COLOURS}" x="{LEFT}" y="{v - 9:g}" width="12" height="12"/>')
         drawn.append(f'<text x="{LEFT + 18}" y="{v + 2:g}">{number + 1}: {escape(label(each))}</text>')
-    return (
-        f'<svg class="plot wide" viewBox="0 0 {WIDE:g} {high:g}" role="img" '
-        f'aria-label="{escape(f"Contributions to the chain {label(name)}")}">{"".join(drawn)}</svg>'
-    )
+    return wide_svg(WIDE, high, f"Contributions to the chain {label(name)}", drawn)
 
 
 def _percent(value: float | None) -> str:
@@ -95,10 +91,6 @@ def _percent(value: float | None) -> str:
 
 def _length(value: Any) -> str:
     return " to ".join(f"{each:.4f}" for each in value) if isinstance(value, list | tuple) else f"{value:.4f}"
-
-
-def _kind(kind: str) -> str:
-    return kind.replace("_", " ")
 
 
 def _first_upper(text: str) -> str:

@@ -14,25 +14,13 @@ STAR = [
     ((1.0 if spike % 2 == 0 else 0.45) * math.sin(spike * math.pi / 5), -(1.0 if spike % 2 == 0 else 0.45) * math.cos(spike * math.pi / 5))
     for spike in range(10)
 ]  # fmt: skip
+ARM = [(-0.4, -1.2), (0.4, -1.2), (0.4, -0.4)]
 SYMBOLS = {
     "square": [(-0.8, -0.8), (0.8, -0.8), (0.8, 0.8), (-0.8, 0.8)],
     "diamond": [(0.0, -1.1), (1.1, 0.0), (0.0, 1.1), (-1.1, 0.0)],
     "triangle": [(0.0, -1.1), (1.0, 0.8), (-1.0, 0.8)],
     "down": [(0.0, 1.1), (1.0, -0.8), (-1.0, -0.8)],
-    "plus": [
-        (-0.4, -1.2),
-        (0.4, -1.2),
-        (0.4, -0.4),
-        (1.2, -0.4),
-        (1.2, 0.4),
-        (0.4, 0.4),
-        (0.4, 1.2),
-        (-0.4, 1.2),
-        (-0.4, 0.4),
-        (-1.2, 0.4),
-        (-1.2, -0.4),
-        (-0.4, -0.4),
-    ],
+    "plus": [(x * c - y * s, x * s + y * c) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1)) for x, y in ARM],
     "hexagon": [(math.sin(k * math.pi / 3), math.cos(k * math.pi / 3)) for k in range(6)],
     "star": [(1.35 * u, 1.35 * v) for u, v in STAR],
 }
@@ -160,6 +148,14 @@ def symbol(u: float, v: float, shape: str, role: str, radius: float = 5.5, title
     corners = " ".join(f"{u + radius * p:.1f},{v + radius * q:.1f}" for p, q in SYMBOLS[shape])
     words = f"<title>{escape(title)}</title>" if title else ""
     return f'<polygon class="symbol {role}" points="{corners}">{words}</polygon>'
+
+
+def wide_svg(width: float, height: float, words: str, drawn: Iterable[str], extra: str = "") -> str:
+    """A picture across the page of marks that are ``drawn`` already; ``words`` describe it."""
+    return (
+        f'<svg class="plot wide" viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(words)}"{extra}>'
+        f"{''.join(drawn)}</svg>"
+    )
 
 
 def legend(entries: Sequence[tuple[str, str, str]]) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from itertools import combinations
 
-from doe.report.sections.plot import Plot, Point, Range, legend, span, symbol, tick_text, ticks
+from doe.report.sections.plot import Plot, Point, Range, legend, span, symbol, tick_text, ticks, wide_svg
 from doe.report.sections.record import Factor, Record, part
 from doe.report.words import half_width, label, quantity, shown
 
@@ -114,10 +114,7 @@ def parallel(given: Sequence[Factor], names: Sequence[str], sets: Sequence[Front
     parts.append('<polyline class="thread chosen" points=""/>')
     parts += [_axis(number, len(axes), name, limits) for number, (_, name, limits) in enumerate(axes)]
     words = f"Parallel coordinates of {len(points)} points of the front"
-    return (
-        f'<svg class="plot wide" viewBox="0 0 {WIDE:g} {HIGH:g}" role="img" aria-label="{words}" data-front="parallel">'
-        f"{''.join(parts)}</svg>"
-    )
+    return wide_svg(WIDE, HIGH, words, parts, ' data-front="parallel"')
 
 
 def _across(number: int, axes: int) -> float:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from html import escape
 
-from doe.report.sections.plot import Plot, span, ticks
+from doe.report.sections.plot import Plot, span, ticks, wide_svg
 from doe.report.sections.record import Record, part
 
 WIDE, ROW, LEFT, RIGHT = 640.0, 34.0, 150.0, 62.0
@@ -57,7 +57,4 @@ def power_bars(terms: Sequence[str], found: Mapping[str, Record]) -> str:
         u = WIDE - RIGHT - 150.0 + 80.0 * place
         drawn.append(f'<rect class="bar {escape(name)}" x="{u:g}" y="{bottom + 21:g}" width="11" height="11"/>')
         drawn.append(f'<text x="{u + 15:g}" y="{bottom + 31:g}">{escape(name)}</text>')
-    return (
-        f'<svg class="plot wide" viewBox="0 0 {WIDE:g} {bottom + 38:g}" role="img" '
-        f'aria-label="Power loss by term, {escape(" and ".join(found))}">{"".join(drawn)}</svg>'
-    )
+    return wide_svg(WIDE, bottom + 38, f"Power loss by term, {' and '.join(found)}", drawn)

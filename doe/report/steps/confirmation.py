@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.study.confirmation import Confirmed, Gain, statement
 from doe.study.limits import Limit, limits_of
 
 if TYPE_CHECKING:
-    from doe.study import Outcome
+    from doe.study import StudyResult
     from doe.study.direct import Direct
     from doe.study.edge import Edge
     from doe.study_file import Study
 
-Array = NDArray[np.float64]
 
-
-def confirmation_record(outcome: Outcome) -> dict[str, Any]:
+def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
     """Every confirmed point by name, with its gains over the baseline and whether they are real."""
     return {
         name: {
@@ -29,11 +28,11 @@ def confirmation_record(outcome: Outcome) -> dict[str, Any]:
             "responses": _quantities(outcome.study, each),
             "power_terms_W": dict(each.power_terms),
             "limits": limits_record(limits_of(outcome.study, each)),
-            **(
-                {"gains": gains_record(outcome.gains[name]), "statement": statement(outcome.gains[name])}
-                if name in outcome.gains
-                else {}
-            ),
+        }
+        | {
+            key: record(outcome.gains[name])
+            for key, record in (("gains", gains_record), ("statement", statement))
+            if name in outcome.gains
         }
         for name, each in outcome.confirmed.items()
     }
@@ -42,13 +41,8 @@ def confirmation_record(outcome: Outcome) -> dict[str, Any]:
 def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
     """Limits judged by simulation, by response: of a lower and an upper one that with the worse verdict, or less room."""
     return {
-        limit.response: {
-            "bound": limit.bound,
-            "sense": limit.sense,
-            "value": limit.value,
-            "error": or_none(limit.error),
-            "verdict": limit.verdict,
-        }
+        limit.response: {key: getattr(limit, key) for key in ("bound", "sense", "value", "error", "verdict")}
+        | {"error": or_none(limit.error)}
         for limit in limits
     }
 
@@ -86,30 +80,19 @@ def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
     front, loss = direct.front, direct.loss
     rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
     surrogate = zip(direct.surrogate_points, direct.surrogate_values, 1.96 * direct.surrogate_errors, strict=True)
-    points = [_point(study, *row) for row in rows]
+    points = [point_record(study, *row) for row in rows]
     return {
         "front": points,
         "pick": {**points[front.pick], "reason": front.pick_reason},
-        "surrogate_front": [_point(study, *row) for row in surrogate if np.isfinite(row[1]).all()],
-        "hypervolume": loss.hypervolume,
-        "hypervolume_error": loss.hypervolume_error,
-        "surrogate_hypervolume": loss.surrogate_hypervolume,
-        "surrogate_hypervolume_error": loss.surrogate_hypervolume_error,
-        "loss_percent": loss.loss_percent,
-        "loss_error_percent": loss.error_percent,
+        "surrogate_front": [point_record(study, *row) for row in surrogate if np.isfinite(row[1]).all()],
+        **asdict(loss),
         "sentence": loss.sentence,
         "run": clearance.direct_run(study),
-        "optimism_percent": dict(
-            zip(
-                [study.responses[index] for index in front.goals.objectives],
-                (100.0 * front.optimism).tolist(),
-                strict=True,
-            )
-        ),
-        "evaluations": front.evaluations,
-        "repeats": front.repeats,
-        "generations": front.generations,
-        "seed": front.seed,
+        "optimism_percent": {
+            study.responses[index]: 100.0 * float(share)
+            for index, share in zip(front.goals.objectives, front.optimism, strict=True)
+        },
+        **{key: getattr(front, key) for key in ("evaluations", "repeats", "generations", "seed")},
         "failed": len(direct.failures),
         "seconds": direct.seconds["search"],
         "comparison_seconds": direct.seconds["comparison"],
@@ -124,11 +107,12 @@ def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:
     }
 
 
-def _point(study: Study, point: Array, values: Array, errors: Array) -> dict[str, Any]:
+def point_record(study: Study, point: Array, values: Array, errors: Array) -> dict[str, Any]:
+    """Factors (k,), responses (m,) and their 95 % half widths (m,) of a point, by name."""
     return {
         "factors": dict(zip(study.factors, point.tolist(), strict=True)),
         "responses": dict(zip(study.responses, values.tolist(), strict=True)),
-        "errors": dict(zip(study.responses, errors.tolist(), strict=True)),
+        "errors": dict(zip(study.responses, map(or_none, errors), strict=True)),
     }
 
 

@@ -12,29 +12,32 @@ if TYPE_CHECKING:
     from doe.study_file import Study
 
 
-def design_record(study: Study, design: Design, evaluation: dict[str, Any]) -> dict[str, Any]:
-    """JSON of ``doe design``: runs in their order, ``standard`` being the place in the standard order from 1."""
+def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:
+    """Runs in their order, from 1."""
     actual = to_actual(design.coded, study.centre, study.step)
-    first = study.file.design.seed
-    runs = [
+    return [
         {
             "run": number,
-            "standard": place + 1,
             "kind": kind,
             "block": block,
             "coded": dict(zip(study.factors, coded.tolist(), strict=True)),
             "factors": dict(zip(study.factors, values.tolist(), strict=True)),
-            "seed": first + place,
+            "seed": study.file.design.seed + place,
         }
         for number, (place, kind, block, coded, values) in enumerate(
             zip(design.order.tolist(), design.kind, design.block_numbers, design.coded, actual, strict=True), 1
         )
     ]
+
+
+def design_record(study: Study, design: Design, evaluation: dict[str, Any]) -> dict[str, Any]:
+    """JSON of ``doe design``: runs in their order, ``standard`` being the place in the standard order from 1."""
+    runs = zip(runs_record(study, design), design.order.tolist(), strict=True)
     return {
         "kind": study.file.design.kind,
         "factors": study.factors,
         "reach": design.reach,
-        "runs": runs,
+        "runs": [{**run, "standard": place + 1} for run, place in runs],
         "evaluation": evaluation,
     }
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from doe.arrays import Array
 from doe.designs import to_coded
 from doe.pareto.indicators import REFERENCE
+from doe.report.steps.confirmation import point_record
 from doe.report.steps.tolerance_aware import print_tolerance_aware, tolerance_aware_record
 from doe.study.drawn import predict_all
 from doe.study.front import half_widths
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from doe.response_surface import Surface
     from doe.study_file import Study
 
-Array = NDArray[np.float64]
-
 
 def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
     """JSON of ``doe front``: factor and response values in their own units and senses."""
@@ -30,12 +29,13 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
     assert front.uncertainty is not None
     sure = front.uncertainty
     points = [
-        {**_named(study, point, values, errors), "non_dominated_probability": float(probability)}
+        {**point_record(study, point, values, errors), "non_dominated_probability": float(probability)}
         for point, values, errors, probability in zip(
             front.points, front.values, sure.half_widths, sure.non_dominated, strict=True
         )
     ]
     gains = predicted_gains(study, surfaces, front.points[front.pick])
+    beyond = beyond_runs(study, to_coded(front.points[front.pick], study.centre, study.step))
     picks: dict[str, Any] = {rule: points[row] for rule, row in front.picks.items()}
     record: dict[str, Any] = {
         "front": points,
@@ -45,9 +45,9 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         "ideal": _extreme(study, front, front.costs.argmin(axis=0)),
         "nadir": _extreme(study, front, front.costs.argmax(axis=0)),
         "knee": points[front.knee],
-        "pick": {**points[front.pick], "reason": front.pick_reason, "beyond_runs": _far(study, front)},
+        "pick": {**points[front.pick], "reason": front.pick_reason, "beyond_runs": beyond},
         "picks": picks,
-        "baseline": point_record(study, surfaces, study.baseline),
+        "baseline": predicted_record(study, surfaces, study.baseline),
         "pick_dominates_baseline": {
             "probability": sure.pick_dominates,
             "standard_error": sure.pick_dominates_error,
@@ -57,12 +57,10 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         "statement": statement(gains),
         "constraints": _limits(study, front.values[front.pick]),
         "archive": front.archive_size,
-        "evaluations": front.evaluations,
         "feasible_share": front.feasible,
-        "generations": front.generations,
-        "seed": front.seed,
+        **{key: getattr(front, key) for key in ("evaluations", "generations", "seed")},
     }
-    if record["pick"]["beyond_runs"]:
+    if beyond:
         record["statement"] += " The pick lies farther out than any run: the surfaces extrapolate there."
     if front.tolerance_aware is not None:
         record["tolerance_aware"] = tolerance_aware_record(study, surfaces, front.tolerance_aware)
@@ -70,16 +68,12 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
     return record
 
 
-def _far(study: Study, front: ParetoFront) -> bool:
-    return beyond_runs(study, to_coded(front.points[front.pick], study.centre, study.step))
-
-
-def point_record(study: Study, surfaces: list[Surface], point: Array) -> dict[str, Any]:
+def predicted_record(study: Study, surfaces: list[Surface], point: Array) -> dict[str, Any]:
     """Factors, responses on the surfaces and their 95 % half widths at a point in factor units."""
     coded = to_coded(point, study.centre, study.step)
     errors = np.array([surface.prediction_standard_error(coded) for surface in surfaces])
     values = predict_all(surfaces, coded[None])[0]
-    return _named(study, point, values, half_widths(surfaces, errors))
+    return point_record(study, point, values, half_widths(surfaces, errors))
 
 
 def asked_point_record(study: Study, surfaces: list[Surface], front: ParetoFront, point: Array) -> dict[str, Any]:
@@ -92,7 +86,7 @@ def asked_point_record(study: Study, surfaces: list[Surface], front: ParetoFront
     beyond = beyond_runs(study, coded)
     outside = " The point lies farther out than any run: the surfaces extrapolate there." if beyond else ""
     return {
-        **point_record(study, surfaces, point),
+        **predicted_record(study, surfaces, point),
         "predicted_gains": gains_record(gains),
         "dominated_by": int(dominates(front.costs, costs).sum()),
         "beyond_runs": beyond,
@@ -195,16 +189,6 @@ def _cells(point: dict[str, Any]) -> list[str]:
         for name, x in point["responses"].items()
     ]
     return factors + shown
-
-
-def _named(study: Study, point: Array, values: Array, errors: Array) -> dict[str, Any]:
-    return {
-        "factors": dict(zip(study.factors, point.tolist(), strict=True)),
-        "responses": dict(zip(study.responses, values.tolist(), strict=True)),
-        "errors": {
-            name: None if np.isnan(error) else float(error) for name, error in zip(study.responses, errors, strict=True)
-        },
-    }
 
 
 def _extreme(study: Study, front: ParetoFront, rows: Any) -> dict[str, float]:

@@ -20,9 +20,9 @@ def tolerance_aware_record(study: Study, surfaces: list[Surface], found: Toleran
     """JSON of a tolerance-aware front. ``robust``: what manufacture leaves of a response (of its distance from the
     target, where it has one).
     """
-    named = [study.responses[index] for index in _objectives(study)]
-    target = np.array([study.file.response[index].goal == "max" for index in _objectives(study)])
-    sign = np.where(target, -1.0, 1.0)
+    wanted = [response for response in study.file.response if response.goal != "none"]
+    named = [response.name for response in wanted]
+    sign = np.array([-1.0 if response.goal == "max" else 1.0 for response in wanted])
 
     def robust(costs: np.ndarray) -> dict[str, float]:
         return dict(zip(named, (sign * costs).tolist(), strict=True))
@@ -89,7 +89,3 @@ def print_tolerance_aware(record: dict[str, Any]) -> None:
 
 def _robust_gain(percent: float | None) -> str:
     return "" if percent is None else f", and {percent:.2f} % more in what manufacture leaves"
-
-
-def _objectives(study: Study) -> list[int]:
-    return [index for index, response in enumerate(study.file.response) if response.goal != "none"]

@@ -16,10 +16,10 @@ from doe.study.limits import limits_of
 from rbdyn.cli.terminal import print_table
 
 if TYPE_CHECKING:
-    from doe.study import Outcome
+    from doe.study import StudyResult
 
 
-def print_outcome(outcome: Outcome, quiet: bool) -> None:
+def print_outcome(outcome: StudyResult, quiet: bool) -> None:
     """The end of a study on the terminal: the answer last, where the eye is."""
     study = outcome.study
     if not quiet and outcome.beside and study.file.reference:
@@ -32,13 +32,13 @@ def print_outcome(outcome: Outcome, quiet: bool) -> None:
             print(f"note: {note}")
 
 
-def print_verdict(outcome: Outcome) -> None:
+def print_verdict(outcome: StudyResult) -> None:
     """What became of the limits: the first that is to be read."""
     if outcome.limits_sentence:
         print(outcome.limits_sentence)
 
 
-def answer_text(outcome: Outcome) -> str:
+def answer_text(outcome: StudyResult) -> str:
     """The answer as it is printed."""
     with redirect_stdout(io.StringIO()) as text:
         print_verdict(outcome)
@@ -46,7 +46,7 @@ def answer_text(outcome: Outcome) -> str:
     return text.getvalue()
 
 
-def _print_answer(outcome: Outcome) -> None:
+def _print_answer(outcome: StudyResult) -> None:
     from doe.clearance import direct_run
 
     study = outcome.study
@@ -75,7 +75,7 @@ def _print_answer(outcome: Outcome) -> None:
         print(f"failed ({len(group['labels'])}): {', '.join(group['labels'])}: {group['cause']}")
 
 
-def _print_limits(outcome: Outcome) -> None:
+def _print_limits(outcome: StudyResult) -> None:
     """Every limit at the baseline and at the pick, judged by simulation."""
     rows = []
     for limit in outcome.limits:
@@ -87,7 +87,7 @@ def _print_limits(outcome: Outcome) -> None:
         print_table("limits judged by simulation", header, rows)
 
 
-def _print_clearances(outcome: Outcome) -> None:
+def _print_clearances(outcome: StudyResult) -> None:
     found = outcome.tolerances
     half_widths = [None] * len(outcome.study.factors) if found is None else found.half_widths.tolist()
     rows = [
@@ -102,7 +102,7 @@ def _print_clearances(outcome: Outcome) -> None:
         print(f"tolerances: {found.sentence}")
 
 
-def _print_other_points(outcome: Outcome) -> None:
+def _print_other_points(outcome: StudyResult) -> None:
     """Confirmed points beside the pick."""
     study = outcome.study
     others = {name: each for name, each in outcome.confirmed.items() if name not in ("baseline", "pick")}
@@ -120,7 +120,7 @@ def _print_other_points(outcome: Outcome) -> None:
     print_table("other points, improvements confirmed by simulation", ("", *study.factors, *wanted), rows)
 
 
-def _print_beside(reference: str, outcome: Outcome) -> None:
+def _print_beside(reference: str, outcome: StudyResult) -> None:
     rows = []
     for row in outcome.beside:
         rows.append((row.response, "level: min, mean, max", _three(row.our_range), _three(row.their_range), ""))

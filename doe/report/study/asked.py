@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from doe.designs import to_actual
 from doe.report.steps.confirmation import or_none
+from doe.report.steps.design import runs_record
 from doe.study.design import evaluation
 from doe.study.goals import known_tolerances, region_of
 
 if TYPE_CHECKING:
-    from doe.study import Outcome
+    from doe.study import StudyResult
     from doe.study_file import Study
 
 
@@ -43,36 +44,27 @@ def asked_record(study: Study) -> dict[str, Any]:
     }
 
 
-def design_record(outcome: Outcome) -> dict[str, Any]:
+def design_record(outcome: StudyResult) -> dict[str, Any]:
     """Points with what they gave, what the design can tell, and which runs failed."""
     from doe.running.failure import grouped
 
     study, design, runs = outcome.study, outcome.design, outcome.runs
     rows = {place: row for row, place in enumerate(runs.places)}
-    actual = to_actual(design.coded, study.centre, study.step)
     return {
         "kind": study.file.design.kind,
         "runs": len(design.coded),
         "factors": study.factors,
         "responses": study.responses,
         "points": [
-            {
-                "run": place + 1,
-                "kind": str(design.kind[place]),
-                "block": design.block_numbers[place],
-                "coded": dict(zip(study.factors, design.coded[place].tolist(), strict=True)),
-                "factors": dict(zip(study.factors, actual[place].tolist(), strict=True)),
-                "responses": _responses(outcome, rows.get(place)),
-                "seed": study.file.design.seed + int(design.order[place]),
-            }
-            for place in range(len(design.coded))
+            {**run, "responses": _responses(outcome, rows.get(place))}
+            for place, run in enumerate(runs_record(study, design))
         ],
         "evaluation": evaluation(study, design),
         "failures": grouped(runs.failures),
     }
 
 
-def _responses(outcome: Outcome, row: int | None) -> dict[str, Any]:
+def _responses(outcome: StudyResult, row: int | None) -> dict[str, Any]:
     """What a run gave, by response; nothing of one that failed."""
     if row is None:
         return {}

@@ -15,13 +15,13 @@ from rbdyn.result import write_json
 
 if TYPE_CHECKING:
     from doe.dimension_chain import Part
-    from doe.study import Outcome
+    from doe.study import StudyResult
 
 # Shaft turns of the motion that is drawn.
 DRAWN_TURNS = 10.0
 
 
-def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
+def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     """Write everything into ``folder``; returns the record of the study, whose ``files`` names them.
 
     summary.json is written last: where it is, all else is whole.
@@ -68,7 +68,7 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     return record
 
 
-def _runs_table(outcome: Outcome) -> list[dict[str, Any]]:
+def _runs_table(outcome: StudyResult) -> list[dict[str, Any]]:
     study, runs, design = outcome.study, outcome.runs, outcome.design
     return [
         {
@@ -84,7 +84,7 @@ def _runs_table(outcome: Outcome) -> list[dict[str, Any]]:
     ]
 
 
-def _beside_table(outcome: Outcome) -> list[dict[str, Any]]:
+def _beside_table(outcome: StudyResult) -> list[dict[str, Any]]:
     study, runs = outcome.study, outcome.runs
     assert outcome.reference_values is not None
     return [
@@ -98,7 +98,7 @@ def _beside_table(outcome: Outcome) -> list[dict[str, Any]]:
     ]
 
 
-def _confirmation_table(outcome: Outcome) -> list[dict[str, Any]]:
+def _confirmation_table(outcome: StudyResult) -> list[dict[str, Any]]:
     study = outcome.study
     rows = []
     for name, each in outcome.confirmed.items():

@@ -18,7 +18,7 @@ from doe.study.design import design_of
 
 if TYPE_CHECKING:
     from doe.response_surface import Surface
-    from doe.study import Outcome
+    from doe.study import StudyResult
     from doe.study_file import Study
 
 
@@ -65,7 +65,7 @@ def _bounds(study: Study, name: str) -> list[float]:
     return [bound for bound in (response.lower, response.upper) if bound is not None]
 
 
-def pareto_front(outcome: Outcome, path: Path) -> None:
+def pareto_front(outcome: StudyResult, path: Path) -> None:
     """Every pair of responses: the fronts, baseline and pick on the surfaces, and both as they were simulated."""
     study, surfaces = outcome.study, outcome.surfaces
     clouds = [("front on the surfaces", outcome.front.values, "tab:blue")]
@@ -83,18 +83,10 @@ def pareto_front(outcome: Outcome, path: Path) -> None:
             ("pick", outcome.pick, "*", "tab:red"),
         ):
             coded = to_coded(each.point, study.centre, study.step)
-            told = [float(surface.predict(coded)) for surface in surfaces]
+            predicted = [float(surface.predict(coded)) for surface in surfaces]
             size = 13 if marker == "*" else 6
-            axis.plot(told[i], told[j], marker, color=color, markersize=size, label=f"{words} on the surfaces")
-            axis.plot(
-                each.values[i],
-                each.values[j],
-                marker,
-                mfc="none",
-                color=color,
-                markersize=size,
-                label=f"{words} simulated",
-            )
+            for x, simulated, face in ((predicted, "on the surfaces", color), (each.values, "simulated", "none")):
+                axis.plot(x[i], x[j], marker, mfc=face, color=color, markersize=size, label=f"{words} {simulated}")
         for number, (draw, response) in enumerate(((axis.axvline, i), (axis.axhline, j))):
             for bound in _bounds(study, surfaces[response].name):
                 words = f"limit {label(surfaces[response].name)} {bound:g}" if number == 0 else ""

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 from doe.report.steps.confirmation import confirmation_record, direct_record, edge_record, gains_record, limits_record
 from doe.report.steps.fit import fit_record
-from doe.report.steps.front import front_record, point_record
+from doe.report.steps.front import front_record, predicted_record
 from doe.report.study.asked import asked_record, design_record
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
 from rbdyn.result import versions
 
 if TYPE_CHECKING:
-    from doe.study import Outcome
+    from doe.study import StudyResult
     from doe.study.direct_pick import DirectPick
 
 FORMAT = "doe.study/1"
 
 
-def summary(outcome: Outcome) -> dict[str, Any]:
+def summary(outcome: StudyResult) -> dict[str, Any]:
     """JSON of ``doe study``."""
     study, gains = outcome.study, outcome.gains["pick"]
     record: dict[str, Any] = {
@@ -33,7 +33,7 @@ def summary(outcome: Outcome) -> dict[str, Any]:
         "design": design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),
-        "pick_on_surfaces": point_record(study, outcome.surfaces, outcome.pick.point),
+        "pick_on_surfaces": predicted_record(study, outcome.surfaces, outcome.pick.point),
         "pick": dict(zip(study.factors, outcome.pick.point.tolist(), strict=True)),
         "confirmation": confirmation_record(outcome),
         "gains": gains_record(gains),
@@ -67,7 +67,7 @@ def _chosen_record(pick: DirectPick) -> dict[str, Any]:
     }
 
 
-def _beside_record(outcome: Outcome) -> dict[str, Any]:
+def _beside_record(outcome: StudyResult) -> dict[str, Any]:
     return {
         row.response: {
             "ours_min_mean_max": [float(x) for x in row.our_range],
