@@ -9,7 +9,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rbdyn.cli.ball import ball
-from rbdyn.cli.options import Json, Out, Quiet, Replicates, SceneFile, Seed, Set, Turns, Verbose, Workers
+from rbdyn.cli.options import (
+    Json,
+    Out,
+    Quiet,
+    Replicates,
+    SceneFile,
+    Seed,
+    Set,
+    Turns,
+    Verbose,
+    Workers,
+    count_option,
+    folder_option,
+    study_flag,
+    verbose_flag,
+)
 from rbdyn.cli.terminal import FAILED, guarded, keeping, output_folder, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
@@ -74,33 +89,17 @@ def simulate(
 def accuracy(
     scene: SceneFile,
     assignments: Set = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write the study as JSON, CSV and pictures here.")
-    ] = None,
-    methods: Annotated[bool, typer.Option("--methods", help="Other integrators beside ours, instead.")] = False,
-    slices: Annotated[bool, typer.Option("--slices", help="Slices of a profiled roller, instead.")] = False,
-    replicates: Annotated[
-        bool, typer.Option("--replicates", help="Statistical error against run time, instead.")
-    ] = False,
-    coverage: Annotated[
-        bool, typer.Option("--coverage", help="How often the stated intervals hold the truth, instead.")
-    ] = False,
-    repeats: Annotated[
-        int | None, typer.Option(min=2, max=100_000, metavar="N", help="Repeats of the coverage; 200 unless given.")
-    ] = None,
-    options: Annotated[bool, typer.Option("--options", help="What each option costs, instead.")] = False,
-    stability: Annotated[
-        bool, typer.Option("--stability", help="How stiff and extreme variants of the scene end, instead.")
-    ] = False,
-    scaling: Annotated[
-        bool, typer.Option("--scaling", help="Time by rollers and slices, memory by turns, instead.")
-    ] = False,
-    battery: Annotated[
-        bool, typer.Option("--battery", help="Solvers over thousands of random ball bearings, instead.")
-    ] = False,
-    scenes: Annotated[
-        int | None, typer.Option(min=1, max=100_000, metavar="N", help="Scenes of the battery; 5000 unless given.")
-    ] = None,
+    out: Annotated[Path | None, folder_option("Write the study as JSON, CSV and pictures here.")] = None,
+    methods: Annotated[bool, study_flag("--methods", "Other integrators beside ours")] = False,
+    slices: Annotated[bool, study_flag("--slices", "Slices of a profiled roller")] = False,
+    replicates: Annotated[bool, study_flag("--replicates", "Statistical error against run time")] = False,
+    coverage: Annotated[bool, study_flag("--coverage", "How often the stated intervals hold the truth")] = False,
+    repeats: Annotated[int | None, count_option(2, "Repeats of the coverage; 200 unless given.")] = None,
+    options: Annotated[bool, study_flag("--options", "What each option costs")] = False,
+    stability: Annotated[bool, study_flag("--stability", "How stiff and extreme variants of the scene end")] = False,
+    scaling: Annotated[bool, study_flag("--scaling", "Time by rollers and slices, memory by turns")] = False,
+    battery: Annotated[bool, study_flag("--battery", "Solvers over thousands of random ball bearings")] = False,
+    scenes: Annotated[int | None, count_option(1, "Scenes of the battery; 5000 unless given.")] = None,
     trajectory: Annotated[
         float | None, typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25.")
     ] = None,
@@ -110,45 +109,35 @@ def accuracy(
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also versions.")] = False,
+    verbose: Annotated[bool, verbose_flag("Also versions.")] = False,
 ) -> None:
     """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, the solvers."""
     with guarded(as_json):
         from rbdyn import accuracy as studies
-
-        asked = {
-            "methods": methods,
-            "slices": slices,
-            "replicates": replicates,
-            "coverage": coverage,
-            "options": options,
-            "stability": stability,
-            "scaling": scaling,
-            "battery": battery,
-        }
-        from rbdyn.accuracy.asked import asked_study
+        from rbdyn.accuracy.choice import chosen_study
         from rbdyn.scene import Scene
 
-        loaded = Scene.load(scene, assignments or [])
-        given = {
-            "turns": trajectory,
-            "scenes": scenes,
-            "repeats": repeats,
-            "sought": None if sought is None else 0.01 * sought,
+        flags = {
+            **{"methods": methods, "slices": slices, "replicates": replicates, "coverage": coverage},
+            **{"options": options, "stability": stability, "scaling": scaling, "battery": battery},
         }
-        limits = {key: value for key, value in given.items() if value is not None}
-        name = asked_study(asked, limits, loaded)
+        loaded = Scene.load(scene, assignments or [])
+        typed = {"turns": trajectory, "scenes": scenes, "repeats": repeats, "sought": sought}
+        limits = {key: value for key, value in typed.items() if value is not None}
+        name = chosen_study(flags, limits, loaded)
+        if "sought" in limits:
+            limits["sought"] *= 0.01
         folder = output_folder(out, "rbdyn accuracy", scene) if out else None
         with progress_bar(name, quiet or as_json) as progress:
-            found = studies.study(name, loaded, progress, **limits)
-        files = studies.write(found, folder) if folder else []
+            report = studies.study(name, loaded, progress, **limits)
+        files = studies.write(report, folder) if folder else []
         if as_json:
-            print_json(found.record)
+            print_json(report.record)
         else:
-            studies.show(found, verbose)
+            studies.show(report, verbose)
             if folder:
                 print(f"written to {folder}: {', '.join(files)}")
-    if found.failed:
+    if report.failed:
         raise typer.Exit(FAILED)
 
 
@@ -174,8 +163,7 @@ def slip_map(
     seed: Seed = None,
     workers: Workers = None,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Write map.json, map.csv and map.png here, and keep finished points."),
+        Path | None, folder_option("Write map.json, map.csv and map.png here, and keep finished points.")
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -315,16 +303,14 @@ def _print_target(target: dict[str, Any]) -> None:
 @app.command()
 def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write here; by default in 'show' beside the result.")
-    ] = None,
+    out: Annotated[Path | None, folder_option("Write here; by default in 'show' beside the result.")] = None,
     turns: Annotated[float | None, typer.Option(help="Counted shaft turns to show; at most 20 unless given.")] = None,
     replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, typer.Option("--animate", help="Also a moving picture and a player.")] = False,
     lyapunov: Annotated[bool, typer.Option("--lyapunov", help="Also the largest Lyapunov exponent.")] = False,
     as_json: Json = False,
     quiet: Quiet = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also peaks of the spectra.")] = False,
+    verbose: Annotated[bool, verbose_flag("Also peaks of the spectra.")] = False,
 ) -> None:
     """Show how the bearing of a saved result moves: pictures, history.csv and orbit.json."""
     with guarded(as_json):

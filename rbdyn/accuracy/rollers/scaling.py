@@ -2,8 +2,7 @@
 
 More rollers stand on a pitch circle larger in proportion; load, cage and inner ring grow with them, so that each roller
 bears the same, and the speed falls so that surface speeds stay; a turn then takes longer, in proportion. More slices
-cut the same roller finer. Times are the
-least of several of a single-threaded run, taken in turns over the sizes, after everything was compiled.
+cut the same roller finer. Times are the least of several of a single-threaded run, taken in turns over the sizes, after everything was compiled.
 """
 
 from __future__ import annotations
@@ -12,12 +11,12 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rbdyn.accuracy.report import Report, Table, record
+from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
 from rbdyn.accuracy.rollers.footprint import last_line
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
@@ -46,6 +45,14 @@ class Point:
     turn_ms: float
     of_real_time: float
     rhs_per_turn: float
+
+
+COLUMNS: Columns = {
+    "ns a right-hand side": ("rhs_ns", ".0f"),
+    "right-hand sides a turn": ("rhs_per_turn", ".0f"),
+    "ms a turn": ("turn_ms", ".2f"),
+    "s a simulated s": ("of_real_time", ".2f"),
+}
 
 
 @dataclass(frozen=True)
@@ -91,21 +98,13 @@ def scaling(
         "rollers": {count: with_rollers(scene, count) for count in rollers},
         "slices": {count: with_slices(scene, count) for count in slices},
     }
-    steps = len(rollers) + len(slices) + len(memory_turns)
-    done = 0
-
-    def step() -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done, steps)
-
-    points = {kind: _times(sizes, step) for kind, sizes in scenes.items()}
+    counted = Progress(progress, len(rollers) + len(slices) + len(memory_turns))
+    points = {kind: _times(sizes, counted.step) for kind, sizes in scenes.items()}
     prepare(scene, roller_bearing(scene))  # so that no process compiles, which takes memory too
     memory = []
     for turns in memory_turns:
         memory.append(Memory(turns, peak_memory(scene, turns)))
-        step()
+        counted.step()
     return Scaling(points, memory)
 
 
@@ -227,42 +226,28 @@ def study(scene: Scene, progress: Callable[[int, int], None] | None = None) -> R
 
 def report(found: Scaling) -> Report:
     """Tables, fits and picture of what was measured."""
-    tables, sentences = [], []
-    for kind, points in found.points.items():
-        header = (kind, "ns a right-hand side", "right-hand sides a turn", "ms a turn", "s a simulated s")
-        cells = [
-            (
-                f"{point.size}",
-                f"{point.rhs_ns:.0f}",
-                f"{point.rhs_per_turn:.0f}",
-                f"{point.turn_ms:.2f}",
-                f"{point.of_real_time:.2f}",
-            )
-            for point in points
-        ]
-        tables.append(Table("", header, cells))
-        line = found.lines[kind]
-        sentences.append(
-            f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f}); "
-            f"as a power: n^{line.exponent:.2f}"
-        )
+    tables = [tabled("", points, {kind: ("size", ""), **COLUMNS}) for kind, points in found.points.items()]
+    sentences = [
+        f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f}); "
+        f"as a power: n^{line.exponent:.2f}"
+        for kind, line in found.lines.items()
+    ]
     sentences += [
         f"{memory.turns} counted turns: at most {memory.peak_MiB:.1f} MiB in a process of its own"
         for memory in found.memory
     ]
+    points = {kind: records(sizes) for kind, sizes in found.points.items()}
     return Report(
         stem="scaling",
         record=record(
             FORMAT,
-            **{kind: [point.__dict__ for point in points] for kind, points in found.points.items()},
-            fits={kind: line.__dict__ for kind, line in found.lines.items()},
-            memory=[memory.__dict__ for memory in found.memory],
+            **points,
+            fits={kind: asdict(line) for kind, line in found.lines.items()},
+            memory=records(found.memory),
         ),
         tables=tables,
         sentences=sentences,
-        sheets={
-            "scaling": [{"of": kind, **point.__dict__} for kind, points in found.points.items() for point in points]
-        },
+        sheets={"scaling": [{"of": kind, **point} for kind, sizes in points.items() for point in sizes]},
         pictures={"scaling": lambda path: _draw(found, path)},
     )
 
