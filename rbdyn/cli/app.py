@@ -25,7 +25,7 @@ from rbdyn.cli.options import (
     study_flag,
     verbose_flag,
 )
-from rbdyn.cli.terminal import FAILED, guarded, keeping, output_folder, print_json, print_table, progress_bar
+from rbdyn.cli.terminal import FAILED, guarded, hand_over, keeping, output_folder, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -67,7 +67,7 @@ def simulate(
 ) -> None:
     """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss."""
     with guarded(as_json):
-        loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
+        loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
         aim = None if target is None else _aim(target, turns, replicates)
         folder = output_folder(out, "rbdyn simulate", scene) if out else None
         from rbdyn.dynamics.simulate import simulate as run_scene
@@ -75,14 +75,8 @@ def simulate(
         with progress_bar("simulating", quiet or as_json) as progress:
             result = run_scene(loaded, workers, progress, target=aim)
         loaded = type(loaded).from_dict(result.scene)
-        if folder:
-            _write(loaded, result, folder)
-        if as_json:
-            print_json(result.as_dict())
-        else:
-            _print(result, quiet, verbose)
-            if folder:
-                print(f"written to {folder}: result.json, history.csv, cage_orbit.png, pocket_forces.png")
+        files = _write(loaded, result, folder) if folder else []
+        hand_over(result.as_dict, as_json, lambda: _print(result, quiet, verbose), folder, files)
 
 
 @app.command()
@@ -131,14 +125,19 @@ def accuracy(
         with progress_bar(name, quiet or as_json) as progress:
             report = studies.study(name, loaded, progress, **limits)
         files = studies.write(report, folder) if folder else []
-        if as_json:
-            print_json(report.record)
-        else:
-            studies.show(report, verbose)
-            if folder:
-                print(f"written to {folder}: {', '.join(files)}")
+        hand_over(lambda: report.record, as_json, lambda: studies.show(report, verbose), folder, files)
     if report.failed:
         raise typer.Exit(FAILED)
+
+
+def _print_map(found: SlipMap) -> None:
+    header = ("load [N]", *(f"{value:g} rpm" for value in found.speeds_rpm))
+    rows = [
+        (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
+        for value, row in zip(found.loads_N, found.grid("cage_slip"), strict=True)
+    ]
+    print_table("cage slip", header, rows)
+    print(f"{len(found.points)} points in {found.wall_s:.1f} s, seed {found.seed}")
 
 
 def _write_map(found: SlipMap, folder: Path) -> list[str]:
@@ -170,7 +169,7 @@ def slip_map(
 ) -> None:
     """Map cage slip, power loss, impact and whirl over speed and load."""
     with guarded(as_json):
-        loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
+        loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
         folder = output_folder(out, "rbdyn map", scene) if out else None
         from rbdyn.cli.ranges import axis_values
         from rbdyn.dynamics import slip_map as study
@@ -180,36 +179,19 @@ def slip_map(
         with keeping(points), progress_bar("mapping", quiet or as_json) as progress:
             found = study.slip_map(loaded, *axes, workers, progress, points)
         files = _write_map(found, folder) if folder else []
-        if as_json:
-            print_json(found.as_dict())
-        else:
-            header = ("load [N]", *(f"{value:g} rpm" for value in found.speeds_rpm))
-            rows = [
-                (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
-                for value, row in zip(found.loads_N, found.grid("cage_slip"), strict=True)
-            ]
-            print_table("cage slip", header, rows)
-            print(f"{len(found.points)} points in {found.wall_s:.1f} s, seed {found.seed}")
-            if folder:
-                print(f"written to {folder}: {', '.join(files)}")
+        hand_over(found.as_dict, as_json, lambda: _print_map(found), folder, files)
         for point in found.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
     if found.failed:
         raise typer.Exit(FAILED)
 
 
-def _rollers(path: Path, overrides: list[str]) -> Scene:
-    """Scene of a roller bearing. Raises InputError for any other."""
+def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> Scene:
+    """Scene of a roller bearing, with keys of [numerics] that have options of their own. Raises InputError for any other."""
     from rbdyn.scene import Scene, rollers_only
 
-    return rollers_only(Scene.load(path, overrides))
-
-
-def _overrides(
-    assignments: list[str] | None, turns: float | None, replicates: int | None, seed: int | None
-) -> list[str]:
-    shorthand = {"turns": turns, "replicates": replicates, "seed": seed}
-    return [*(assignments or []), *(f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None)]
+    numerics = (f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None)
+    return rollers_only(Scene.load(path, [*(assignments or []), *numerics]))
 
 
 def _aim(target: str, turns: float | None, replicates: int | None) -> float:
@@ -222,7 +204,7 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     return target_of(target)
 
 
-def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:
+def _write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     from rbdyn import plots
     from rbdyn.dynamics.motion.history import history, most_turns
 
@@ -233,6 +215,7 @@ def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:
     title = f"first {turns:g} counted shaft turns"
     plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
     plots.pocket_forces({title: shown}, folder / "pocket_forces.png")
+    return ["result.json", "history.csv", "cage_orbit.png", "pocket_forces.png"]
 
 
 def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:

@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
 from rbdyn.dynamics.parameters.geometry import roller_radii
+from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import FIGURES
 from rbdyn.result import Quantity, SimulationResult
@@ -101,11 +101,6 @@ def one_bearing(scene: Scene) -> Scene:
     errors_um = (1e6 * radii - 500.0 * scene.bearing.roller_diameter_mm) / 0.5
     rollers = {"roller_diameter_spread_um": 0.0, "roller_diameter_errors_um": errors_um.tolist()}
     return scene.model_copy(update={"bearing": scene.bearing.model_copy(update=rollers)})
-
-
-def with_numerics(scene: Scene, **changes: Any) -> Scene:
-    """The scene with other numerics."""
-    return scene.model_copy(update={"numerics": scene.numerics.model_copy(update=changes)})
 
 
 def truth_of(scene: Scene) -> Scene:

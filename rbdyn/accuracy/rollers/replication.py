@@ -21,7 +21,7 @@ from rbdyn.accuracy.rollers.tolerances import OUTPUTS
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
-from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.scene import Scene
 
@@ -112,12 +112,10 @@ def pool_of_runs(
     counted = Progress(progress, len(turns) * pool)
     values, cpu_s = {}, {}
     for length in turns:
-        update = {"turns": length, "replicates": pool, "impact_window_turns": min(turns)}
-        numerics = scene.numerics.model_copy(update=update)
-        longer = scene.model_copy(update={"numerics": numerics})
+        longer = with_numerics(scene, turns=length, replicates=pool, impact_window_turns=min(turns))
         bearing = roller_bearing(longer)
         prepare(longer, bearing)
-        runs = run_series(longer, bearing, [numerics.rtol], None, counted.step, Stop())[0]
+        runs = run_series(longer, bearing, [scene.numerics.rtol], None, counted.step, Stop())[0]
         values[length] = {name: np.array([figure(run) for run in runs]) for name, figure in OUTPUTS.items()}
         cpu_s[length] = float(np.mean([run.cpu_s for run in runs]))
     return values, cpu_s

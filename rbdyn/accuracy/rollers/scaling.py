@@ -8,7 +8,6 @@ cut the same roller finer. Times are the least of several of a single-threaded r
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -17,14 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
-from rbdyn.accuracy.rollers.footprint import last_line
+from rbdyn.accuracy.rollers.footprint import printed
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import InputError, RunError
+from rbdyn.faults import InputError
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.accuracy.rollers.scaling/1"
@@ -187,16 +186,8 @@ def peak_memory(scene: Scene, turns: int) -> float:
     Raises RunError where that process fails.
     """
     chosen = with_options(scene, [f"numerics.turns={turns}", "numerics.replicates=1", "numerics.companion=false"])
-    found = subprocess.run(
-        [sys.executable, "-c", "from rbdyn.accuracy.rollers.scaling import print_peak_memory; print_peak_memory()"],
-        input=json.dumps(chosen.model_dump(mode="json", exclude_none=True)),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if found.returncode != 0:
-        raise RunError(f"the memory of {turns} turns could not be measured: {last_line(found.stderr)}")
-    return float(found.stdout)
+    fault = f"the memory of {turns} turns could not be measured"
+    return float(printed(print_peak_memory, chosen.model_dump(mode="json", exclude_none=True), fault))
 
 
 def print_peak_memory() -> None:
