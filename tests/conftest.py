@@ -74,6 +74,13 @@ EVERYTHING = (
 )
 
 
+def law_types(parameters: Any) -> set[type]:
+    """Types of all NamedTuples within the parameters of a bearing: they choose what is compiled."""
+    if not isinstance(parameters, tuple):
+        return set()
+    return {type(parameters)}.union(*map(law_types, parameters))
+
+
 class Outcome(NamedTuple):
     """What one call of the right-hand side fills."""
 

@@ -10,10 +10,9 @@ import math
 
 import numpy as np
 import pytest
-from conftest import make, right_hand_side, state_near_contact
+from conftest import law_types, make, right_hand_side, state_near_contact
 from interpreted_invariants import REWRITTEN, on_both
 
-from rbdyn.accuracy.rollers.footprint import law_types
 from rbdyn.accuracy.rollers.option_cost import OPTIONS
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.film import ShortJournalFilm

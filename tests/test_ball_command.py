@@ -25,7 +25,7 @@ QUIET = EXAMPLES / "angular_contact_7014.toml"
 
 def test_unit_preload_study_finds_both_optima():
     """Unit: the least stress and the longest life are no worse than any point of the scan."""
-    record = optimum_study(Scene.load(SINGLE), "preload", [0.0, 50.0, 100.0, 200.0])
+    record, _ = optimum_study(Scene.load(SINGLE), "preload", [0.0, 50.0, 100.0, 200.0])
     stresses = [max(point["inner_stress_MPa"], point["outer_stress_MPa"]) for point in record["points"]]
     assert record["least_stress"]["max_stress_MPa"] <= min(stresses)
     assert record["longest_life"]["L10_Mrev"] >= max(point["L10_Mrev"] for point in record["points"])

@@ -15,10 +15,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import law_types
 
 import rbdyn.contact
 import rbdyn.dynamics
-from rbdyn.accuracy.rollers.footprint import added_modules, instructions, law_types, parameter_bytes
+from rbdyn.accuracy.rollers.footprint import added_modules, instructions, parameter_bytes
 from rbdyn.accuracy.rollers.option_cost import OPTIONS, with_options
 from rbdyn.contact.film import journal_film_force
 from rbdyn.contact.hertz_line import sum_of_slices

@@ -156,7 +156,7 @@ def test_unit_missing_cvode_is_a_row(smooth, smooth_end, monkeypatch):
     for method in CVODE:
         (row,) = attempts_of(method, [smooth], smooth_end)
         assert row.status == "not installed: pip install 'rbdyn[bench]'"
-        assert row.as_dict()["turn_ms"] is None
+        assert row.turn_ms is None
 
 
 def test_unit_times_faster():

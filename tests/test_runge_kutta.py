@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from rbdyn.dynamics.ensemble import CancelledError, Stop
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import POWERS, SHAFT
+from rbdyn.dynamics.integrators import dormand_prince as dp
 from rbdyn.dynamics.integrators import runge_kutta as rk
 from rbdyn.dynamics.parameters.geometry import scales
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -63,7 +64,7 @@ def orders_of(scene):
     return [slope_of(steps, errors[:, kind].max(axis=1)) for kind in (slice(0, 20), slice(20, 40))]
 
 
-def one_step(bearing, y, h, evaluate, table=rk.A):
+def one_step(bearing, y, h, evaluate, table=dp.A):
     """One step in Python from a module's table, in fixed axes: stages and end state."""
     k = np.empty((len(table), y.size))
     k[0] = evaluate(bearing, y).dy
@@ -95,7 +96,7 @@ def test_unit_dense_output_meets_the_ends():
     """Unit: values and slopes at both ends of a step are those of the step (round-off)."""
     draw = np.random.default_rng(0)
     step, h = SimpleNamespace(k=draw.normal(size=(7, 3)), y=draw.normal(size=3)), 0.3
-    end = step.y + h * rk.A[6] @ step.k[:6]
+    end = step.y + h * dp.A[6] @ step.k[:6]
     # Slopes at the ends are k_1 and k_7 whatever the stages between.
     for i in range(3):
         at = [rk.interpolate.py_func(step.y, step.k, h, theta, i) for theta in (0.0, 1.0, 1e-6, 1.0 - 1e-6)]
@@ -107,10 +108,10 @@ def test_unit_dense_output_meets_the_ends():
 def test_unit_tableau():
     """Unit: row sums, quadrature and tree conditions to order five, embedded weights, first same as last."""
     a = np.zeros((7, 7))
-    a[:, :6] = rk.A
-    b = np.array([rk.B1, 0.0, rk.B3, rk.B4, rk.B5, rk.B6, 0.0])
+    a[:, :6] = dp.A
+    b = np.array([dp.B1, 0.0, dp.B3, dp.B4, dp.B5, dp.B6, 0.0])
     c = a.sum(axis=1)
-    assert c == pytest.approx(rk.C, abs=1e-15)
+    assert c == pytest.approx(dp.C, abs=1e-15)
     assert a[6] == pytest.approx(b, abs=0.0)
     for power in range(5):
         assert b @ c**power == pytest.approx(1.0 / (power + 1), abs=1e-15)
@@ -130,11 +131,11 @@ def test_unit_tableau():
     }
     for name, (value, exact) in trees.items():
         assert value == pytest.approx(exact, abs=2e-15), name
-    e = np.array([rk.E1, 0.0, rk.E3, rk.E4, rk.E5, rk.E6, rk.E7])
+    e = np.array([dp.E1, 0.0, dp.E3, dp.E4, dp.E5, dp.E6, dp.E7])
     for power in range(4):  # the companion is of fourth order
         assert e @ c**power == pytest.approx(0.0, abs=1e-16)
     assert abs(e @ c**4) > 1e-5
-    d = (rk.D1, rk.D3, rk.D4, rk.D5, rk.D6, rk.D7)
+    d = (dp.D1, dp.D3, dp.D4, dp.D5, dp.D6, dp.D7)
     assert sum(d) == pytest.approx(0.0, abs=1e-14)
 
 
@@ -259,8 +260,8 @@ def test_oracle_peak_inside_one_step(conservative, evaluate):
         carry.k[:] = 0.0
         carry.k[0, 10], carry.k[6, 10] = speed, -fall * speed
         # Back where it came from at the end of the step, and a cubic between.
-        weights = np.array([[rk.B3, rk.B4], [rk.D3, rk.D4]])
-        carry.k[2:4, 10] = np.linalg.solve(weights, [-rk.B1 * speed, -(rk.D1 - rk.D7 * fall) * speed])
+        weights = np.array([[dp.B3, dp.B4], [dp.D3, dp.D4]])
+        carry.k[2:4, 10] = np.linalg.solve(weights, [-dp.B1 * speed, -(dp.D1 - dp.D7 * fall) * speed])
         thetas = np.linspace(0.0, 1.0, 2001)
         forces = []
         for theta in thetas:

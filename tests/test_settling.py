@@ -18,7 +18,7 @@ from rbdyn.dynamics.parameters.geometry import CAGE_SHARES, absolute_tolerance, 
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.start import start_state
 from rbdyn.dynamics.recording import Recording, record
-from rbdyn.dynamics.run import Run
+from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.settling import run_until_settled, whole_windows
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.drift import drift_of, drifting, slow_change, unseen_regime
@@ -236,7 +236,7 @@ def test_unit_coverage_counts(outer_result):
 def test_unit_repeats_are_of_one_bearing(make_scene):
     """Unit: rollers drawn from a spread stay those of the scene whatever the seed of a repeat."""
     drawn = make_scene("bearing.roller_diameter_spread_um=0.5")
-    fixed = coverage.with_numerics(coverage.one_bearing(drawn), seed=77)
+    fixed = with_numerics(coverage.one_bearing(drawn), seed=77)
     assert roller_radii(fixed) == pytest.approx(roller_radii(drawn), rel=1e-12)
     plain = make_scene()
     assert coverage.one_bearing(plain) is plain

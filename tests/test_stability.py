@@ -76,12 +76,16 @@ def test_unit_open_balance_is_unexplained(outer, monkeypatch):
 def test_unit_record_and_files(rows, tmp_path):
     """Unit: JSON without NaN, a line a case in the table, as many cells as headings."""
     listed = list(rows.values())
-    assert write(stability.report(listed), tmp_path) == ["stability.json", "stability.csv"]
+    report = stability.report(listed)
+    assert write(report, tmp_path) == ["stability.json", "stability.csv"]
     saved = json.loads((tmp_path / "stability.json").read_text())
     assert saved["format"] == "rbdyn.accuracy.rollers.stability/1" and saved["status"] == "ok"
     assert [case["case"] for case in saved["cases"]] == list(rows)
     assert len(pd.read_csv(tmp_path / "stability.csv")) == len(rows)
-    assert {len(row.cells()) for row in listed} == {len(stability.HEADER)}
+    (table,) = report.tables
+    assert [line[0] for line in table.cells] == list(rows) and {len(line) for line in table.cells} == {
+        len(table.header)
+    }
 
 
 @pytest.mark.parametrize(

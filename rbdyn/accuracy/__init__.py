@@ -1,7 +1,7 @@
 """How far the numbers are from true ones, and what that costs in time.
 
 Studies, each a module with ``study(scene, progress) -> Report``; the command ``rbdyn accuracy`` runs them by name:
-``rollers`` in time, ``balls`` in equilibrium. ``asked``: which study a command line means; ``judgement``: what errors
+``rollers`` in time, ``balls`` in equilibrium. ``choice``: which study a command line means; ``judgement``: what errors
 allow to conclude; ``report``: tables, files.
 
 A reference is a much tighter run that two methods agree on; an error and a time come from separate runs, the first
@@ -10,8 +10,8 @@ call never counts; what fails stays in the table. From Python::
     from rbdyn import Scene, accuracy
 
     scene = Scene.load("examples/cylindrical_roller.toml")
-    found = accuracy.study("methods", scene)  # .record, .tables, .sentences
-    accuracy.write(found, folder)  # JSON, CSV, pictures
+    report = accuracy.study("methods", scene)  # .record, .tables, .sentences
+    accuracy.write(report, folder)  # JSON, CSV, pictures
     rows = accuracy.statistics_bias(scene, (1e-1, 1e-2, 1e-3)).rows
 
 Names are fetched when first used: importing the package loads neither numba nor scipy.
@@ -59,8 +59,8 @@ def study(
 
     Raises KeyError for an unknown name, InputError where the scene has nothing to study, RunError, KeyboardInterrupt.
     """
-    found: Report = import_module(STUDIES[name]).study(scene, progress, **options)
-    return found
+    report: Report = import_module(STUDIES[name]).study(scene, progress, **options)
+    return report
 
 
 def __getattr__(name: str) -> Any:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from rbdyn.result import versions, write_json
+
+# Of each heading the field of a row and the format of its figure, see ``cell``, or a function that words it.
+Columns = Mapping[str, tuple[str, str] | Callable[[Any], str]]
 
 
 class Table(NamedTuple):
@@ -36,14 +39,45 @@ class Report:
 class Progress:
     """Counts what is done out of a known total."""
 
-    def __init__(self, told: Callable[[int, int], None] | None, total: int) -> None:
-        self.told, self.total, self.done = told, total, 0
+    def __init__(self, report: Callable[[int, int], None] | None, total: int) -> None:
+        self.report, self.total, self.done = report, total, 0
 
-    def step(self) -> None:
-        """One more is done."""
+    def step(self, *part: int) -> None:
+        """One more is done; what a ``part`` counts of its own does not matter here."""
         self.done += 1
-        if self.told is not None:
-            self.told(self.done, self.total)
+        if self.report is not None:
+            self.report(self.done, self.total)
+
+
+def cell(value: Any, form: str) -> str:
+    """A figure as text, None as nothing; a format that ends in " %" takes a share."""
+    if value is None:
+        return ""
+    return f"{100.0 * value:{form[:-2]}} %" if form.endswith(" %") else format(value, form)
+
+
+def tabled(title: str, rows: Iterable[Any], columns: Columns) -> Table:
+    """Table of rows, a line each."""
+    lines = [
+        tuple(each(row) if callable(each) else cell(getattr(row, each[0]), each[1]) for each in columns.values())
+        for row in rows
+    ]
+    return Table(title, tuple(columns), lines)
+
+
+def records(rows: Iterable[Any]) -> list[dict[str, Any]]:
+    """JSON of rows that are dataclasses."""
+    return [asdict(row) for row in rows]
+
+
+def flat(row: Mapping[str, Any], opened: str = "") -> dict[str, Any]:
+    """A record without nesting, for a sheet: figures of a table within it become ``name_table``, or plain ``name`` where
+    that is ``opened``.
+    """
+    row = {key: value for key, value in row.items() if key != opened} | (row.get(opened) or {})
+    nested = {key: value for key, value in row.items() if isinstance(value, dict)}
+    plain = {key: value for key, value in row.items() if key not in nested}
+    return plain | {f"{name}_{key}": value for key, table in nested.items() for name, value in table.items()}
 
 
 def record(form: str, **parts: Any) -> dict[str, Any]:

@@ -9,8 +9,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rbdyn.cli.ball import ball
-from rbdyn.cli.options import Json, Out, Quiet, Replicates, SceneFile, Seed, Set, Turns, Verbose, Workers
-from rbdyn.cli.terminal import FAILED, guarded, keeping, output_folder, print_json, print_table, progress_bar
+from rbdyn.cli.options import (
+    Json,
+    Out,
+    Quiet,
+    Replicates,
+    SceneFile,
+    Seed,
+    Set,
+    Turns,
+    Verbose,
+    Workers,
+    count_option,
+    folder_option,
+    study_flag,
+    verbose_flag,
+)
+from rbdyn.cli.terminal import FAILED, guarded, hand_over, keeping, output_folder, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -52,7 +67,7 @@ def simulate(
 ) -> None:
     """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss."""
     with guarded(as_json):
-        loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
+        loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
         aim = None if target is None else _aim(target, turns, replicates)
         folder = output_folder(out, "rbdyn simulate", scene) if out else None
         from rbdyn.dynamics.simulate import simulate as run_scene
@@ -60,47 +75,25 @@ def simulate(
         with progress_bar("simulating", quiet or as_json) as progress:
             result = run_scene(loaded, workers, progress, target=aim)
         loaded = type(loaded).from_dict(result.scene)
-        if folder:
-            _write(loaded, result, folder)
-        if as_json:
-            print_json(result.as_dict())
-        else:
-            _print(result, quiet, verbose)
-            if folder:
-                print(f"written to {folder}: result.json, history.csv, cage_orbit.png, pocket_forces.png")
+        files = _write(loaded, result, folder) if folder else []
+        hand_over(result.as_dict, as_json, lambda: _print(result, quiet, verbose), folder, files)
 
 
 @app.command()
 def accuracy(
     scene: SceneFile,
     assignments: Set = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write the study as JSON, CSV and pictures here.")
-    ] = None,
-    methods: Annotated[bool, typer.Option("--methods", help="Other integrators beside ours, instead.")] = False,
-    slices: Annotated[bool, typer.Option("--slices", help="Slices of a profiled roller, instead.")] = False,
-    replicates: Annotated[
-        bool, typer.Option("--replicates", help="Statistical error against run time, instead.")
-    ] = False,
-    coverage: Annotated[
-        bool, typer.Option("--coverage", help="How often the stated intervals hold the truth, instead.")
-    ] = False,
-    repeats: Annotated[
-        int | None, typer.Option(min=2, max=100_000, metavar="N", help="Repeats of the coverage; 200 unless given.")
-    ] = None,
-    options: Annotated[bool, typer.Option("--options", help="What each option costs, instead.")] = False,
-    stability: Annotated[
-        bool, typer.Option("--stability", help="How stiff and extreme variants of the scene end, instead.")
-    ] = False,
-    scaling: Annotated[
-        bool, typer.Option("--scaling", help="Time by rollers and slices, memory by turns, instead.")
-    ] = False,
-    battery: Annotated[
-        bool, typer.Option("--battery", help="Solvers over thousands of random ball bearings, instead.")
-    ] = False,
-    scenes: Annotated[
-        int | None, typer.Option(min=1, max=100_000, metavar="N", help="Scenes of the battery; 5000 unless given.")
-    ] = None,
+    out: Annotated[Path | None, folder_option("Write the study as JSON, CSV and pictures here.")] = None,
+    methods: Annotated[bool, study_flag("--methods", "Other integrators beside ours")] = False,
+    slices: Annotated[bool, study_flag("--slices", "Slices of a profiled roller")] = False,
+    replicates: Annotated[bool, study_flag("--replicates", "Statistical error against run time")] = False,
+    coverage: Annotated[bool, study_flag("--coverage", "How often the stated intervals hold the truth")] = False,
+    repeats: Annotated[int | None, count_option(2, "Repeats of the coverage; 200 unless given.")] = None,
+    options: Annotated[bool, study_flag("--options", "What each option costs")] = False,
+    stability: Annotated[bool, study_flag("--stability", "How stiff and extreme variants of the scene end")] = False,
+    scaling: Annotated[bool, study_flag("--scaling", "Time by rollers and slices, memory by turns")] = False,
+    battery: Annotated[bool, study_flag("--battery", "Solvers over thousands of random ball bearings")] = False,
+    scenes: Annotated[int | None, count_option(1, "Scenes of the battery; 5000 unless given.")] = None,
     trajectory: Annotated[
         float | None, typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25.")
     ] = None,
@@ -110,46 +103,41 @@ def accuracy(
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also versions.")] = False,
+    verbose: Annotated[bool, verbose_flag("Also versions.")] = False,
 ) -> None:
     """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, the solvers."""
     with guarded(as_json):
         from rbdyn import accuracy as studies
-
-        asked = {
-            "methods": methods,
-            "slices": slices,
-            "replicates": replicates,
-            "coverage": coverage,
-            "options": options,
-            "stability": stability,
-            "scaling": scaling,
-            "battery": battery,
-        }
-        from rbdyn.accuracy.asked import asked_study
+        from rbdyn.accuracy.choice import chosen_study
         from rbdyn.scene import Scene
 
-        loaded = Scene.load(scene, assignments or [])
-        given = {
-            "turns": trajectory,
-            "scenes": scenes,
-            "repeats": repeats,
-            "sought": None if sought is None else 0.01 * sought,
+        flags = {
+            **{"methods": methods, "slices": slices, "replicates": replicates, "coverage": coverage},
+            **{"options": options, "stability": stability, "scaling": scaling, "battery": battery},
         }
-        limits = {key: value for key, value in given.items() if value is not None}
-        name = asked_study(asked, limits, loaded)
+        loaded = Scene.load(scene, assignments or [])
+        typed = {"turns": trajectory, "scenes": scenes, "repeats": repeats, "sought": sought}
+        limits = {key: value for key, value in typed.items() if value is not None}
+        name = chosen_study(flags, limits, loaded)
+        if "sought" in limits:
+            limits["sought"] *= 0.01
         folder = output_folder(out, "rbdyn accuracy", scene) if out else None
         with progress_bar(name, quiet or as_json) as progress:
-            found = studies.study(name, loaded, progress, **limits)
-        files = studies.write(found, folder) if folder else []
-        if as_json:
-            print_json(found.record)
-        else:
-            studies.show(found, verbose)
-            if folder:
-                print(f"written to {folder}: {', '.join(files)}")
-    if found.failed:
+            report = studies.study(name, loaded, progress, **limits)
+        files = studies.write(report, folder) if folder else []
+        hand_over(lambda: report.record, as_json, lambda: studies.show(report, verbose), folder, files)
+    if report.failed:
         raise typer.Exit(FAILED)
+
+
+def _print_map(found: SlipMap) -> None:
+    header = ("load [N]", *(f"{value:g} rpm" for value in found.speeds_rpm))
+    rows = [
+        (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
+        for value, row in zip(found.loads_N, found.grid("cage_slip"), strict=True)
+    ]
+    print_table("cage slip", header, rows)
+    print(f"{len(found.points)} points in {found.wall_s:.1f} s, seed {found.seed}")
 
 
 def _write_map(found: SlipMap, folder: Path) -> list[str]:
@@ -174,15 +162,14 @@ def slip_map(
     seed: Seed = None,
     workers: Workers = None,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Write map.json, map.csv and map.png here, and keep finished points."),
+        Path | None, folder_option("Write map.json, map.csv and map.png here, and keep finished points.")
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Map cage slip, power loss, impact and whirl over speed and load."""
     with guarded(as_json):
-        loaded = _rollers(scene, _overrides(assignments, turns, replicates, seed))
+        loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
         folder = output_folder(out, "rbdyn map", scene) if out else None
         from rbdyn.cli.ranges import axis_values
         from rbdyn.dynamics import slip_map as study
@@ -192,36 +179,19 @@ def slip_map(
         with keeping(points), progress_bar("mapping", quiet or as_json) as progress:
             found = study.slip_map(loaded, *axes, workers, progress, points)
         files = _write_map(found, folder) if folder else []
-        if as_json:
-            print_json(found.as_dict())
-        else:
-            header = ("load [N]", *(f"{value:g} rpm" for value in found.speeds_rpm))
-            rows = [
-                (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
-                for value, row in zip(found.loads_N, found.grid("cage_slip"), strict=True)
-            ]
-            print_table("cage slip", header, rows)
-            print(f"{len(found.points)} points in {found.wall_s:.1f} s, seed {found.seed}")
-            if folder:
-                print(f"written to {folder}: {', '.join(files)}")
+        hand_over(found.as_dict, as_json, lambda: _print_map(found), folder, files)
         for point in found.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
     if found.failed:
         raise typer.Exit(FAILED)
 
 
-def _rollers(path: Path, overrides: list[str]) -> Scene:
-    """Scene of a roller bearing. Raises InputError for any other."""
+def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> Scene:
+    """Scene of a roller bearing, with keys of [numerics] that have options of their own. Raises InputError for any other."""
     from rbdyn.scene import Scene, rollers_only
 
-    return rollers_only(Scene.load(path, overrides))
-
-
-def _overrides(
-    assignments: list[str] | None, turns: float | None, replicates: int | None, seed: int | None
-) -> list[str]:
-    shorthand = {"turns": turns, "replicates": replicates, "seed": seed}
-    return [*(assignments or []), *(f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None)]
+    numerics = (f"numerics.{key}={value}" for key, value in shorthand.items() if value is not None)
+    return rollers_only(Scene.load(path, [*(assignments or []), *numerics]))
 
 
 def _aim(target: str, turns: float | None, replicates: int | None) -> float:
@@ -234,7 +204,7 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     return target_of(target)
 
 
-def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:
+def _write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     from rbdyn import plots
     from rbdyn.dynamics.motion.history import history, most_turns
 
@@ -245,6 +215,7 @@ def _write(scene: Scene, result: SimulationResult, folder: Path) -> None:
     title = f"first {turns:g} counted shaft turns"
     plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
     plots.pocket_forces({title: shown}, folder / "pocket_forces.png")
+    return ["result.json", "history.csv", "cage_orbit.png", "pocket_forces.png"]
 
 
 def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
@@ -315,16 +286,14 @@ def _print_target(target: dict[str, Any]) -> None:
 @app.command()
 def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write here; by default in 'show' beside the result.")
-    ] = None,
+    out: Annotated[Path | None, folder_option("Write here; by default in 'show' beside the result.")] = None,
     turns: Annotated[float | None, typer.Option(help="Counted shaft turns to show; at most 20 unless given.")] = None,
     replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, typer.Option("--animate", help="Also a moving picture and a player.")] = False,
     lyapunov: Annotated[bool, typer.Option("--lyapunov", help="Also the largest Lyapunov exponent.")] = False,
     as_json: Json = False,
     quiet: Quiet = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also peaks of the spectra.")] = False,
+    verbose: Annotated[bool, verbose_flag("Also peaks of the spectra.")] = False,
 ) -> None:
     """Show how the bearing of a saved result moves: pictures, history.csv and orbit.json."""
     with guarded(as_json):

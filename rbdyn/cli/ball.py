@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from rbdyn.cli.options import Json, Quiet, SceneFile, Set
-from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json
+from rbdyn.cli.options import Json, Quiet, SceneFile, Set, folder_option, verbose_flag
+from rbdyn.cli.terminal import FAILED, guarded, hand_over, output_folder
 from rbdyn.faults import InputError
 
 
@@ -39,12 +39,10 @@ def ball(
     wanted: Annotated[
         float | None, typer.Option("--yield", help="Share of bearings that must meet --race-limits; 0.95 if left out.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write the result as JSON here, with its tables and pictures.")
-    ] = None,
+    out: Annotated[Path | None, folder_option("Write the result as JSON here, with its tables and pictures.")] = None,
     as_json: Json = False,
     quiet: Quiet = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also the stiffness matrix and cost.")] = False,
+    verbose: Annotated[bool, verbose_flag("Also the stiffness matrix and cost.")] = False,
 ) -> None:
     """Find the equilibrium of a ball bearing: contact angles, loads, stiffness, stress, life."""
     with guarded(as_json):
@@ -73,11 +71,6 @@ def ball(
 
         result, path = with_runout(loaded, equilibrium(loaded))
         files = write(result, folder, path) if folder else []
-        if as_json:
-            print_json(result.as_dict())
-        else:
-            print_result(result, quiet, verbose)
-            if folder:
-                print(f"written to {folder}: {', '.join(files)}")
+        hand_over(result.as_dict, as_json, lambda: print_result(result, quiet, verbose), folder, files)
     if not result.found:
         raise typer.Exit(FAILED)

@@ -11,7 +11,7 @@ import numpy as np
 
 from rbdyn.cli.ball_sweep import print_points
 from rbdyn.cli.ranges import axis_values
-from rbdyn.cli.terminal import output_folder, print_json, print_table
+from rbdyn.cli.terminal import hand_over, output_folder, print_table
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.remarks import remarks, tipping
@@ -48,16 +48,10 @@ def runout_record(scene: BallScene) -> tuple[dict[str, Any], Followed]:
     return {**{f"{name}_um": 1e6 * value for name, value in told.items()}, "turns": turns}, followed
 
 
-def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> dict[str, Any]:
-    """Peak pressure and life over preload [N], clearance or wear of the balls [um], and where each is best.
-
-    Raises InputError for a double-decker, or where the sweep is refused.
+def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tuple[dict[str, Any], SweepResult]:
+    """Peak pressure and life over preload [N], clearance or wear of the balls [um], and where each is best; and the points
+    as a sweep tells them. Raises InputError for a double-decker, or where the sweep is refused.
     """
-    return _optimum(scene, swept, values)[0]
-
-
-def _optimum(scene: BallScene, swept: str, values: Sequence[float]) -> tuple[dict[str, Any], SweepResult]:
-    """Record of a study, and its points as a sweep tells them."""
     run, unit, si = SWEPT[swept]
     try:
         found = run(_single(scene, swept), [si * value for value in values])
@@ -156,7 +150,7 @@ def run(
     if name == "race_limits":
         record = race_limits(scene, value, wanted)
     else:
-        record, table = _optimum(scene, name, axis_values(value, f"--{name}"))
+        record, table = optimum_study(scene, name, axis_values(value, f"--{name}"))
     if folder:
         write_json(folder / files[0], record)
         if table is not None:
@@ -164,21 +158,20 @@ def run(
 
             table.save(folder / f"{name}.csv")
             files += [f"{name}.csv", *pictures(table, folder)]
-    if as_json:
-        print_json(record)
-        return 0
+    hand_over(lambda: record, as_json, lambda: _print(record, table, quiet), folder, files)
+    return 0
+
+
+def _print(record: dict[str, Any], table: SweepResult | None, quiet: bool) -> None:
     if table is None:
         _print_limits(record)
-    else:
-        print_points(table)
-        for best, title in (("least_stress", "least stress"), ("longest_life", "longest life")):
-            at = record[best]
-            print(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
-        for note in record["notes"] if not quiet else ():
-            print(f"note: {note}")
-    if folder:
-        print(f"written to {folder}: {', '.join(files)}")
-    return 0
+        return
+    print_points(table)
+    for best, title in (("least_stress", "least stress"), ("longest_life", "longest life")):
+        at = record[best]
+        print(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
+    for note in record["notes"] if not quiet else ():
+        print(f"note: {note}")
 
 
 def _print_limits(record: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.cli.terminal import FAILED, output_folder, print_json, print_table, progress_bar
+from rbdyn.cli.terminal import FAILED, hand_over, output_folder, print_table, progress_bar
 from rbdyn.result import write_json
 
 if TYPE_CHECKING:
@@ -41,23 +41,18 @@ def run(scene: BallScene, texts: Sequence[str], out: Path | None, source: Path, 
     with progress_bar("sweeping", quiet or as_json) as progress:
         found = sweep(scene, keys, progress)
     files = write(found, folder) if folder else []
-    if as_json:
-        print_json(found.as_dict())
-    else:
-        show(found)
-        for note in found.notes if not quiet else ():
-            print(f"note: {found.where(note['points'])}: {note['note']}")
-        if folder:
-            print(f"written to {folder}: {', '.join(files)}")
+    hand_over(found.as_dict, as_json, lambda: show(found, quiet), folder, files)
     for places in found.failures.values():
         print(f"{found.where(places)}: {found.statuses[places[0]]}", file=sys.stderr)
     return FAILED if found.failures else 0
 
 
-def show(found: SweepResult) -> None:
-    """Print the points and what they cost."""
+def show(found: SweepResult, quiet: bool) -> None:
+    """Print the points, what they cost and the notes."""
     print_points(found)
     print(f"{len(found.statuses)} points in {found.wall_s:.3g} s, {found.cold} of them not started from a neighbour")
+    for note in found.notes if not quiet else ():
+        print(f"note: {found.where(note['points'])}: {note['note']}")
 
 
 def print_points(found: SweepResult) -> None:

@@ -3,9 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+
+
+def folder_option(says: str) -> Any:
+    """``--out`` of a command that writes other files than ``Out`` says."""
+    return typer.Option(metavar="DIR", help=says)
+
+
+def verbose_flag(says: str) -> Any:
+    """``--verbose`` of a command that tells other things than ``Verbose`` says."""
+    return typer.Option("--verbose", "-v", help=says)
+
+
+def study_flag(name: str, studies: str) -> Any:
+    """A flag that asks for another study than the usual one."""
+    return typer.Option(name, help=f"{studies}, instead.")
+
+
+def count_option(least: int, says: str) -> Any:
+    """A number of things to run."""
+    return typer.Option(min=least, max=100_000, metavar="N", help=says)
+
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to simulate.")]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replace a key; repeatable.")]
@@ -13,7 +34,7 @@ Turns = Annotated[float | None, typer.Option(help="Counted shaft turns [numerics
 Replicates = Annotated[int | None, typer.Option(help="Seeded replicates [numerics.replicates].")]
 Seed = Annotated[int | None, typer.Option(help="Seed [numerics.seed].")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all processors by default.")]
-Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Write result.json, history.csv and pictures here.")]
+Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no notes.")]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print power terms and cost.")]
+Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]

@@ -58,6 +58,22 @@ def print_json(record: dict[str, Any]) -> None:
     print(json.dumps(record, indent=1, allow_nan=False))
 
 
+def hand_over(
+    record: Callable[[], dict[str, Any]],
+    as_json: bool,
+    show: Callable[[], None],
+    folder: Path | None,
+    files: Sequence[str],
+) -> None:
+    """The ``record`` as JSON; else what ``show`` prints, and the names of the files written, where there is a folder."""
+    if as_json:
+        print_json(record())
+        return
+    show()
+    if folder:
+        print(f"written to {folder}: {', '.join(files)}")
+
+
 @contextmanager
 def keeping(path: Path | None) -> Iterator[None]:
     """Let Ctrl-C tell that what was finished lies in ``path``, once that is there; elsewhere nothing is kept."""

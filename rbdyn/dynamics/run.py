@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,6 +136,11 @@ class Run:
             f"{'take numerics.method = auto, ' if self.scene.numerics.method in EXPLICIT else ''}raise "
             "numerics.step_budget_per_turn, loosen numerics.rtol, or soften the stiffest law"
         )
+
+
+def with_numerics(scene: Scene, **changes: Any) -> Scene:
+    """The scene with other numerics, which are not validated."""
+    return scene.model_copy(update={"numerics": scene.numerics.model_copy(update=changes)})
 
 
 def prepare(scene: Scene, bearing: RollerBearing) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
@@ -88,43 +88,39 @@ def run_until_settled(
     return Ensemble(runs, companions, begin.first, None, begin.turns, notes)
 
 
+@dataclass
 class Team:
-    """Recordings that go on together, in threads. ``to_come``: runs of others that the progress counts too."""
+    """Recordings that go on together, in threads; ``done`` of them have ended. ``to_come``: runs of others that the
+    progress counts too."""
 
-    def __init__(
-        self,
-        start: Start,
-        replicates: range,
-        rtol: float,
-        workers: int | None,
-        stop: Stop,
-        progress: Callable[[int, int], None] | None,
-        to_come: int,
-        done: int = 0,
-    ) -> None:
-        self._start, self._replicates, self._rtol = start, replicates, rtol
-        self._workers, self._stop, self._progress = workers, stop, progress
-        self._to_come, self.done = to_come, done
-        self._recordings: dict[int, Recording] = {}
+    start: Start
+    replicates: range
+    rtol: float
+    workers: int | None
+    stop: Stop
+    progress: Callable[[int, int], None] | None
+    to_come: int
+    done: int = 0
+    recordings: dict[int, Recording] = field(default_factory=dict)
 
     def to(self, turns: float) -> list[Replicate]:
         """All of them after so many turns past the warm-up. Raises RunError, KeyboardInterrupt."""
-        total = self.done + len(self._replicates) + self._to_come
+        total = self.done + len(self.replicates) + self.to_come
         runs: dict[int, Replicate] = {}
 
         def go_on(replicate: int) -> Replicate:
-            if replicate not in self._recordings:
-                self._recordings[replicate] = self._start(replicate, self._rtol, self._stop)
-            return self._recordings[replicate].to(turns)
+            if replicate not in self.recordings:
+                self.recordings[replicate] = self.start(replicate, self.rtol, self.stop)
+            return self.recordings[replicate].to(turns)
 
         def ended(one: Ended[Replicate]) -> None:
             runs[one.place] = one.result()
             self.done += 1
-            if self._progress is not None:
-                self._progress(self.done, total)
+            if self.progress is not None:
+                self.progress(self.done, total)
 
-        run_all([partial(go_on, replicate) for replicate in self._replicates], self._workers, self._stop, ended)
-        return [runs[place] for place in range(len(self._replicates))]
+        run_all([partial(go_on, replicate) for replicate in self.replicates], self.workers, self.stop, ended)
+        return [runs[place] for place in range(len(self.replicates))]
 
 
 def whole_windows(scene: Scene) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.equations import LOSSES
+from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
 from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.parameters.left_out import heat_notes, left_out_notes
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -18,6 +18,7 @@ from rbdyn.dynamics.recording import Recording
 from rbdyn.dynamics.run import Run, prepare
 from rbdyn.dynamics.settling import Ensemble, run_until_settled
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
+from rbdyn.dynamics.statistics.metrics import work_done
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene
 
@@ -75,7 +76,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
     everything = [*runs, *companions]
     figures = quantities(scene, runs, companions, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
-    inner_load, outer_load = (max(getattr(run, f"max_{race}_load") for run in runs) for race in ("inner", "outer"))
+    inner_load, outer_load = (max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD))
     races = race_report(scene, inner_load, outer_load)
     return SimulationResult(
         status="ok",
@@ -92,7 +93,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         },
         max_inner_load=inner_load,
         max_outer_load=outer_load,
-        max_land_load=max(run.max_land_load for run in runs),
+        max_land_load=max(run.largest_load(LAND_LOAD) for run in runs),
         races=races,
         clearance=clearance_report(scene),
         impact_window_turns=scene.impact_window_turns,
@@ -101,10 +102,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         cost={
             "wall_s": wall_s,
             "compile_s": compile_s,
-            "cpu_s": sum(run.cpu_s for run in everything),
-            "steps": sum(run.accepted_steps for run in everything),
-            "rejected_steps": sum(run.rejected_steps for run in everything),
-            "rhs_evaluations": sum(run.derivatives for run in everything),
+            **work_done(everything),
             "turns": sum(float(run.durations.sum()) for run in everything) / scene.turn_s,
             **stiffness_cost(runs),
         },

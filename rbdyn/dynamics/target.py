@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
-from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.bias import bias_scale, companion_tolerance
 from rbdyn.dynamics.statistics.error_bars import FIGURES, settled
-from rbdyn.dynamics.statistics.metrics import Replicate, mean_gap
+from rbdyn.dynamics.statistics.metrics import Replicate, mean_gap, work_done
 from rbdyn.faults import InputError
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
@@ -88,8 +88,7 @@ class Choice(NamedTuple):
 
     def applied(self, scene: Scene) -> Scene:
         """The scene with this choice."""
-        numbers = {"rtol": self.rtol, "turns": self.turns, "replicates": self.replicates, "companion": True}
-        return scene.model_copy(update={"numerics": scene.numerics.model_copy(update=numbers)})
+        return with_numerics(scene, rtol=self.rtol, turns=self.turns, replicates=self.replicates, companion=True)
 
 
 @dataclass(frozen=True)
@@ -179,8 +178,7 @@ def measure(
 ) -> tuple[Model, Mapping[str, float]]:
     """Pilots over the ladder of tolerances: what they tell, and what they cost (``ADDED``). Raises RunError."""
     turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)
-    numbers = {"turns": turns, "replicates": PILOT_REPLICATES}
-    pilot = scene.model_copy(update={"numerics": scene.numerics.model_copy(update=numbers)})
+    pilot = with_numerics(scene, turns=turns, replicates=PILOT_REPLICATES)
     bearing = roller_bearing(pilot)
     compile_s = prepare(pilot, bearing)
     started = time.perf_counter()
@@ -188,14 +186,10 @@ def measure(
     wall_s = time.perf_counter() - started
     per_turn = PILOT_REPLICATES * (turns + scene.numerics.warm_up_turns)
     derivatives = [sum(run.derivatives for run in runs) for runs in series]
-    everything = [run for runs in series for run in runs]
     spent = {
         "wall_s": wall_s,
         "compile_s": compile_s,
-        "cpu_s": sum(run.cpu_s for run in everything),
-        "steps": sum(run.accepted_steps for run in everything),
-        "rejected_steps": sum(run.rejected_steps for run in everything),
-        "rhs_evaluations": sum(derivatives),
+        **work_done([run for runs in series for run in runs]),
         "turns": per_turn * len(LADDER),
     }
     series = [settled(pilot, runs, [])[0] for runs in series]

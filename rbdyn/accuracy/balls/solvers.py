@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.accuracy.balls.cases import Problem
-from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.accuracy.report import Columns, Progress, Report, Table, record, tabled
 from rbdyn.faults import InputError, RunError
 from rbdyn.quasistatic.rivals import finite_search, limited, minpack, plain_newton
 from rbdyn.quasistatic.row import equilibrium
@@ -56,6 +56,14 @@ class Attempt(NamedTuple):
     status: str
 
 
+COLUMNS: Columns = {
+    "solver": ("solver", ""),
+    "iterations at most": ("limit", ""),
+    "residual over largest force": ("residual", ".1e"),
+    "time [us]": ("solve_us", ".0f"),
+}
+
+
 class Success(NamedTuple):
     """How a solver fares over many problems: share solved; median, 99 % and longest time [us]; median steps; causes."""
 
@@ -78,6 +86,16 @@ class Success(NamedTuple):
         """The share solved with its interval, in words."""
         low, high = self.interval
         return f"{100.0 * self.solved:.2f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"
+
+
+SUCCESS_COLUMNS: Columns = {
+    "scenes": ("problems", ""),
+    "solved": ("solved", ".2f %"),
+    "median [us]": ("median_us", ".0f"),
+    "99 % [us]": ("slow_us", ".0f"),
+    "longest [us]": ("longest_us", ".0f"),
+    "steps": ("median_steps", ".0f"),
+}
 
 
 def share(count: int, total: int) -> tuple[float, float]:
@@ -116,7 +134,10 @@ def study(
             },
             conclusion=sentence,
         ),
-        tables=(_attempt_table(attempts), success_table(f"{perturbations} seeded scenes nearby", rows)),
+        tables=(
+            tabled("residual against time", _until_done(attempts), COLUMNS),
+            success_table(f"{perturbations} seeded scenes nearby", rows),
+        ),
         sentences=(*causes(rows), sentence),
         sheets={"solvers": [attempt._asdict() for attempt in attempts]},
         pictures={"solvers": lambda path: _draw(attempts, path)},
@@ -198,20 +219,7 @@ def fared(name: str, found: Sequence[Solution], took_us: Sequence[float]) -> Suc
 
 def success_table(title: str, rows: Sequence[Success], first: str = "solver") -> Table:
     """Table of how solvers fare."""
-    header = (first, "scenes", "solved", "median [us]", "99 % [us]", "longest [us]", "steps")
-    cells = [
-        (
-            row.solver,
-            f"{row.problems}",
-            f"{100.0 * row.solved:.2f} %",
-            f"{row.median_us:.0f}",
-            f"{row.slow_us:.0f}",
-            f"{row.longest_us:.0f}",
-            f"{row.median_steps:.0f}",
-        )
-        for row in rows
-    ]
-    return Table(title, header, cells)
+    return tabled(title, rows, {first: ("solver", ""), **SUCCESS_COLUMNS})
 
 
 def causes(rows: Sequence[Success]) -> list[str]:
@@ -249,15 +257,6 @@ def _fared(name: str, solver: Solver, problems: Sequence[Problem], counted: Prog
         times.append(took)
         counted.step()
     return fared(name, found, times)
-
-
-def _attempt_table(attempts: Sequence[Attempt]) -> Table:
-    header = ("solver", "iterations at most", "residual over largest force", "time [us]")
-    cells = [
-        (attempt.solver, f"{attempt.limit}", f"{attempt.residual:.1e}", f"{attempt.solve_us:.0f}")
-        for attempt in _until_done(attempts)
-    ]
-    return Table("residual against time", header, cells)
 
 
 def _until_done(attempts: Sequence[Attempt]) -> list[Attempt]:

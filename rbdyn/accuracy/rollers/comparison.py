@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT
-from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.accuracy.report import Columns, Progress, Report, Table, flat, record, records, tabled
 from rbdyn.accuracy.rollers import method_bias
 from rbdyn.accuracy.rollers.equal_error import Speedup, times_faster
 from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, compiled
@@ -52,9 +52,16 @@ class Attempt:
     turn_ms: float | None
     rhs_per_turn: float | None
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        return dict(self.__dict__)
+
+COLUMNS: Columns = {
+    "method": ("method", ""),
+    "setting": ("setting", ""),
+    "position error [m]": ("position_error_m", ".2g"),
+    "worst over scale": ("scaled_error", ".2g"),
+    "ms a turn": ("turn_ms", ".3g"),
+    "right-hand sides a turn": ("rhs_per_turn", ".0f"),
+    "status": ("status", ""),
+}
 
 
 def study(
@@ -71,14 +78,14 @@ def study(
     motion = trajectories(scene, progress, turns, methods)
     rows = method_bias.bias_rows(scene, progress=progress)
     chosen = method_bias.conclusion(rows, scene, sought)
-    written = [row.as_dict() for row in rows]
+    written = records(rows)
     return replace(
         motion,
         record=motion.record
         | {"statistics": written, "sought": sought, "conclusion": f"{motion.record['conclusion']} {chosen}"},
         tables=(*motion.tables, method_bias.table(rows, sought)),
         sentences=(*motion.sentences, chosen),
-        sheets={**motion.sheets, "statistics": [method_bias.flat(row) for row in written]},
+        sheets={**motion.sheets, "statistics": [flat(row, "found") for row in written]},
     )
 
 
@@ -97,22 +104,23 @@ def trajectories(
             counted.step()
     ratios = speedups(attempts, known.floor(turns))
     sentences = conclusion(attempts, ratios, known.floor(turns), turns)
+    written = records(attempts)
     return Report(
         stem="methods",
         record=record(
             FORMAT,
-            rows=[attempt.as_dict() for attempt in attempts],
+            rows=written,
             conclusion=" ".join(sentences),
             turns=turns,
             starts=STARTS,
             reference=agreement_record(known),
             resolved_m=known.floor(turns),
-            times_faster={name: ratio.__dict__ for name, ratio in ratios.items()},
+            times_faster={name: asdict(ratio) for name, ratio in ratios.items()},
             compile_s=compile_s,
         ),
         tables=(agreement_table(known), table(attempts, turns), ratio_table(ratios)),
         sentences=(*sentences, f"{compile_s:.1f} s to load or compile, in none of the times"),
-        sheets={"methods": [attempt.as_dict() for attempt in attempts]},
+        sheets={"methods": written},
         pictures={"methods": lambda path: _draw(attempts, known.floor(turns), turns, path)},
     )
 
@@ -203,44 +211,26 @@ def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: f
     """In words: who is faster at equal error, and what failed."""
     sentences = []
     if ratios:
-        told = ", ".join(
+        faster = ", ".join(
             f"{ratio.mean:.2g} ({ratio.least:.2g} to {ratio.greatest:.2g}) times that of {name}"
             for name, ratio in ratios.items()
         )
         sentences.append(
-            f"At equal position error after {turns:g} turns the speed of {OURS.name} is {told}: geometric mean, least and "
+            f"At equal position error after {turns:g} turns the speed of {OURS.name} is {faster}: geometric mean, least and "
             "greatest over the errors in common."
         )
     failed = {a.method: sum(b.method == a.method and b.status != OK for b in attempts) for a in attempts}
-    told = ", ".join(f"{name} at {count}" for name, count in failed.items() if count)
-    if told:
-        sentences.append(f"Failed settings: {told}.")
+    settings = ", ".join(f"{name} at {count}" for name, count in failed.items() if count)
+    if settings:
+        sentences.append(f"Failed settings: {settings}.")
     sentences.append(f"Errors below {floor:.1g} m are not resolved and count for nothing.")
     return sentences
 
 
 def table(attempts: Sequence[Attempt], turns: float) -> Table:
     """Table for the terminal, failures in their places."""
-
-    def shown(value: float | None, form: str) -> str:
-        return "" if value is None else format(value, form)
-
-    cells = [
-        (
-            a.method,
-            a.setting,
-            shown(a.position_error_m, ".2g"),
-            shown(a.scaled_error, ".2g"),
-            shown(a.turn_ms, ".3g"),
-            shown(a.rhs_per_turn, ".0f"),
-            a.status,
-        )
-        for a in attempts
-    ]
-    header = (
-        "method", "setting", "position error [m]", "worst over scale", "ms a turn", "right-hand sides a turn", "status",
-    )  # fmt: skip
-    return Table(f"errors after {turns:g} shaft turns, worst of {STARTS} starts; one thread", header, cells)
+    title = f"errors after {turns:g} shaft turns, worst of {STARTS} starts; one thread"
+    return tabled(title, attempts, COLUMNS)
 
 
 def ratio_table(ratios: dict[str, Speedup]) -> Table:
@@ -249,11 +239,8 @@ def ratio_table(ratios: dict[str, Speedup]) -> Table:
         (name, f"{r.mean:.3g}", f"{r.least:.3g}", f"{r.greatest:.3g}", f"{r.low:.1g} to {r.high:.1g}")
         for name, r in ratios.items()
     ]
-    return Table(
-        f"times that {OURS.name} is faster at equal error",
-        ("than", "mean", "least", "greatest", "position errors [m]"),
-        cells,
-    )
+    header = ("than", "mean", "least", "greatest", "position errors [m]")
+    return Table(f"times that {OURS.name} is faster at equal error", header, cells)
 
 
 def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) -> None:

@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
-from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
 from rbdyn.dynamics.parameters.geometry import roller_radii
+from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import FIGURES
 from rbdyn.result import Quantity, SimulationResult
@@ -43,9 +43,16 @@ class Row:
     half_width: float
     offset: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        return dict(self.__dict__)
+
+COLUMNS: Columns = {
+    "figure": ("figure", ""),
+    "truth": ("truth", ".6g"),
+    "±": ("truth_error", ".2g"),
+    "covered": ("covered", ".3f"),
+    "statistical alone": ("statistical_alone", ".3f"),
+    "half-width": ("half_width", ".2g %"),
+    "offset": ("offset", "+.2g %"),
+}
 
 
 def study(scene: Scene, progress: Callable[[int, int], None] | None = None, repeats: int = REPEATS) -> Report:
@@ -60,41 +67,29 @@ def study(scene: Scene, progress: Callable[[int, int], None] | None = None, repe
         counted.step()
     rows = [row(name, truth, results) for name in FIGURES]
     turns = sum(result.cost["turns"] for result in results) / repeats
-    asked = scene.numerics.turns + scene.numerics.warm_up_turns
+    each = scene.numerics.turns + scene.numerics.warm_up_turns
     longer = sum(result.counted_turns > 1.01 * scene.numerics.turns for result in results) / repeats
     sentences = [
         conclusion(rows, repeats),
         f"A run took {turns:.0f} shaft turns over all replicates and companions; asked for were "
-        f"{asked * (scene.numerics.replicates + scene.numerics.companions):.0f}, and {100.0 * longer:.0f} % of the runs "
+        f"{each * (scene.numerics.replicates + scene.numerics.companions):.0f}, and {100.0 * longer:.0f} % of the runs "
         "were lengthened.",
     ]
-    header = ("figure", "truth", "±", "covered", "statistical alone", "half-width", "offset")
-    cells = [
-        (
-            one.figure,
-            f"{one.truth:.6g}",
-            f"{one.truth_error:.2g}",
-            f"{one.covered:.3f}",
-            f"{one.statistical_alone:.3f}",
-            f"{100.0 * one.half_width:.2g} %",
-            f"{100.0 * one.offset:+.2g} %",
-        )
-        for one in rows
-    ]
+    written = records(rows)
     return Report(
         stem="coverage",
         record=record(
             FORMAT,
-            rows=[one.as_dict() for one in rows],
+            rows=written,
             pooled=pooled(rows),
             repeats=repeats,
             mean_turns=turns,
             lengthened=longer,
             conclusion=" ".join(sentences),
         ),
-        tables=(Table(f"95 % intervals that hold the truth, {repeats} repeats", header, cells),),
+        tables=(tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, COLUMNS),),
         sentences=sentences,
-        sheets={"coverage": [one.as_dict() for one in rows]},
+        sheets={"coverage": written},
     )
 
 
@@ -106,11 +101,6 @@ def one_bearing(scene: Scene) -> Scene:
     errors_um = (1e6 * radii - 500.0 * scene.bearing.roller_diameter_mm) / 0.5
     rollers = {"roller_diameter_spread_um": 0.0, "roller_diameter_errors_um": errors_um.tolist()}
     return scene.model_copy(update={"bearing": scene.bearing.model_copy(update=rollers)})
-
-
-def with_numerics(scene: Scene, **changes: Any) -> Scene:
-    """The scene with other numerics."""
-    return scene.model_copy(update={"numerics": scene.numerics.model_copy(update=changes)})
 
 
 def truth_of(scene: Scene) -> Scene:
@@ -173,9 +163,9 @@ def conclusion(rows: list[Row], repeats: int) -> str:
     low, high = POOLED
     share, scatter = pooled(rows), 1.96 * math.sqrt(0.95 * 0.05 / repeats)
     narrow = [f"{one.figure} {one.covered:.2f}" for one in rows if one.covered < LOWEST]
-    told = f"Pooled over the figures {share:.3f} (0.95 ± {scatter:.3f} for a sound interval of one figure)"
+    over_all = f"Pooled over the figures {share:.3f} (0.95 ± {scatter:.3f} for a sound interval of one figure)"
     if narrow:
-        return f"{told}; too narrow (below {LOWEST:.2f}): {', '.join(narrow)}."
+        return f"{over_all}; too narrow (below {LOWEST:.2f}): {', '.join(narrow)}."
     if share > high:
-        return f"{told}; none is too narrow, together they are wider than they need be."
-    return f"{told}; none below {LOWEST:.2f}." if share >= low else f"{told}; together they are too narrow."
+        return f"{over_all}; none is too narrow, together they are wider than they need be."
+    return f"{over_all}; none below {LOWEST:.2f}." if share >= low else f"{over_all}; together they are too narrow."

@@ -19,23 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import entry, kernel
+from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, derivative, derivative_once
-from rbdyn.dynamics.forces.state import (
-    CAGE_ANGLE,
-    CAGE_SPEED,
-    CAGE_VX,
-    CAGE_VY,
-    CAGE_X,
-    CAGE_Y,
-    RING_VX,
-    RING_VY,
-    RING_X,
-    RING_Y,
-    Layout,
-)
+from rbdyn.dynamics.forces.state import Layout
 from rbdyn.dynamics.integrators.booking import book_whirl
 
-BODY_PAIRS = ((CAGE_X, CAGE_VX), (CAGE_Y, CAGE_VY), (CAGE_ANGLE, CAGE_SPEED), (RING_X, RING_VX), (RING_Y, RING_VY))
+BODY_PAIRS = (
+    (state.CAGE_X, state.CAGE_VX),
+    (state.CAGE_Y, state.CAGE_VY),
+    (state.CAGE_ANGLE, state.CAGE_SPEED),
+    (state.RING_X, state.RING_VX),
+    (state.RING_Y, state.RING_VY),
+)
 
 
 def velocity_of(layout: Layout) -> NDArray[np.int64]:
@@ -64,7 +59,7 @@ def book(tally, y, body, loads):
     """Take up the largest loads at a step's end, and the speed of the cage's centre as a sample of its whirl."""
     for force in range(LOADS):
         tally.largest[force] = max(tally.largest[force], loads[0, force])
-    book_whirl(tally.whirl, y[body + CAGE_VX], y[body + CAGE_VY])
+    book_whirl(tally.whirl, y[body + state.CAGE_VX], y[body + state.CAGE_VY])
 
 
 @entry

@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -35,11 +35,6 @@ def footprint(scene: Scene, bearing: RollerBearing) -> Footprint:
 
     pair = pair_of(explicit_method(scene.numerics.method, scene.numerics.rtol))
     return Footprint(layout_of(scene).size, parameter_bytes(bearing), instructions(bearing, pair))
-
-
-def law_types(parameters: Any) -> set[type]:
-    """Types of all NamedTuples within the parameters of a bearing: they choose what is compiled."""
-    return {type(part) for part in _parts(parameters) if isinstance(part, tuple)}
 
 
 def parameter_bytes(parameters: Any) -> int:
@@ -78,21 +73,28 @@ def added_modules(plain: Scene, scenes: Sequence[Scene]) -> list[tuple[str, ...]
 
     Raises RunError where that interpreter fails.
     """
-    found = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "from rbdyn.accuracy.rollers.footprint import print_added_modules; print_added_modules()",
-        ],
-        input=json.dumps([scene.model_dump(mode="json", exclude_none=True) for scene in (plain, *scenes)]),
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    data = [scene.model_dump(mode="json", exclude_none=True) for scene in (plain, *scenes)]
+    fault = "the modules of the options could not be listed"
+    return [tuple(modules) for modules in json.loads(printed(print_added_modules, data, fault, NUMBA_DISABLE_JIT="1"))]
+
+
+def printed(function: Callable[[], None], data: Any, fault: str, **environment: str) -> str:
+    """What a function of this package prints in a fresh interpreter that is given ``data`` as JSON on standard input.
+
+    Raises RunError, which begins with ``fault``, where that interpreter fails.
+    """
+    name = function.__name__
+    run = subprocess.run(
+        [sys.executable, "-c", f"from {function.__module__} import {name}; {name}()"],
+        input=json.dumps(data),
+        env={**os.environ, **environment},
         capture_output=True,
         text=True,
         check=False,
     )
-    if found.returncode != 0:
-        raise RunError(f"the modules of the options could not be listed: {last_line(found.stderr)}")
-    return [tuple(modules) for modules in json.loads(found.stdout)]
+    if run.returncode != 0:
+        raise RunError(f"{fault}: {last_line(run.stderr)}")
+    return run.stdout
 
 
 def last_line(text: str) -> str:

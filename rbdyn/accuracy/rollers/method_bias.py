@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
-from rbdyn.accuracy.report import Progress, Table
+from rbdyn.accuracy.report import Columns, Progress, Table, tabled
 from rbdyn.accuracy.rollers.methods import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
-from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, OUTPUTS, Bias, bias_cells, bias_of
+from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import record
@@ -42,9 +41,14 @@ class Row:
     power_gap: float | None
     found: Bias | None
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        return {**self.__dict__, "found": self.found.__dict__ if self.found else None}
+
+COLUMNS: Columns = {
+    "method": ("method", ""),
+    "setting": ("setting", ""),
+    "status": ("status", ""),
+    "ms a turn": ("turn_ms", ".2f"),
+    "power gap": ("power_gap", ".2g %"),
+}
 
 
 def bias_rows(
@@ -94,39 +98,22 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
     limits = f"biases of at most {percent(sought)} and a power balance closed to {percent(NEGLIGIBLE)}"
     if not best:
         return f"Which method keeps its statistics is {rest}." if rest else f"No method shows {limits}."
-    told = ", ".join(
+    cheapest = ", ".join(
         f"{row.method} {row.turn_ms:.2f} ms ({row.setting}, errors at most {percent(row.found.known_to)})"
         for row in best.values()
         if row.found is not None
     )
-    return f"Measured {limits}, a turn: {told}." + (f" Other settings are {rest}." if rest else "")
+    return f"Measured {limits}, a turn: {cheapest}." + (f" Other settings are {rest}." if rest else "")
 
 
 def table(rows: Sequence[Row], sought: float = SOUGHT) -> Table:
     """Table for the terminal, failures in their places."""
-    cells = [
-        (row.method, row.setting, row.status, *[""] * 6)
-        if row.found is None
-        else (
-            row.method,
-            row.setting,
-            row.status,
-            f"{row.turn_ms:.2f}",
-            f"{100.0 * (row.power_gap or 0.0):.2g} %",
-            *bias_cells(row.found),
-            row.found.verdict(sought),
-        )
-        for row in rows
-    ]
-    header = ("method", "setting", "status", "ms a turn", "power gap", *OUTPUTS, f"within {percent(sought)}")
-    return Table(f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors", header, cells)
 
+    def where_found(text: Callable[[Bias], str]) -> Callable[[Row], str]:
+        return lambda row: "" if row.found is None else text(row.found)
 
-def flat(row: dict[str, Any]) -> dict[str, Any]:
-    """A row without nesting, for a sheet."""
-    plain = {key: value for key, value in row.items() if key != "found"}
-    found = row["found"] or {}
-    return plain | {f"{name}_{kind}": of[name] for kind, of in found.items() for name in of}
+    biases = {heading: where_found(text) for heading, text in bias_columns(sought).items()}
+    return tabled(f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors", rows, {**COLUMNS, **biases})
 
 
 def _steps(scene: Scene, contact_times: float) -> float:

@@ -20,7 +20,7 @@ from rbdyn.accuracy.rollers.stretch import Stretch
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.geometry import scales
-from rbdyn.dynamics.run import Run
+from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 
@@ -63,9 +63,12 @@ class Method(NamedTuple):
 def ready_ours(stretch: Stretch, rtol: float) -> Callable[[], Arrived]:
     """As in a simulation, with everything that one keeps: works, largest loads, whirl."""
     limits = {"turns": stretch.turns, "discard_turns": 0.0, "step_budget_per_turn": BUDGET_PER_TURN, "method": "rk45"}
-    numerics = stretch.scene.numerics.model_copy(update=limits)
-    scene = stretch.scene.model_copy(update={"numerics": numerics})
-    run = Run(scene, stretch.bearing, 0, rtol, Stop())
+    scene = with_numerics(stretch.scene, **limits)
+    return _over(stretch, Run(scene, stretch.bearing, 0, rtol, Stop()))
+
+
+def _over(stretch: Stretch, run: Run) -> Callable[[], Arrived]:
+    """The call that takes a run over a stretch."""
     run.carry.y[:] = stretch.start
 
     def go() -> Arrived:
@@ -108,14 +111,8 @@ def by_fixed_step(verlet: bool) -> Callable[..., Callable[[], Arrived]]:
     """``ready`` of velocity Verlet, or else of the classical Runge-Kutta method."""
 
     def ready(stretch: Stretch, contact_times: float) -> Callable[[], Arrived]:
-        run = FixedStepRun(stretch.scene, stretch.bearing, 0, fixed_step(stretch.scene, contact_times), verlet)
-        run.carry.y[:] = stretch.start
-
-        def go() -> Arrived:
-            run.to(stretch.turns)
-            return Arrived(run.carry.y, int(run.carry.counts[2]))
-
-        return go
+        step = fixed_step(stretch.scene, contact_times)
+        return _over(stretch, FixedStepRun(stretch.scene, stretch.bearing, 0, step, verlet))
 
     return ready
 

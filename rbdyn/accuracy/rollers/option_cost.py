@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from rbdyn.accuracy.report import Report, Table, record
+from rbdyn.accuracy.report import Columns, Progress, Report, record, tabled
 from rbdyn.accuracy.rollers.footprint import Footprint, added_modules, footprint
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -88,9 +88,27 @@ class OptionCost:
         sizes = {
             f"{which}{name}": size
             for which, held in (("with_", self.holds), ("without_", self.plain_holds))
-            for name, size in held.__dict__.items()
+            for name, size in asdict(held).items()
         }
         return {name: getattr(self, name) for name in times} | sizes | {"modules": list(self.modules)}
+
+
+def _added(size: str) -> Callable[[OptionCost], str]:
+    return lambda cost: f"{getattr(cost.holds, size) - getattr(cost.plain_holds, size):+d}"
+
+
+COLUMNS: Columns = {
+    "option": ("option", ""),
+    "with": ("with_ns", ".0f"),
+    "without": ("without_ns", ".0f"),
+    "difference": ("difference_ns", "+.0f"),
+    "power gap": ("power_gap", ".2g %"),
+    "s to compile or load": ("compile_s", ".1f"),
+    "state": _added("state"),
+    "parameters [B]": _added("parameter_bytes"),
+    "instructions": _added("instructions"),
+    "modules": lambda cost: " ".join(module.rpartition(".")[2] for module in cost.modules),
+}
 
 
 def option_costs(
@@ -104,7 +122,7 @@ def option_costs(
     chosen = _allowed(plain, options)
     bearings = [roller_bearing(option) for option in chosen.values()]
     modules = added_modules(plain, list(chosen.values()))
-    rows = []
+    rows, counted = [], Progress(progress, len(chosen))
     for (name, option), bearing, needed in zip(chosen.items(), bearings, modules, strict=True):
         compile_s = prepare(option, bearing)
         times: tuple[list[float], list[float]] = ([], [])
@@ -117,8 +135,7 @@ def option_costs(
         with_ns, without_ns = (float(np.median(found)) for found in times)
         holds = footprint(option, bearing)
         rows.append(OptionCost(name, with_ns, without_ns, gap, compile_s, holds, plain_holds, needed))
-        if progress is not None:
-            progress(len(rows), len(chosen))
+        counted.step()
     return rows
 
 
@@ -143,26 +160,8 @@ def study(
     scene: Scene, progress: Callable[[int, int], None] | None = None, options: Mapping[str, Sequence[str]] = OPTIONS
 ) -> Report:
     """``rbdyn accuracy --options``. Raises RunError, KeyboardInterrupt."""
-    rows = [row.as_dict() for row in option_costs(scene, options, progress)]
-    cells = [
-        (
-            row["option"],
-            f"{row['with_ns']:.0f}",
-            f"{row['without_ns']:.0f}",
-            f"{row['difference_ns']:+.0f}",
-            f"{100.0 * row['power_gap']:.2g} %",
-            f"{row['compile_s']:.1f}",
-            f"{row['with_state'] - row['without_state']:+d}",
-            f"{row['with_parameter_bytes'] - row['without_parameter_bytes']:+d}",
-            f"{row['with_instructions'] - row['without_instructions']:+d}",
-            " ".join(module.rpartition(".")[2] for module in row["modules"]),
-        )
-        for row in rows
-    ]
-    header = (
-        *("option", "with", "without", "difference", "power gap", "s to compile or load"),
-        *("state", "parameters [B]", "instructions", "modules"),
-    )
+    costs = option_costs(scene, options, progress)
+    rows = [cost.as_dict() for cost in costs]
     plain = [
         f"without any: {row['without_state']} numbers of state, {row['without_parameter_bytes']} B of parameters, "
         f"{row['without_instructions']} instructions compiled (LLVM)"
@@ -171,7 +170,7 @@ def study(
     return Report(
         stem="options",
         record=record(FORMAT, options=rows),
-        tables=(Table("nanoseconds a right-hand side; what the option adds to the program", header, cells),),
+        tables=(tabled("nanoseconds a right-hand side; what the option adds to the program", costs, COLUMNS),),
         sentences=plain,
         sheets={"options": [row | {"modules": " ".join(row["modules"])} for row in rows]},
     )

@@ -9,19 +9,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.accuracy.judgement import NORMAL, SOUGHT, about, percent
-from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.accuracy.report import Columns, Progress, Report, flat, record, records, tabled
 from rbdyn.accuracy.rollers.tolerances import OUTPUTS
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
-from rbdyn.dynamics.run import prepare
+from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.scene import Scene
 
@@ -42,9 +42,17 @@ class Row:
     cpu_s: float
     half_width: dict[str, float]
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        return dict(self.__dict__)
+
+def _half_width(name: str) -> Callable[[Row], str]:
+    return lambda row: percent(row.half_width[name])
+
+
+COLUMNS: Columns = {
+    "replicates": ("replicates", ""),
+    "turns each": ("turns", "g"),
+    "processor s": ("cpu_s", ".2f"),
+    **{f"{name} ±": _half_width(name) for name in OUTPUTS},
+}
 
 
 @dataclass(frozen=True)
@@ -75,34 +83,21 @@ def study(
     rows = replication_rows(values, cpu_s, [count for count in COUNTS if count <= pool])
     slopes = {name: slope(turns, [values[length][name] for length in turns]) for name in OUTPUTS}
     sentences = conclusion(rows, slopes, scene, pool, sought)
-    header = ("replicates", "turns each", "processor s", *(f"{name} ±" for name in OUTPUTS))
-    cells = [
-        (
-            f"{row.replicates}",
-            f"{row.turns:g}",
-            f"{row.cpu_s:.2f}",
-            *(f"{100.0 * row.half_width[name]:.2g} %" for name in OUTPUTS),
-        )
-        for row in rows
-    ]
+    written = records(rows)
     return Report(
         stem="replicates",
         record=record(
             FORMAT,
-            rows=[row.as_dict() for row in rows],
-            slopes={name: found.__dict__ for name, found in slopes.items()},
+            rows=written,
+            slopes={name: asdict(one) for name, one in slopes.items()},
             conclusion=" ".join(sentences),
             pool=pool,
             sought=sought,
             discard_turns=scene.numerics.warm_up_turns,
         ),
-        tables=(Table("95 % half-widths, relative", header, cells),),
+        tables=(tabled("95 % half-widths, relative", rows, COLUMNS),),
         sentences=sentences,
-        sheets={
-            "replicates": [
-                {"replicates": row.replicates, "turns": row.turns, "cpu_s": row.cpu_s} | row.half_width for row in rows
-            ]
-        },
+        sheets={"replicates": [flat(row, "half_width") for row in written]},
         pictures={"replicates": lambda path: _draw(rows, path)},
     )
 
@@ -117,12 +112,10 @@ def pool_of_runs(
     counted = Progress(progress, len(turns) * pool)
     values, cpu_s = {}, {}
     for length in turns:
-        update = {"turns": length, "replicates": pool, "impact_window_turns": min(turns)}
-        numerics = scene.numerics.model_copy(update=update)
-        longer = scene.model_copy(update={"numerics": numerics})
+        longer = with_numerics(scene, turns=length, replicates=pool, impact_window_turns=min(turns))
         bearing = roller_bearing(longer)
         prepare(longer, bearing)
-        runs = run_series(longer, bearing, [numerics.rtol], None, lambda done, total: counted.step(), Stop())[0]
+        runs = run_series(longer, bearing, [scene.numerics.rtol], None, counted.step, Stop())[0]
         values[length] = {name: np.array([figure(run) for run in runs]) for name, figure in OUTPUTS.items()}
         cpu_s[length] = float(np.mean([run.cpu_s for run in runs]))
     return values, cpu_s

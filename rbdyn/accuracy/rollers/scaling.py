@@ -2,30 +2,28 @@
 
 More rollers stand on a pitch circle larger in proportion; load, cage and inner ring grow with them, so that each roller
 bears the same, and the speed falls so that surface speeds stay; a turn then takes longer, in proportion. More slices
-cut the same roller finer. Times are the
-least of several of a single-threaded run, taken in turns over the sizes, after everything was compiled.
+cut the same roller finer. Times are the least of several of a single-threaded run, taken in turns over the sizes, after everything was compiled.
 """
 
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rbdyn.accuracy.report import Report, Table, record
-from rbdyn.accuracy.rollers.footprint import last_line
+from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
+from rbdyn.accuracy.rollers.footprint import printed
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.faults import InputError, RunError
+from rbdyn.faults import InputError
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.accuracy.rollers.scaling/1"
@@ -46,6 +44,14 @@ class Point:
     turn_ms: float
     of_real_time: float
     rhs_per_turn: float
+
+
+COLUMNS: Columns = {
+    "ns a right-hand side": ("rhs_ns", ".0f"),
+    "right-hand sides a turn": ("rhs_per_turn", ".0f"),
+    "ms a turn": ("turn_ms", ".2f"),
+    "s a simulated s": ("of_real_time", ".2f"),
+}
 
 
 @dataclass(frozen=True)
@@ -91,21 +97,13 @@ def scaling(
         "rollers": {count: with_rollers(scene, count) for count in rollers},
         "slices": {count: with_slices(scene, count) for count in slices},
     }
-    steps = len(rollers) + len(slices) + len(memory_turns)
-    done = 0
-
-    def step() -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done, steps)
-
-    points = {kind: _times(sizes, step) for kind, sizes in scenes.items()}
+    counted = Progress(progress, len(rollers) + len(slices) + len(memory_turns))
+    points = {kind: _times(sizes, counted.step) for kind, sizes in scenes.items()}
     prepare(scene, roller_bearing(scene))  # so that no process compiles, which takes memory too
     memory = []
     for turns in memory_turns:
         memory.append(Memory(turns, peak_memory(scene, turns)))
-        step()
+        counted.step()
     return Scaling(points, memory)
 
 
@@ -188,16 +186,8 @@ def peak_memory(scene: Scene, turns: int) -> float:
     Raises RunError where that process fails.
     """
     chosen = with_options(scene, [f"numerics.turns={turns}", "numerics.replicates=1", "numerics.companion=false"])
-    found = subprocess.run(
-        [sys.executable, "-c", "from rbdyn.accuracy.rollers.scaling import print_peak_memory; print_peak_memory()"],
-        input=json.dumps(chosen.model_dump(mode="json", exclude_none=True)),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if found.returncode != 0:
-        raise RunError(f"the memory of {turns} turns could not be measured: {last_line(found.stderr)}")
-    return float(found.stdout)
+    fault = f"the memory of {turns} turns could not be measured"
+    return float(printed(print_peak_memory, chosen.model_dump(mode="json", exclude_none=True), fault))
 
 
 def print_peak_memory() -> None:
@@ -227,42 +217,28 @@ def study(scene: Scene, progress: Callable[[int, int], None] | None = None) -> R
 
 def report(found: Scaling) -> Report:
     """Tables, fits and picture of what was measured."""
-    tables, sentences = [], []
-    for kind, points in found.points.items():
-        header = (kind, "ns a right-hand side", "right-hand sides a turn", "ms a turn", "s a simulated s")
-        cells = [
-            (
-                f"{point.size}",
-                f"{point.rhs_ns:.0f}",
-                f"{point.rhs_per_turn:.0f}",
-                f"{point.turn_ms:.2f}",
-                f"{point.of_real_time:.2f}",
-            )
-            for point in points
-        ]
-        tables.append(Table("", header, cells))
-        line = found.lines[kind]
-        sentences.append(
-            f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f}); "
-            f"as a power: n^{line.exponent:.2f}"
-        )
+    tables = [tabled("", points, {kind: ("size", ""), **COLUMNS}) for kind, points in found.points.items()]
+    sentences = [
+        f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f}); "
+        f"as a power: n^{line.exponent:.2f}"
+        for kind, line in found.lines.items()
+    ]
     sentences += [
         f"{memory.turns} counted turns: at most {memory.peak_MiB:.1f} MiB in a process of its own"
         for memory in found.memory
     ]
+    points = {kind: records(sizes) for kind, sizes in found.points.items()}
     return Report(
         stem="scaling",
         record=record(
             FORMAT,
-            **{kind: [point.__dict__ for point in points] for kind, points in found.points.items()},
-            fits={kind: line.__dict__ for kind, line in found.lines.items()},
-            memory=[memory.__dict__ for memory in found.memory],
+            **points,
+            fits={kind: asdict(line) for kind, line in found.lines.items()},
+            memory=records(found.memory),
         ),
         tables=tables,
         sentences=sentences,
-        sheets={
-            "scaling": [{"of": kind, **point.__dict__} for kind, points in found.points.items() for point in points]
-        },
+        sheets={"scaling": [{"of": kind, **point} for kind, sizes in points.items() for point in sizes]},
         pictures={"scaling": lambda path: _draw(found, path)},
     )
 

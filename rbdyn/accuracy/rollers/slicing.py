@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
-from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.accuracy.report import Columns, Progress, Report, flat, record, records, tabled
 from rbdyn.accuracy.rollers.option_cost import with_options
-from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, OUTPUTS, Bias, bias_cells, bias_of, flat
+from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of
 from rbdyn.contact.hertz_line import line_load
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing
@@ -41,9 +41,12 @@ class Row(Bias):
     load_error: float
     rhs_ns: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        return dict(self.__dict__)
+
+COLUMNS: Columns = {
+    "slices": ("slices", ""),
+    "load error": ("load_error", ".2g %"),
+    "ns a right-hand side": ("rhs_ns", ".0f"),
+}
 
 
 def study(
@@ -58,34 +61,19 @@ def study(
     """
     rows = slice_rows(scene, counts, progress)
     chosen = conclusion(rows, scene, sought)
-    header = ("slices", "load error", "ns a right-hand side", *OUTPUTS, f"within {percent(sought)}")
-    cells = [
-        (
-            f"{row.slices}",
-            f"{100.0 * row.load_error:.2g} %",
-            f"{row.rhs_ns:.0f}",
-            *bias_cells(row),
-            "reference" if row is rows[-1] else row.verdict(sought),
-        )
-        for row in rows
-    ]
-    numerics = scene.numerics
+    numerics, written, finest = scene.numerics, records(rows), rows[-1]
+    title = f"bias against {finest.slices} slices, 95 % errors"
     return Report(
         stem="slices",
         record=record(
-            FORMAT,
-            rows=[row.as_dict() for row in rows],
-            conclusion=chosen,
-            turns=numerics.turns,
-            replicates=numerics.replicates,
-            sought=sought,
+            FORMAT, rows=written, conclusion=chosen, turns=numerics.turns, replicates=numerics.replicates, sought=sought
         ),
-        tables=(Table(f"bias against {rows[-1].slices} slices, 95 % errors", header, cells),),
+        tables=(tabled(title, rows, {**COLUMNS, **bias_columns(sought, finest)}),),
         sentences=(
             chosen,
             f"{numerics.replicates} replicates of {numerics.turns:g} turns; load errors against {FINE} slices",
         ),
-        sheets={"slices": [flat(row) for row in rows]},
+        sheets={"slices": [flat(row) for row in written]},
         pictures={"slices": lambda path: _draw(rows, path, sought)},
     )
 
@@ -109,7 +97,7 @@ def slice_rows(
         cut = with_options(scene, (f"model.slices={count}",))
         bearing = roller_bearing(cut)
         prepare(cut, bearing)
-        series[count] = run_series(cut, bearing, [cut.numerics.rtol], 1, lambda done, total: counted.step(), Stop())[0]
+        series[count] = run_series(cut, bearing, [cut.numerics.rtol], 1, counted.step, Stop())[0]
     errors = load_errors(scene, counts)
     return [
         Row(

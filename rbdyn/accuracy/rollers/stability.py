@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from rbdyn.accuracy.report import Report, Table, record
+from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
@@ -27,18 +26,18 @@ LARGEST_GAP = 0.01
 TURNS, DISCARDED = 5, 2
 # What a case may end with. All but "open" say what to do; "refused" and "stopped" do so in their reason.
 CLOSED, TIGHTENED, OPEN, STOPPED, REFUSED = "closed", "closed, tightened", "open", "stopped", "refused"
-HEADER = (
-    "case",
-    "status",
-    "method",
-    "steps a turn",
-    "ms a turn",
-    "power gap",
-    "stiffness ratio",
-    "impact [N]",
-    "whirl ratio",
-    "loss [W]",
-)
+COLUMNS: Columns = {
+    "case": ("case", ""),
+    "status": ("status", ""),
+    "method": ("method", ""),
+    "steps a turn": ("steps_per_turn", ".0f"),
+    "ms a turn": ("turn_ms", ".3g"),
+    "power gap": ("power_gap", ".1e"),
+    "stiffness ratio": ("stiffness_ratio", ".1e"),
+    "impact [N]": ("impact_force_N", ".4g"),
+    "whirl ratio": ("whirl_deviation_ratio", ".3g"),
+    "loss [W]": ("power_loss_W", ".4g"),
+}
 
 
 @dataclass(frozen=True)
@@ -68,29 +67,6 @@ class Ending:
     def unexplained(self) -> bool:
         """Whether the case neither closes nor tells why."""
         return self.status == OPEN
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        return {**self.__dict__, "assignments": list(self.assignments)}
-
-    def cells(self) -> tuple[str, ...]:
-        """A line of the table."""
-
-        def shown(value: float | None, form: str) -> str:
-            return "" if value is None else format(value, form)
-
-        return (
-            self.case,
-            self.status,
-            self.method or "",
-            shown(self.steps_per_turn, ".0f"),
-            shown(self.turn_ms, ".3g"),
-            shown(self.power_gap, ".1e"),
-            shown(self.stiffness_ratio, ".1e"),
-            shown(self.impact_force_N, ".4g"),
-            shown(self.whirl_deviation_ratio, ".3g"),
-            shown(self.power_loss_W, ".4g"),
-        )
 
 
 def cases(scene: Scene) -> dict[str, tuple[str, ...]]:
@@ -146,23 +122,22 @@ def battery(
 ) -> list[Ending]:
     """A row a case; all cases unless some are ``chosen``. Raises KeyboardInterrupt."""
     listed = cases(scene) if chosen is None else chosen
-    rows = []
-    for done, (name, assignments) in enumerate(listed.items(), 1):
+    counted, rows = Progress(progress, len(listed)), []
+    for name, assignments in listed.items():
         rows.append(ending(scene, name, assignments))
-        if progress is not None:
-            progress(done, len(listed))
+        counted.step()
     return rows
 
 
 def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
     """Run one case."""
     short = (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}", "numerics.impact_window_turns=1e9")
-    told = tuple(assignments)
+    assignments = tuple(assignments)
     try:
-        varied = with_options(scene, (*short, *told))
+        varied = with_options(scene, (*short, *assignments))
         bearing = roller_bearing(varied)
     except InputError as error:
-        return Ending(case, told, REFUSED, "; ".join(error.faults))
+        return Ending(case, assignments, REFUSED, "; ".join(error.faults))
     rtol, tightened = varied.numerics.rtol, False
     try:
         prepare(varied, bearing)
@@ -171,7 +146,7 @@ def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
             rtol, tightened = 0.1 * rtol, True
             run = run_replicate(varied, bearing, 0, rtol, Stop())
     except RunError as error:
-        return Ending(case, told, STOPPED, str(error))
+        return Ending(case, assignments, STOPPED, str(error))
     status, reason = _judge(run, rtol, tightened)
     turns = varied.numerics.turns + varied.numerics.warm_up_turns
     eigenvalue, held = largest_eigenvalue(run.stiffness), held_by_stability(run.stiffness)
@@ -183,7 +158,7 @@ def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
     }
     return Ending(
         case,
-        told,
+        assignments,
         status,
         reason,
         method=run.method,
@@ -215,15 +190,15 @@ def study(scene: Scene, progress: Callable[[int, int], None] | None = None) -> R
 def report(rows: Sequence[Ending]) -> Report:
     """Table of the endings, and every reason."""
     unexplained = sum(row.unexplained for row in rows)
-    told = record(FORMAT, largest_gap=LARGEST_GAP, cases=[row.as_dict() for row in rows])
+    written = record(FORMAT, largest_gap=LARGEST_GAP, cases=records(rows))
     if unexplained:
-        told["status"] = f"{unexplained} of {len(rows)} cases neither close nor tell why"
+        written["status"] = f"{unexplained} of {len(rows)} cases neither close nor tell why"
     title = f"extreme scenes; closed: power balance within {100.0 * LARGEST_GAP:g} %"
     return Report(
         stem="stability",
-        record=told,
-        tables=(Table(title, HEADER, [row.cells() for row in rows]),),
+        record=written,
+        tables=(tabled(title, rows, COLUMNS),),
         sentences=[f"{row.case}: {row.reason}" for row in rows if row.reason],
-        sheets={"stability": [{**row.as_dict(), "assignments": " ".join(row.assignments)} for row in rows]},
+        sheets={"stability": [row | {"assignments": " ".join(row["assignments"])} for row in records(rows)]},
         failed=unexplained > 0,
     )

@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, Difference, Verdict, check_replicates, judged, overall, percent, undecided
-from rbdyn.accuracy.report import Progress, Table
+from rbdyn.accuracy.report import Columns, Progress, Table, tabled
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
@@ -76,9 +75,14 @@ class Row(Bias):
     steps_per_turn: float
     power_gap: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        return dict(self.__dict__)
+
+COLUMNS: Columns = {
+    "rtol": ("rtol", "g"),
+    "ms a turn": ("turn_ms", ".2f"),
+    "ns a right-hand side": ("rhs_ns", ".0f"),
+    "steps a turn": ("steps_per_turn", ".0f"),
+    "power gap": ("power_gap", ".2g %"),
+}
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,7 @@ def statistics_bias(
     failures: dict[float, str] = {}
     for rtol in ordered:
         try:
-            series[rtol] = run_series(scene, bearing, [rtol], 1, lambda done, total: counted.step(), Stop())[0]
+            series[rtol] = run_series(scene, bearing, [rtol], 1, counted.step, Stop())[0]
         except RunError as error:
             if rtol == ordered[0]:
                 raise
@@ -158,37 +162,23 @@ def bias_of(runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Bias:
 
 def table(found: StatisticsBias, sought: float = SOUGHT) -> Table:
     """Table for the terminal; failed tolerances at the end."""
-    header = (
-        *("rtol", "ms a turn", "ns a right-hand side", "steps a turn", "power gap"),
-        *OUTPUTS,
-        f"within {percent(sought)}",
-    )
-    cells = [
-        (
-            f"{row.rtol:g}",
-            f"{row.turn_ms:.2f}",
-            f"{row.rhs_ns:.0f}",
-            f"{row.steps_per_turn:.0f}",
-            f"{100.0 * row.power_gap:.2g} %",
-            *bias_cells(row),
-            "reference" if row is found.rows[-1] else row.verdict(sought),
-        )
-        for row in found.rows
-    ]
-    cells += [(f"{rtol:g}", "failed", *[""] * (len(header) - 2)) for rtol in found.failures]
-    return Table(f"bias against rtol {found.rows[-1].rtol:g}, 95 % errors", header, cells)
+    reference = found.rows[-1]
+    title = f"bias against rtol {reference.rtol:g}, 95 % errors"
+    ran = tabled(title, found.rows, {**COLUMNS, **bias_columns(sought, reference)})
+    failed = [(f"{rtol:g}", "failed", *[""] * (len(ran.header) - 2)) for rtol in found.failures]
+    return ran._replace(cells=[*ran.cells, *failed])
 
 
-def bias_cells(row: Bias) -> list[str]:
-    """Bias of each output with its error, as text."""
-    return [f"{100.0 * row.bias[name]:+.2f} ± {100.0 * row.bias_error[name]:.2f} %" for name in OUTPUTS]
+def bias_columns(sought: float, reference: Bias | None = None) -> dict[str, Callable[[Bias], str]]:
+    """Columns of the bias of each output with its error, and of what they say; ``reference`` is not judged."""
 
+    def output(name: str) -> Callable[[Bias], str]:
+        return lambda row: f"{100.0 * row.bias[name]:+.2f} ± {100.0 * row.bias_error[name]:.2f} %"
 
-def flat(row: Row | Any) -> dict[str, Any]:
-    """A row without nesting, for a sheet."""
-    nested = {key: value for key, value in row.as_dict().items() if isinstance(value, dict)}
-    plain = {key: value for key, value in row.as_dict().items() if key not in nested}
-    return plain | {f"{name}_{kind}": of[name] for kind, of in nested.items() for name in of}
+    return {
+        **{name: output(name) for name in OUTPUTS},
+        f"within {percent(sought)}": lambda row: "reference" if row is reference else row.verdict(sought),
+    }
 
 
 def _row(scene: Scene, rtol: float, runs: list[Replicate], reference: list[Replicate]) -> Row:

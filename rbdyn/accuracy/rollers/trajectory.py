@@ -7,7 +7,7 @@ turn only, and every span has its own floor below which the reference itself is 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -132,5 +132,5 @@ def agreement_record(found: Reference) -> dict[str, Any]:
     """JSON of the references."""
     return {
         "methods": {OURS.name: OUR_REFERENCE_RTOL, DOP853.name: THEIR_REFERENCE_RTOL},
-        "agreement": [{"turns": span, **error.__dict__} for span, error in found.agreement.items()],
+        "agreement": [{"turns": span, **asdict(error)} for span, error in found.agreement.items()],
     }

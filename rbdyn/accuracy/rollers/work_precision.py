@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from rbdyn.accuracy.judgement import SOUGHT
-from rbdyn.accuracy.report import Report, record
+from rbdyn.accuracy.report import Report, flat, record, records
 from rbdyn.accuracy.rollers import comparison, tolerances
 from rbdyn.accuracy.rollers.methods import COMPILED
 from rbdyn.accuracy.rollers.trajectory import DEFAULT_TURNS
@@ -29,13 +29,13 @@ def study(
     motion = comparison.trajectories(scene, progress, turns, COMPILED)
     found = tolerances.statistics_bias(scene, rtols, progress)
     chosen = tolerances.conclusion(found.rows, scene, sought)
-    numerics = scene.numerics
+    numerics, rows = scene.numerics, records(found.rows)
     agreement, trajectories, _ = motion.tables
     return Report(
         stem="accuracy",
         record=record(
             FORMAT,
-            rows=[row.as_dict() for row in found.rows],
+            rows=rows,
             sought=sought,
             failures={f"{rtol:g}": why for rtol, why in found.failures.items()},
             conclusion=chosen,
@@ -50,7 +50,7 @@ def study(
             *(f"rtol {rtol:g} failed: {why}" for rtol, why in found.failures.items()),
             f"{numerics.replicates} replicates of {numerics.turns:g} turns",
         ),
-        sheets={"accuracy": [tolerances.flat(row) for row in found.rows], "trajectory": motion.record["rows"]},
+        sheets={"accuracy": [flat(row) for row in rows], "trajectory": motion.record["rows"]},
         pictures={"accuracy": lambda path: _draw(found.rows, path, sought), "trajectory": motion.pictures["methods"]},
     )
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rbdyn.compiled.elementary import fast_cos_sin
 from rbdyn.compiled.kernel import kernel, routine
+from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.cage_body import cage_acceleration
 from rbdyn.dynamics.forces.drag import drag_forces
 from rbdyn.dynamics.forces.drive import action, load_power, tick
@@ -22,18 +23,6 @@ from rbdyn.dynamics.forces.pocket import pocket_contact, pocket_gap
 from rbdyn.dynamics.forces.race_lanes import race_forces
 from rbdyn.dynamics.forces.races import Race, roller_radius
 from rbdyn.dynamics.forces.ring_motion import RingMotion, outer_motion, support_motion
-from rbdyn.dynamics.forces.state import (
-    CAGE_ANGLE,
-    CAGE_SPEED,
-    CAGE_VX,
-    CAGE_VY,
-    CAGE_X,
-    CAGE_Y,
-    RING_VX,
-    RING_VY,
-    RING_X,
-    RING_Y,
-)
 
 # Powers lost, in the order of the power vector; behind them stand the powers that come in by the shafts and by loads
 # without a potential.
@@ -97,9 +86,15 @@ def pocket_direction(bearing, cosine, sine, j):
 @kernel
 def cage_motion(y, body):
     """Motion of the cage, whose coordinates stand from ``body`` on; its mark is the mid-line of the first pocket."""
-    cosine, sine = fast_cos_sin(y[body + CAGE_ANGLE])
+    cosine, sine = fast_cos_sin(y[body + state.CAGE_ANGLE])
     return RingMotion(
-        y[body + CAGE_X], y[body + CAGE_Y], y[body + CAGE_VX], y[body + CAGE_VY], y[body + CAGE_SPEED], cosine, sine
+        y[body + state.CAGE_X],
+        y[body + state.CAGE_Y],
+        y[body + state.CAGE_VX],
+        y[body + state.CAGE_VY],
+        y[body + state.CAGE_SPEED],
+        cosine,
+        sine,
     )
 
 
@@ -107,10 +102,10 @@ def cage_motion(y, body):
 def inner_motion(y, body, acting):
     """Motion of the inner ring."""
     return RingMotion(
-        y[body + RING_X],
-        y[body + RING_Y],
-        y[body + RING_VX],
-        y[body + RING_VY],
+        y[body + state.RING_X],
+        y[body + state.RING_Y],
+        y[body + state.RING_VX],
+        y[body + state.RING_VY],
         acting.inner_speed,
         acting.inner_cos,
         acting.inner_sin,
@@ -146,22 +141,25 @@ def roller_gap(bearing, y, cage, j):
     return pocket_gap(bearing.pocket, roller_radius(bearing.sizes, j), dy * ex - dx * ey, dx * ex + dy * ey)
 
 
+class OnCage(NamedTuple):
+    """What the rollers do to the cage: force [N] and moment [N m]; powers lost [W]; largest loads of a wall [N]."""
+
+    x: float
+    y: float
+    moment: float
+    friction: float
+    damping: float
+    film: float
+    load: float
+    contact_load: float
+
+
 @kernel
-def derivative(bearing, y, row, dy, power, loads, scratch):
-    """Fill row ``row`` of ``dy``, of the powers [W] and of the largest loads [N], for the state ``y``."""
+def pocket_forces(bearing, cage, y, row, dy, scratch):
+    """Add the forces of the pocket walls to row ``row`` of ``dy``, as yet forces and moments on the rollers."""
     z = roller_count(bearing)
-    body = 5 * z
-    acting, cage, inner, outer = motions(bearing, y)
-    # A long chain of roots and quotients: begun first, it runs beside what follows.
-    land = guide_forces(bearing.guide, cage, inner, outer)
-    tick(bearing.drive, acting, row, dy)
-    cage_fx = cage_fy = cage_moment = pocket_friction = pocket_damping = pocket_film = 0.0
-    pocket_load = contact_load = 0.0
-    drag_loss = drag_forces(bearing.drag, z, y, row, dy)
-    for i in range(2 * z):
-        dy[row, i] = y[2 * z + i]
-    for i in range(4 * z, 5 * z):
-        dy[row, i] = 0.0
+    fx = fy = moment = friction = damping = film = 0.0
+    load = contact_load = 0.0
     for j in range(z):
         scratch.gap[j] = roller_gap(bearing, y, cage, j)
     for j in range(z):
@@ -171,52 +169,83 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
         dy[row, 2 * z + j] += wall[0]
         dy[row, 3 * z + j] += wall[1]
         dy[row, 4 * z + j] += wall[2]
-        cage_fx -= wall[0]
-        cage_fy -= wall[1]
-        cage_moment += wall[3]
-        pocket_load = max(pocket_load, abs(wall[8]))
+        fx -= wall[0]
+        fy -= wall[1]
+        moment += wall[3]
+        load = max(load, abs(wall[8]))
         contact_load = max(contact_load, wall[4])
-        pocket_friction += wall[5]
-        pocket_damping += wall[6]
-        pocket_film += wall[7]
-    on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
+        friction += wall[5]
+        damping += wall[6]
+        film += wall[7]
+    return OnCage(fx, fy, moment, friction, damping, film, load, contact_load)
+
+
+@kernel
+def accelerate_rollers(bearing, row, dy):
+    """Turn forces and moments on the rollers, which stand in row ``row`` of ``dy``, into accelerations."""
+    z = roller_count(bearing)
     per_mass, per_inertia = 1.0 / bearing.roller_mass, 1.0 / bearing.roller_inertia
     for i in range(2 * z, 4 * z):
         dy[row, i] *= per_mass
     for i in range(4 * z, 5 * z):
         dy[row, i] *= per_inertia
     add_weight(bearing.gravity, 2 * z, z, row, dy)
-    ax, ay, spin_up = cage_acceleration(
-        bearing.cage,
-        cage_fx + land.cage_x,
-        cage_fy + land.cage_y,
-        cage_moment + land.cage_moment,
-        cage.cos,
-        cage.sin,
-        cage.speed,
-    )
-    dy[row, body + CAGE_X] = cage.vx
-    dy[row, body + CAGE_Y] = cage.vy
-    dy[row, body + CAGE_ANGLE] = cage.speed
-    dy[row, body + CAGE_VX] = ax
-    dy[row, body + CAGE_VY] = ay
-    dy[row, body + CAGE_SPEED] = spin_up
-    add_weight(bearing.gravity, body + CAGE_VX, 1, row, dy)
-    dy[row, body + RING_X] = inner.vx
-    dy[row, body + RING_Y] = inner.vy
-    dy[row, body + RING_VX] = (on_inner[0] + land.inner_x + acting.load_x) / bearing.inner_ring_mass
-    dy[row, body + RING_VY] = (on_inner[1] + land.inner_y + acting.load_y) / bearing.inner_ring_mass
-    add_weight(bearing.gravity, body + RING_VX, 1, row, dy)
-    support_loss = support_motion(
-        bearing.outer_ring, bearing.gravity, on_outer[0] + land.outer_x, on_outer[1] + land.outer_y, y, row, dy
-    )
+
+
+@kernel
+def accelerate_cage(bearing, cage, pockets, land, row, dy):
+    """Rates of the cage's coordinates into row ``row`` of ``dy``."""
+    body = 5 * roller_count(bearing)
+    fx, fy, moment = pockets.x + land.cage_x, pockets.y + land.cage_y, pockets.moment + land.cage_moment
+    ax, ay, spin_up = cage_acceleration(bearing.cage, fx, fy, moment, cage.cos, cage.sin, cage.speed)
+    dy[row, body + state.CAGE_X] = cage.vx
+    dy[row, body + state.CAGE_Y] = cage.vy
+    dy[row, body + state.CAGE_ANGLE] = cage.speed
+    dy[row, body + state.CAGE_VX] = ax
+    dy[row, body + state.CAGE_VY] = ay
+    dy[row, body + state.CAGE_SPEED] = spin_up
+    add_weight(bearing.gravity, body + state.CAGE_VX, 1, row, dy)
+
+
+@kernel
+def accelerate_inner_ring(bearing, inner, fx, fy, row, dy):
+    """Rates of the inner ring's coordinates under a force [N] into row ``row`` of ``dy``."""
+    body = 5 * roller_count(bearing)
+    dy[row, body + state.RING_X] = inner.vx
+    dy[row, body + state.RING_Y] = inner.vy
+    dy[row, body + state.RING_VX] = fx / bearing.inner_ring_mass
+    dy[row, body + state.RING_VY] = fy / bearing.inner_ring_mass
+    add_weight(bearing.gravity, body + state.RING_VX, 1, row, dy)
+
+
+@kernel
+def derivative(bearing, y, row, dy, power, loads, scratch):
+    """Fill row ``row`` of ``dy``, of the powers [W] and of the largest loads [N], for the state ``y``."""
+    z = roller_count(bearing)
+    acting, cage, inner, outer = motions(bearing, y)
+    # A long chain of roots and quotients: begun first, it runs beside what follows.
+    land = guide_forces(bearing.guide, cage, inner, outer)
+    tick(bearing.drive, acting, row, dy)
+    drag_loss = drag_forces(bearing.drag, z, y, row, dy)
+    for i in range(2 * z):
+        dy[row, i] = y[2 * z + i]
+    for i in range(4 * z, 5 * z):
+        dy[row, i] = 0.0
+    pockets = pocket_forces(bearing, cage, y, row, dy, scratch)
+    on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
+    accelerate_rollers(bearing, row, dy)
+    accelerate_cage(bearing, cage, pockets, land, row, dy)
+    ring_fx, ring_fy = on_inner[0] + land.inner_x + acting.load_x, on_inner[1] + land.inner_y + acting.load_y
+    accelerate_inner_ring(bearing, inner, ring_fx, ring_fy, row, dy)
+    support_fx, support_fy = on_outer[0] + land.outer_x, on_outer[1] + land.outer_y
+    support_loss = support_motion(bearing.outer_ring, bearing.gravity, support_fx, support_fy, y, row, dy)
     power[row, 0] = on_outer[4]
     power[row, 1] = on_inner[4]
     power[row, 2] = on_outer[5] + on_inner[5]
     power[row, 3] = on_outer[6] + on_inner[6]
-    power[row, 4] = pocket_friction
-    power[row, 5] = pocket_damping
-    power[row, 6] = pocket_film
+    power[row, 4] = pockets.friction
+    power[row, 5] = pockets.damping
+    power[row, 6] = pockets.film
     power[row, 7] = land.film
     power[row, 8] = land.friction
     power[row, 9] = land.damping
@@ -225,11 +254,11 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     inner_moment, outer_moment = on_inner[2] + land.inner_moment, on_outer[2] + land.outer_moment
     power[row, SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
     power[row, LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
-    loads[row, POCKET_LOAD] = pocket_load
+    loads[row, POCKET_LOAD] = pockets.load
     loads[row, OUTER_LOAD] = on_outer[3]
     loads[row, INNER_LOAD] = on_inner[3]
     loads[row, LAND_LOAD] = land.load
-    loads[row, POCKET_CONTACT_LOAD] = contact_load
+    loads[row, POCKET_CONTACT_LOAD] = pockets.contact_load
 
 
 @routine

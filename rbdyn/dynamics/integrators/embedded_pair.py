@@ -8,7 +8,8 @@ from which stability is said to hold a step, ``limit``.
 
 from __future__ import annotations
 
-from rbdyn.compiled.kernel import law
+from rbdyn.compiled.elementary import fma
+from rbdyn.compiled.kernel import kernel, law
 
 
 @law
@@ -24,6 +25,21 @@ def stage_time(pair, s):
 @law
 def stage_state(pair, s, y, k, h, state):
     """State at which row ``s`` is evaluated. One pass a stage: rows of weight zero may hold anything."""
+
+
+@kernel
+def early_stage_state(s, y, k, w0, w1, w2, state):
+    """``stage_state`` of rows 1 to 3 by the weights of rows 0 to 2, times the step."""
+    n = y.size
+    if s == 1:
+        for i in range(n):
+            state[i] = fma(w0, k[0, i], y[i])
+    elif s == 2:
+        for i in range(n):
+            state[i] = fma(w1, k[1, i], fma(w0, k[0, i], y[i]))
+    else:
+        for i in range(n):
+            state[i] = fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i])))
 
 
 @law

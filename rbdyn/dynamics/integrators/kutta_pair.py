@@ -13,6 +13,7 @@ import numpy as np
 
 from rbdyn.compiled.elementary import fma
 from rbdyn.dynamics.integrators.embedded_pair import (
+    early_stage_state,
     mean_rate,
     quartic_rate,
     rate_error,
@@ -54,15 +55,8 @@ def _(pair, s):
 def _(pair, s, y, k, h, state):
     n = y.size
     w0, w1, w2, w3 = h * A[s, 0], h * A[s, 1], h * A[s, 2], h * A[s, 3]
-    if s == 1:
-        for i in range(n):
-            state[i] = fma(w0, k[0, i], y[i])
-    elif s == 2:
-        for i in range(n):
-            state[i] = fma(w1, k[1, i], fma(w0, k[0, i], y[i]))
-    elif s == 3:
-        for i in range(n):
-            state[i] = fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i])))
+    if s <= 3:
+        early_stage_state(s, y, k, w0, w1, w2, state)
     else:
         for i in range(n):
             state[i] = fma(w3, k[3, i], fma(w2, k[2, i], fma(w1, k[1, i], fma(w0, k[0, i], y[i]))))

@@ -109,18 +109,8 @@ def cheaper_method(
 
 def _copy(carry: Carry) -> Carry:
     """A run of its own from here on; only the work space is shared."""
-    return Carry(
-        carry.y.copy(),
-        carry.k.copy(),
-        carry.stage.copy(),
-        carry.power.copy(),
-        carry.loads.copy(),
-        carry.scratch,
-        carry.clock.copy(),
-        carry.counts.copy(),
-        carry.stiffness.copy(),
-        carry.pair,
-    )
+    own: dict[str, Any] = {name: part.copy() for name, part in carry._asdict().items() if isinstance(part, np.ndarray)}
+    return carry._replace(**own)
 
 
 def held_by_stability(stiffness: Sequence[float] | np.ndarray) -> float:

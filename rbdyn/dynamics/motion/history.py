@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces import observe as row
 from rbdyn.dynamics.forces.observe import OBSERVED, observe
-from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, RING_X, RING_Y
 from rbdyn.dynamics.parameters.geometry import layout_of
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
@@ -25,6 +23,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 # Numbers of a history, 0.8 GB: with its table and pictures 2 GB. 1000 turns of 10 rollers at 512 samples are 0.7e8.
 MOST_NUMBERS = 1e8
+# Fields that are columns of cage and inner ring in the state, and those that are rows of ``observe``, in their order.
+BODIES = ("cage_x", "cage_y", "cage_angle", "cage_vx", "cage_vy", "cage_speed", "ring_x", "ring_y")
+SEEN = ("outer_load", "inner_load", "pocket_load", "outer_slip", "inner_slip", "outer_heat", "inner_heat")
 
 
 @dataclass(frozen=True)
@@ -129,26 +130,13 @@ def history(
         scene=scene,
         time=np.arange(len(states)) * scene.turn_s / per_turn,
         inner_angle=clock[:, 0],
-        cage_x=states[:, body + CAGE_X],
-        cage_y=states[:, body + CAGE_Y],
-        cage_vx=states[:, body + CAGE_VX],
-        cage_vy=states[:, body + CAGE_VY],
-        cage_angle=states[:, body + CAGE_ANGLE],
-        cage_speed=states[:, body + CAGE_SPEED],
-        ring_x=states[:, body + RING_X],
-        ring_y=states[:, body + RING_Y],
+        **{name: states[:, body + place] for place, name in enumerate(BODIES)},
         outer_x=still if support is None else states[:, support],
         outer_y=still if support is None else states[:, support + 1],
         roller_x=x,
         roller_y=y,
         roller_spin=states[:, 4 * z : 5 * z],
         azimuth=np.unwrap(np.arctan2(y, x), axis=0),
-        outer_load=seen[row.OUTER_LOAD],
-        inner_load=seen[row.INNER_LOAD],
-        pocket_load=seen[row.POCKET_LOAD],
-        outer_slip=seen[row.OUTER_SLIP],
-        inner_slip=seen[row.INNER_SLIP],
-        outer_heat=seen[row.OUTER_HEAT],
-        inner_heat=seen[row.INNER_HEAT],
+        **dict(zip(SEEN, seen, strict=True)),
         land_load=land,
     )

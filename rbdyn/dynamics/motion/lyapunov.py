@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.geometry import absolute_tolerance
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.run import Run
+from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.scene import Scene
 
@@ -89,12 +89,11 @@ def lyapunov_exponent(
     half-width is Student's t over blocks of a twentieth of the turns; None for less than two turns.
     """
     started = time.perf_counter()
-    numerics = scene.numerics.model_copy(update={"turns": turns + ALIGN_TURNS})
-    scene = scene.model_copy(update={"numerics": numerics})
+    scene = with_numerics(scene, turns=turns + ALIGN_TURNS)
     bearing, stop = roller_bearing(scene), stop or Stop()
     leader = Run(scene, bearing, replicate, rtol, stop)
     follower = Run(scene, bearing, replicate, rtol, stop)
-    begin = numerics.warm_up_turns
+    begin = scene.numerics.warm_up_turns
     leader.to(begin)
     follower.carry.clock[:] = leader.carry.clock
     # The clock of a scene that depends on time has no scale, and is not moved apart.

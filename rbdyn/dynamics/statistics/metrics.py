@@ -10,16 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.forces.equations import (
-    INNER_LOAD,
-    LAND_LOAD,
-    LOAD,
-    LOSSES,
-    OUTER_LOAD,
-    POCKET_CONTACT_LOAD,
-    POCKET_LOAD,
-    SHAFT,
-)
+from rbdyn.dynamics.forces.equations import LOAD, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.bias import companion_error
 from rbdyn.result import Quantity
@@ -134,20 +125,9 @@ class Replicate:
         """Mean power [W] of one loss."""
         return float(self.work[self.first :, LOSSES.index(term)].sum() / self.duration)
 
-    @property
-    def max_inner_load(self) -> float:
-        """Largest load between a roller and the inner race [N]."""
-        return float(self.largest[self.first :, INNER_LOAD].max())
-
-    @property
-    def max_outer_load(self) -> float:
-        """Largest load between a roller and the outer race [N]."""
-        return float(self.largest[self.first :, OUTER_LOAD].max())
-
-    @property
-    def max_land_load(self) -> float:
-        """Largest dry load between cage and guide land [N]."""
-        return float(self.largest[self.first :, LAND_LOAD].max())
+    def largest_load(self, force: int) -> float:
+        """Largest load counted [N], by its place in the load vector."""
+        return float(self.largest[self.first :, force].max())
 
 
 class Figure(NamedTuple):
@@ -201,6 +181,16 @@ CAGE_SLIP = Figure(_timed(lambda run: np.column_stack((run.kinematic_angle, run.
 def mean_gap(runs: Sequence[Replicate]) -> float:
     """Size of the mean relative gap of the power balance: what is left of it when replicates are averaged."""
     return abs(sum(run.signed_power_gap for run in runs)) / len(runs)
+
+
+def work_done(runs: Sequence[Replicate]) -> dict[str, float]:
+    """Cost of runs, warm-up included: processor time, steps, right-hand sides."""
+    return {
+        "cpu_s": sum(run.cpu_s for run in runs),
+        "steps": sum(run.accepted_steps for run in runs),
+        "rejected_steps": sum(run.rejected_steps for run in runs),
+        "rhs_evaluations": sum(run.derivatives for run in runs),
+    }
 
 
 def missing_power(runs: Sequence[Replicate]) -> float:
