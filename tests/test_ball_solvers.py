@@ -19,10 +19,10 @@ from rbdyn.accuracy.report import Progress
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.bearing import equilibrium as solve_scene
 from rbdyn.quasistatic.rivals import finite_search, limited, minpack, plain_newton
-from rbdyn.quasistatic.rivals.elimination import eliminate
 from rbdyn.quasistatic.rivals.finite_search import loaded, offset_distances, search_points
 from rbdyn.quasistatic.rivals.full_system import evaluate, forces, system_of, unknowns
 from rbdyn.quasistatic.row import equilibrium
+from rbdyn.quasistatic.row.elimination import eliminate
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 from rbdyn.scene import BallScene
 
@@ -61,11 +61,15 @@ def test_unit_elimination_solves_and_tells_singular_matrices(interpreted):
     matrix, vector = draw.normal(size=(7, 7)), draw.normal(size=7)
     matrix[0, 0] = 0.0
     expected, matrix_left = np.linalg.solve(matrix, vector), matrix.copy()
-    assert solve(matrix_left, vector)
+    assert solve(matrix_left, vector, 7, 0.0)
     assert vector == pytest.approx(expected, rel=1e-10)
+    assert not solve(matrix.copy(), np.ones(7), 7, 1e3)
     matrix[:, 3] = 0.0
-    assert not solve(matrix, np.ones(7))
-    assert not solve(np.full((2, 2), np.nan), np.ones(2))
+    assert not solve(matrix.copy(), np.ones(7), 7, 0.0)
+    # The first three equations alone can be solved.
+    expected, part = np.linalg.solve(matrix[:3, :3], np.ones(3)), np.ones(7)
+    assert solve(matrix, part, 3, 0.0) and part[:3] == pytest.approx(expected, rel=1e-10) and (part[3:] == 1.0).all()
+    assert not solve(np.full((2, 2), np.nan), np.ones(2), 2, 0.0)
 
 
 def test_invariant_the_convex_solution_leaves_nothing_in_the_full_system(problem, ours):

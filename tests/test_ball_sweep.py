@@ -202,14 +202,11 @@ def test_unit_a_lost_point_is_followed_by_a_fresh_start():
     model, points, _ = sweeps._packed(scene, axes, snake(axes))
     points.load[1] = np.nan
     row, found = model.row, sweeps.empty(3, model.row.cosine.size)
-    at, counts = sweeps.space(row.cosine.size), np.zeros(sweeps.COUNTERS, np.int64)
-    q, balls = np.zeros(5), np.zeros((row.cosine.size, 4))
-    arrived = sweeps.march_through(
-        model.control, row.cosine, row.sine, points, 0, 3, False, q, balls, at, counts, found
-    )
+    at = sweeps.space(row.cosine.size)
+    arrived = sweeps.march_through(model.control, row.cosine, row.sine, points, 0, 3, False, at, found)
     assert arrived and (found.outcome == 0).tolist() == [True, False, True]
     assert found.cold.tolist() == [1, 1, 1]
-    assert found.told[2, :, 0] == pytest.approx(equilibrium(scene_with(f"{SPEED}=15e3")).rows[0].inner_load)
+    assert found.figures[2, :, 0] == pytest.approx(equilibrium(scene_with(f"{SPEED}=15e3")).rows[0].inner_load)
 
 
 def test_unit_a_double_decker_goes_point_by_point(tmp_path):

@@ -11,7 +11,7 @@ from doe.dimension_chain import read_chains, solve
 from doe.report.steps.chain import print_chain
 from doe.study_file.chain_section import StudyChain, chain_table
 from rbdyn.faults import InputError, read_toml
-from rbdyn.mounting.rings import Ring, mounted_clearance
+from rbdyn.mounting.rings import MountedRings, Ring, mounted_clearance
 from rbdyn.properties.materials import Material
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -43,17 +43,15 @@ def test_the_radial_chain_loses_what_the_rings_of_the_simulator_lose(solved):
     steel = Material(206e9, 0.3, 7827.0)
     sizes = {name: each.nominal_mm + each.mean_mm for name, each in part.items()}
     initial = sizes["outer_raceway"] - sizes["inner_raceway"] - 2 * sizes["rollers"]
-    mounted = mounted_clearance(
-        1e-3 * initial,
+    rings = MountedRings(
         shaft=Ring(0.0, 0.0135, steel),
         inner_ring=Ring(0.0135, 0.01725, steel),
         outer_ring=Ring(0.02626, 0.03, steel),
         housing=Ring(0.03, 0.04, steel),
         inner_interference=1e-3 * (sizes["shaft_seat"] - sizes["ring_bore"]),
         outer_interference=1e-3 * (sizes["ring_outside"] - sizes["housing_bore"]),
-        roller_diameter=0.009,
-        roller_material=steel,
     )
+    mounted = mounted_clearance(1e-3 * initial, rings, 0.009, steel)
     low, high = solved["radial"].rss_mm
     assert (low + high) / 2 == pytest.approx(1e3 * mounted.operating, abs=1e-9)
 

@@ -33,16 +33,6 @@ def scene(radial=150.0, axial=40.0, clearance=None, **operation):
     )
 
 
-@settings(max_examples=40, deadline=None)
-@given(st.floats(-5.0, 5.0), st.floats(0.1, 3.0))
-def test_closed_form_golden_section(place, power):
-    """Closed form: |x - c|^p has its minimum at c, smooth or with a corner, at an end where c lies outside."""
-    found, value = preload.golden_section(lambda x: abs(x - place) ** power, -3.0, 4.0, 1e-6)
-    nearest = min(max(place, -3.0), 4.0)
-    assert found == pytest.approx(nearest, abs=1e-6)
-    assert value == abs(found - place) ** power
-
-
 def test_optima_are_those_of_a_dense_scan():
     """Oracle: a scan of 400 cold starts has no less stress and no longer life than the two optima."""
     found = preload.over_preload(scene(), np.linspace(0.0, 130.0, 14))

@@ -14,7 +14,7 @@ from scipy.integrate import solve_bvp
 
 from rbdyn.faults import InputError, validated
 from rbdyn.mounting.fits import operating_clearance
-from rbdyn.mounting.rings import Ring, interface_pressure, mounted_clearance
+from rbdyn.mounting.rings import MountedRings, Ring, interface_pressure, mounted_clearance
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Bearing, CustomMaterial, Materials
@@ -167,17 +167,15 @@ def test_unit_fit_comes_loose():
 def test_literature_fit_loss(ratio):
     """Literature: on a solid shaft of like steel the raceway grows by bore/raceway of the interference: 0.7 to 0.85."""
     raceway = 17.25e-3
-    mounted = mounted_clearance(
-        20e-6,
+    rings = MountedRings(
         shaft=Ring(0.0, ratio * raceway, STEEL),
         inner_ring=Ring(ratio * raceway, raceway, STEEL),
         outer_ring=Ring(26.25e-3, 31e-3, STEEL),
         housing=Ring(31e-3, 45e-3, STEEL),
         inner_interference=10e-6,
         outer_interference=0.0,
-        roller_diameter=9e-3,
-        roller_material=STEEL,
     )
+    mounted = mounted_clearance(20e-6, rings, 9e-3, STEEL)
     loss = -mounted.inner_fit / 10e-6
     assert loss == pytest.approx(ratio, rel=1e-12)
     assert 0.70 <= round(loss, 12) <= 0.85

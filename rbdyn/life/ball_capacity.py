@@ -2,7 +2,7 @@
 
 The factors follow the standards as they are commonly restated, not their text. f_c = 0.41 * 98.0665 * 0.95 times
 Lundberg and Palmgren's terms gives the printed table of ISO 281 within 0.1 % with both grooves at 0.52; the static
-rating is worked out from its definition (4200 MPa, elastic constants of ISO/TR 10657) instead of read from f_0.
+rating is worked out from its definition (4200 MPa) instead of read from f_0.
 Lengths in m, angles in rad.
 """
 
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.contact.hertz_point import ball_on_race, peak_pressure
+from rbdyn.contact.hertz_point import PointContact, peak_pressure
 
 LIFE_EXPONENT = 3.0
 # lambda of a single row: what practice falls short of the theory (ISO/TR 1281-1), and the theory's constant [N, mm].
@@ -22,7 +22,6 @@ CAPACITY_CONSTANT = 0.41 * 98.0665
 RATING_FACTOR = 1.3  # b_m of ball bearings of contemporary steel
 LARGEST_PLAIN_BALL = 25.4  # [mm]; above, capacity grows as the power 1.4 of the diameter
 STATIC_PRESSURE = 4.2e9  # [Pa]
-STATIC_MODULUS = 207e9 / (1.0 - 0.3**2)  # E' [Pa] behind f_0 in ISO 76
 MOST_LOADED = 5.0  # Stribeck's Q_max Z cos(alpha)/F_r
 
 # ISO 281, table 3, single row. Relative axial load F_a/(Z D^2) [MPa]; it times 1/cos(alpha) is f_0 F_a/C_0.
@@ -76,18 +75,23 @@ def ball_size_term(ball_diameter: float) -> float:
     return millimetres**1.8 if millimetres <= LARGEST_PLAIN_BALL else 3.647 * millimetres**1.4
 
 
-def capacity_factor(gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.52) -> float:
-    """f_c of a radial or angular contact ball bearing (ISO 281, in N and mm), gamma = D cos(alpha)/d_m.
-
-    The standard's own table holds for 0.52; it grants a closer groove no more. Raises ValueError unless
-    0 < gamma < 1 and both factors exceed 0.5.
-    """
+def refuse_impossible(gamma: float, inner_groove_factor: float, outer_groove_factor: float) -> None:
+    """Raise ValueError unless 0 < gamma < 1 and both groove factors exceed 0.5."""
     if not 0.0 < gamma < 1.0:
         raise ValueError(f"gamma = {gamma:g}: the ball must be smaller than the pitch circle")
     if not min(inner_groove_factor, outer_groove_factor) > 0.5:
         raise ValueError(
             f"groove factors {inner_groove_factor:g} and {outer_groove_factor:g} must be above 0.5, or the ball jams"
         )
+
+
+def capacity_factor(gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.52) -> float:
+    """f_c of a radial or angular contact ball bearing (ISO 281, in N and mm), gamma = D cos(alpha)/d_m.
+
+    The standard's own table holds for 0.52; it grants a closer groove no more. Raises ValueError unless
+    0 < gamma < 1 and both factors exceed 0.5.
+    """
+    refuse_impossible(gamma, inner_groove_factor, outer_groove_factor)
     inner_to_outer = 1.04 * ((1.0 - gamma) / (1.0 + gamma)) ** 1.72
     inner_to_outer *= groove_ratio(inner_groove_factor, outer_groove_factor)
     races = (1.0 + inner_to_outer ** (10.0 / 3.0)) ** -0.3
@@ -115,32 +119,14 @@ def dynamic_capacity(
     return factor * (rows * math.cos(contact_angle)) ** 0.7 * balls ** (2.0 / 3.0) * ball_size_term(ball_diameter)
 
 
-def static_factor(gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.53) -> float:
-    """f_0 of ISO 76 [N/mm^2]: C_0 = f_0 i Z D^2 cos(alpha), at gamma = D cos(alpha)/d_m, by exact Hertz.
+def static_capacity(balls: int, contact_angle: float, races: tuple[PointContact, PointContact]) -> float:
+    """Basic static radial load rating C_0 [N] of a row by its definition in ISO 76, from the contacts with its ``races``.
 
-    The load that makes 4200 MPa on the weaker race of the most loaded ball, which bears 5 F_r/(Z cos alpha).
+    The load that makes 4200 MPa on the most loaded ball, which bears 5 F_r/(Z cos alpha), at the race that has it first: the
+    outer one up to some D cos(alpha)/d_m = 0.09, the inner one beyond.
     """
-    ball = 1e-3
-    loads = (
-        (STATIC_PRESSURE / float(peak_pressure(ball_on_race(ball, groove, signed, STATIC_MODULUS), 1.0))) ** 3
-        for groove, signed in ((inner_groove_factor, gamma), (outer_groove_factor, -gamma))
-    )
-    return min(loads) / MOST_LOADED
-
-
-def static_capacity(
-    balls: int,
-    ball_diameter: float,
-    pitch_diameter: float,
-    contact_angle: float = 0.0,
-    inner_groove_factor: float = 0.52,
-    outer_groove_factor: float = 0.53,
-    rows: int = 1,
-) -> float:
-    """Basic static radial load rating C_0r [N] by ISO 76, f_0 i Z D^2 cos(alpha)."""
-    cosine = math.cos(contact_angle)
-    factor = static_factor(ball_diameter * cosine / pitch_diameter, inner_groove_factor, outer_groove_factor)
-    return factor * rows * balls * (ball_diameter * 1e3) ** 2 * cosine
+    sharpest = max(float(peak_pressure(contact, 1.0)) for contact in races)
+    return balls * math.cos(contact_angle) * (STATIC_PRESSURE / sharpest) ** 3 / MOST_LOADED
 
 
 def load_factors(contact_angle: float, axial_load: float, balls: int, ball_diameter: float) -> LoadFactors:

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.life.ball_capacity import ball_size_term, groove_ratio
+from rbdyn.life.ball_capacity import ball_size_term, groove_ratio, refuse_impossible
 from rbdyn.life.turns import Life
 
 LOAD_LIFE = 3.0
@@ -58,12 +58,7 @@ def lundberg_palmgren_capacities(
     """
     relative = ball_diameter / pitch_diameter
     gamma = relative * math.cos(contact_angle)
-    if not 0.0 < gamma < 1.0:
-        raise ValueError(f"gamma = {gamma:g}: the ball must be smaller than the pitch circle")
-    if not min(inner_groove_factor, outer_groove_factor) > 0.5:
-        raise ValueError(
-            f"groove factors {inner_groove_factor:g} and {outer_groove_factor:g} must be above 0.5, or the ball jams"
-        )
+    refuse_impossible(gamma, inner_groove_factor, outer_groove_factor)
 
     def capacity(groove: float, signed: float) -> float:
         shape = (1.0 - signed) ** 1.39 / (1.0 + signed) ** (1.0 / 3.0) * relative**0.3
@@ -128,13 +123,8 @@ def row_life(
     inner_capacity, outer_capacity = capacities
     damage = (inner_equivalent / inner_capacity) ** RACE_EXPONENT
     damage += (outer_equivalent / outer_capacity) ** RACE_EXPONENT
-    return BallLife(
-        million_turns=damage ** (-1.0 / WEIBULL) if damage > 0.0 else math.inf,
-        inner_load=inner_equivalent,
-        outer_load=outer_equivalent,
-        inner_capacity=inner_capacity,
-        outer_capacity=outer_capacity,
-    )
+    million_turns = damage ** (-1.0 / WEIBULL) if damage > 0.0 else math.inf
+    return BallLife(million_turns, inner_equivalent, outer_equivalent, inner_capacity, outer_capacity)
 
 
 def _loads(loads: NDArray[np.float64], race: str) -> NDArray[np.float64]:

@@ -171,14 +171,7 @@ def reference_life(
     inner_capacity, outer_capacity = race_capacities(capacity, rollers, gamma)
     damage = (inner_load / inner_capacity) ** LAMINA_EXPONENT + (outer_load / outer_capacity) ** LAMINA_EXPONENT
     life = damage ** (-1.0 / WEIBULL) if damage > 0.0 else math.inf
-    return ReferenceLife(
-        million_turns=life,
-        equivalent_load=capacity * life**-0.3,
-        inner_load=inner_load,
-        outer_load=outer_load,
-        inner_capacity=inner_capacity,
-        outer_capacity=outer_capacity,
-    )
+    return ReferenceLife(life, capacity * life**-0.3, inner_load, outer_load, inner_capacity, outer_capacity)
 
 
 def _lamina_loads(loads: NDArray[np.float64], race: str) -> NDArray[np.float64]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from rbdyn.mounting.fits import MountedRings, mounted_rings
+from rbdyn.mounting.fits import mounted_rings
 from rbdyn.mounting.ring_growth import UNCHANGED, GrooveChange, groove_change, printed_growth
-from rbdyn.mounting.rings import Ring
+from rbdyn.mounting.rings import MountedRings, Ring
 from rbdyn.properties.materials import Material
 from rbdyn.scene.ball import BallScene, DoubleDeckerScene, SingleRowScene
 from rbdyn.scene.ball_bearing import BallRow
@@ -141,7 +141,7 @@ def _between(scene: BallScene, row: BallRow, inner: Ring | None, outer: Ring | N
         inner,
         outer,
         1e-3 * row.ball_diameter_mm,
-        (row.inner_groove_factor, row.outer_groove_factor),
+        row.groove_factors,
         row.contact_angle,
         ball_material=scene.material("ball"),
         ball_temperature_rise=rings.ball_rise,

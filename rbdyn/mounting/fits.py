@@ -2,43 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from rbdyn.mounting.rings import MountedClearance, Ring, interface_pressure, loosening_speed, mounted_clearance
+from rbdyn.mounting.rings import MountedClearance, MountedRings, Ring, mounted_clearance
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import Bearing, Materials
 from rbdyn.scene.mounting import Mounting, Raceways, material_of
-
-
-@dataclass(frozen=True)
-class MountedRings:
-    """Shaft, both rings and housing at their temperatures and speeds; interferences are diametral [m], positive tight.
-
-    ``element_temperature_rise``: of balls or rollers above the drawing [K].
-    """
-
-    shaft: Ring
-    inner_ring: Ring
-    outer_ring: Ring
-    housing: Ring
-    inner_interference: float
-    outer_interference: float
-    element_temperature_rise: float
-
-    @property
-    def inner_pressure(self) -> float:
-        """Pressure between shaft and inner ring [Pa]; 0 where rotation or heat has loosened the fit."""
-        return interface_pressure(self.shaft, self.inner_ring, self.inner_interference)
-
-    @property
-    def outer_pressure(self) -> float:
-        """Pressure between outer ring and housing [Pa]."""
-        return interface_pressure(self.outer_ring, self.housing, self.outer_interference)
-
-    @property
-    def loosening_speed(self) -> float:
-        """Speed [rad/s] at which rotation loosens the inner ring from its shaft; 0 if loose at rest, or infinite."""
-        return loosening_speed(self.shaft, self.inner_ring, self.inner_interference)
 
 
 def mounted_rings(
@@ -61,15 +28,8 @@ def mounted_rings(
     element_rise = _rise(mounting.roller_temperature_C, reference, 0.5 * (inner_rise + outer_rise))
     inner_speed, outer_speed = (inner_speed, outer_speed) if mounting.rotation else (0.0, 0.0)
 
-    shaft_bore, bore, outside, housing_outside = (
-        0.5e-3 * diameter
-        for diameter in (
-            mounting.shaft_bore_mm,
-            mounting.bore_mm,
-            mounting.outside_diameter_mm,
-            mounting.housing_diameter_mm,
-        )
-    )
+    shaft_bore, bore = 0.5e-3 * mounting.shaft_bore_mm, 0.5e-3 * mounting.bore_mm
+    outside, housing_outside = 0.5e-3 * mounting.outside_diameter_mm, 0.5e-3 * mounting.housing_diameter_mm
     inner_race, outer_race = (0.5e-3 * diameter for diameter in bearing.raceway_diameters_mm)
     return MountedRings(
         shaft=Ring(shaft_bore, bore, material_of(mounting.shaft_material), shaft_rise, inner_speed),
@@ -92,16 +52,7 @@ def operating_clearance(
     material = material_of(materials.rings)
     rings = mounted_rings(mounting, bearing, material, material, inner_speed, outer_speed)
     return mounted_clearance(
-        bearing.radial_clearance_mm * 1e-3,
-        shaft=rings.shaft,
-        inner_ring=rings.inner_ring,
-        outer_ring=rings.outer_ring,
-        housing=rings.housing,
-        inner_interference=rings.inner_interference,
-        outer_interference=rings.outer_interference,
-        roller_diameter=bearing.roller_diameter_mm * 1e-3,
-        roller_material=material_of(materials.roller),
-        roller_temperature_rise=rings.element_temperature_rise,
+        bearing.radial_clearance_mm * 1e-3, rings, bearing.roller_diameter_mm * 1e-3, material_of(materials.roller)
     )
 
 

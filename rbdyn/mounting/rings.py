@@ -101,6 +101,37 @@ def loosening_speed(inner: Ring, outer: Ring, interference: float) -> float:
 
 
 @dataclass(frozen=True)
+class MountedRings:
+    """Shaft, both rings and housing at their temperatures and speeds; interferences are diametral [m], positive tight.
+
+    ``inner_ring`` ends at its raceway outside, ``outer_ring`` at its raceway inside; each turns at its own speed. ``element_temperature_rise``: of balls or rollers above the drawing [K].
+    """
+
+    shaft: Ring
+    inner_ring: Ring
+    outer_ring: Ring
+    housing: Ring
+    inner_interference: float
+    outer_interference: float
+    element_temperature_rise: float = 0.0
+
+    @property
+    def inner_pressure(self) -> float:
+        """Pressure between shaft and inner ring [Pa]; 0 where rotation or heat has loosened the fit."""
+        return interface_pressure(self.shaft, self.inner_ring, self.inner_interference)
+
+    @property
+    def outer_pressure(self) -> float:
+        """Pressure between outer ring and housing [Pa]."""
+        return interface_pressure(self.outer_ring, self.housing, self.outer_interference)
+
+    @property
+    def loosening_speed(self) -> float:
+        """Speed [rad/s] at which rotation loosens the inner ring from its shaft; 0 if loose at rest, or infinite."""
+        return loosening_speed(self.shaft, self.inner_ring, self.inner_interference)
+
+
+@dataclass(frozen=True)
 class MountedClearance:
     """Where the clearance goes. Changes of the diametral clearance [m], negative where they take some.
 
@@ -119,40 +150,23 @@ class MountedClearance:
 
 
 def mounted_clearance(
-    initial: float,
-    *,
-    shaft: Ring,
-    inner_ring: Ring,
-    outer_ring: Ring,
-    housing: Ring,
-    inner_interference: float,
-    outer_interference: float,
-    roller_diameter: float,
-    roller_material: Material,
-    roller_temperature_rise: float = 0.0,
+    initial: float, rings: MountedRings, roller_diameter: float, roller_material: Material
 ) -> MountedClearance:
     """Diametral clearance of a mounted roller bearing as it runs, from ``initial`` of the loose parts [m].
 
-    ``inner_ring`` ends at its raceway outside, ``outer_ring`` at its raceway inside; each turns at its own speed.
-    Interferences are diametral [m], positive tight. Raises ValueError as ``interface_pressure``.
+    Raises ValueError as ``interface_pressure``.
     """
-    inner_pressure = interface_pressure(shaft, inner_ring, inner_interference)
-    outer_pressure = interface_pressure(outer_ring, housing, outer_interference)
-    inner_race, outer_race = inner_ring.outer_radius, outer_ring.inner_radius
+    inner_pressure, outer_pressure = rings.inner_pressure, rings.outer_pressure
+    inner, outer = rings.inner_ring, rings.outer_ring
+    inner_race, outer_race = inner.outer_radius, outer.inner_radius
     # A growth takes its double from a diameter; each roller stands in the gap twice across the bearing.
-    inner_fit = -2.0 * inner_ring.pressure_growth(inner_race, inside=inner_pressure)
-    outer_fit = 2.0 * outer_ring.pressure_growth(outer_race, outside=outer_pressure)
-    rollers = 2.0 * roller_material.thermal_expansion * roller_temperature_rise * roller_diameter
-    races = 2.0 * (outer_ring.thermal_growth(outer_race) - inner_ring.thermal_growth(inner_race))
+    inner_fit = -2.0 * inner.pressure_growth(inner_race, inside=inner_pressure)
+    outer_fit = 2.0 * outer.pressure_growth(outer_race, outside=outer_pressure)
+    rollers = 2.0 * roller_material.thermal_expansion * rings.element_temperature_rise * roller_diameter
+    races = 2.0 * (outer.thermal_growth(outer_race) - inner.thermal_growth(inner_race))
     temperature = races - rollers
-    rotation = 2.0 * (outer_ring.rotation_growth(outer_race) - inner_ring.rotation_growth(inner_race))
+    rotation = 2.0 * (outer.rotation_growth(outer_race) - inner.rotation_growth(inner_race))
+    operating = initial + inner_fit + outer_fit + temperature + rotation
     return MountedClearance(
-        initial=initial,
-        inner_fit=inner_fit,
-        outer_fit=outer_fit,
-        temperature=temperature,
-        rotation=rotation,
-        operating=initial + inner_fit + outer_fit + temperature + rotation,
-        inner_pressure=inner_pressure,
-        outer_pressure=outer_pressure,
+        initial, inner_fit, outer_fit, temperature, rotation, operating, inner_pressure, outer_pressure
     )

@@ -52,7 +52,7 @@ def pictures(result: SweepResult, folder: Path) -> list[str]:
     draw("angles.png", angles)
     draw("pressure_and_life.png", pressure_and_life)
     draw("stiffness.png", stiffness)
-    if len(shape) == 1 and result.told:
+    if len(shape) == 1 and result.figures:
         draw("azimuth.png", azimuth)
     return names
 
@@ -133,7 +133,7 @@ def azimuth(result: SweepResult, path: Path) -> None:
     rows = _rows(result)
     figure, axes = plt.subplots(2, len(rows), figsize=(5.8 * len(rows), 6.4), squeeze=False, sharex=True)
     shades = plt.get_cmap("viridis")(np.linspace(0.0, 0.88, len(shown)))
-    for title, name, pair in zip(rows, result.told, axes.T, strict=True):
+    for title, name, pair in zip(rows, result.figures, axes.T, strict=True):
         for axis, race in zip(pair, ("inner", "outer"), strict=True):
             for place, records, shade in zip(shown, balls, shades, strict=True):
                 angles_on(axis, records[name], {race: shade}, {race: f"{values[place]:.5g}"}, marks=".")

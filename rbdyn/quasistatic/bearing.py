@@ -44,21 +44,21 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
     head, tail = _frame(scene, solution.status, took)
     if not solution.found:
         return BallResult({**head, **tail})
-    rating, table = row_rating(scene, model), solution.told[np.newaxis]
+    rating, table = row_rating(scene, model), solution.figures[np.newaxis]
     if why := overloads(table, [rating]):
         return BallResult({**head, "status": why[0], **tail})
     record = row_record(rating, solution, film_record(scene, rating, solution, ("inner_ring", "outer_ring")))
     record["reaction"] = load_record(solution.reaction)
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
-    told = sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
+    notes = sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
     others = _other_roots(scene, model, solution)
     if others:
-        told.append(
+        notes.append(
             f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load under this raceway control, see "
             "other_roots; this one is reached from one common cage speed"
         )
     roots = {"other_roots": others} if others is not None else {}
-    return BallResult({**head, **record, **grown, **roots, "notes": told, **tail}, (solution,), (rating,))
+    return BallResult({**head, **record, **grown, **roots, "notes": notes, **tail}, (solution,), (rating,))
 
 
 def row_rating(scene: SingleRowScene, model: RowModel) -> Rating:
@@ -73,7 +73,7 @@ def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> 
     if scene.model.raceway_control not in SEVERAL_ROOTS or scene.model.solver != "convex":
         return None
     found = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
-    return [{**displacement_record(root.displacement), "balls": ball_records(root.told)} for root in found]
+    return [{**displacement_record(root.displacement), "balls": ball_records(root.figures)} for root in found]
 
 
 def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallResult:
@@ -93,13 +93,13 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
         Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed_rpm)),
     )
     layers: dict[str, Any] = {}
-    told: list[str] = []
+    notes: list[str] = []
     for name, rating, row in zip(rings, ratings, rows, strict=True):
-        if why := overloads(row.told[np.newaxis], [rating]):
+        if why := overloads(row.figures[np.newaxis], [rating]):
             return BallResult({**head, "status": f"{name} row {why[0]}", **tail})
         layers[name] = row_record(rating, row, film_record(scene, rating, row, rings[name]))
-        told += sentences(remarks(row.told[np.newaxis], [rating], name))
-    told += sentences([tipping(solution.displacement[np.newaxis, 3:], scene)])
+        notes += sentences(remarks(row.figures[np.newaxis], [rating], name))
+    notes += sentences([tipping(solution.displacement[np.newaxis, 3:], scene)])
     grown = growth_record(
         scene, dict(zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True))
     )
@@ -111,7 +111,7 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
         "residual_N": solution.residual,
         "iterations": solution.steps + sum(row.steps for row in rows),
     }
-    return BallResult({**head, **whole, **layers, **grown, "notes": told, **tail}, rows, ratings)
+    return BallResult({**head, **whole, **layers, **grown, "notes": notes, **tail}, rows, ratings)
 
 
 def _frame(scene: BallScene, status: str, took: float) -> tuple[dict[str, Any], dict[str, Any]]:

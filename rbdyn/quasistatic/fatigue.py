@@ -17,39 +17,24 @@ def capacity_of(drawing: BallRow) -> float:
     """C_r of a row [N]: the catalogue's where the drawing has it, else by ISO 281 from the dimensions."""
     if drawing.dynamic_capacity_N is not None:
         return drawing.dynamic_capacity_N
-    return dynamic_capacity(
-        drawing.balls,
-        1e-3 * drawing.ball_diameter_mm,
-        1e-3 * drawing.pitch_diameter_mm,
-        drawing.contact_angle,
-        max(drawing.inner_groove_factor, CLOSEST_RATED),
-        max(drawing.outer_groove_factor, CLOSEST_RATED),
-    )
+    inner, outer = (max(factor, CLOSEST_RATED) for factor in drawing.groove_factors)
+    return dynamic_capacity(*_sizes(drawing), inner, outer)
 
 
 def reference_capacities(drawing: BallRow) -> tuple[float, float]:
     """Ball loads [N] that the inner and the outer race bear for 1e6 turns by ISO/TS 16281."""
     gamma = drawing.ball_diameter_mm * math.cos(drawing.contact_angle) / drawing.pitch_diameter_mm
-    return rated_capacities(
-        capacity_of(drawing),
-        drawing.balls,
-        gamma,
-        drawing.contact_angle,
-        drawing.inner_groove_factor,
-        drawing.outer_groove_factor,
-    )
+    return rated_capacities(capacity_of(drawing), drawing.balls, gamma, drawing.contact_angle, *drawing.groove_factors)
 
 
 def plain_capacities(drawing: BallRow) -> tuple[float, float]:
     """The same by Lundberg and Palmgren from the dimensions alone: steel and finish of 1947, no b_m."""
-    return lundberg_palmgren_capacities(
-        drawing.balls,
-        1e-3 * drawing.ball_diameter_mm,
-        1e-3 * drawing.pitch_diameter_mm,
-        drawing.contact_angle,
-        drawing.inner_groove_factor,
-        drawing.outer_groove_factor,
-    )
+    return lundberg_palmgren_capacities(*_sizes(drawing), *drawing.groove_factors)
+
+
+def _sizes(drawing: BallRow) -> tuple[int, float, float, float]:
+    """Number of balls, their diameter and that of the pitch circle [m], contact angle [rad]."""
+    return drawing.balls, 1e-3 * drawing.ball_diameter_mm, 1e-3 * drawing.pitch_diameter_mm, drawing.contact_angle
 
 
 def turning_rings(inner_speed: float, outer_speed: float) -> Turning:

@@ -1,8 +1,8 @@
 """Preload or clearance for least stress and for longest life, and what worn balls do to the clearance.
 
 Stress and life ask for different things: the peak Hertz pressure belongs to one ball, a life to all of them and to how
-often they pass. A coarse scan, each equilibrium started from its neighbour, finds where each is best; golden sections
-refine it. Neither needs to have one optimum only, or one inside the range: what is found is the best of the scan,
+often they pass. A coarse scan, each equilibrium started from its neighbour, finds where each is best; a search between its
+neighbours refines it. Neither needs to have one optimum only, or one inside the range: what is found is the best of the scan,
 refined, and a sentence says when it lies at an end.
 """
 
@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from rbdyn.faults import validated
 from rbdyn.quasistatic.fatigue import reference_capacities, solution_life, turning_rings
@@ -24,7 +25,6 @@ from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.ball_bearing import BallRow
 
-GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 # Optima closer together than this share of the range, or that lose less than this of stress or life, count as one.
 SAME_PLACE = 0.02
 SAME_VALUE = 0.005
@@ -86,27 +86,9 @@ def solved(value: float, case: Case, start: Solution | None = None) -> Point:
         solution = solve(case.rating.model.row, case.rating.model.control, case.load, case.given)
     if not solution.found:
         return Point(value, solution, case.rating)
-    peak = np.max(list(pressures(solution.told[np.newaxis], [case.rating]).values()))
+    peak = np.max(list(pressures(solution.figures[np.newaxis], [case.rating]).values()))
     life = solution_life(solution, case.rating.capacities, turning_rings(*case.rating.speeds))
     return Point(value, solution, case.rating, float(peak), life.million_turns)
-
-
-def golden_section(
-    function: Callable[[float], float], low: float, high: float, tolerance: float
-) -> tuple[float, float]:
-    """Place and value of a minimum between ``low`` and ``high``, to within ``tolerance``; no derivative is used."""
-    left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    at_left, at_right = function(left), function(right)
-    while high - low > tolerance:
-        if at_left <= at_right:
-            high, right, at_right = right, left, at_left
-            left = high - GOLDEN * (high - low)
-            at_left = function(left)
-        else:
-            low, left, at_left = left, right, at_right
-            right = low + GOLDEN * (high - low)
-            at_right = function(right)
-    return (left, at_left) if at_left <= at_right else (right, at_right)
 
 
 def sweep(case_at: Callable[[float], Case], values: Sequence[float], name: str, unit: str, scale: float = 1.0) -> Sweep:
@@ -139,8 +121,10 @@ def sweep(case_at: Callable[[float], Case], values: Sequence[float], name: str, 
             point = point_at(value)
             return worth(point) if point.solution.found else math.inf
 
-        place, value = golden_section(cost, low, high, 1e-4 * (high - low))
-        return point_at(place) if value < worth(found[best]) else found[best]
+        # Brent's search in an interval, which needs no derivative.
+        place = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 1e-4 * (high - low)}).x
+        trial = point_at(float(place))
+        return trial if trial.solution.found and worth(trial) < worth(found[best]) else found[best]
 
     least = refined(lambda point: point.peak_pressure)
     longest = refined(lambda point: -point.million_turns)

@@ -50,7 +50,7 @@ class Remark(NamedTuple):
 
 
 def pressures(balls: Vector, ratings: Sequence[Rating]) -> dict[str, Vector]:
-    """Largest Hertz pressure (n,) on each race [Pa] of ``balls`` (n, Z, TOLD)."""
+    """Largest Hertz pressure (n,) on each race [Pa] of ``balls`` (n, Z, FIGURES)."""
     found = {}
     for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
         contact = PointContact(*np.array([getattr(rating.model, f"{race}_contact") for rating in ratings]).T)
@@ -96,7 +96,7 @@ def needed_friction(balls: Vector, ratings: Sequence[Rating]) -> Vector:
 
 
 def remarks(balls: Vector, ratings: Sequence[Rating], name: str = "") -> list[Remark]:
-    """Remarks on n equilibria of a row, ``balls`` (n, Z, TOLD); ``name`` of the row, where there are two."""
+    """Remarks on n equilibria of a row, ``balls`` (n, Z, FIGURES); ``name`` of the row, where there are two."""
     row = f"{name} row: " if name else ""
     touching, angle = balls[:, :, INNER_LOAD] > 0.0, np.degrees(balls[:, :, INNER_ANGLE])
     size = touching.shape[1]

@@ -91,10 +91,10 @@ def ball_columns(balls: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def ball_records(told: NDArray[np.float64]) -> list[dict[str, float]]:
-    """One record a ball, from what ``solve_row`` told (Z, TOLD)."""
-    columns = ball_columns(told[np.newaxis])
-    return [{name: float(values[0, j]) for name, values in columns.items()} for j in range(len(told))]
+def ball_records(figures: NDArray[np.float64]) -> list[dict[str, float]]:
+    """One record a ball, from the figures (Z, FIGURES) of ``solve_row``."""
+    columns = ball_columns(figures[np.newaxis])
+    return [{name: float(values[0, j]) for name, values in columns.items()} for j in range(len(figures))]
 
 
 def stiffness_record(stiffness: NDArray[np.float64]) -> dict[str, Any]:

@@ -104,6 +104,11 @@ class BallRow(Strict):
         return (self.inner_groove_factor + self.outer_groove_factor - 1.0) * self.ball_diameter_mm
 
     @property
+    def groove_factors(self) -> tuple[float, float]:
+        """Of the inner and the outer groove."""
+        return self.inner_groove_factor, self.outer_groove_factor
+
+    @property
     def contact_angle(self) -> float:
         """Unloaded contact angle [rad], given or from the clearance; 0 for an interference."""
         if self.radial_clearance_mm is None:

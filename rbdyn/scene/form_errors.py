@@ -97,14 +97,7 @@ class FormErrors(Strict):
         return max(given + [wave.highest_order for wave in drawn if wave is not None], default=0)
 
 
-GROOVES = (
-    "inner_roundness",
-    "outer_roundness",
-    "inner_side_sway",
-    "outer_side_sway",
-    "inner_groove_radius",
-    "outer_groove_radius",
-)
+GROOVES = tuple(key for key in FormErrors.model_fields if f"{key}_random" in FormErrors.model_fields)
 
 
 def faults(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diameter_mm: float) -> list[str]:

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.contact.hertz_point import PointContact, peak_pressure
+from rbdyn.contact.hertz_point import PointContact
+from rbdyn.life import ball_capacity
 from rbdyn.mounting.ball_rings import layer_changes
 from rbdyn.mounting.ring_growth import GrooveChange
 from rbdyn.quasistatic.double_decker.equilibrium import DoubleDeckerSolution, Layer, Stack
@@ -24,9 +25,6 @@ from rbdyn.quasistatic.result import displacement_record
 from rbdyn.quasistatic.row.model import RPM, RowModel, contacts, row_model
 from rbdyn.scene.ball import DoubleDeckerScene
 from rbdyn.scene.ball_bearing import BallRow
-
-# ISO 76: pressure under the static capacity, and its most loaded ball, 5 C0/(Z cos a_0).
-STATIC_PRESSURE, STRIBECK = 4.2e9, 5.0
 
 
 class DoubleDeckerModel(NamedTuple):
@@ -117,14 +115,9 @@ def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFrict
 
 
 def static_capacity(row: BallRow, races: tuple[PointContact, PointContact]) -> float:
-    """Static capacity C0 [N], of the catalogue or from the pressure that defines it (ISO 76), at the race that has it first.
-
-    The outer race up to some D cos a_0/dm = 0.09, the inner one beyond.
-    """
-    if row.static_capacity_N is not None:
-        return row.static_capacity_N
-    sharpest = max(float(peak_pressure(contact, 1.0)) for contact in races)
-    return row.balls * math.cos(row.contact_angle) * (STATIC_PRESSURE / sharpest) ** 3 / STRIBECK
+    """Static capacity C0 [N], of the catalogue or from the pressure that defines it."""
+    given = row.static_capacity_N
+    return ball_capacity.static_capacity(row.balls, row.contact_angle, races) if given is None else given
 
 
 def middle_record(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> dict[str, Any]:

@@ -22,7 +22,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.rivals.full_system import solution_at, system_of
@@ -39,6 +38,7 @@ from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
 from rbdyn.quasistatic.row.place import groove_centre
 from rbdyn.quasistatic.row.row import Row
+from rbdyn.quasistatic.row.space import Vector
 
 UNLOADED_BALLS = 5  # besides the outcomes of Levenberg-Marquardt
 SENTENCES = {
@@ -61,7 +61,7 @@ class Search(NamedTuple):
 SEARCH, DAMPING = Search(), Damping()
 
 
-def search_points(row: Row, search: Search = SEARCH) -> NDArray[np.float64]:
+def search_points(row: Row, search: Search = SEARCH) -> Vector:
     """Starting places (searches, Z, 2) of the balls [m], in the order in which they are tried."""
     size = np.hypot(row.axial, row.radial)
     out = np.stack((row.axial, row.radial), axis=1) / size[:, np.newaxis]
@@ -73,7 +73,7 @@ def search_points(row: Row, search: Search = SEARCH) -> NDArray[np.float64]:
     return np.array([radius * (out + search.step * (k * tangent + m * out)) for k, m in steps])
 
 
-def offset_distances(points: NDArray[np.float64], balls: NDArray[np.float64]) -> NDArray[np.float64]:
+def offset_distances(points: Vector, balls: Vector) -> Vector:
     """Distance [m] of the mean of each set of starting places from the mean place of the ``balls`` found (eq 19)."""
     return np.asarray(np.linalg.norm(points.mean(axis=1) - balls[:, :2].mean(axis=0), axis=1))
 
@@ -81,15 +81,15 @@ def offset_distances(points: NDArray[np.float64], balls: NDArray[np.float64]) ->
 @entry
 def _search(
     control: Any, system: Any, damping: Any, points: Any, limit: int, strict: bool, u: Any
-) -> tuple[int, int, int, int, float]:
+) -> tuple[int, int, int, float]:
     """Try ``points`` one after the other, ``limit`` iterations in all; ``u`` is left at the solution or the best point.
 
-    Returns the last outcome, the searches, the iterations, the evaluations and the largest residual [N] there.
+    Returns the last outcome, the searches, the iterations and the largest residual [N] there.
     """
     row = system.row
     z = row.cosine.size
     best, least = u.copy(), math.inf
-    outcome, searches, iterations, evaluations = EXHAUSTED, 0, 0, 0
+    outcome, searches, iterations = EXHAUSTED, 0, 0
     for n in range(points.shape[0]):
         if iterations >= limit:
             break
@@ -98,18 +98,17 @@ def _search(
             u[2 * j], u[2 * j + 1] = points[n, j, 0], points[n, j, 1]
         u[2 * z :] = 0.0
         allowed = min(damping.iterations, limit - iterations)
-        outcome, taken, evaluated, worst = levenberg_marquardt(control, system, damping, allowed, u)
+        outcome, taken, worst = levenberg_marquardt(control, system, damping, allowed, u)
         iterations += taken
-        evaluations += evaluated
         if outcome == CONVERGED:
             if not strict or loaded(system, u):
-                return CONVERGED, searches, iterations, evaluations, worst
+                return CONVERGED, searches, iterations, worst
             outcome = UNLOADED_BALLS
         if worst < least:
             least = worst
             best[:] = u
     u[:] = best
-    return outcome, searches, iterations, evaluations, least
+    return outcome, searches, iterations, least
 
 
 @entry
@@ -133,8 +132,8 @@ def loaded(system: Any, u: Any) -> bool:
 def solve(
     row: Row,
     control: Control,
-    load: NDArray[np.float64],
-    given: NDArray[np.float64] | None = None,
+    load: Vector,
+    given: Vector | None = None,
     start: Solution | None = None,
     search: Search = SEARCH,
     damping: Damping = DAMPING,
@@ -151,6 +150,6 @@ def solve(
         points = np.concatenate((start.balls[np.newaxis, :, :2], points))
     u = np.zeros(system.size)
     most = damping.iterations * len(points) if limit is None else limit
-    outcome, searches, iterations, evaluations, residual = _search(control, system, damping, points, most, strict, u)
+    outcome, searches, iterations, residual = _search(control, system, damping, points, most, strict, u)
     status = OK if outcome == CONVERGED else f"none of {searches} searches converged; the last {SENTENCES[outcome]}"
-    return solution_at(control, system, u, status, iterations, evaluations, residual, searches)
+    return solution_at(control, system, u, status, iterations, residual, searches)

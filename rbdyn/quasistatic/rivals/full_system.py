@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from rbdyn.compiled.kernel import entry, routine
 from rbdyn.quasistatic.row.ball import ball_forces, deflection
 from rbdyn.quasistatic.row.control import Control
-from rbdyn.quasistatic.row.equilibrium import TOLD, Solution, tell, told_solution
-from rbdyn.quasistatic.row.newton import COUNTERS, space
+from rbdyn.quasistatic.row.equilibrium import FIGURES, Solution, fill_figures, solution_of
 from rbdyn.quasistatic.row.place import groove_centre
-from rbdyn.quasistatic.row.ring import BALL, LOADED, RING, assemble
-from rbdyn.quasistatic.row.row import Row, component_lengths
+from rbdyn.quasistatic.row.ring import LOADED, assemble
+from rbdyn.quasistatic.row.row import Row
+from rbdyn.quasistatic.row.space import STEPS, Task, Vector, posed, space
 
 
 class System(NamedTuple):
@@ -30,8 +30,8 @@ class System(NamedTuple):
     """
 
     row: Row
-    load: NDArray[np.float64]
-    held: NDArray[np.float64]
+    load: Vector
+    held: Vector
     free: NDArray[np.int64]
 
     @property
@@ -40,21 +40,18 @@ class System(NamedTuple):
         return 2 * self.row.cosine.size + self.free.size
 
 
-def system_of(row: Row, load: NDArray[np.float64], given: NDArray[np.float64] | None = None) -> System:
+def system_of(row: Row, load: Vector, given: Vector | None = None) -> System:
     """The system of ``equilibrium.solve(row, ..., load, given)``."""
-    unit = component_lengths(row.lever)
-    held = np.full(RING, np.nan) if given is None else np.asarray(given, float)
-    return System(
-        row, np.asarray(load, float) / unit, np.where(np.isnan(held), 0.0, held) * unit, np.flatnonzero(np.isnan(held))
-    )
+    force, free, held = posed(row, load, given)
+    return System(row, force, held, np.flatnonzero(free))
 
 
-def unknowns(system: System, q: NDArray[np.float64], balls: NDArray[np.float64]) -> NDArray[np.float64]:
+def unknowns(system: System, q: Vector, balls: Vector) -> Vector:
     """Vector of the unknowns with the ring at ``q`` (5,) [m] and the balls at ``balls`` (Z, 2 or more)."""
     return np.concatenate((balls[:, :2].ravel(), q[system.free]))
 
 
-def ring_of(system: System, u: NDArray[np.float64]) -> NDArray[np.float64]:
+def ring_of(system: System, u: Vector) -> Vector:
     """Displacement (5,) of the ring [m] in the unknowns ``u``."""
     q = system.held.copy()
     q[system.free] = u[2 * system.row.cosine.size :]
@@ -118,29 +115,21 @@ def evaluate(control: Any, system: Any, u: Any, residual: Any, jacobian: Any) ->
 
 
 @entry
-def _finish(control: Any, row: Any, load: Any, q: Any, balls: Any, at: Any, told: Any) -> None:
+def _finish(task: Any, at: Any, figures: Any) -> None:
     """Stiffness and loads at a solution, lifted balls put to rest."""
     at.work[:, LOADED] = 1.0
-    assemble(control, 1.0, False, row, load, q, balls, at.matrix, at.vector, at.work, at.sums)
-    tell(control, row, q, balls, at.work, told)
+    assemble(task, 1.0, False, at)
+    fill_figures(task, at, figures)
 
 
 def solution_at(
-    control: Control,
-    system: System,
-    u: NDArray[np.float64],
-    status: str,
-    steps: int,
-    evaluations: int,
-    residual: float,
-    searches: int | None = None,
+    control: Control, system: System, u: Vector, status: str, steps: int, residual: float, searches: int | None = None
 ) -> Solution:
     """What a solver of the full system found at ``u``, or where it stopped and why, with the ``residual`` [N] there."""
     row, z = system.row, system.row.cosine.size
-    at, told, counts = space(z), np.zeros((z, TOLD)), np.zeros(COUNTERS, np.int64)
-    counts[0], counts[1] = steps, evaluations
-    q, balls = ring_of(system, u), np.zeros((z, BALL))
-    balls[:, :2] = u[: 2 * z].reshape(z, 2)
-    _finish(control, row, system.load, q, balls, at, told)
-    found = told_solution(row, at, q, balls, counts, told, 0, residual)
-    return found._replace(status=status, searches=searches)
+    at, figures = space(z), np.zeros((z, FIGURES))
+    at.counts[STEPS] = steps
+    at.q[:], at.balls[:, :2] = ring_of(system, u), u[: 2 * z].reshape(z, 2)
+    # Nothing is solved any more: which components are free does not matter.
+    _finish(Task(control, row, system.load, np.ones_like(system.load)), at, figures)
+    return solution_of(row, at, figures, status, residual, searches)

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.compiled.kernel import routine
-from rbdyn.quasistatic.rivals.elimination import eliminate
 from rbdyn.quasistatic.rivals.full_system import forces
+from rbdyn.quasistatic.row.elimination import eliminate
 from rbdyn.quasistatic.row.newton import ACCEPTED
 
 CONVERGED, STATIONARY, NO_DESCENT, NOT_FINITE, EXHAUSTED = range(5)
@@ -38,47 +38,45 @@ class Damping(NamedTuple):
 
 
 @routine
-def levenberg_marquardt(control: Any, system: Any, damping: Any, limit: int, u: Any) -> tuple[int, int, int, float]:
+def levenberg_marquardt(control: Any, system: Any, damping: Any, limit: int, u: Any) -> tuple[int, int, float]:
     """Minimise ||F|| from ``u``, which is left at the best point, in at most ``limit`` iterations.
 
-    Returns the outcome, the iterations, the evaluations and the largest residual [N].
+    Returns the outcome, the iterations and the largest residual [N].
     """
     size = u.size
     residual, jacobian = np.zeros(size), np.zeros((size, size))
     trial, ahead, ahead_jacobian = np.zeros(size), np.zeros(size), np.zeros((size, size))
     worst, largest = forces(control, system, u, residual, jacobian)
-    evaluations = 1
     for iteration in range(limit):
         if not math.isfinite(worst):
-            return NOT_FINITE, iteration, evaluations, worst
+            return NOT_FINITE, iteration, worst
         if worst <= ACCEPTED * largest:
-            return CONVERGED, iteration, evaluations, worst
+            return CONVERGED, iteration, worst
         length = math.sqrt(np.sum(residual * residual))
         gradient = np.dot(jacobian.T, residual)
         slope = math.sqrt(np.sum(gradient * gradient))
         if slope <= damping.stationary * math.sqrt(np.sum(jacobian * jacobian)) * length:
-            return STATIONARY, iteration, evaluations, worst
+            return STATIONARY, iteration, worst
         normal = np.dot(jacobian.T, jacobian)
         for i in range(size):
             normal[i, i] += length / (damping.length_unit * damping.length_unit)
         step = -gradient
-        if not eliminate(normal, step):
-            return NO_DESCENT, iteration, evaluations, worst
+        if not eliminate(normal, step, size, 0.0):
+            return NO_DESCENT, iteration, worst
         along = np.sum(gradient * step)
         scale, better = 1.0, False
         for _ in range(damping.backtracks):
             for i in range(size):
                 trial[i] = u[i] + scale * step[i]
             ahead_worst, ahead_largest = forces(control, system, trial, ahead, ahead_jacobian)
-            evaluations += 1
             if 0.5 * np.sum(ahead * ahead) <= 0.5 * length * length + damping.decrease * scale * along:
                 better = True
                 break
             scale *= damping.backtrack
         if not better:
-            return NO_DESCENT, iteration, evaluations, worst
+            return NO_DESCENT, iteration, worst
         u[:] = trial
         residual[:] = ahead
         jacobian[:, :] = ahead_jacobian
         worst, largest = ahead_worst, ahead_largest
-    return (CONVERGED if worst <= ACCEPTED * largest else EXHAUSTED), limit, evaluations, worst
+    return (CONVERGED if worst <= ACCEPTED * largest else EXHAUSTED), limit, worst

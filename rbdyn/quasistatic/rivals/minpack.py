@@ -6,11 +6,10 @@ compiled forces and back.
 
 from __future__ import annotations
 
+import functools
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbdyn.quasistatic.rivals.full_system import evaluate, solution_at, system_of
 from rbdyn.quasistatic.rivals.plain_newton import unloaded
@@ -18,62 +17,41 @@ from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
 from rbdyn.quasistatic.row.newton import ACCEPTED
 from rbdyn.quasistatic.row.row import Row
+from rbdyn.quasistatic.row.space import Vector
 
 EVALUATIONS = 1000
 # As tight as MINPACK takes without a warning; the residual decides.
-TIGHTEST = 1e-15
+TIGHTEST = {"hybr": {"xtol": 1e-15}, "lm": {"xtol": 1e-15, "ftol": 1e-15, "gtol": 0.0}}
+LIMIT = {"hybr": "maxfev", "lm": "maxiter"}
 
 
-def hybrid(
+def solve(
     row: Row,
     control: Control,
-    load: NDArray[np.float64],
-    given: NDArray[np.float64] | None = None,
+    load: Vector,
+    given: Vector | None = None,
     start: Solution | None = None,
     limit: int = EVALUATIONS,
+    method: str = "hybr",
 ) -> Solution:
-    """As ``equilibrium.solve``, by MINPACK's hybrj in at most ``limit`` evaluations. ``start`` is not used."""
-    return _solve("hybr", {"xtol": TIGHTEST, "maxfev": limit}, row, control, load, given)
-
-
-def levenberg_marquardt(
-    row: Row,
-    control: Control,
-    load: NDArray[np.float64],
-    given: NDArray[np.float64] | None = None,
-    start: Solution | None = None,
-    limit: int = EVALUATIONS,
-) -> Solution:
-    """As ``equilibrium.solve``, by MINPACK's lmder in at most ``limit`` evaluations. ``start`` is not used."""
-    tight = {"xtol": TIGHTEST, "ftol": TIGHTEST, "gtol": 0.0, "maxiter": limit}
-    return _solve("lm", tight, row, control, load, given)
-
-
-def _solve(
-    method: str,
-    options: dict[str, Any],
-    row: Row,
-    control: Control,
-    load: NDArray[np.float64],
-    given: NDArray[np.float64] | None,
-) -> Solution:
+    """As ``equilibrium.solve``, by MINPACK's hybrj or lmder ("lm") in at most ``limit`` evaluations. ``start`` is not used."""
     from scipy.optimize import root
 
     system = system_of(row, load, given)
     residual, jacobian = np.zeros(system.size), np.zeros((system.size, system.size))
     calls = 0
 
-    def function(u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def function(u: Vector) -> Vector:
         nonlocal calls
         calls += 1
         evaluate(control, system, u, residual, jacobian)
         return residual.copy()
 
-    def derivative(u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def derivative(u: Vector) -> Vector:
         evaluate(control, system, u, residual, jacobian)
         return jacobian.copy()
 
-    first = unloaded(system)
+    first, options = unloaded(system), {**TIGHTEST[method], LIMIT[method]: limit}
     try:
         with np.errstate(all="ignore"):
             u = np.asarray(root(function, first, jac=derivative, method=method, options=options).x)
@@ -86,4 +64,8 @@ def _solve(
         u = first
         worst, largest = evaluate(control, system, u, residual, jacobian)
     status = OK if worst <= ACCEPTED * largest else why
-    return solution_at(control, system, u, status, calls, calls, worst)
+    return solution_at(control, system, u, status, calls, worst)
+
+
+hybrid = functools.partial(solve, method="hybr")
+levenberg_marquardt = functools.partial(solve, method="lm")

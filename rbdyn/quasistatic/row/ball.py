@@ -150,17 +150,15 @@ def _going_with_the_cage(control, strength, row, a_axial, a_radial, x, y, di, do
     return elastic_forces(row, a_axial, a_radial, x, y, di, do)
 
 
-@ball_forces.body(FixedShare, FrictionShare)
-def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
-    one_i, si, ci = line(a_axial - x, a_radial - y)
-    one_o, so, co = line(x, y)
-    qi, ki = spring(di, row.inner_stiffness)
-    qo, ko = spring(do, row.outer_stiffness)
+@kernel
+def steered(control: Any, strength: float, row: Any, inner: Any, outer: Any, di: float, do: float) -> Any:
+    """What the race control makes of a ball: F_c, the friction forces T_i and T_o [N], then M_g [N m].
+
+    The forces as (value, derivatives by inner angle, outer angle, inner depth, outer depth); ``inner, outer``: sine, cosine,
+    load and stiffness of the contacts.
+    """
+    (si, ci, qi, ki), (so, co, qo, ko) = inner, outer
     spinning = control.spinning
-    if strength == 0.0 or qi <= 0.0 or qo <= 0.0 or ci <= 0.0:
-        return elastic_forces(row, a_axial, a_radial, x, y, di, do)
-    aa, ar, rr = tangent(qi, ki, one_i, si, ci)
-    oaa, oar, orr = tangent(qo, ko, one_o, so, co)
     share, share_i, share_o = spin_share(control, di, do)
     (f, f_i, f_o, f_s), (m, m_i, m_o, m_s) = orbit_and_spin(spinning, share, ci, si, co, so)
     # A lightly loaded ball, or one across the groove, goes with the cage; otherwise the race control alone rules.
@@ -170,11 +168,9 @@ def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
     follow_d = strength * level * loaded_q / spinning.blend_load * ki
     follow_a = -strength * loaded * level_c / ACROSS * si
     beyond = f - row.centrifugal_force
-    pull = row.centrifugal_force + follow * beyond
     moment = follow * m
     by_diameter = 2.0 / spinning.ball_diameter
     ti, to = share * moment * by_diameter, (1.0 - share) * moment * by_diameter
-    # By inner angle, outer angle, inner deflection, outer deflection.
     pull_1, pull_2 = follow * f_i + follow_a * beyond, follow * f_o
     pull_3, pull_4 = follow_d * beyond + follow * f_s * share_i, follow * f_s * share_o
     in_share = m * share * by_diameter
@@ -190,17 +186,42 @@ def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
     held_i, slope_i, by_load_i = held(ti, spinning.friction * qi)
     held_o, slope_o, by_load_o = held(to, spinning.friction * qo)
     by_load_i, by_load_o = by_load_i * spinning.friction * ki, by_load_o * spinning.friction * ko
-    ti, ti_1, ti_2, ti_3, ti_4 = (held_i, slope_i * ti_1, slope_i * ti_2, slope_i * ti_3 + by_load_i, slope_i * ti_4)
-    to, to_1, to_2, to_3, to_4 = (held_o, slope_o * to_1, slope_o * to_2, slope_o * to_3, slope_o * to_4 + by_load_o)
-    # Down to the places: an angle turns with (c, -s)/length, a deflection grows along (s, c).
-    ic, is_ = ci * one_i, si * one_i
-    oc, os_ = co * one_o, so * one_o
-    pull_ua, pull_ur = pull_1 * ic + pull_3 * si, -pull_1 * is_ + pull_3 * ci
-    pull_xa, pull_xr = pull_2 * oc + pull_4 * so, -pull_2 * os_ + pull_4 * co
-    ti_ua, ti_ur = ti_1 * ic + ti_3 * si, -ti_1 * is_ + ti_3 * ci
-    ti_xa, ti_xr = ti_2 * oc + ti_4 * so, -ti_2 * os_ + ti_4 * co
-    to_ua, to_ur = to_1 * ic + to_3 * si, -to_1 * is_ + to_3 * ci
-    to_xa, to_xr = to_2 * oc + to_4 * so, -to_2 * os_ + to_4 * co
+    return (
+        (row.centrifugal_force + follow * beyond, (pull_1, pull_2, pull_3, pull_4)),
+        (held_i, (slope_i * ti_1, slope_i * ti_2, slope_i * ti_3 + by_load_i, slope_i * ti_4)),
+        (held_o, (slope_o * to_1, slope_o * to_2, slope_o * to_3, slope_o * to_4 + by_load_o)),
+        moment,
+    )
+
+
+@kernel
+def by_places(slopes: Any, ic: float, is_: float, oc: float, os_: float, sines: Any) -> tuple[float, ...]:
+    """Derivatives by the inner line u = A - X and by the outer line X, (axial, radial) each, of what ``steered`` gives.
+
+    An angle turns with (c, -s)/length, a depth grows along (s, c); ``sines``: si, ci, so, co.
+    """
+    by_1, by_2, by_3, by_4 = slopes
+    si, ci, so, co = sines
+    return by_1 * ic + by_3 * si, -by_1 * is_ + by_3 * ci, by_2 * oc + by_4 * so, -by_2 * os_ + by_4 * co
+
+
+@ball_forces.body(FixedShare, FrictionShare)
+def _rolling(control, strength, row, a_axial, a_radial, x, y, di, do):
+    one_i, si, ci = line(a_axial - x, a_radial - y)
+    one_o, so, co = line(x, y)
+    qi, ki = spring(di, row.inner_stiffness)
+    qo, ko = spring(do, row.outer_stiffness)
+    if strength == 0.0 or qi <= 0.0 or qo <= 0.0 or ci <= 0.0:
+        return elastic_forces(row, a_axial, a_radial, x, y, di, do)
+    aa, ar, rr = tangent(qi, ki, one_i, si, ci)
+    oaa, oar, orr = tangent(qo, ko, one_o, so, co)
+    pulls, inner, outer, moment = steered(control, strength, row, (si, ci, qi, ki), (so, co, qo, ko), di, do)
+    (pull, pull_by), (ti, ti_by), (to, to_by) = pulls, inner, outer
+    ic, is_, oc, os_ = ci * one_i, si * one_i, co * one_o, so * one_o
+    sines = si, ci, so, co
+    pull_ua, pull_ur, pull_xa, pull_xr = by_places(pull_by, ic, is_, oc, os_, sines)
+    ti_ua, ti_ur, ti_xa, ti_xr = by_places(ti_by, ic, is_, oc, os_, sines)
+    to_ua, to_ur, to_xa, to_xr = by_places(to_by, ic, is_, oc, os_, sines)
     # Ring, by the inner line u = A - X and by the outer line X.
     ring_aa, ring_ar = aa - ti_ua * ci + ti * si * ic, ar - ti_ur * ci - ti * si * is_
     ring_ra, ring_rr = ar + ti_ua * si + ti * ci * ic, rr + ti_ur * si - ti * ci * is_

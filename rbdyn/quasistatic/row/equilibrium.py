@@ -6,20 +6,20 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import entry, routine
 from rbdyn.quasistatic.row.ball import ball_forces, spring
 from rbdyn.quasistatic.row.control import Control
-from rbdyn.quasistatic.row.newton import CONVERGED, COUNTERS, NOT_CONVEX_MINIMUM, Space, find, space, unbalance
+from rbdyn.quasistatic.row.newton import CONVERGED, NOT_CONVEX_MINIMUM, find
 from rbdyn.quasistatic.row.place import groove_centre
-from rbdyn.quasistatic.row.ring import BALL, INNER_DEPTH, LOADED, OUTER_DEPTH, RING, TAKEN
+from rbdyn.quasistatic.row.ring import INNER_DEPTH, LOADED, OUTER_DEPTH, RING, TAKEN, unbalance
 from rbdyn.quasistatic.row.row import Row, component_lengths
+from rbdyn.quasistatic.row.space import STEPS, STRIDES, Space, Task, Vector, posed, space
 
-# What ``tell`` leaves of a ball.
-INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, TOLD = range(7)
+# Figures of a ball.
+INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, FIGURES = range(7)
 OK = "ok"
-# A figure below this share of the largest of its kind is rounding: where symmetry makes it zero, it is told as zero.
+# A figure below this share of the largest of its kind is rounding: where symmetry makes it zero, it is set to zero.
 RESOLUTION = 1e-12
 SENTENCES = {NOT_CONVEX_MINIMUM: "no equilibrium was found even with one common cage speed"}
 LOST = (
@@ -29,30 +29,29 @@ LOST = (
 
 
 class Solution(NamedTuple):
-    """Equilibrium of one row of Z balls. Arrays (Z,) unless told; angles in rad, forces in N, lengths in m.
+    """Equilibrium of one row of Z balls. Arrays (Z,) unless said otherwise; angles in rad, forces in N, lengths in m.
 
     ``displacement``: (x, y, z, theta_x, theta_y) of the inner ring [m, rad]. ``balls`` (Z, 2): place of each centre, (axial,
     radial) from its outer groove centre; ``depths`` (Z, 2): how deep its contacts are, (inner, outer). ``reaction`` (5,): the load that the ring takes [N, N m]. ``stiffness`` (5, 5): its
     derivative by the displacement. ``residual``: the largest force left over [N]. ``status``: "ok" or why there is none.
-    ``steps, assemblies, strides``: Newton steps, evaluations of all balls, and continuations of the race control.
+    ``steps, strides``: Newton steps, and continuations of the race control.
     ``searches``: starting values that the finite search tried; None for a solver that searches for none.
     """
 
-    displacement: NDArray[np.float64]
-    balls: NDArray[np.float64]
-    depths: NDArray[np.float64]
-    inner_load: NDArray[np.float64]
-    outer_load: NDArray[np.float64]
-    inner_angle: NDArray[np.float64]
-    outer_angle: NDArray[np.float64]
-    centrifugal_force: NDArray[np.float64]
-    gyroscopic_moment: NDArray[np.float64]
-    reaction: NDArray[np.float64]
-    stiffness: NDArray[np.float64]
+    displacement: Vector
+    balls: Vector
+    depths: Vector
+    inner_load: Vector
+    outer_load: Vector
+    inner_angle: Vector
+    outer_angle: Vector
+    centrifugal_force: Vector
+    gyroscopic_moment: Vector
+    reaction: Vector
+    stiffness: Vector
     status: str
     residual: float
     steps: int
-    assemblies: int
     strides: int
     searches: int | None = None
 
@@ -62,8 +61,8 @@ class Solution(NamedTuple):
         return self.status == OK
 
     @property
-    def told(self) -> NDArray[np.float64]:
-        """(Z, TOLD): what ``solve_row`` told of the balls."""
+    def figures(self) -> Vector:
+        """(Z, FIGURES): figures of the balls, as ``solve_row`` gives them."""
         return np.stack(self[3:9], axis=1)
 
 
@@ -72,63 +71,58 @@ def without_noise(values: Any, largest: Any) -> Any:
     return np.where(np.abs(values) <= RESOLUTION * largest, 0.0, values)
 
 
-def resolved(q: Any, taken: Any, matrix: Any, told: Any, lever: Any) -> Any:
-    """What ``solve_row`` left (..., 5), (..., 5), (..., 5, 5) and (..., Z, TOLD), with 0 for what is below its resolution.
+def resolved(q: Any, taken: Any, matrix: Any, figures: Any, lever: Any) -> Any:
+    """What ``solve_row`` left (..., 5), (..., 5), (..., 5, 5) and (..., Z, FIGURES), with 0 for what is below its resolution.
 
     Displacement and stiffness against their largest entry, the load that the ring takes against the largest contact load, angles
     against 1 rad, gyroscopic moments against centrifugal force times ``lever`` (...) [m].
     """
-    most = told[..., [INNER_LOAD, OUTER_LOAD]].max(axis=(-2, -1))
-    pull = np.abs(told[..., PULL]).max(axis=-1) * lever
-    largest = np.zeros(told.shape)
+    most = figures[..., [INNER_LOAD, OUTER_LOAD]].max(axis=(-2, -1))
+    pull = np.abs(figures[..., PULL]).max(axis=-1) * lever
+    largest = np.zeros(figures.shape)
     largest[..., [INNER_ANGLE, OUTER_ANGLE]], largest[..., MOMENT] = 1.0, pull[..., np.newaxis]
     return (
         without_noise(q, np.abs(q).max(axis=-1, keepdims=True)),
         without_noise(taken, most[..., np.newaxis]),
         without_noise(matrix, np.abs(matrix).max(axis=(-2, -1), keepdims=True)),
-        without_noise(told, largest),
+        without_noise(figures, largest),
     )
 
 
 @routine
-def tell(control: Any, row: Any, q: Any, balls: Any, work: Any, told: Any) -> None:
-    """Fill ``told`` (Z, TOLD) with angles, loads and what the balls' motion does to them; ``work`` as ``assemble`` left it."""
+def fill_figures(task: Any, at: Any, figures: Any) -> None:
+    """Fill ``figures`` (Z, FIGURES) with angles, loads and what the balls' motion does to them, ``at`` as ``assemble`` left it."""
+    row, balls = task.row, at.balls
     for j in range(row.cosine.size):
-        a_axial, a_radial = groove_centre(row, q, j)
+        a_axial, a_radial = groove_centre(row, at.q, j)
         x, y = balls[j, 0], balls[j, 1]
-        told[j, INNER_ANGLE] = math.atan2(a_axial - x, a_radial - y)
-        told[j, OUTER_ANGLE] = math.atan2(x, y)
-        told[j, INNER_LOAD], _ = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
-        told[j, OUTER_LOAD], _ = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
-        told[j, PULL], told[j, MOMENT] = row.centrifugal_force, 0.0
-        if work[j, LOADED] > 0.0:
-            _, _, _, _, _, _, told[j, PULL], told[j, MOMENT] = ball_forces(
-                control, 1.0, row, a_axial, a_radial, x, y, balls[j, INNER_DEPTH], balls[j, OUTER_DEPTH]
+        figures[j, INNER_ANGLE] = math.atan2(a_axial - x, a_radial - y)
+        figures[j, OUTER_ANGLE] = math.atan2(x, y)
+        figures[j, INNER_LOAD], _ = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
+        figures[j, OUTER_LOAD], _ = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+        figures[j, PULL], figures[j, MOMENT] = row.centrifugal_force, 0.0
+        if at.work[j, LOADED] > 0.0:
+            _, _, _, _, _, _, figures[j, PULL], figures[j, MOMENT] = ball_forces(
+                task.control, 1.0, row, a_axial, a_radial, x, y, balls[j, INNER_DEPTH], balls[j, OUTER_DEPTH]
             )
         else:
             # A lifted ball lies on the outer race alone and has no inner angle of its own.
-            told[j, INNER_LOAD], told[j, INNER_ANGLE] = 0.0, told[j, OUTER_ANGLE]
-            told[j, OUTER_LOAD] = row.centrifugal_force
+            figures[j, INNER_LOAD], figures[j, INNER_ANGLE] = 0.0, figures[j, OUTER_ANGLE]
+            figures[j, OUTER_LOAD] = row.centrifugal_force
 
 
 @entry
-def solve_row(
-    control: Any, row: Any, load: Any, free: Any, warm: bool, q: Any, balls: Any, at: Any, counts: Any, told: Any
-) -> tuple[int, float]:
-    """Find the equilibrium and fill ``told`` (Z, TOLD); see ``newton.find``. Returns the outcome and the residual [N]."""
-    counts[:] = 0
-    outcome = find(control, row, load, free, warm, q, balls, at, counts)
-    _, worst = unbalance(load, free, at.sums)
-    tell(control, row, q, balls, at.work, told)
+def solve_row(task: Any, warm: bool, at: Any, figures: Any) -> tuple[int, float]:
+    """``newton.find`` the equilibrium and fill ``figures`` (Z, FIGURES). Returns the outcome and the residual [N]."""
+    at.counts[:] = 0
+    outcome = find(task, warm, at)
+    _, worst = unbalance(task, at)
+    fill_figures(task, at, figures)
     return outcome, worst
 
 
 def solve(
-    row: Row,
-    control: Control,
-    load: NDArray[np.float64],
-    given: NDArray[np.float64] | None = None,
-    start: Solution | None = None,
+    row: Row, control: Control, load: Vector, given: Vector | None = None, start: Solution | None = None
 ) -> Solution:
     """Equilibrium of a row under ``load`` (Fx, Fy, Fz [N], Mx, My [N m]) on the inner ring.
 
@@ -137,48 +131,37 @@ def solve(
     ``status``.
     """
     size = row.cosine.size
-    unit = component_lengths(row.lever)
-    free = np.ones(RING) if given is None else np.where(np.isnan(given), 1.0, 0.0)
-    q = np.zeros(RING) if given is None else np.where(free > 0.0, 0.0, given) * unit
-    balls = np.zeros((size, BALL))
+    force, free, held = posed(row, load, given)
+    at, figures = space(size), np.zeros((size, FIGURES))
+    at.q[:] = held
     if start is not None:
-        q = np.where(free > 0.0, start.displacement * unit, q)
-        balls[:] = np.hstack((start.balls, start.depths))
-    at, counts, told = space(size), np.zeros(COUNTERS, np.int64), np.zeros((size, TOLD))
-    outcome, worst = solve_row(
-        control, row, np.asarray(load, float) / unit, free, start is not None, q, balls, at, counts, told
-    )
-    return told_solution(row, at, q, balls, counts, told, outcome, worst)
+        at.q[:] = np.where(free > 0.0, start.displacement * component_lengths(row.lever), held)
+        at.balls[:] = np.hstack((start.balls, start.depths))
+    outcome, worst = solve_row(Task(control, row, force, free), start is not None, at, figures)
+    return solution_of(row, at, figures, OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST), worst)
 
 
-def told_solution(
-    row: Row,
-    at: Space,
-    q: NDArray[np.float64],
-    balls: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    told: NDArray[np.float64],
-    outcome: int,
-    worst: float,
+def solution_of(
+    row: Row, at: Space, figures: Vector, status: str, residual: float, searches: int | None = None
 ) -> Solution:
-    """What a compiled solve left, in the units and names of a Solution."""
+    """What a solve left, in the units and names of a Solution."""
     unit = component_lengths(row.lever)
-    q, taken, matrix, told = resolved(q, at.sums[TAKEN : TAKEN + RING], at.matrix, told, row.lever)
+    q, taken, matrix, figures = resolved(at.q, at.sums[TAKEN : TAKEN + RING], at.matrix, figures, row.lever)
     return Solution(
         displacement=q / unit,
-        balls=balls[:, :INNER_DEPTH],
-        depths=balls[:, INNER_DEPTH:],
-        inner_load=told[:, INNER_LOAD],
-        outer_load=told[:, OUTER_LOAD],
-        inner_angle=told[:, INNER_ANGLE],
-        outer_angle=told[:, OUTER_ANGLE],
-        centrifugal_force=told[:, PULL],
-        gyroscopic_moment=told[:, MOMENT],
+        balls=at.balls[:, :INNER_DEPTH],
+        depths=at.balls[:, INNER_DEPTH:],
+        inner_load=figures[:, INNER_LOAD],
+        outer_load=figures[:, OUTER_LOAD],
+        inner_angle=figures[:, INNER_ANGLE],
+        outer_angle=figures[:, OUTER_ANGLE],
+        centrifugal_force=figures[:, PULL],
+        gyroscopic_moment=figures[:, MOMENT],
         reaction=taken * unit,
         stiffness=matrix * np.outer(unit, unit),
-        status=OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST),
-        residual=worst,
-        steps=int(counts[0]),
-        assemblies=int(counts[1]),
-        strides=int(counts[2]),
+        status=status,
+        residual=residual,
+        steps=int(at.counts[STEPS]),
+        strides=int(at.counts[STRIDES]),
+        searches=searches,
     )

@@ -21,6 +21,13 @@ def groove_centre(row: Any, q: Any, j: int) -> tuple[float, float]:
 
 
 @kernel
+def moved_centre(row: Any, j: int, step: Any) -> tuple[float, float]:
+    """How far a ``step`` (5,) of the ring moves the inner groove centre at ball j, (axial, radial) in the unit of the step."""
+    c, s = row.cosine[j], row.sine[j]
+    return step[2] + step[3] * s - step[4] * c, step[0] * c + step[1] * s
+
+
+@kernel
 def lifted(row: Any, j: int, a_axial: float, a_radial: float) -> bool:
     """Whether ball j, pressed to the outer race by its centrifugal force alone, is clear of the inner race."""
     if row.centrifugal_force > 0.0:

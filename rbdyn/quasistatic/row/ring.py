@@ -11,7 +11,7 @@ from typing import Any
 
 from rbdyn.compiled.kernel import kernel, routine
 from rbdyn.quasistatic.row.ball import ball_forces, deflection, line, spring
-from rbdyn.quasistatic.row.place import groove_centre, lifted, rest, settle
+from rbdyn.quasistatic.row.place import groove_centre, lifted, moved_centre, rest, settle
 
 RING = 5
 # Columns of the work space of a ball: Newton step (axial, radial), its change with A (four), open or loaded, then the lines
@@ -20,13 +20,13 @@ BALL_WORK = 13
 LOADED, INNER_LINE, OUTER_LINE, INNER_GAP, OUTER_GAP = 6, 7, 9, 11, 12
 # Columns of ``balls``: place (axial, radial) and depth of the contacts (inner, outer) [m].
 AXIAL, RADIAL, INNER_DEPTH, OUTER_DEPTH, BALL = range(5)
+# Sums over the balls; from TAKEN on what the ring takes [N].
+ENERGY, UNBALANCE, WORST, LARGEST, TAKEN = range(5)
+SUMS = TAKEN + RING
 # Residual over the contact loads of a ball that counts as settled.
 SETTLED = 1e-11
 # A Newton step leaves at least this share of a depth.
 LEFT = 0.2
-# Sums that ``assemble`` leaves in ``sums``; from TAKEN on what the ring takes [N].
-ENERGY, UNBALANCE, WORST, LARGEST, TAKEN = range(5)
-SUMS = TAKEN + RING
 
 
 @kernel
@@ -44,152 +44,214 @@ def astray(convex: bool, ra: float, rr: float, fa: float, fr: float) -> bool:
     return lacking > 0.3 * held if convex else held == 0.0
 
 
-@routine
-def assemble(
-    control: Any, strength: float, mixed: bool, row: Any, load: Any, q: Any, balls: Any, matrix: Any, vector: Any,
-    work: Any, sums: Any,
-) -> None:  # fmt: skip
-    """Ring forces at ``q`` and ``balls``, with the balls eliminated.
+@kernel
+def balanced_forces(
+    control: Any, strength: float, mixed: bool, row: Any, j: int, a_axial: float, a_radial: float, balls: Any, work: Any
+) -> Any:
+    """``ball_forces`` of ball j, which is settled first where it has just come into contact or lies astray."""
+    if work[j, LOADED] == 0.0:
+        settle(row, j, a_axial, a_radial, SETTLED, balls)
+        measure(row, j, a_axial, a_radial, balls)
+        work[j, LOADED] = 1.0
+    elif not mixed:
+        measure(row, j, a_axial, a_radial, balls)
+    for attempt in range(2):
+        forces = ball_forces(
+            control, strength, row, a_axial, a_radial, balls[j, AXIAL], balls[j, RADIAL], balls[j, INNER_DEPTH],
+            balls[j, OUTER_DEPTH],
+        )  # fmt: skip
+        (ra, rr), (fa, fr, _) = forces[0], forces[1]
+        if attempt == 1 or not astray(strength == 0.0, ra, rr, fa, fr):
+            break
+        settle(row, j, a_axial, a_radial, SETTLED, balls)
+        measure(row, j, a_axial, a_radial, balls)
+    return forces
 
-    ``mixed``: whether the depths in ``balls`` are unknowns of their own; else they are set to what the places tell.
-    Fills ``matrix`` (5, 5), the derivative of the load that the ring takes by q where every ball stays in balance [N/m];
-    ``vector`` (5,), the load less what the ring takes once the balls have moved into balance to first order [N];
-    ``work`` (Z, BALL_WORK) for ``follow``; ``sums``: energy [J], the squared length of the balls' residuals [N^2], the largest
-    of them [N], the largest force [N] and what the ring takes. Moments and couples count over the lever. Lifted balls are put
-    to rest.
+
+@kernel
+def add_up(row: Any, j: int, forces: Any, balls: Any, sums: Any) -> None:
+    """Add energy, residual and ring forces of ball j to ``sums``."""
+    (ra, rr), (fa, fr, fm), _, _, _, _, pull, _ = forces
+    qi, _ = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
+    qo, _ = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+    sums[ENERGY] += 0.4 * (qi * balls[j, INNER_DEPTH] + qo * balls[j, OUTER_DEPTH])
+    sums[ENERGY] -= row.centrifugal_force * (balls[j, RADIAL] - row.outer_reach[j])
+    sums[UNBALANCE] += ra * ra + rr * rr
+    sums[WORST] = max(sums[WORST], abs(ra), abs(rr))
+    sums[LARGEST] = max(sums[LARGEST], abs(fa), abs(fr), abs(pull))
+    c, s = row.cosine[j], row.sine[j]
+    turn = fa + fm * (1.0 / row.lever)
+    sums[TAKEN] += fr * c
+    sums[TAKEN + 1] += fr * s
+    sums[TAKEN + 2] += fa
+    sums[TAKEN + 3] += turn * s
+    sums[TAKEN + 4] -= turn * c
+
+
+@kernel
+def ahead(force: float, by_a: Any, by_x: Any, gaps: Any) -> float:
+    """``force`` where the ``gaps`` (axial, radial) of the inner and the outer contact are closed, from its derivatives."""
+    outer_a, outer_r = by_x[0] + by_a[0], by_x[1] + by_a[1]
+    return force + (by_a[0] * gaps[0] + by_a[1] * gaps[1] + outer_a * gaps[2] + outer_r * gaps[3])
+
+
+@kernel
+def close_gaps(row: Any, j: int, a_axial: float, a_radial: float, forces: Any, balls: Any, work: Any, sums: Any) -> Any:
+    """Residual and ring forces with what the places of ball j tell beyond its depths, which goes into the step only."""
+    (ra, rr), (fa, fr, fm), by_a, by_x, ring_a, ring_x, _, _ = forces
+    x, y = balls[j, AXIAL], balls[j, RADIAL]
+    one_i, si, ci = line(a_axial - x, a_radial - y)
+    one_o, so, co = line(x, y)
+    gap_i = 1.0 / one_i - row.inner_reach[j] - balls[j, INNER_DEPTH]
+    gap_o = 1.0 / one_o - row.outer_reach[j] - balls[j, OUTER_DEPTH]
+    _, ki = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
+    _, ko = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+    slip = max(abs(gap_i) * ki, abs(gap_o) * ko)
+    sums[WORST] = max(sums[WORST], slip)
+    sums[UNBALANCE] += slip * slip
+    work[j, INNER_LINE], work[j, INNER_LINE + 1], work[j, INNER_GAP] = si, ci, gap_i
+    work[j, OUTER_LINE], work[j, OUTER_LINE + 1], work[j, OUTER_GAP] = so, co, gap_o
+    gaps = gap_i * si, gap_i * ci, gap_o * so, gap_o * co
+    residual = ahead(ra, by_a[:2], by_x[:2], gaps), ahead(rr, by_a[2:], by_x[2:], gaps)
+    force = ahead(fa, ring_a[:2], ring_x[:2], gaps), ahead(fr, ring_a[2:4], ring_x[2:4], gaps)
+    return residual, (*force, ahead(fm, ring_a[4:], ring_x[4:], gaps))
+
+
+@kernel
+def eliminate_ball(row: Any, j: int, residual: Any, ring: Any, forces: Any, one_b: float, work: Any) -> Any:
+    """Step of ball j into ``work``; its force (axial, radial, couple) on the ring after it, and that by A (six).
+
+    The ball moves by -B^-1 (residual + R dA): B = d residual/dX with 1/determinant ``one_b``, R = d residual/dA.
     """
+    (ra, rr), (fa, fr, fm), (_, _, by_a, by_x, ring_a, ring_x, _, _) = residual, ring, forces
+    b0, b1, b2, b3 = by_x[3] * one_b, -by_x[1] * one_b, -by_x[2] * one_b, by_x[0] * one_b
+    da, dr = -(b0 * ra + b1 * rr), -(b2 * ra + b3 * rr)
+    m0, m1 = -(b0 * by_a[0] + b1 * by_a[2]), -(b0 * by_a[1] + b1 * by_a[3])
+    m2, m3 = -(b2 * by_a[0] + b3 * by_a[2]), -(b2 * by_a[1] + b3 * by_a[3])
+    work[j, 0], work[j, 1] = da, dr
+    work[j, 2], work[j, 3], work[j, 4], work[j, 5] = m0, m1, m2, m3
+    one = 1.0 / row.lever
+    ta = fa + ring_x[0] * da + ring_x[1] * dr
+    tr = fr + ring_x[2] * da + ring_x[3] * dr
+    tm = ta + (fm + ring_x[4] * da + ring_x[5] * dr) * one
+    aa = ring_a[0] + ring_x[0] * m0 + ring_x[1] * m2
+    ar = ring_a[1] + ring_x[0] * m1 + ring_x[1] * m3
+    ra_, rr_ = ring_a[2] + ring_x[2] * m0 + ring_x[3] * m2, ring_a[3] + ring_x[2] * m1 + ring_x[3] * m3
+    ma = aa + (ring_a[4] + ring_x[4] * m0 + ring_x[5] * m2) * one
+    mr = ar + (ring_a[5] + ring_x[4] * m1 + ring_x[5] * m3) * one
+    return (ta, tr, tm), (aa, ar, ra_, rr_, ma, mr)
+
+
+@kernel
+def add_to_ring(c: float, s: float, force: Any, stiffness: Any, matrix: Any, vector: Any) -> None:
+    """Add a ball at the azimuth (c, s), as ``eliminate_ball`` gives it, to the ring's system but for what symmetry gives."""
+    (ta, tr, tm), (aa, ar, ra, rr, ma, mr) = force, stiffness
+    vector[0] -= tr * c
+    vector[1] -= tr * s
+    vector[2] -= ta
+    vector[3] -= tm * s
+    vector[4] += tm * c
+    cc, cs, ss = c * c, c * s, s * s
+    matrix[0, 0] += rr * cc
+    matrix[0, 1] += rr * cs
+    matrix[1, 1] += rr * ss
+    matrix[0, 2] += ra * c
+    matrix[1, 2] += ra * s
+    matrix[0, 3] += ra * cs
+    matrix[0, 4] -= ra * cc
+    matrix[1, 3] += ra * ss
+    matrix[2, 0] += ar * c
+    matrix[2, 1] += ar * s
+    matrix[2, 2] += aa
+    matrix[2, 3] += aa * s
+    matrix[2, 4] -= aa * c
+    matrix[3, 0] += mr * cs
+    matrix[3, 1] += mr * ss
+    matrix[3, 2] += ma * s
+    matrix[3, 3] += ma * ss
+    matrix[3, 4] -= ma * cs
+    matrix[4, 0] -= mr * cc
+    matrix[4, 2] -= ma * c
+    matrix[4, 4] += ma * cc
+
+
+@routine
+def assemble(task: Any, strength: float, mixed: bool, at: Any) -> None:
+    """Ring forces at ``at.q`` and ``at.balls``, with the balls eliminated.
+
+    ``mixed``: whether the depths in ``at.balls`` are unknowns of their own; else they are set to what the places tell.
+    Fills ``at.matrix``, the derivative of the load that the ring takes by q where every ball stays in balance [N/m];
+    ``at.vector``, the load less what the ring takes once the balls have moved into balance to first order [N];
+    ``at.work`` for ``follow``; ``at.sums``: energy [J], the squared length of the balls' residuals [N^2], the largest of them [N],
+    the largest force [N] and what the ring takes. Moments and couples count over the lever. Lifted balls are put to rest.
+    """
+    # Arrays are taken out of their tuple once: inside the loop that would count references.
+    control, row, load, q, balls, work = task.control, task.row, task.load, at.q, at.balls, at.work
+    matrix, vector, sums = at.matrix, at.vector, at.sums
     vector[:] = load
     matrix[:, :] = 0.0
-    energy, unbalance, worst, largest = 0.0, 0.0, 0.0, 0.0
-    taken_x, taken_y, taken_z, taken_u, taken_v = 0.0, 0.0, 0.0, 0.0, 0.0
-    one = 1.0 / row.lever
+    sums[:] = 0.0
     for j in range(row.cosine.size):
         a_axial, a_radial = groove_centre(row, q, j)
         if lifted(row, j, a_axial, a_radial):
             rest(row, j, balls, a_axial, a_radial)
             work[j, LOADED] = 0.0
-            largest = max(largest, row.centrifugal_force)
+            sums[LARGEST] = max(sums[LARGEST], row.centrifugal_force)
             # By its place: at rest on the outer race.
-            energy += row.rest_energy
+            sums[ENERGY] += row.rest_energy
             continue
-        if work[j, LOADED] == 0.0:
-            settle(row, j, a_axial, a_radial, SETTLED, balls)
-            measure(row, j, a_axial, a_radial, balls)
-            work[j, LOADED] = 1.0
-        elif not mixed:
-            measure(row, j, a_axial, a_radial, balls)
-        for attempt in range(2):
-            (ra, rr), (fa, fr, fm), by_a, by_x, ring_a, ring_x, pull, _ = ball_forces(
-                control, strength, row, a_axial, a_radial, balls[j, AXIAL], balls[j, RADIAL],
-                balls[j, INNER_DEPTH], balls[j, OUTER_DEPTH],
-            )  # fmt: skip
-            if attempt == 1 or not astray(strength == 0.0, ra, rr, fa, fr):
-                break
-            settle(row, j, a_axial, a_radial, SETTLED, balls)
-            measure(row, j, a_axial, a_radial, balls)
-        x, y = balls[j, AXIAL], balls[j, RADIAL]
-        qi, ki = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
-        qo, ko = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
-        energy += 0.4 * (qi * balls[j, INNER_DEPTH] + qo * balls[j, OUTER_DEPTH])
-        energy -= row.centrifugal_force * (y - row.outer_reach[j])
-        unbalance += ra * ra + rr * rr
-        worst = max(worst, abs(ra), abs(rr))
-        largest = max(largest, abs(fa), abs(fr), abs(pull))
-        c, s = row.cosine[j], row.sine[j]
-        turn = fa + fm * one
-        taken_x += fr * c
-        taken_y += fr * s
-        taken_z += fa
-        taken_u += turn * s
-        taken_v -= turn * c
+        forces = balanced_forces(control, strength, mixed, row, j, a_axial, a_radial, balls, work)
+        add_up(row, j, forces, balls, sums)
+        residual, ring, by_x = forces[0], forces[1], forces[3]
         if mixed:
-            # What the places tell beyond the depths goes into the step, not into the forces.
-            one_i, si, ci = line(a_axial - x, a_radial - y)
-            one_o, so, co = line(x, y)
-            gap_i = 1.0 / one_i - row.inner_reach[j] - balls[j, INNER_DEPTH]
-            gap_o = 1.0 / one_o - row.outer_reach[j] - balls[j, OUTER_DEPTH]
-            slip = max(abs(gap_i) * ki, abs(gap_o) * ko)
-            worst = max(worst, slip)
-            unbalance += slip * slip
-            work[j, INNER_LINE], work[j, INNER_LINE + 1], work[j, INNER_GAP] = si, ci, gap_i
-            work[j, OUTER_LINE], work[j, OUTER_LINE + 1], work[j, OUTER_GAP] = so, co, gap_o
-            ia, ir, oa, or_ = gap_i * si, gap_i * ci, gap_o * so, gap_o * co
-            ra += by_a[0] * ia + by_a[1] * ir + (by_x[0] + by_a[0]) * oa + (by_x[1] + by_a[1]) * or_
-            rr += by_a[2] * ia + by_a[3] * ir + (by_x[2] + by_a[2]) * oa + (by_x[3] + by_a[3]) * or_
-            fa += ring_a[0] * ia + ring_a[1] * ir + (ring_x[0] + ring_a[0]) * oa + (ring_x[1] + ring_a[1]) * or_
-            fr += ring_a[2] * ia + ring_a[3] * ir + (ring_x[2] + ring_a[2]) * oa + (ring_x[3] + ring_a[3]) * or_
-            fm += ring_a[4] * ia + ring_a[5] * ir + (ring_x[4] + ring_a[4]) * oa + (ring_x[5] + ring_a[5]) * or_
+            residual, ring = close_gaps(row, j, a_axial, a_radial, forces, balls, work, sums)
         determinant = by_x[0] * by_x[3] - by_x[1] * by_x[2]
         if determinant == 0.0:
             # Squeezed by less than the spacing of numbers: as good as lifted.
             work[j, LOADED] = 0.0
             continue
-        # The ball moves by -B^-1 (residual + R dA): B = d residual/dX, R = d residual/dA.
-        one_b = 1.0 / determinant
-        b0, b1, b2, b3 = by_x[3] * one_b, -by_x[1] * one_b, -by_x[2] * one_b, by_x[0] * one_b
-        da, dr = -(b0 * ra + b1 * rr), -(b2 * ra + b3 * rr)
-        m0, m1 = -(b0 * by_a[0] + b1 * by_a[2]), -(b0 * by_a[1] + b1 * by_a[3])
-        m2, m3 = -(b2 * by_a[0] + b3 * by_a[2]), -(b2 * by_a[1] + b3 * by_a[3])
-        work[j, 0], work[j, 1] = da, dr
-        work[j, 2], work[j, 3], work[j, 4], work[j, 5] = m0, m1, m2, m3
-        ta = fa + ring_x[0] * da + ring_x[1] * dr
-        tr = fr + ring_x[2] * da + ring_x[3] * dr
-        tm = ta + (fm + ring_x[4] * da + ring_x[5] * dr) * one
-        aa = ring_a[0] + ring_x[0] * m0 + ring_x[1] * m2
-        ar = ring_a[1] + ring_x[0] * m1 + ring_x[1] * m3
-        ra_, rr_ = ring_a[2] + ring_x[2] * m0 + ring_x[3] * m2, ring_a[3] + ring_x[2] * m1 + ring_x[3] * m3
-        ma = aa + (ring_a[4] + ring_x[4] * m0 + ring_x[5] * m2) * one
-        mr = ar + (ring_a[5] + ring_x[4] * m1 + ring_x[5] * m3) * one
-        vector[0] -= tr * c
-        vector[1] -= tr * s
-        vector[2] -= ta
-        vector[3] -= tm * s
-        vector[4] += tm * c
-        cc, cs, ss = c * c, c * s, s * s
-        matrix[0, 0] += rr_ * cc
-        matrix[0, 1] += rr_ * cs
-        matrix[1, 1] += rr_ * ss
-        matrix[0, 2] += ra_ * c
-        matrix[1, 2] += ra_ * s
-        matrix[0, 3] += ra_ * cs
-        matrix[0, 4] -= ra_ * cc
-        matrix[1, 3] += ra_ * ss
-        matrix[2, 0] += ar * c
-        matrix[2, 1] += ar * s
-        matrix[2, 2] += aa
-        matrix[2, 3] += aa * s
-        matrix[2, 4] -= aa * c
-        matrix[3, 0] += mr * cs
-        matrix[3, 1] += mr * ss
-        matrix[3, 2] += ma * s
-        matrix[3, 3] += ma * ss
-        matrix[3, 4] -= ma * cs
-        matrix[4, 0] -= mr * cc
-        matrix[4, 2] -= ma * c
-        matrix[4, 4] += ma * cc
+        force, stiffness = eliminate_ball(row, j, residual, ring, forces, 1.0 / determinant, work)
+        add_to_ring(row.cosine[j], row.sine[j], force, stiffness, matrix, vector)
     matrix[1, 0] = matrix[0, 1]
     matrix[1, 4] = -matrix[0, 3]
     matrix[4, 1] = -matrix[3, 0]
     matrix[4, 3] = matrix[3, 4]
-    for i, taken in enumerate((taken_x, taken_y, taken_z, taken_u, taken_v)):
-        energy -= load[i] * q[i]
-        sums[TAKEN + i] = taken
-        largest = max(largest, abs(load[i]))
-    sums[ENERGY], sums[UNBALANCE], sums[WORST], sums[LARGEST] = energy, unbalance, worst, largest
+    for i in range(RING):
+        sums[ENERGY] -= load[i] * q[i]
+        sums[LARGEST] = max(sums[LARGEST], abs(load[i]))
+
+
+@kernel
+def unbalance(task: Any, at: Any) -> tuple[float, float]:
+    """Squared length of all residuals [N^2] and the largest of them [N], the ring's free components included."""
+    sums, load, free = at.sums, task.load, task.free
+    total, worst = sums[UNBALANCE], sums[WORST]
+    for i in range(RING):
+        left = (load[i] - sums[TAKEN + i]) * free[i]
+        total += left * left
+        worst = max(worst, abs(left))
+    return total, worst
+
+
+@kernel
+def ball_step(row: Any, j: int, step: Any, work: Any) -> tuple[float, float, float, float]:
+    """Moves [m] that go with the ring's ``step``: of the inner groove centre at ball j, then of the ball, (axial, radial) each."""
+    axial, radial = moved_centre(row, j, step)
+    x = work[j, 0] + work[j, 2] * axial + work[j, 3] * radial
+    return axial, radial, x, work[j, 1] + work[j, 4] * axial + work[j, 5] * radial
 
 
 @routine
-def follow(row: Any, step: Any, scale: float, work: Any, start: Any, balls: Any) -> None:
-    """Move the balls from ``start`` by ``scale`` times the Newton step that goes with the ring's ``step`` [m]."""
+def follow(row: Any, scale: float, work: Any, at: Any) -> None:
+    """Move ring and balls from ``at.old_q`` and ``at.old_balls`` by ``scale`` times the Newton step, the balls' in ``work``."""
+    start, balls, step, q, old_q = at.old_balls, at.balls, at.step, at.q, at.old_q
+    for i in range(RING):
+        q[i] = old_q[i] + scale * step[i]
     for j in range(row.cosine.size):
         for i in range(BALL):
             balls[j, i] = start[j, i]
         if work[j, LOADED] > 0.0:
-            c, s = row.cosine[j], row.sine[j]
-            axial = step[2] + step[3] * s - step[4] * c
-            radial = step[0] * c + step[1] * s
-            x = work[j, 0] + work[j, 2] * axial + work[j, 3] * radial
-            y = work[j, 1] + work[j, 4] * axial + work[j, 5] * radial
+            axial, radial, x, y = ball_step(row, j, step, work)
             balls[j, AXIAL] += scale * x
             balls[j, RADIAL] += scale * y
             inner = work[j, INNER_GAP] + work[j, INNER_LINE] * (axial - x) + work[j, INNER_LINE + 1] * (radial - y)

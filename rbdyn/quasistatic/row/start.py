@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from rbdyn.compiled.kernel import kernel, routine
-from rbdyn.quasistatic.row.place import groove_centre, settle
+from rbdyn.quasistatic.row.place import groove_centre, moved_centre, settle
 from rbdyn.quasistatic.row.ring import LOADED, RING, measure
 
 FIRST_STEP = 1e-6  # [m]
@@ -26,22 +26,28 @@ def force_along(row: Any, both: float, q: Any, direction: Any) -> float:
         length = math.sqrt(a_axial * a_axial + a_radial * a_radial)
         deflection = max(length - row.inner_reach[j] - row.outer_reach[j], 0.0)
         load = both * deflection * math.sqrt(deflection) / length
-        c, s = row.cosine[j], row.sine[j]
-        axial = direction[2] + direction[3] * s - direction[4] * c
-        total += load * (a_axial * axial + a_radial * (direction[0] * c + direction[1] * s))
+        axial, radial = moved_centre(row, j, direction)
+        total += load * (a_axial * axial + a_radial * radial)
     return total
 
 
-@routine
-def along_the_load(row: Any, load: Any, free: Any, q: Any, direction: Any, base: Any) -> None:
-    """Move ``q`` from where it is along the free part of the load until the balls carry it, roughly.
+@kernel
+def force_at(row: Any, both: float, far: float, at: Any) -> float:
+    """``force_along`` with the ring at ``at.base`` + ``far`` along ``at.step``, where it is left."""
+    q, base, step = at.q, at.base, at.step
+    for i in range(RING):
+        q[i] = base[i] + far * step[i]
+    return force_along(row, both, q, step)
 
-    ``free`` (5,): 1 where the load rules, 0 where the displacement is prescribed. ``direction, base``: work space (5,).
-    """
+
+@routine
+def along_the_load(task: Any, at: Any) -> None:
+    """Move ``at.q`` from where it is along the free part of the load until the balls carry it, roughly."""
+    row, direction = task.row, at.step
     length = 0.0
     for i in range(RING):
-        direction[i] = load[i] * free[i]
-        base[i] = q[i]
+        direction[i] = task.load[i] * task.free[i]
+        at.base[i] = at.q[i]
         length += direction[i] * direction[i]
     if length == 0.0:
         return
@@ -50,30 +56,25 @@ def along_the_load(row: Any, load: Any, free: Any, q: Any, direction: Any, base:
         direction[i] /= wanted
     both = (row.inner_stiffness ** (-2.0 / 3.0) + row.outer_stiffness ** (-2.0 / 3.0)) ** -1.5
     below, above = 0.0, FIRST_STEP
-    while above < LONGEST_STEP:
-        for i in range(RING):
-            q[i] = base[i] + above * direction[i]
-        if force_along(row, both, q, direction) >= wanted:
-            break
+    while above < LONGEST_STEP and not force_at(row, both, above, at) >= wanted:
         below, above = above, 3.0 * above
     while above - below > START_ERROR * (above - below + 0.1 * below):
         middle = 0.5 * (below + above)
-        for i in range(RING):
-            q[i] = base[i] + middle * direction[i]
-        if force_along(row, both, q, direction) >= wanted:
+        if force_at(row, both, middle, at) >= wanted:
             above = middle
         else:
             below = middle
         if above - below < 0.02 * above:
             break
     for i in range(RING):
-        q[i] = base[i] + above * direction[i]
+        at.q[i] = at.base[i] + above * direction[i]
 
 
 @routine
-def settle_all(row: Any, q: Any, balls: Any, work: Any) -> None:
-    """Settle every ball for the ring at ``q``, and mark all in ``work`` as loaded."""
-    work[:, LOADED] = 1.0
+def settle_all(row: Any, at: Any) -> None:
+    """Settle every ball for the ring at ``at.q``, and mark all as loaded."""
+    q, balls = at.q, at.balls
+    at.work[:, LOADED] = 1.0
     for j in range(row.cosine.size):
         a_axial, a_radial = groove_centre(row, q, j)
         settle(row, j, a_axial, a_radial, SETTLED, balls)

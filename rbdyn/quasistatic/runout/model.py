@@ -22,7 +22,7 @@ from rbdyn.quasistatic.runout.tolerance_design import Bench
 from rbdyn.quasistatic.runout.turn import Followed, follow
 from rbdyn.scene.ball import BallScene, SingleRowScene
 from rbdyn.scene.bearing import Harmonic
-from rbdyn.scene.form_errors import FormErrors, RandomWaviness
+from rbdyn.scene.form_errors import GROOVES, FormErrors, RandomWaviness
 
 # Steps times balls of a path: 1.4 kB each while it is made.
 MOST_PLACES = 1_000_000
@@ -38,8 +38,8 @@ def follow_ring(scene: BallScene) -> Followed:
         raise InputError(["errors: missing; a bearing without form errors has no runout, add the table"])
     steps, turns, balls = row.errors.steps, row.errors.turns, row.bearing.balls
     if (places := steps * turns * balls) > MOST_PLACES:
-        told = f"errors.steps = {steps}, errors.turns = {turns}: of {balls} balls these make {places} places"
-        raise InputError([f"{told}, more than the {MOST_PLACES} that memory has room for; take fewer steps or turns"])
+        many = f"errors.steps = {steps}, errors.turns = {turns}: of {balls} balls these make {places} places"
+        raise InputError([f"{many}, more than the {MOST_PLACES} that memory has room for; take fewer steps or turns"])
     test = bench_of(row)
     path = ball_path(errors_of(row.errors, balls), test.turning, steps, turns)
     return follow(test.row, test.control, test.load, path, turns, test.given)
@@ -93,8 +93,8 @@ def errors_of(errors: FormErrors, balls: int) -> RaceErrors:
     """
     streams = [np.random.default_rng(child) for child in np.random.SeedSequence(errors.seed).spawn(8)]
     forms = {
-        name: _form(getattr(errors, key), getattr(errors, f"{key}_random"), draw)
-        for (name, key), draw in zip(_RACES.items(), streams, strict=False)
+        key.replace("side_", ""): _form(getattr(errors, key), getattr(errors, f"{key}_random"), draw)
+        for key, draw in zip(GROOVES, streams, strict=False)
     }
     given, spread = errors.ball_diameter_errors_um, errors.ball_diameter_spread_um
     larger = np.array(given) if given is not None else spread * streams[6].standard_normal(balls)
@@ -106,16 +106,6 @@ def errors_of(errors: FormErrors, balls: int) -> RaceErrors:
             wave = waviness((harmonic.order, 1e-6 * harmonic.amplitude_um, phase))
             sphericity[ball] = sphericity[ball].plus(wave)
     return RaceErrors(1e-6 * larger, tuple(sphericity), **forms)
-
-
-_RACES = {
-    "inner_roundness": "inner_roundness",
-    "outer_roundness": "outer_roundness",
-    "inner_sway": "inner_side_sway",
-    "outer_sway": "outer_side_sway",
-    "inner_groove_radius": "inner_groove_radius",
-    "outer_groove_radius": "outer_groove_radius",
-}
 
 
 def _form(given: list[Harmonic], drawn: RandomWaviness | None, draw: np.random.Generator) -> Waviness:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from rbdyn.faults import RunError
 from rbdyn.quasistatic.row.control import Control
-from rbdyn.quasistatic.row.newton import COUNTERS, space
-from rbdyn.quasistatic.row.ring import BALL, RING
+from rbdyn.quasistatic.row.ring import RING
 from rbdyn.quasistatic.row.row import Row, component_lengths
+from rbdyn.quasistatic.row.space import Task, posed, space
 from rbdyn.quasistatic.runout.measures import Runout, runout
 from rbdyn.quasistatic.runout.race_errors import BallPath
-from rbdyn.quasistatic.runout.walk import LARGEST_LOAD, RESIDUAL, TOLD, WALKED, walk
+from rbdyn.quasistatic.runout.walk import FIGURES, LARGEST_LOAD, RESIDUAL, walk
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,7 +28,7 @@ class Followed:
     """Path of the inner ring. ``path``: displacements x, y, z [m], theta_x, theta_y [rad], (steps, 5).
 
     ``ring_angle`` [rad]; ``largest_load``: of any ball on any race at each step [N]; ``residual``: the largest force left
-    over in any step [N]; ``newton_steps, assemblies``: of all steps together.
+    over in any step [N]; ``newton_steps``: of all steps together.
     """
 
     ring_angle: Array
@@ -36,7 +36,6 @@ class Followed:
     largest_load: Array
     residual: float
     newton_steps: int
-    assemblies: int
     turns: int
 
     def runout(self, face_radius: float) -> Runout:
@@ -63,49 +62,25 @@ def follow(
     of ``equilibrium.solve``. Raises RunError naming the step where no equilibrium is found.
     """
     steps, size = balls.azimuth.shape
-    unit = component_lengths(row.lever)
-    free = np.ones(RING) if given is None else np.where(np.isnan(given), 1.0, 0.0)
-    q = np.zeros(RING) if given is None else np.where(free > 0.0, 0.0, given) * unit
-    changes = np.stack(
-        (
-            np.cos(balls.azimuth),
-            np.sin(balls.azimuth),
-            row.axial + balls.axial,
-            row.radial + balls.radial,
-            row.inner_reach + balls.inner_reach,
-            row.outer_reach + balls.outer_reach,
-        )
-    )
+    force, free, held = posed(row, load, given)
+    # Places and reaches, in the one order of ``Row`` and ``BallPath``.
+    places = (own + change for own, change in zip(row[2:6], balls[2:6], strict=True))
+    changes = np.stack((np.cos(balls.azimuth), np.sin(balls.azimuth), *places))
     # The walk writes over its row.
-    cosine, sine, axial, radial, inner_reach, outer_reach = np.zeros((6, size))
-    own = row._replace(
-        cosine=cosine, sine=sine, axial=axial, radial=radial, inner_reach=inner_reach, outer_reach=outer_reach
-    )
-    path, told, walked = np.zeros((steps, RING)), np.zeros((steps, TOLD)), np.zeros(WALKED, np.int64)
-    reached = walk(
-        control,
-        own,
-        np.asarray(load, float) / unit,
-        free,
-        changes,
-        q,
-        np.zeros((size, BALL)),
-        space(size),
-        np.zeros(COUNTERS, np.int64),
-        path,
-        told,
-        walked,
-    )
+    own = Row._make((*np.zeros((6, size)), *row[6:]))
+    at = space(size)
+    at.q[:] = held
+    path, figures = np.zeros((steps, RING)), np.zeros((steps, FIGURES))
+    reached, newton_steps = walk(Task(control, own, force, free), changes, at, path, figures)
     if reached < steps:
         raise RunError(
             f"runout: no equilibrium at step {reached + 1} of {steps}; lessen the form errors or raise the load"
         )
     return Followed(
         ring_angle=balls.ring_angle,
-        path=path / unit,
-        largest_load=told[:, LARGEST_LOAD],
-        residual=float(told[:, RESIDUAL].max()),
-        newton_steps=int(walked[0]),
-        assemblies=int(walked[1]),
+        path=path / component_lengths(row.lever),
+        largest_load=figures[:, LARGEST_LOAD],
+        residual=float(figures[:, RESIDUAL].max()),
+        newton_steps=newton_steps,
         turns=turns,
     )

@@ -30,7 +30,7 @@ def ring_columns(displacement: Vector, reaction: Vector, stiffness: Vector) -> C
 
 
 def row_columns(balls: Vector, ratings: Sequence[Rating]) -> Columns:
-    """Angles, loads, pressures and life of a row, from ``balls`` (n, Z, TOLD) and as many ratings.
+    """Angles, loads, pressures and life of a row, from ``balls`` (n, Z, FIGURES) and as many ratings.
 
     A ball that lies on the outer race alone has no inner angle: its part in the extremes is left out, and NaN stands for ball 1.
     """

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import entry, kernel, law
 from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
-from rbdyn.quasistatic.row.equilibrium import TOLD, solve_row
-from rbdyn.quasistatic.row.newton import COLD_STARTS, CONVERGED, STEPS
+from rbdyn.quasistatic.row.equilibrium import FIGURES, solve_row
+from rbdyn.quasistatic.row.newton import CONVERGED
 from rbdyn.quasistatic.row.ring import RING, TAKEN
 from rbdyn.quasistatic.row.row import Row
+from rbdyn.quasistatic.row.space import COLD_STARTS, STEPS, Task, Vector
 
 # Fields of ``Row`` that change from point to point: arrays over the balls, then numbers.
 PLACES, NUMBERS = Row._fields[2:6], Row._fields[6:]
@@ -26,23 +27,24 @@ class Points(NamedTuple):
     ``load, given`` (n, 5): tilts and moments count over the lever; ``free`` (n, 5) is 1 where the load rules.
     """
 
-    places: NDArray[np.float64]
-    numbers: NDArray[np.float64]
-    race_control: NDArray[np.float64]
-    load: NDArray[np.float64]
-    given: NDArray[np.float64]
-    free: NDArray[np.float64]
+    places: Vector
+    numbers: Vector
+    race_control: Vector
+    load: Vector
+    given: Vector
+    free: Vector
 
 
 class Found(NamedTuple):
-    """What is found at n points: ``displacement, taken`` (n, 5), ``matrix`` (n, 5, 5) with tilts over the lever, ``told`` (n, Z, TOLD)
-    as of ``solve_row``, ``residual`` [N], ``outcome``, ``steps`` and ``cold`` (n,): whether the start was not the point before."""
+    """What is found at n points: ``displacement, taken`` (n, 5), ``matrix`` (n, 5, 5) with tilts over the lever, ``figures``
+    (n, Z, FIGURES) of the balls, ``residual`` [N], ``outcome``, ``steps`` and ``cold`` (n,): whether the start was not the point
+    before."""
 
-    displacement: NDArray[np.float64]
-    taken: NDArray[np.float64]
-    matrix: NDArray[np.float64]
-    told: NDArray[np.float64]
-    residual: NDArray[np.float64]
+    displacement: Vector
+    taken: Vector
+    matrix: Vector
+    figures: Vector
+    residual: Vector
     outcome: NDArray[np.int64]
     steps: NDArray[np.int64]
     cold: NDArray[np.int64]
@@ -50,16 +52,8 @@ class Found(NamedTuple):
 
 def empty(points: int, balls: int) -> Found:
     """Room for what is found."""
-    return Found(
-        np.zeros((points, RING)),
-        np.zeros((points, RING)),
-        np.zeros((points, RING, RING)),
-        np.zeros((points, balls, TOLD)),
-        np.zeros(points),
-        np.zeros(points, np.int64),
-        np.zeros(points, np.int64),
-        np.zeros(points, np.int64),
-    )
+    shapes = (points, RING), (points, RING), (points, RING, RING), (points, balls, FIGURES), points
+    return Found._make((*(np.zeros(shape) for shape in shapes), *np.zeros((3, points), np.int64)))
 
 
 def leaves(control: Control) -> list[float]:
@@ -95,13 +89,12 @@ def spinning(n: Any) -> Any:
 
 @entry
 def march_through(
-    control: Any, cosine: Any, sine: Any, points: Any, first: int, last: int, warm: bool, q: Any, balls: Any, at: Any,
-    counts: Any, found: Any,
-) -> bool:  # fmt: skip
+    control: Any, cosine: Any, sine: Any, points: Any, first: int, last: int, warm: bool, at: Any, found: Any
+) -> bool:
     """Fill ``found`` for the points from ``first`` to before ``last``; returns whether the last of them has its equilibrium.
 
-    ``warm``: whether ``q`` and ``balls`` hold that of the point before. After a point without one, the next starts afresh.
-    ``control`` tells the kind only; ``at, counts`` are as of ``newton.find``.
+    ``warm``: whether ``at`` stands at that of the point before. After a point without one, the next starts afresh. ``control``
+    tells the kind only.
     """
     for k in range(first, last):
         n, places = points.numbers[k], points.places
@@ -109,17 +102,14 @@ def march_through(
             cosine, sine, places[0, k], places[1, k], places[2, k], places[3, k],
             n[0], n[1], n[2], n[3], n[4], n[5], n[6],
         )  # fmt: skip
-        free = points.free[k]
+        task = Task(with_numbers(control, points.race_control[k]), row, points.load[k], points.free[k])
         for i in range(RING):
-            if not warm or free[i] == 0.0:
-                q[i] = points.given[k, i]
-        ours = with_numbers(control, points.race_control[k])
-        outcome, worst = solve_row(ours, row, points.load[k], free, warm, q, balls, at, counts, found.told[k])
-        found.displacement[k] = q
-        for i in range(RING):
-            found.taken[k, i] = at.sums[TAKEN + i]
+            if not warm or task.free[i] == 0.0:
+                at.q[i] = points.given[k, i]
+        found.outcome[k], found.residual[k] = solve_row(task, warm, at, found.figures[k])
+        found.displacement[k] = at.q
+        found.taken[k] = at.sums[TAKEN:]
         found.matrix[k] = at.matrix
-        found.residual[k], found.outcome[k] = worst, outcome
-        found.steps[k], found.cold[k] = counts[STEPS], counts[COLD_STARTS]
-        warm = outcome == CONVERGED
+        found.steps[k], found.cold[k] = at.counts[STEPS], at.counts[COLD_STARTS]
+        warm = found.outcome[k] == CONVERGED
     return warm

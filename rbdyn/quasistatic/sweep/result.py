@@ -27,7 +27,7 @@ class SweepResult:
     """Equilibria over a grid of scene keys, in the order of ``keys``, the last one running fastest.
 
     ``keys``: values of each key; ``columns``: a figure a point, units in the names, NaN where ``statuses`` tells why there is no
-    equilibrium. ``told``: by row of balls, what is known of each ball in SI as (points, (points, Z, 6)), a pair a number Z of balls;
+    equilibrium. ``figures``: by row of balls, those of each ball in SI as (points, (points, Z, 6)), a pair a number Z of balls;
     empty in a loaded sweep. ``notes``: "about" what, the "note" of the first point and all "points" that it is about, counted from 0 in
     the order of the table. ``cold``: points not started from their neighbour. ``wall_s``: what they took.
     """
@@ -38,7 +38,7 @@ class SweepResult:
     cold: int
     wall_s: float
     scene: dict[str, Any]
-    told: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = field(default_factory=dict, repr=False)
+    figures: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = field(default_factory=dict, repr=False)
     notes: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -86,8 +86,8 @@ class SweepResult:
         for note in self.notes:
             for place in note["points"]:
                 words[place].append(note["about"])
-        told = ["; ".join(about) for about in words]
-        return pd.DataFrame({**self._places(), **self.columns, "status": self.statuses, "notes": told})
+        about = ["; ".join(each) for each in words]
+        return pd.DataFrame({**self._places(), **self.columns, "status": self.statuses, "notes": about})
 
     def balls(self) -> pd.DataFrame:
         """A row a ball and point: keys, row of balls, ball from 1, then as ``BallResult.table``.
@@ -96,12 +96,12 @@ class SweepResult:
         """
         import pandas as pd
 
-        if not self.told:
+        if not self.figures:
             raise RuntimeError("a loaded sweep does not know its balls; run it again")
         frames = []
         places = self._places()
         found = np.array([status == OK for status in self.statuses])
-        for name, groups in self.told.items():
+        for name, groups in self.figures.items():
             for points, balls in groups:
                 kept = points[found[points]]
                 size = balls.shape[1]
@@ -114,12 +114,11 @@ class SweepResult:
 
     def balls_at(self, place: int) -> dict[str, list[dict[str, float]]]:
         """Records of the balls of a point, by row; as those of ``BallResult``. Raises RuntimeError as ``balls``."""
-        if not self.told:
+        if not self.figures:
             raise RuntimeError("a loaded sweep does not know its balls; run it again")
         found = {}
-        for name, groups in self.told.items():
-            told = next(balls[points == place] for points, balls in groups if place in points)
-            found[name] = ball_records(told[0])
+        for name, groups in self.figures.items():
+            found[name] = ball_records(next(balls[points == place] for points, balls in groups if place in points)[0])
         return found
 
     def points(self) -> list[dict[str, Any]]:

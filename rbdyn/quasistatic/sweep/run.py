@@ -21,8 +21,9 @@ from rbdyn.quasistatic.remarks import Rating, Remark, overloads, remarks, tippin
 from rbdyn.quasistatic.result import BallResult
 from rbdyn.quasistatic.row.equilibrium import LOST, OK, SENTENCES, resolved
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
-from rbdyn.quasistatic.row.newton import CONVERGED, COUNTERS, space
-from rbdyn.quasistatic.row.ring import BALL, RING
+from rbdyn.quasistatic.row.newton import CONVERGED
+from rbdyn.quasistatic.row.ring import RING
+from rbdyn.quasistatic.row.space import space
 from rbdyn.quasistatic.sweep.figures import Columns, ring_columns, row_columns
 from rbdyn.quasistatic.sweep.march import LEVER, Found, Points, empty, leaves, march_through
 from rbdyn.quasistatic.sweep.points import Axis, axes_of, scenes, snake
@@ -47,7 +48,7 @@ Group = tuple[NDArray[np.int64], Vector]
 
 
 class Walked(NamedTuple):
-    """What a sweep found, in the order in which it went; ``balls`` as ``SweepResult.told``, remarks with their first point."""
+    """What a sweep found, in the order in which it went; ``balls`` as ``SweepResult.figures``, remarks with their first point."""
 
     columns: Columns
     statuses: list[str]
@@ -125,15 +126,12 @@ def _march(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ..
     assert isinstance(scene, SingleRowScene)
     model, points, ratings = _packed(scene, axes, order)
     row, size, count = model.row, model.row.cosine.size, len(order)
-    found, at, counts = empty(count, size), space(size), np.zeros(COUNTERS, np.int64)
-    q, balls, warm = np.zeros(RING), np.zeros((size, BALL)), False
+    found, at, warm = empty(count, size), space(size), False
     for first in range(0, count, CHUNK):
         last = min(first + CHUNK, count)
-        warm = march_through(
-            model.control, row.cosine, row.sine, points, first, last, warm, q, balls, at, counts, found
-        )
+        warm = march_through(model.control, row.cosine, row.sine, points, first, last, warm, at, found)
         progress(last, count)
-    *ring, balls = resolved(found.displacement, found.taken, found.matrix, found.told, points.numbers[:, LEVER])
+    *ring, balls = resolved(found.displacement, found.taken, found.matrix, found.figures, points.numbers[:, LEVER])
     columns = _columns(points, found, ring, balls, ratings)
     statuses = [OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST) for outcome in found.outcome.tolist()]
     for k, why in overloads(balls, ratings).items():
@@ -206,7 +204,7 @@ def _one_by_one(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[in
     """Any bearing, through ``rbdyn.equilibrium``."""
     rows: list[dict[str, float]] = []
     statuses: list[str] = []
-    told_of: dict[str, list[Vector]] = {}
+    figures_of: dict[str, list[Vector]] = {}
     notes: list[tuple[int, Remark]] = []
     before: BallResult | None = None
     balls, cold = 0, 0
@@ -223,16 +221,16 @@ def _one_by_one(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[in
         statuses.append(result.status)
         rows.append({})
         if result.found:
-            rows[-1], told_rows, found = _figures(point, result)
+            rows[-1], by_row, found = _figures(point, result)
             notes += [(place, remark) for remark in found]
         for name in ("row",) if isinstance(point, SingleRowScene) else ("inner", "outer"):
             size = count or getattr(point.bearing, name).balls
-            told_of.setdefault(name, []).append(told_rows[name] if result.found else np.full((size, 6), np.nan))
+            figures_of.setdefault(name, []).append(by_row[name] if result.found else np.full((size, 6), np.nan))
         before = result if result.found else None
         progress(place + 1, len(order))
     names = dict.fromkeys(name for row in rows for name in row)
     columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
-    return Walked(columns, statuses, told_of, cold, notes)
+    return Walked(columns, statuses, figures_of, cold, notes)
 
 
 def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Vector], list[Remark]]:
@@ -245,8 +243,8 @@ def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], di
     balls, found = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
     names = ("row",) if len(result.rows) == 1 else ("inner", "outer")
     for name, rating, solution in zip(names, result.ratings, result.rows, strict=True):
-        balls[name] = solution.told
-        found += remarks(solution.told[np.newaxis], [rating], name.removeprefix("row"))
+        balls[name] = solution.figures
+        found += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
         prefix = "" if name == "row" else f"{name}_row_"
         columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
     figures = {name: float(value[0]) for name, value in columns.items()}

@@ -1,4 +1,4 @@
-"""Gauss elimination of a dense system: what solvers need that know nothing of the structure of the equations."""
+"""Gauss elimination of a dense system."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from rbdyn.compiled.kernel import routine
 
 
 @routine
-def eliminate(matrix: Any, vector: Any) -> bool:
+def eliminate(matrix: Any, vector: Any, size: int, least: float) -> bool:
     """Solve ``matrix`` x = ``vector`` in place with row pivots; x is left in ``vector``, the matrix is spent.
 
-    Returns whether every pivot was found: False for a matrix that is singular or not finite.
+    Only the first ``size`` rows and columns count. Returns whether every pivot was found: False for a matrix that is not
+    finite or has a pivot no larger than ``least``, 0 where only a singular one is to fail.
     """
-    size = vector.size
     for i in range(size):
         pivot = i
         for k in range(i + 1, size):
             if abs(matrix[k, i]) > abs(matrix[pivot, i]):
                 pivot = k
-        if not 0.0 < abs(matrix[pivot, i]) < 1e300:
+        if not least < abs(matrix[pivot, i]) < 1e300:
             return False
         if pivot != i:
             for k in range(i, size):
@@ -28,7 +28,7 @@ def eliminate(matrix: Any, vector: Any) -> bool:
         one = 1.0 / matrix[i, i]
         for k in range(i + 1, size):
             factor = matrix[k, i] * one
-            # Most of the matrix is zero, and stays so where no ball meets another.
+            # Most of a matrix of all balls is zero, and stays so where no ball meets another.
             if factor != 0.0:
                 for m in range(i + 1, size):
                     matrix[k, m] -= factor * matrix[i, m]
