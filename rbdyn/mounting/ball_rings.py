@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 from rbdyn.mounting.fits import mounted_rings
 from rbdyn.mounting.ring_growth import UNCHANGED, GrooveChange, groove_change, printed_growth
 from rbdyn.mounting.rings import MountedRings, Ring
-from rbdyn.properties.materials import Material
 from rbdyn.scene.ball import BallScene, DoubleDeckerScene, SingleRowScene
 from rbdyn.scene.ball_bearing import BallRow
 
@@ -112,14 +111,14 @@ def growth_record(scene: BallScene, names: dict[str, GrooveChange]) -> dict[str,
 
 
 def _pair(scene: BallScene) -> RingPair:
-    mounted = mounted_of(scene)
-    if mounted is not None:
+    rings = mounted_of(scene)
+    if rings is not None:
         return RingPair(
-            mounted.inner_ring,
-            mounted.outer_ring,
-            mounted.inner_pressure,
-            mounted.outer_pressure,
-            mounted.element_temperature_rise,
+            rings.inner_ring,
+            rings.outer_ring,
+            rings.inner_pressure,
+            rings.outer_pressure,
+            rings.element_temperature_rise,
         )
     (below, above), operation = scene.outermost_rows, scene.operation
     inner_race, outer_race = (0.5e-3 * diameter for diameter in scene.bearing.raceway_diameters_mm)
@@ -154,5 +153,4 @@ def _printed(scene: BallScene, row: BallRow, ring: str, speed: float) -> float:
     if speed == 0.0:
         return 0.0
     assert row.bore_mm is not None
-    material: Material = scene.material(ring)
-    return printed_growth(1e-3 * row.pitch_diameter_mm, 1e-3 * row.bore_mm, material, speed)
+    return printed_growth(1e-3 * row.pitch_diameter_mm, 1e-3 * row.bore_mm, scene.material(ring), speed)

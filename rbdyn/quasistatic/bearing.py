@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rbdyn.mounting.ball_rings import growth_record, row_change
-from rbdyn.quasistatic.double_decker.equilibrium import Start, solve_double_decker
+from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of, load_record, middle_record
 from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.remarks import Rating, overloads, remarks, sentences, tipping
@@ -78,7 +78,7 @@ def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> 
 
 def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallResult:
     model = double_decker_of(scene)
-    warm = Start(*start.rows) if start is not None and len(start.rows) == 2 else None
+    warm = (start.rows[0], start.rows[1]) if start is not None and len(start.rows) == 2 else None
     began = time.perf_counter()
     solution = solve_double_decker(model.stack, load_of(scene), given_of(scene), model.middle_given, warm)
     took = time.perf_counter() - began

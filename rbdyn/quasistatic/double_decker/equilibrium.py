@@ -55,13 +55,6 @@ class Stack(NamedTuple):
     arm_1: float
 
 
-class Start(NamedTuple):
-    """Both rows at an equilibrium nearby, each seen from its own outer ring."""
-
-    inner: Solution
-    outer: Solution
-
-
 class DoubleDeckerSolution(NamedTuple):
     """Equilibrium of both layers.
 
@@ -150,12 +143,12 @@ def solve_double_decker(
     load: Vector,
     given: Vector | None = None,
     middle_given: Vector | None = None,
-    start: Start | DoubleDeckerSolution | None = None,
+    start: tuple[Solution, Solution] | None = None,
 ) -> DoubleDeckerSolution:
     """Equilibrium under ``load`` (5,) [N, N m] on the inner ring, at P0.
 
     ``given`` (5,): prescribed displacements of the inner ring against the outer ring [m, rad]; ``middle_given`` (5,): of the
-    middle ring (zeros in its tilts hold it square); both NaN where forces rule. ``start``: a solution nearby. Never raises
+    middle ring (zeros in its tilts hold it square); both NaN where forces rule. ``start``: inner and outer row nearby. Never raises
     for want of an equilibrium: see ``status``.
     """
     load = np.asarray(load, float)
@@ -168,11 +161,11 @@ def solve_double_decker(
     coupled = held & (to_inner[:, free] != 0.0).any(axis=1)
     if not coupled.any():
         relative = np.where(held, given - to_inner @ np.where(free, 0.0, middle_given), np.nan)
-        inner = solve(*stack.inner, load, relative, start.inner if start else None)
+        inner = solve(*stack.inner, load, relative, start[0] if start else None)
         onto = load_on_middle_ring(stack, inner)
-        outer = solve(*stack.outer, onto, middle_given, start.outer if start else None)
+        outer = solve(*stack.outer, onto, middle_given, start[1] if start else None)
         return _result(stack, free, inner, outer, onto, 0)
-    starts = [start.outer.displacement] if start else []
+    starts = [start[1].displacement] if start else []
     starts += [_shared_out(stack, load, given, middle_given, share) for share in SHARES]
     best: DoubleDeckerSolution | None = None
     for first in starts:
@@ -199,7 +192,7 @@ def _follow(
     given: Vector,
     free: NDArray[np.bool_],
     middle: Vector,
-    start: Start | DoubleDeckerSolution | None,
+    start: tuple[Solution, Solution] | None,
 ) -> DoubleDeckerSolution:
     """Newton on the free components of the middle ring's displacement, guarded by the length of what is left over."""
     to_inner = carried(stack.arm_0)
@@ -214,7 +207,7 @@ def _follow(
     def length(left: Vector, inner: Solution, outer: Solution) -> float:
         return float(np.linalg.norm(left[free])) if inner.found and outer.found else np.inf
 
-    inner, outer, left = rows(middle, start.inner if start else None, start.outer if start else None)
+    inner, outer, left = rows(middle, start[0] if start else None, start[1] if start else None)
     size, steps = length(left, inner, outer), 0
     while steps < STEPS and size > AIM * _largest(inner, outer) and np.isfinite(size):
         onto_by_middle = _onto_by_relative(stack, inner) @ _relative_by_middle(inner.stiffness, held, to_inner)

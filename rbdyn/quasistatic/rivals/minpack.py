@@ -30,11 +30,10 @@ def solve(
     control: Control,
     load: Vector,
     given: Vector | None = None,
-    start: Solution | None = None,
     limit: int = EVALUATIONS,
     method: str = "hybr",
 ) -> Solution:
-    """As ``equilibrium.solve``, by MINPACK's hybrj or lmder ("lm") in at most ``limit`` evaluations. ``start`` is not used."""
+    """As ``equilibrium.solve``, by MINPACK's hybrj or lmder ("lm") in at most ``limit`` evaluations."""
     from scipy.optimize import root
 
     system = system_of(row, load, given)
