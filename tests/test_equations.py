@@ -250,7 +250,7 @@ INTERPRETED = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
 from conftest import make, right_hand_side, state_near_contact
-from rbdyn.dynamics.model import roller_bearing
+from rbdyn.dynamics.parameters.model import roller_bearing
 out = []
 for assignments in json.loads(sys.argv[2]):
     scene = make(*assignments)

@@ -142,7 +142,7 @@ def types_by_body():
     """Every registered body of a law, and the parameter types it stands for."""
     found = {}
     for package in (rbdyn.contact, rbdyn.dynamics):
-        for info in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+        for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             for value in vars(importlib.import_module(info.name)).values():
                 for kind, body in getattr(value, "bodies", {}).items() if hasattr(value, "body") else ():
                     found.setdefault(name_of(body), set()).add(kind)
