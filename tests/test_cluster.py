@@ -68,6 +68,8 @@ def slow_echo(text: str) -> Ran:
     """Work for a worker: gives back its text, unless that tells it to die."""
     if text == "die":
         assert "dask" in " ".join(sys.orig_argv)
+        # What this worker did before is reported in batches.
+        time.sleep(1.0)
         os.kill(os.getpid(), signal.SIGKILL)
     time.sleep(float(text))
     return Ran({"text": text}, None, 0.0, pid=os.getpid())
@@ -140,9 +142,9 @@ def test_cluster_gives_each_place_its_own_and_tells_what_is_gone(tmp_path, monke
 @pytest.mark.slow
 def test_point_that_kills_its_workers_is_told_as_lost_and_the_others_are_kept(tmp_path):
     with started(tmp_path, 2, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0") as there:
-        found = collected(there.address, ["0.01", "die", "0.02"])
-    assert found[0].result and found[2].result
-    assert found[1].lost and found[1].cause is not None and found[1].cause.startswith("its workers were lost")
+        found = collected(there.address, ["0.01", "0.02", "die"])
+    assert found[0].result and found[1].result
+    assert found[2].lost and found[2].cause is not None and found[2].cause.startswith("its workers were lost")
 
 
 @pytest.mark.slow
