@@ -94,7 +94,7 @@ def folder(tmp_path_factory) -> Path:
     }  # fmt: skip
     sweep = {
         "format": SWEEP_FORMAT, "keys": {"operation.axial_load_N": [1.0, 2.0]}, "cost": {"wall_s": 1.0, "cold_starts": 1},
-        "points": [{"operation.axial_load_N": x, "status": "ok", "x_mm": 0.1} for x in (1.0, 2.0)], "scene": {},
+        "points": [{"operation.axial_load_N": x, "status": "ok", "x_mm": 0.1} for x in (1.0, 2.0)], "scene": {}, "notes": [],
     }  # fmt: skip
     for name, record in (("result", result), ("sweep", sweep)):
         (folder / f"{name}.json").write_text(json.dumps(record, indent=1), encoding="utf-8")

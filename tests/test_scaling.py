@@ -81,7 +81,7 @@ def test_unit_times_are_measured_and_written(found, tmp_path):
     whole = Scaling({**found.points, "slices": list(found.points["rollers"])}, [Memory(4, 100.0), Memory(8, 100.0)])
     assert write(report(whole), tmp_path) == ["scaling.json", "scaling.csv", "scaling.png"]
     saved = json.loads((tmp_path / "scaling.json").read_text())
-    assert saved["format"] == "rbdyn.accuracy.rollers.scaling/1" and set(saved["fits"]) == {"rollers", "slices"}
+    assert saved["format"] == "rbdyn.scaling/1" and set(saved["fits"]) == {"rollers", "slices"}
     assert (tmp_path / "scaling.png").stat().st_size > 10_000
     assert len((tmp_path / "scaling.csv").read_text().splitlines()) == 5
 
@@ -102,4 +102,4 @@ def test_command_scaling(command, tmp_path):
     assert [len(record[kind]) for kind in ("rollers", "slices", "memory")] == [6, 6, 2]
     few, many = (memory["peak_MiB"] for memory in record["memory"])
     assert abs(many - few) < 5.0
-    assert {file.name for file in tmp_path.iterdir()} == {"scaling.json", "scaling.csv", "scaling.png"}
+    assert {file.name for file in tmp_path.iterdir()} == {"scaling.json", "scaling.csv", "scaling.png", "made_by.json"}

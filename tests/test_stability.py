@@ -79,7 +79,7 @@ def test_unit_record_and_files(rows, tmp_path):
     report = stability.report(listed)
     assert write(report, tmp_path) == ["stability.json", "stability.csv"]
     saved = json.loads((tmp_path / "stability.json").read_text())
-    assert saved["format"] == "rbdyn.accuracy.rollers.stability/1" and saved["status"] == "ok"
+    assert saved["format"] == "rbdyn.stability/1" and saved["status"] == "ok"
     assert [case["case"] for case in saved["cases"]] == list(rows)
     assert len(pd.read_csv(tmp_path / "stability.csv")) == len(rows)
     (table,) = report.tables

@@ -26,7 +26,7 @@ from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.accuracy.rollers.scaling/1"
+FORMAT = "rbdyn.scaling/1"
 ROLLERS = (10, 20, 30, 50, 70, 100)
 SLICES = (1, 11, 31, 61, 101, 201)
 MEMORY_TURNS = (40, 4000)

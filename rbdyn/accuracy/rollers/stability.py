@@ -21,7 +21,7 @@ from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError, RunError
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.accuracy.rollers.stability/1"
+FORMAT = "rbdyn.stability/1"
 LARGEST_GAP = 0.01
 TURNS, DISCARDED = 5, 2
 # What a case may end with. All but "open" say what to do; "refused" and "stopped" do so in their reason.
