@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import json
 import math
@@ -114,7 +115,7 @@ class SimulationResult:
     target: dict[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
+        """JSON form, which shares nothing with the result."""
         return {
             "format": FORMAT,
             **{key: getattr(self, name).as_dict() for key, name in FIGURES.items()},
@@ -125,7 +126,7 @@ class SimulationResult:
                 "max_land_N": self.max_land_load,
             },
             "notes": list(self.notes),
-            **{key: getattr(self, name) for key, name in PLAIN.items()},
+            **{key: copy.deepcopy(getattr(self, name)) for key, name in PLAIN.items()},
         }
 
     @classmethod

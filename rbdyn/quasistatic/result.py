@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,8 +50,8 @@ class BallResult:
         return 1e-3 * np.array([place["x"], place["y"], place["z"], tilt["x"], tilt["y"]])
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        return self.record
+        """JSON form, which shares nothing with the result."""
+        return copy.deepcopy(self.record)
 
     def table(self) -> pd.DataFrame:
         """A row a ball: azimuth, angles, loads, centrifugal force, gyroscopic moment; units in the names."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -146,10 +147,10 @@ class SweepResult:
                 {"cause": cause, "points": len(at), "first": self.at(at[0]), "status": self.statuses[at[0]]}
                 for cause, at in self.failures.items()
             ],
-            "notes": self.notes,
+            "notes": list(self.notes),
             "cost": {"wall_s": self.wall_s, "cold_starts": self.cold},
             "versions": versions(),
-            "scene": self.scene,
+            "scene": copy.deepcopy(self.scene),
         }
 
     def save(self, path: Path | str) -> None:
