@@ -164,16 +164,16 @@ def test_a_bad_assignment_is_one_sentence(assignment, words):
 
 @pytest.mark.parametrize("read", [Scene.load, Study.load, read_chains])
 def test_unknown_keys_are_told_in_linear_time_and_a_byte_order_mark_is_read(tmp_path, read):
-    """Rate: 100 000 unknown keys take seconds (hours where each is compared with all)."""
+    """Rate: 100 000 unknown keys take seconds of the processor (hours where each is compared with all)."""
     name = {Scene.load: "cylindrical_roller", Study.load: "clearance_study"}.get(read, "pocket_chain")
     whole, path = (EXAMPLES / f"{name}.toml").read_bytes(), tmp_path / "s.toml"
     path.write_bytes(b"\xef\xbb\xbf" + whole)
     assert read(path)
     path.write_bytes(b"".join(b"k%d = 1\n" % number for number in range(100_000)) + whole)
-    start = time.perf_counter()
+    start = time.process_time()
     faults = faults_of(read, path)
     assert len(faults) == MOST_FAULTS and "99951 more" in faults[-1]
-    assert time.perf_counter() - start < 10.0
+    assert time.process_time() - start < 10.0
 
 
 def test_sentences_are_cut_in_the_middle():

@@ -77,7 +77,7 @@ def copy(tmp_path, monkeypatch):
     ("module", "old", "new"),
     [
         ("rbdyn/plots/motion.py", '"', "'"),
-        ("rbdyn/scene/bearing.py", "# Harmonics of the raceway radii", "# Waves of the raceways"),
+        ("rbdyn/scene/bearing.py", "Harmonics of the outer raceway", "Waves of the outer raceway"),
         ("rbdyn/scene/bearing.py", '"""Geometry of a cylindrical roller bearing.', '"""Drawing.'),
         ("rbdyn/cli/app.py", '"', "'"),
         ("doe/report/words.py", '"', "'"),

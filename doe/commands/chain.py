@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from doe.commands.options import Json, Save
+from doe.commands.options import Save
 from doe.commands.steps import save
+from rbdyn.cli.options import Json, flag
 from rbdyn.cli.terminal import BAD_INPUT, guarded, print_json
 from rbdyn.faults import InputError
 
@@ -20,10 +21,8 @@ def chain(
     ],
     out: Save = None,
     as_json: Json = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Parts only.")] = False,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Also yields by distribution, quantiles, classes.")
-    ] = False,
+    quiet: Annotated[bool, flag("--quiet", "-q", says="Parts only.")] = False,
+    verbose: Annotated[bool, flag("--verbose", "-v", says="Also yields by distribution, quantiles, classes.")] = False,
 ) -> None:
     """Solve dimension chains: limits, yield, contributions, allocation. One that misses its limits is refused."""
     with guarded(as_json):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from doe.commands.options import Json, Save, StudyPath
+from doe.commands.options import Save, StudyPath
 from doe.commands.steps import save
+from rbdyn.cli.options import Json, flag
 from rbdyn.cli.terminal import guarded, print_json
 
 
@@ -15,9 +14,9 @@ def design(
     path: StudyPath,
     out: Save = None,
     as_json: Json = False,
-    as_csv: Annotated[bool, typer.Option("--csv", help="Print a CSV table and nothing else.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Actual values only.")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also seeds and leverages.")] = False,
+    as_csv: Annotated[bool, flag("--csv", says="Print a CSV table and nothing else.")] = False,
+    quiet: Annotated[bool, flag("--quiet", "-q", says="Actual values only.")] = False,
+    verbose: Annotated[bool, flag("--verbose", "-v", says="Also seeds and leverages.")] = False,
 ) -> None:
     """Print the design: every run, and how well the runs can tell what is asked of them."""
     with guarded(as_json):

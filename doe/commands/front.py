@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doe.commands.options import Data, Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
+from doe.commands.options import Data, Direct, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import Effort, fitted, keeping_runs, save, searched
+from rbdyn.cli.options import Json, flag
 from rbdyn.cli.terminal import guarded, print_json
 from rbdyn.faults import InputError, refuse
 
@@ -34,7 +35,7 @@ def front(
     direct: Direct = False,
     as_json: Json = False,
     quiet: Quiet = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also every point of the front.")] = False,
+    verbose: Annotated[bool, flag("--verbose", "-v", says="Also every point of the front.")] = False,
 ) -> None:
     """Find the Pareto front on the response surfaces."""
     with guarded(as_json), keeping_runs(out):

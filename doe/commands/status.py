@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from doe.commands.options import Json, Out, Quiet, StudyPath
+from doe.commands.options import Out, Quiet, StudyPath
+from rbdyn.cli.options import Json
 from rbdyn.cli.terminal import guarded, print_json
 
 
