@@ -74,6 +74,18 @@ EVERYTHING = (
 )
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config: pytest.Config) -> None:
+    """Two processes where pytest-xdist is installed and nothing else is asked for; a file's tests stay in one."""
+    if not config.pluginmanager.hasplugin("xdist") or hasattr(config, "workerinput"):
+        return
+    option = config.option
+    if option.numprocesses is None and option.dist == "no" and not option.usepdb:
+        option.numprocesses = 2
+    if option.numprocesses and option.dist == "no":
+        option.dist = "loadfile"
+
+
 def law_types(parameters: Any) -> set[type]:
     """Types of all NamedTuples within the parameters of a bearing: they choose what is compiled."""
     if not isinstance(parameters, tuple):
