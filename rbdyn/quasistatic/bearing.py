@@ -44,7 +44,7 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
     head, tail = _frame(scene, solution.status, took)
     if not solution.found:
         return BallResult({**head, **tail})
-    rating, table = row_rating(scene, model), solution.told[np.newaxis]
+    rating, table = row_rating(scene, model), solution.figures[np.newaxis]
     if why := overloads(table, [rating]):
         return BallResult({**head, "status": why[0], **tail})
     record = row_record(rating, solution, film_record(scene, rating, solution, ("inner_ring", "outer_ring")))
@@ -73,7 +73,7 @@ def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> 
     if scene.model.raceway_control not in SEVERAL_ROOTS or scene.model.solver != "convex":
         return None
     found = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
-    return [{**displacement_record(root.displacement), "balls": ball_records(root.told)} for root in found]
+    return [{**displacement_record(root.displacement), "balls": ball_records(root.figures)} for root in found]
 
 
 def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallResult:
@@ -95,10 +95,10 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
     layers: dict[str, Any] = {}
     notes: list[str] = []
     for name, rating, row in zip(rings, ratings, rows, strict=True):
-        if why := overloads(row.told[np.newaxis], [rating]):
+        if why := overloads(row.figures[np.newaxis], [rating]):
             return BallResult({**head, "status": f"{name} row {why[0]}", **tail})
         layers[name] = row_record(rating, row, film_record(scene, rating, row, rings[name]))
-        notes += sentences(remarks(row.told[np.newaxis], [rating], name))
+        notes += sentences(remarks(row.figures[np.newaxis], [rating], name))
     notes += sentences([tipping(solution.displacement[np.newaxis, 3:], scene)])
     grown = growth_record(
         scene, dict(zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True))

@@ -26,7 +26,7 @@ def row_record(rating: Rating, solution: Solution, film: dict[str, Any]) -> dict
     searches = {} if solution.searches is None else {"searches": solution.searches}
     return {
         **displacement_record(solution.displacement),
-        "balls": ball_records(solution.told),
+        "balls": ball_records(solution.figures),
         "max_stress_MPa": {race: 1e-6 * float(np.max(peak_pressure(contacts[race], loads[race]))) for race in contacts},
         "contacts": {
             race: {**contact_record(contacts[race], float(loads[race].max())), **film.get(race, {})}
@@ -34,7 +34,7 @@ def row_record(rating: Rating, solution: Solution, film: dict[str, Any]) -> dict
         },
         "stiffness": stiffness_record(solution.stiffness),
         "life": life_record(rating, solution),
-        "needed_friction": float(needed_friction(solution.told[np.newaxis], [rating])[0]),
+        "needed_friction": float(needed_friction(solution.figures[np.newaxis], [rating])[0]),
         "residual_N": solution.residual,
         "iterations": solution.steps,
         **searches,

@@ -243,8 +243,8 @@ def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], di
     balls, found = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
     names = ("row",) if len(result.rows) == 1 else ("inner", "outer")
     for name, rating, solution in zip(names, result.ratings, result.rows, strict=True):
-        balls[name] = solution.told
-        found += remarks(solution.told[np.newaxis], [rating], name.removeprefix("row"))
+        balls[name] = solution.figures
+        found += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
         prefix = "" if name == "row" else f"{name}_row_"
         columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
     figures = {name: float(value[0]) for name, value in columns.items()}
