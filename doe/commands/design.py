@@ -8,7 +8,7 @@ import typer
 
 from doe.commands.options import Json, Save, StudyPath
 from doe.commands.steps import save
-from rbdyn.cli.terminal import guarded, print_json
+from rbdyn.cli.terminal import guarded, hand_over
 
 
 def design(
@@ -33,9 +33,6 @@ def design(
         points = design_of(loaded)
         record = design_record(loaded, points, evaluation(loaded, points))
         save(out, path, "design.json", record)
-        if as_json:
-            print_json(record)
-        elif as_csv:
-            print_csv(record)
-        else:
-            print_design(record, quiet, verbose)
+        hand_over(
+            lambda: record, as_json, lambda: print_csv(record) if as_csv else print_design(record, quiet, verbose)
+        )
