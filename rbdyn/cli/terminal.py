@@ -16,7 +16,7 @@ import typer
 from rbdyn.cli.loading import INTERRUPTED
 from rbdyn.cli.streams import FAILED
 from rbdyn.faults import InputError, RunError
-from rbdyn.kept import digest_of
+from rbdyn.records.kept import digest_of
 from rbdyn.result import write_json
 
 BAD_INPUT = 2
