@@ -8,13 +8,12 @@ import math
 import os
 import platform
 from collections.abc import Callable
-from dataclasses import fields
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.faults import InputError, bounded, read_text
-from rbdyn.records.record import Record, derived, keyed, path_of
+from rbdyn.records.record import Record, derived, keyed, told
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -107,8 +106,8 @@ class SimulationResult(SavedRecord):
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 
-        told = ((path_of(one)[0], getattr(self, one.name)) for one in fields(self))
-        rows = {key: figure.as_dict() for key, figure in told if isinstance(figure, Quantity)}
+        figures = ((path[0], getattr(self, one.name)) for one, path in told(self))
+        rows = {key: figure.as_dict() for key, figure in figures if isinstance(figure, Quantity)}
         return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
 
 

@@ -13,8 +13,8 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from types import UnionType
 from typing import Any, Literal, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
 
-# A field without a path is none of the JSON form.
-UNSAID = "unsaid"
+# What fields are declared to be, of a class.
+_kinds: Callable[[Any], dict[str, Any]] = functools.cache(get_type_hints)
 
 
 def keyed(*path: str, **options: Any) -> Any:
@@ -34,7 +34,7 @@ def derived(by: Callable[[Any], Any], *path: str, spread: bool = False, init: Li
 
 def unsaid(**options: Any) -> Any:
     """A field of which JSON does not tell."""
-    return field(metadata={UNSAID: True}, **options)
+    return field(metadata={"path": None}, **options)
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, unsaid))
@@ -53,9 +53,9 @@ class Record:
     def as_dict(self) -> dict[str, Any]:
         """JSON form, which shares nothing with the record: plain numbers, lists and tables, units in the names."""
         found: dict[str, Any] = {}
-        for one in fields(self):
-            value, path = plain(getattr(self, one.name)), path_of(one)
-            if UNSAID in one.metadata or (value is None and one.default is None):
+        for one, path in told(self):
+            value = plain(getattr(self, one.name))
+            if value is None and one.default is None:
                 continue
             table = found
             for key in path[:-1]:
@@ -66,26 +66,23 @@ class Record:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
-        of: Any = cls
-        told, kinds = [one for one in fields(cls) if UNSAID not in one.metadata], _kinds(of)
-        taken = {key for one in told for key in path_of(one)[:1]}
+        taken = {key for _, path in told(cls) for key in path[:1]}
         found: dict[str, Any] = {}
-        for one in told:
-            path = path_of(one)
+        for one, path in told(cls):
             if not one.init or (path and one.default is None and path[0] not in data):
                 continue
             value: Any = data if path else {key: value for key, value in data.items() if key not in taken}
             for key in path:
                 value = value[key]
             if path or value or one.default is MISSING:
-                found[one.name] = restored(kinds[one.name], value)
+                found[one.name] = restored(_kinds(cls)[one.name], value)
         return cls(**found)
 
 
-def path_of(one: Field[Any]) -> tuple[str, ...]:
-    """Keys of a field in JSON, from the outermost in; none for one that is spread."""
-    path: tuple[str, ...] = one.metadata.get("path", (one.name,))
-    return path
+def told(record: Record | type[Record]) -> list[tuple[Field[Any], tuple[str, ...]]]:
+    """Fields of which JSON tells, each with its keys there from the outermost in; one that is spread has none of its own."""
+    paths = ((one, one.metadata.get("path", (one.name,))) for one in fields(record))
+    return [(one, path) for one, path in paths if path is not None]
 
 
 def plain(value: Any) -> Any:
@@ -117,8 +114,3 @@ def restored(kind: Any, value: Any) -> Any:
     elif type(value) is kind or (kind is float and type(value) is int):
         return value
     raise TypeError(f"{value!r} is not of {kind}")
-
-
-@functools.cache
-def _kinds(cls: type[Record]) -> dict[str, Any]:
-    return get_type_hints(cls)
