@@ -7,7 +7,7 @@ from typing import Annotated
 from doe.commands.options import Save, StudyPath
 from doe.commands.steps import save
 from rbdyn.cli.options import Json, flag
-from rbdyn.cli.terminal import guarded, print_json
+from rbdyn.cli.terminal import guarded, hand_over
 
 
 def design(
@@ -32,9 +32,6 @@ def design(
         points = design_of(loaded)
         record = design_record(loaded, points, evaluation(loaded, points))
         save(out, path, "design.json", record)
-        if as_json:
-            print_json(record)
-        elif as_csv:
-            print_csv(record)
-        else:
-            print_design(record, quiet, verbose)
+        hand_over(
+            lambda: record, as_json, lambda: print_csv(record) if as_csv else print_design(record, quiet, verbose)
+        )

@@ -7,7 +7,7 @@ from typing import Annotated
 from doe.commands.options import Data, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import Effort, fitted, keeping_runs, save
 from rbdyn.cli.options import Json, flag
-from rbdyn.cli.terminal import guarded, print_json
+from rbdyn.cli.terminal import guarded, hand_over
 
 
 def fit(
@@ -37,7 +37,4 @@ def fit(
 
             for name, rows in fit_tables(surfaces).items():
                 pd.DataFrame(rows).to_csv(out / name, index=False)
-        if as_json:
-            print_json(record)
-        else:
-            print_fit(surfaces, quiet, verbose, loaded.factors)
+        hand_over(lambda: record, as_json, lambda: print_fit(surfaces, quiet, verbose, loaded.factors))

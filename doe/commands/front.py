@@ -9,7 +9,7 @@ import typer
 from doe.commands.options import Data, Direct, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import Effort, fitted, keeping_runs, save, searched
 from rbdyn.cli.options import Json, flag
-from rbdyn.cli.terminal import guarded, print_json
+from rbdyn.cli.terminal import guarded, hand_over
 from rbdyn.faults import InputError, refuse
 
 if TYPE_CHECKING:
@@ -60,10 +60,7 @@ def front(
 
             record["direct"] = direct_record(loaded, searched(loaded, found, effort))
         save(out, path, "front.json", record)
-        if as_json:
-            print_json(record)
-        else:
-            print_front(record, verbose)
+        hand_over(lambda: record, as_json, lambda: print_front(record, verbose))
 
 
 def _point(study: Study, text: str) -> list[float]:

@@ -28,7 +28,7 @@ from rbdyn.cli.options import (
     study_flag,
     verbose_flag,
 )
-from rbdyn.cli.terminal import FAILED, guarded, hand_over, keeping, output_folder, print_json, print_table, progress_bar
+from rbdyn.cli.terminal import FAILED, guarded, hand_over, keeping, output_folder, print_table, progress_bar
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -307,7 +307,4 @@ def show(
         folder = output_folder(out or asked.path.parent / "show", "rbdyn show", asked.path)
         with progress_bar("showing", quiet or as_json) as progress:
             record = motion.write(asked, folder, animate, lyapunov, progress)
-        if as_json:
-            print_json(record)
-        else:
-            motion.print_record(record, folder, quiet, verbose)
+        hand_over(lambda: record, as_json, lambda: motion.print_record(record, quiet, verbose), folder, record["files"])

@@ -155,13 +155,16 @@ class Numerics(Strict):
         """How many replicates are repeated."""
         return math.ceil(self.companion_share * self.replicates - 1e-9) if self.companion else 0
 
+    @property
+    def most_batches(self) -> int:
+        """Batches for which each replicate and companion has memory."""
+        return MOST_KEPT // (self.replicates + self.companions)
+
     @model_validator(mode="after")
     def _fits_into_memory(self) -> Numerics:
-        runs = self.replicates + self.companions
-        most = MOST_KEPT // runs
-        if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > most:
+        if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > self.most_batches:
             raise ValueError(
-                f"turns = {self.turns:g}: {runs} replicates and companions have memory for {most} turns each, warm-up "
-                "included; take fewer turns or replicates"
+                f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have memory for "
+                f"{self.most_batches} turns each, warm-up included; take fewer turns or replicates"
             )
         return self

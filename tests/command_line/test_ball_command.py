@@ -146,15 +146,15 @@ def test_invariant_a_held_ring_tells_the_moment_that_holds_it():
         return equilibrium(Scene.from_dict(table, "7208.toml", [*lone, *changes]))
 
     held = found()
-    moment = held.record["reaction"]["moment_Nm"]
-    assert moment["x"] == 0.0 and abs(moment["y"]) > 10.0 and held.record["notes"] == []
+    moment = held.as_dict()["reaction"]["moment_Nm"]
+    assert moment["x"] == 0.0 and abs(moment["y"]) > 10.0 and held.as_dict()["notes"] == []
     same = found("operation.tilt='free'", f"operation.moment_Nm=[0.0, {moment['y']!r}]")
     assert same.displacement == pytest.approx(held.displacement, rel=1e-8, abs=1e-13)
     free = found("operation.tilt='free'")
-    (note,) = free.record["notes"]
+    (note,) = free.as_dict()["notes"]
     assert note.startswith("the free ring tips by 3.1 mrad (11 arc minutes)") and "operation.tilt = 'fixed'" in note
-    assert free.record["life"]["L10_Mrev"] < 0.5 * held.record["life"]["L10_Mrev"]
-    assert found("operation.tilt='free'", "operation.prescribed.tilt_y_mrad=2.0").record["notes"] == []
+    assert free.as_dict()["life"]["L10_Mrev"] < 0.5 * held.as_dict()["life"]["L10_Mrev"]
+    assert found("operation.tilt='free'", "operation.prescribed.tilt_y_mrad=2.0").as_dict()["notes"] == []
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_invariant_what_symmetry_makes_zero_is_told_as_zero(file, changes, zeros
     load = "operation.load_N[3]" if scene.operation.load_N else "operation.radial_load_N"
     column = sweep(scene, {load: [100.0, 200.0, 300.0]}).columns
     assert all((column[name] == 0.0).all() and not np.signbit(column[name]).any() for name in zeros)
-    record = equilibrium(scene).record
+    record = equilibrium(scene).as_dict()
     ring = {f"{axis}_mm": value for axis, value in record["displacement_mm"].items()}
     ring |= {f"tilt_{axis}_mrad": value for axis, value in record["tilt_mrad"].items()}
     ring |= {f"force_{axis}_N": value for axis, value in record["reaction"]["load_N"].items()}

@@ -12,6 +12,7 @@ from typer.testing import CliRunner, Result
 
 from doe.cli import app
 from doe.report.steps.fit import print_fit
+from doe.running.failure import StoppedError
 from doe.study.runs import read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
@@ -169,3 +170,18 @@ def test_rows_of_one_run_are_its_replicates(tmp_path):
     refused = run(tmp_path, rows)
     assert refused.exit_code == 2
     assert "guide_clearance_mm of run 1 is 0.1234 in one replicate and 0.15 in another" in refused.output
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_run_that_is_stopped_says_what_is_kept(tmp_path, monkeypatch, kept):
+    """Unit: a full disk or a lost cluster leaves the finished runs in the folder of ``--out``, and nowhere without one."""
+
+    def stop(*arguments, **options):
+        raise StoppedError("the scheduler is gone", "start again")
+
+    monkeypatch.setattr("doe.clearance.run_scenes", stop)
+    path = study(tmp_path)
+    (tmp_path / "cylindrical_roller.toml").write_text((EXAMPLES / "cylindrical_roller.toml").read_text())
+    found = CliRunner().invoke(app, ["fit", str(path), *(["--out", str(tmp_path / "out")] if kept else [])])
+    where = "finished runs are kept" if kept else "without --out no finished run is kept"
+    assert found.exit_code == 1 and found.stderr == f"the scheduler is gone; {where}: start again\n"

@@ -205,7 +205,7 @@ def test_unit_no_equilibrium_is_told(monkeypatch):
     monkeypatch.setattr(double_decker, "STEPS", 0)
     result = equilibrium(scene_of("operation.axial_load_N=0.0", "operation.prescribed.z_mm=0.02"))
     assert not result.found and result.status == double_decker.LOST
-    assert "inner" not in result.record
+    assert "inner" not in result.as_dict()
 
 
 @pytest.mark.parametrize(
@@ -237,7 +237,7 @@ def test_unit_a_start_nearby_saves_steps():
         scene_of("operation.inner_speed_rpm=20100.0"), equilibrium(scene_of("operation.inner_speed_rpm=20000.0"))
     )
     assert warm.displacement == pytest.approx(cold.displacement, abs=1e-13)
-    assert warm.record["iterations"] < cold.record["iterations"]
+    assert warm.as_dict()["iterations"] < cold.as_dict()["iterations"]
 
 
 def test_unit_record_has_both_layers_and_the_middle_ring():
@@ -260,7 +260,7 @@ def test_unit_speed_of_the_middle_ring():
     oil = ("lubricant.oil='MIL-L-23699'", "lubricant.temperature_C=60.0")
     scene = scene_of("bearing.middle.speed_split='torque_balance'", *oil)
     split = double_decker_of(scene).split
-    record = equilibrium(scene).record["middle_ring"]
+    record = equilibrium(scene).as_dict()["middle_ring"]
     assert record["speed_status"] == split.status == "shared"
     assert record["speed_share"] < 0.0576 and record["friction_torque_Nmm"] > 0.0
     heavier = scene_of("bearing.middle.speed_split='torque_balance'", "operation.axial_load_N=600.0", *oil)

@@ -19,7 +19,7 @@ from doe.study_file import Study
 from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError
 from rbdyn.quasistatic.sweep.result import FORMAT as SWEEP_FORMAT
 from rbdyn.quasistatic.sweep.result import SweepResult
-from rbdyn.result import FORMAT, SimulationResult
+from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -86,7 +86,7 @@ def folder(tmp_path_factory) -> Path:
         "cage_slip",
     )
     result = {
-        "format": FORMAT, "status": "ok", **dict.fromkeys(names, quantity), "power_balance": {"relative_gap": 1e-3},
+        "format": SimulationResult.FORMAT, "status": "ok", **dict.fromkeys(names, quantity), "power_balance": {"relative_gap": 1e-3},
         "power_terms_W": {"drag": 2.0}, "loads": {"max_inner_N": 1.0, "max_outer_N": 2.0, "max_land_N": 0.0},
         "races": {"inner": {"pressure_MPa": 900.0}}, "clearance_um": {"drawn": 20.0}, "impact_window_turns": 1.0,
         "transient_turns": None, "counted_turns": 2.0, "target": None, "cost": {"wall_s": 1.0}, "replicates": 2, "seed": 1,

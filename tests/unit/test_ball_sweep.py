@@ -45,7 +45,7 @@ def grid():
 def assert_as_alone(found, place, scene):
     """All figures of a point are those of ``rbdyn.equilibrium``."""
     alone = equilibrium(scene)
-    record, row = alone.record, alone.rows[0]
+    record, row = alone.as_dict(), alone.rows[0]
     shown = {name: float(column[place]) for name, column in found.columns.items()}
     near = dict(rel=1e-8, abs=1e-12)
     scale = np.abs(alone.displacement[:3]).max()
@@ -212,7 +212,7 @@ def test_unit_a_lost_point_is_followed_by_a_fresh_start():
 def test_unit_a_double_decker_goes_point_by_point(tmp_path):
     """Unit: both rows and the middle ring as ``rbdyn.equilibrium`` has them; pictures show both."""
     found = sweep(scene_with(file=DOUBLE), {SPEED: [5e3, 15e3]})
-    alone = equilibrium(scene_with(f"{SPEED}=15e3", file=DOUBLE)).record
+    alone = equilibrium(scene_with(f"{SPEED}=15e3", file=DOUBLE)).as_dict()
     shown = {name: column[1] for name, column in found.columns.items()}
     assert found.status == "ok" and found.cold == 1
     assert shown["x_mm"] == pytest.approx(alone["displacement_mm"]["x"], rel=1e-9)
@@ -346,7 +346,7 @@ def test_oracle_a_sweep_has_the_notes_of_its_points(file, changes, keys, tmp_pat
     table, told = found.table()["notes"], 0
     for place, status in enumerate(found.statuses):
         point = [f"{key}={value}" for key, value in found.at(place).items()]
-        alone = equilibrium(scene_with(*changes, *point, file=file)).record.get("notes", ())
+        alone = equilibrium(scene_with(*changes, *point, file=file)).as_dict().get("notes", ())
         assert status != "ok" or len(alone) == len([word for word in table[place].split("; ") if word])
         for note in found.notes:
             assert note["about"] not in table[place] if place not in note["points"] else note["about"] in table[place]

@@ -174,16 +174,16 @@ def test_limit_mounting_of_a_ball_bearing_is_a_change_of_clearance():
     plain["bearing"]["clearance_change_um"] = taken
     first, second = equilibrium(mounted), equilibrium(BallScene.from_dict(plain))
     assert first.displacement == pytest.approx(second.displacement, abs=1e-12)
-    record = first.record["fits"]
+    record = first.as_dict()["fits"]
     assert record["inner_ring_loosens_rpm"] > 12000.0 and not record["inner_ring_loose"]
     assert record["inner_pressure_MPa"] > record["outer_pressure_MPa"] > 0.0
 
 
 def test_unit_rotation_loosens_a_light_fit():
     """Unit: a fit of 1 um has let go at 12000 rpm, and the record says from which speed."""
-    record = equilibrium(deep_groove(mounting={"inner_interference_um": 0.3})).record["fits"]
+    record = equilibrium(deep_groove(mounting={"inner_interference_um": 0.3})).as_dict()["fits"]
     assert record["inner_ring_loose"] and 0.0 < record["inner_ring_loosens_rpm"] < 12000.0
-    loose = equilibrium(deep_groove(mounting={"inner_interference_um": -3.0})).record["fits"]
+    loose = equilibrium(deep_groove(mounting={"inner_interference_um": -3.0})).as_dict()["fits"]
     assert loose["inner_ring_loosens_rpm"] == 0.0
 
 
@@ -213,7 +213,7 @@ def test_unit_growth_of_a_single_row(form):
     expected = thick if form == "thick_ring" else printed_growth(46e-3, 30e-3, STEEL, ring.speed)
     assert row_change(scene).radial == pytest.approx(expected, rel=1e-12)
     grown = equilibrium(scene)
-    assert grown.record["ring_growth_um"]["inner_less_outer_race"] == pytest.approx(1e6 * expected)
+    assert grown.as_dict()["ring_growth_um"]["inner_less_outer_race"] == pytest.approx(1e6 * expected)
     assert grown.displacement[0] < plain.displacement[0]
 
 

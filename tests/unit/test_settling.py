@@ -134,14 +134,22 @@ def test_unit_a_run_that_drifts_goes_on(example):
     assert "still drift over the 240 turns" in endless.notes[1] and "numerics.extend_limit" in endless.notes[1]
 
 
-def test_unit_lengthening_is_bounded_and_can_be_forbidden(example):
-    """Unit: ``extend_limit`` bounds it, ``extend = false`` forbids it, a schedule has none; workers change nothing."""
+def test_unit_lengthening_is_bounded_and_can_be_forbidden(example, monkeypatch):
+    """Unit: ``extend_limit`` and memory bound it, ``extend = false`` forbids it, a schedule has none; workers change nothing."""
 
     def ramp(turns):
         return 0.05 * turns
 
     limited = example.model_copy(update={"numerics": example.numerics.model_copy(update={"extend_limit": 3.0})})
     assert len(settled_run(limited, ramp).runs[0].durations) == 120
+    # Room for 150 batches each of four replicates and a companion: twice 60 fit, four times do not.
+    monkeypatch.setattr("rbdyn.scene.laws.MOST_KEPT", 150 * 5)
+    full = settled_run(example, ramp)
+    assert {len(run.durations) for run in (*full.runs, *full.companions)} == {120}
+    assert "still drift" in full.notes[1] and full.notes[1].endswith(
+        "take fewer replicates: there is no memory for longer ones"
+    )
+    monkeypatch.undo()
     fixed = example.model_copy(update={"numerics": example.numerics.model_copy(update={"extend": False})})
     found = settled_run(fixed, ramp)
     assert len(found.runs[0].durations) == 60 and "set numerics.extend = true" in found.notes[0]

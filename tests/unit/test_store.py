@@ -20,7 +20,7 @@ from doe.running.failure import Failure, grouped
 from doe.running.owner import LEASE_S, this_process
 from doe.running.store import Point, Store
 from rbdyn.faults import InputError, RunError
-from rbdyn.kept import digest_of
+from rbdyn.records.kept import digest_of
 
 POINTS = [Point(f"key {number}", f"design run {number}", number, {"x": 0.5}) for number in range(1, 9)]
 

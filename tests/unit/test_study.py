@@ -26,7 +26,7 @@ from doe.study.runs import read_runs, run_design
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError
-from rbdyn.kept import run_key
+from rbdyn.records.kept import run_key
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -31,7 +31,7 @@ from doe.study.simulations import Simulations
 from doe.study.status import study_status
 from doe.study_file import Study
 from rbdyn.faults import RunError
-from rbdyn.kept import digest_of
+from rbdyn.records.kept import digest_of
 
 CENTRES = range(15, 21)
 
@@ -149,7 +149,7 @@ def test_other_code_runs_everything_again_also_what_failed(tmp_path, monkeypatch
     study = Study.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, faulty=(6,))
     assert run_design(study, tmp_path, 2, silent).failures
-    monkeypatch.setattr("rbdyn.kept.source_digest", lambda *roots: "edited")
+    monkeypatch.setattr("rbdyn.records.kept.source_digest", lambda *roots: "edited")
     ran = instantly(monkeypatch.setattr)
     assert not run_design(study, tmp_path, 2, silent).failures
     assert sorted(ran) == list(range(1, 21))

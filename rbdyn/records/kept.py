@@ -54,6 +54,6 @@ def code_version(*modules: str) -> str:
     return json.dumps({**packages, "sources": source_digest("rbdyn.dynamics.simulate", *modules)}, sort_keys=True)
 
 
-def digest_of(text: str) -> str:
-    """SHA-256 of a text."""
-    return hashlib.sha256(text.encode()).hexdigest()
+def digest_of(content: str | bytes) -> str:
+    """SHA-256 of a text or of the content of a file."""
+    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
