@@ -50,7 +50,10 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
     record = row_record(rating, solution, film_record(scene, rating, solution, ("inner_ring", "outer_ring")))
     record["reaction"] = load_record(solution.reaction)
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
-    notes = sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
+    notes = [
+        *_oil_notes(scene),
+        *sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)]),
+    ]
     others = _other_roots(scene, model, solution)
     if others:
         notes.append(
@@ -59,6 +62,10 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
         )
     roots = {"other_roots": others} if others is not None else {}
     return BallResult({**head, **record, **grown, **roots, "notes": notes, **tail}, (solution,), (rating,))
+
+
+def _oil_notes(scene: BallScene) -> list[str]:
+    return [] if scene.lubricant is None else list(scene.lubricant.estimates)
 
 
 def row_rating(scene: SingleRowScene, model: RowModel) -> Rating:
@@ -93,7 +100,7 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
         Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed_rpm)),
     )
     layers: dict[str, Any] = {}
-    notes: list[str] = []
+    notes = _oil_notes(scene)
     for name, rating, row in zip(rings, ratings, rows, strict=True):
         if why := overloads(row.told[np.newaxis], [rating]):
             return BallResult({**head, "status": f"{name} row {why[0]}", **tail})

@@ -6,7 +6,8 @@ import math
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticKnownError
 
 from rbdyn.faults import Strict
 from rbdyn.fields import LIGHTEST_RING_KG, Fraction, NotVanishing, Positive, or_refuse
@@ -162,7 +163,10 @@ class Cage(Strict):
     """Cage and guide land. Clearances are diametral; ``pocket_clearance_mm`` is pocket width less roller diameter."""
 
     guidance: Literal["outer", "inner", "roller"]
-    guide_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0), NotVanishing]
+    # Needed where a ring guides the cage; under guidance by the rollers it is none.
+    guide_clearance_mm: Annotated[
+        Annotated[float, Field(gt=0.0, le=10.0), NotVanishing] | None, Field(validate_default=True)
+    ] = None
     pocket_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0), NotVanishing]
     mass_g: Annotated[float, Field(ge=0.01, le=1e6)]
     # Of a roller on a pocket wall: on a drawing, the straight part of the wall that the roller's cylinder meets, less
@@ -181,9 +185,16 @@ class Cage(Strict):
     lands: Annotated[int, Field(ge=1, le=4)] = 2
     land_width_mm: Positive = 3.0
 
+    @field_validator("guide_clearance_mm")
+    @classmethod
+    def _needed_by_a_land(cls, value: float | None, given: ValidationInfo) -> float | None:
+        if value is None and given.data.get("guidance") != "roller":
+            raise PydanticKnownError("missing")
+        return value
+
     @model_validator(mode="after")
     def _sensible(self) -> Cage:
-        if self.pocket_clearance_mm > 5.0 or self.guide_clearance_mm > 5.0:
+        if self.pocket_clearance_mm > 5.0 or (self.guide_clearance_mm or 0.0) > 5.0:
             raise ValueError("cage: clearances above 5 mm are not clearances; give millimetres")
         if self.pocket_radial_clearance_mm is not None and self.guidance != "roller":
             raise ValueError(
