@@ -11,13 +11,14 @@ with Loading():
     from doe.commands.design import design
     from doe.commands.fit import fit
     from doe.commands.front import front
+    from doe.commands.new import new
     from doe.commands.status import status
     from doe.commands.study import study
     from rbdyn.cli import streams
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
-for command in (study, status, design, fit, front, chain):
+for command in (new, study, status, design, fit, front, chain):
     app.command()(command)
 
 

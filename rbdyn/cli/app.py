@@ -1,4 +1,4 @@
-"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball`` stands beside."""
+"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball`` and ``new`` stand beside."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rbdyn.cli.ball import ball
+from rbdyn.cli.new import new
 from rbdyn.cli.options import (
     Json,
     Out,
@@ -38,6 +39,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 TRACE_TURNS = 10.0
 
 app.command()(ball)
+app.command()(new)
 
 
 @app.callback()

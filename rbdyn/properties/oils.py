@@ -8,10 +8,11 @@ tells how far off it may be.
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
+import re
 from typing import NamedTuple, Self
 
 from rbdyn.properties.lubricants import ABSOLUTE_ZERO_C, Oil
+from rbdyn.properties.tables import table
 
 # ISO 3448: kinematic viscosity at 40 C [mm^2/s], within 10 % of it.
 GRADES = (10, 15, 22, 32, 46, 68, 100, 150, 220, 320, 460)
@@ -49,27 +50,7 @@ BASE_OILS = {
     "PAG": BaseOil(200.0, (0.5489, 0.1485), 1020.0, 7.0e-4, 0.035, 0.16, 2000.0),
 }
 
-# ASTM D2270: from each viscosity at 100 C on [mm^2/s], L = a Y^2 + b Y + c at 40 C of an oil of index 0 and H = d Y^2 + e Y + f
-# of one of index 100; within 0.1 % of the table of the standard.
-D2270 = (
-    (2.0, 1.14673, 1.7576, -0.109, 0.84155, 1.5521, -0.077),
-    (3.8, 3.38095, -15.4952, 33.196, 0.78571, 1.7929, -0.183),
-    (4.4, 2.5, -7.2143, 13.812, 0.82143, 1.5679, 0.119),
-    (5.0, 0.101, 16.635, -45.469, 0.04985, 9.1613, -18.557),
-    (6.4, 3.35714, -23.5643, 78.466, 0.22619, 7.7369, -16.656),
-    (7.0, 0.01191, 21.475, -72.87, 0.79762, -0.7321, 14.61),
-    (7.7, 0.41858, 16.1558, -56.04, 0.05794, 10.5156, -28.24),
-    (9.0, 0.88779, 7.5527, -16.6, 0.26665, 6.7015, -10.81),
-    (12.0, 0.7672, 10.7972, -38.18, 0.20073, 8.4658, -22.49),
-    (15.0, 0.97305, 5.3135, -2.2, 0.28889, 5.9741, -4.93),
-    (18.0, 0.97256, 5.25, -0.98, 0.24504, 7.416, -16.73),
-    (22.0, 0.91413, 7.4759, -21.82, 0.20323, 9.1267, -34.23),
-    (28.0, 0.87031, 9.7157, -50.77, 0.18411, 10.1015, -46.75),
-    (40.0, 0.84703, 12.6752, -133.31, 0.17029, 11.4866, -80.62),
-    (55.0, 0.85921, 11.1009, -83.19, 0.1713, 11.368, -76.94),
-    (70.0, 0.83531, 14.6731, -216.246, 0.16841, 11.8493, -96.947),
-)
-THINNEST, THICKEST = D2270[0][0], 1000.0  # at 100 C [mm^2/s]; no index is defined below the first
+THINNEST, THICKEST = 2.0, 1000.0  # at 100 C [mm^2/s]; no viscosity index is defined below the first
 BISECTIONS = 60
 
 
@@ -130,14 +111,15 @@ class Fluid(NamedTuple):
 
 
 def viscosity_index(at_40: float, at_100: float) -> float:
-    """Viscosity index of an oil with these kinematic viscosities [mm^2/s] (ASTM D2270).
+    """Viscosity index of an oil with these kinematic viscosities [mm^2/s] (ASTM D2270, ``d2270.csv``).
 
     100 (L - U)/(L - H) up to 100, beyond 100 + (10^N - 1)/0.00715 with N = lg(H/U)/lg Y. Raises ValueError where the
     viscosity at 100 C is below 2 mm^2/s, for which none is defined.
     """
     if at_100 < THINNEST:
         raise ValueError(f"{at_100:g} mm2/s at 100 C: no viscosity index is defined below {THINNEST:g}")
-    _, a, b, c, d, e, f = D2270[bisect_right(D2270, at_100, key=lambda row: row[0]) - 1]
+    rows = ([float(value) for value in row.values()] for row in table("d2270"))
+    _, a, b, c, d, e, f = [row for row in rows if row[0] <= at_100][-1]
     low, high = (a * at_100 + b) * at_100 + c, (d * at_100 + e) * at_100 + f
     if at_40 >= high:
         return 100.0 * (low - at_40) / (low - high)
@@ -162,6 +144,37 @@ def grade_oil(grade: float, base: BaseOil, index: float | None = None) -> Fluid:
     """An oil of an ISO viscosity grade; its index is the base oil's unless given. Raises ValueError."""
     at_100 = viscosity_at_100(grade, base.viscosity_index if index is None else index)
     return Fluid(Walther.through((40.0, grade), (100.0, at_100)), base, base.density)
+
+
+class NamedOil(NamedTuple):
+    """An oil as it is asked for: what the scene calls it, its base oil if told, and whether it is the oil of a grease."""
+
+    oil: str
+    base_oil: str | None = None
+    grease: bool = False
+
+
+NAMED = re.compile(r"(grease\s+)?(?:iso\s*)?vg\s*-?(\d+)\s*([a-z]*)", re.IGNORECASE)
+NUMBERS = {"7808": "MIL-L-7808", "23699": "MIL-L-23699", "85734": "MIL-L-85734"}
+
+
+def oil_named(text: str) -> NamedOil:
+    """The oil of a text such as "ISO VG 32", "VG 15 PAO", "grease VG 100 mineral", "23699" or "Jet Oil II". Raises ValueError."""
+    plain = " ".join(text.split())
+    if found := NAMED.fullmatch(plain):
+        grease, grade, base = found.groups()
+        bases = {name.lower(): name for name in BASE_OILS}
+        if int(grade) in GRADES and (not base or base.lower() in bases):
+            return NamedOil(f"ISO VG {int(grade)}", bases.get(base.lower()), bool(grease))
+    for number, name in NUMBERS.items():
+        if re.fullmatch(rf"(?:mil-?(?:l|prf)-?)?{number}[a-z]?", plain, re.IGNORECASE):
+            return NamedOil(name)
+    if re.fullmatch(r"(?:mobil )?jet (?:oil )?(?:ii|2)", plain, re.IGNORECASE):
+        return NamedOil(next(iter(TURBINE_OILS)))
+    raise ValueError(
+        f"is no oil known here; write ISO VG {', '.join(map(str, GRADES[:-1]))} or {GRADES[-1]}, with {', '.join(BASE_OILS)} behind it "
+        "and grease before it as needed, or 7808, 23699, 85734, Jet Oil II; own data go into [lubricant] as oil = 'data_sheet'"
+    )
 
 
 # The maker's data sheet: 27.6 and 5.1 mm^2/s at 40 and 100 C, 1003.5 kg/m^3 at 15 C.

@@ -178,7 +178,9 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
     missed = sum(load < least for least in rules.values())
     if not missed:
         return ()
-    told = ", ".join(f"{1e-3 * least:.2g} kN ({rule})" for rule, least in sorted(rules.items(), key=lambda item: item[1]))
+    told = ", ".join(
+        f"{1e-3 * least:.2g} kN ({rule})" for rule, least in sorted(rules.items(), key=lambda item: item[1])
+    )
     return (
         f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {told}; no rule is safe, "
         "cage_slip tells",
