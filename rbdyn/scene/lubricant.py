@@ -88,10 +88,6 @@ class Lubricant(Strict):
         if self.viscosities_C_mm2_s is not None:
             said = f"lubricant.viscosities_C_mm2_s and lubricant.oil = {self.oil!r} contradict each other"
             return or_refuse(self, [f"{said}: leave the one out or set the other to 'data_sheet'"])
-        try:
-            self._fluid()
-        except ValueError as error:
-            return or_refuse(self, [f"lubricant.viscosity_index: {error}; mend it"])
         return self
 
     def _data_sheet_faults(self) -> list[str]:
