@@ -12,6 +12,7 @@ with Loading():
     from doe.commands.fit import fit
     from doe.commands.front import front
     from doe.commands.keys import keys
+    from doe.commands.new import new
     from doe.commands.status import status
     from doe.commands.study import study
     from rbdyn.cli import streams
@@ -19,7 +20,7 @@ with Loading():
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 
-for command in (study, status, design, fit, front, chain, keys):
+for command in (new, study, status, design, fit, front, chain, keys):
     app.command()(command)
 
 

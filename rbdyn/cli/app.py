@@ -1,4 +1,4 @@
-"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball`` and ``keys`` stand beside."""
+"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball``, ``new`` and ``keys`` stand beside."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 
 from rbdyn.cli.ball import ball
 from rbdyn.cli.keys import command as keys
+from rbdyn.cli.new import new
 from rbdyn.cli.options import (
     Json,
     Out,
@@ -42,6 +43,7 @@ TRACE_TURNS = 10.0
 
 app.command()(ball)
 app.command("keys")(keys)
+app.command()(new)
 
 
 @app.callback()

@@ -11,7 +11,7 @@ import numpy as np
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
 from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
-from rbdyn.dynamics.parameters.left_out import heat_notes, left_out_notes
+from rbdyn.dynamics.parameters.left_out import heat_notes, left_out_notes, light_load_notes
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.race_report import race_notes, race_report
 from rbdyn.dynamics.recording import Recording
@@ -111,6 +111,8 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         seed=scene.numerics.seed,
         notes=(
             *scene.unit_notes,
+            *scene.lubricant.estimates,
+            *light_load_notes(scene),
             *race_notes(scene, races),
             *heat_notes(scene, figures["power_loss_W"].value),
             *_notes(scene, power_gap),

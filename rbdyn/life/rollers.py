@@ -74,6 +74,12 @@ def dynamic_capacity(
     return factor * sizes * rollers**0.75
 
 
+def static_capacity(rollers: int, roller_diameter: float, effective_length: float, pitch_diameter: float) -> float:
+    """Basic static radial load rating C_0r [N] of one row by ISO 76, 44 (1 - D/d_m) Z L D in N and mm; lengths in m."""
+    gamma = roller_diameter / pitch_diameter
+    return 44e6 * (1.0 - gamma) * rollers * effective_length * roller_diameter
+
+
 def race_capacities(capacity: float, rollers: int, gamma: float, rows: int = 1) -> tuple[float, float]:
     """Roller load [N] that the inner and the outer race bear for 1e6 turns: Q_ci, Q_ce of ISO/TS 16281.
 

@@ -1,1 +1,2 @@
-"""Properties by name: ``materials`` (elastic constants, density, expansion) and ``lubricants`` (oils over temperature)."""
+"""Properties by name: ``materials`` (elastic constants, density, expansion), ``lubricants`` (an oil, and jet oils over temperature),
+``oils`` (grades and data sheets)."""

@@ -20,7 +20,7 @@ class Oil:
     """An oil at one temperature.
 
     ``viscosity`` [Pa s], ``viscosity_slope`` = -d(viscosity)/dT [Pa s/K], ``density`` [kg/m^3],
-    ``conductivity`` [W/(m K)], ``pressure_coefficient`` alpha of viscosity exp(alpha p) [1/Pa].
+    ``conductivity`` [W/(m K)], ``pressure_coefficient`` alpha of viscosity exp(alpha p) [1/Pa], ``heat_capacity`` [J/(kg K)].
     """
 
     viscosity: float
@@ -28,6 +28,7 @@ class Oil:
     density: float
     conductivity: float
     pressure_coefficient: float
+    heat_capacity: float
 
 
 def mil_l_7808(kelvin: float) -> Oil:
@@ -39,7 +40,8 @@ def mil_l_7808(kelvin: float) -> Oil:
     density = _between(kelvin, (311.0, 367.0, 422.0, 478.0), (954.0, 914.0, 870.0, 826.0))
     conductivity = _between(kelvin, (311.0, 367.0, 422.0, 478.0), (0.1449, 0.1340, 0.1327, 0.1314))
     pressure_coefficient = 7.5808e-10 + 1.0742e-6 / (max(kelvin, COLDEST_PRESSURE) - 215.56)
-    return Oil(viscosity, slope, density, conductivity, pressure_coefficient)
+    heat_capacity = _between(kelvin, (311.0, 367.0, 422.0, 478.0), (1800.0, 1968.0, 2177.0, 2344.0))
+    return Oil(viscosity, slope, density, conductivity, pressure_coefficient, heat_capacity)
 
 
 def mil_l_23699(kelvin: float) -> Oil:
@@ -50,10 +52,15 @@ def mil_l_23699(kelvin: float) -> Oil:
     density = _between(kelvin, (233.0, 300.0, 367.0, 422.0), (1016.0, 966.0, 922.0, 884.0))
     pressure_coefficient = math.exp(1.15607 * math.log(viscosity) - 17.496) / viscosity
     conductivity = 0.14868 - 2.2275e-4 * (kelvin - 366.67)
-    return Oil(viscosity, slope, density, conductivity, pressure_coefficient)
+    return Oil(viscosity, slope, density, conductivity, pressure_coefficient, 2000.0)
 
 
-OILS: dict[str, Callable[[float], Oil]] = {"MIL-L-7808": mil_l_7808, "MIL-L-23699": mil_l_23699}
+# MIL-L-85734 is a 5 cSt oil with additives that bear load in gears.
+OILS: dict[str, Callable[[float], Oil]] = {
+    "MIL-L-7808": mil_l_7808,
+    "MIL-L-23699": mil_l_23699,
+    "MIL-L-85734": mil_l_23699,
+}
 
 
 def oil_at(name: str, temperature_c: float) -> Oil:

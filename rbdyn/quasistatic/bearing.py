@@ -58,7 +58,10 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
     film = film_record(scene, rating, solution, ("inner_ring", "outer_ring"))
     report = row_report(rating, solution, film, load_record(solution.reaction))
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
-    notes = sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
+    notes = [
+        *_oil_notes(scene),
+        *sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)]),
+    ]
     others = _other_roots(scene, model, solution)
     if others:
         notes.append(
@@ -67,6 +70,10 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
         )
     found = {"report": report, **grown, "other_roots": others, "notes": notes}
     return replace(nothing, **found, rows=(solution,), ratings=(rating,))
+
+
+def _oil_notes(scene: BallScene) -> list[str]:
+    return [] if scene.lubricant is None else list(scene.lubricant.estimates)
 
 
 def row_rating(scene: SingleRowScene, model: RowModel) -> Rating:
@@ -101,7 +108,7 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
         Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed_rpm)),
     )
     layers: dict[str, RowReport] = {}
-    notes: list[str] = []
+    notes = _oil_notes(scene)
     for name, rating, row in zip(rings, ratings, rows, strict=True):
         if why := overloads(row.figures[np.newaxis], [rating]):
             return replace(nothing, status=f"{name} row {why[0]}")

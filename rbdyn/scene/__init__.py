@@ -17,7 +17,7 @@ from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
 from rbdyn.scene.laws import Laws, Numerics
-from rbdyn.scene.lubricant import Lubricant, Traction
+from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
 from rbdyn.scene.mounting import Mounting, faults, material_of
 from rbdyn.scene.operation import Operation, Support
 from rbdyn.scene.reading import SceneFile
@@ -62,6 +62,11 @@ class Scene(SceneFile):
             return cast(type[Self], BallScene._of_kind(data))
         return cls
 
+    @model_validator(mode="before")
+    @classmethod
+    def _traction_of_oil(cls, data: Any) -> Any:
+        return with_traction_of_oil(data)
+
     @model_validator(mode="after")
     def _assembles(self) -> Scene:
         bearing, cage, laws = self.bearing, self.cage, self.model
@@ -74,7 +79,7 @@ class Scene(SceneFile):
                 f"{bearing.rollers} pockets ({web:.4g} mm); make it smaller or take fewer rollers"
             )
         if laws.guide_land == "film" and cage.guidance != "roller":
-            radial_um = 500.0 * cage.guide_clearance_mm
+            radial_um = 500.0 * (cage.guide_clearance_mm or 0.0)
             if laws.land_film_floor_um >= radial_um:
                 found.append(
                     f"model.land_film_floor_um = {laws.land_film_floor_um:g}: not below the radial guide clearance of "
@@ -96,6 +101,12 @@ class Scene(SceneFile):
             found.append(
                 f"model.slices = 1 contradicts bearing.roller_profile = {bearing.roller_profile!r} with bearing.tilt_mrad = "
                 f"{bearing.tilt_mrad:g}: one slice shows neither profile nor tilt; leave model.slices out"
+            )
+        rheology = self.traction.rheology_oil or self.lubricant.oil
+        if self.traction.model == "thermal_newtonian" and rheology not in RHEOLOGY_OILS:
+            found.append(
+                f"traction.model = 'thermal_newtonian': no constants of {rheology} are known; add traction.rheology_oil of an oil "
+                "alike, or take 'limiting_shear'"
             )
         found += self._tilt_faults()
         land = self.land_diameter_mm
@@ -191,8 +202,9 @@ class Scene(SceneFile):
     @property
     def guide_clearance_m(self) -> float | None:
         """Radial play of the cage in its land [m]; None where no land guides it."""
+        clearance = self.cage.guide_clearance_mm
         landless = self.cage.guidance == "roller" or self.model.guide_land == "off"
-        return None if landless else 0.5e-3 * self.cage.guide_clearance_mm
+        return None if landless or clearance is None else 0.5e-3 * clearance
 
     @property
     def turn_s(self) -> float:

@@ -6,7 +6,8 @@ import math
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticKnownError
 
 from rbdyn.faults import Strict
 from rbdyn.fields import LIGHTEST_RING_KG, Fraction, NotVanishing, Positive, or_refuse
@@ -175,8 +176,10 @@ class Cage(Strict):
 
     guidance: Literal["outer", "inner", "roller"]
     """What guides the cage: a land of the outer ring, of the inner ring, or the rollers in their pockets."""
-    guide_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0), NotVanishing]
-    """Diametral clearance between cage and guide land."""
+    guide_clearance_mm: Annotated[
+        Annotated[float, Field(gt=0.0, le=10.0), NotVanishing] | None, Field(validate_default=True)
+    ] = None
+    """Diametral clearance between cage and guide land; needed where a ring guides the cage."""
     pocket_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0), NotVanishing]
     """Pocket width less roller diameter."""
     mass_g: Annotated[float, Field(ge=0.01, le=1e6)]
@@ -201,9 +204,16 @@ class Cage(Strict):
     land_width_mm: Positive = 3.0
     """Width of one guide land."""
 
+    @field_validator("guide_clearance_mm")
+    @classmethod
+    def _needed_by_a_land(cls, value: float | None, given: ValidationInfo) -> float | None:
+        if value is None and given.data.get("guidance") != "roller":
+            raise PydanticKnownError("missing")
+        return value
+
     @model_validator(mode="after")
     def _sensible(self) -> Cage:
-        if self.pocket_clearance_mm > 5.0 or self.guide_clearance_mm > 5.0:
+        if self.pocket_clearance_mm > 5.0 or (self.guide_clearance_mm or 0.0) > 5.0:
             raise ValueError("cage: clearances above 5 mm are not clearances; give millimetres")
         if self.pocket_radial_clearance_mm is not None and self.guidance != "roller":
             raise ValueError(

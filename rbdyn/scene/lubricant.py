@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from rbdyn.faults import Strict
 from rbdyn.fields import Fraction, NonNegative, NotVanishing, Positive, or_refuse
-from rbdyn.properties.lubricants import Oil, oil_at
+from rbdyn.properties.lubricants import OILS, Oil, oil_at
+from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 
 RheologyOil = Literal["MIL-L-7808", "MIL-L-23699", "MIL-L-27502", "Santotrac 30", "Santotrac 50", "Mobil DTE SAE30"]
+RHEOLOGY_OILS = get_args(RheologyOil)
+OilName = Literal[
+    "MIL-L-7808", "MIL-L-23699", "MIL-L-85734", "Mobil Jet Oil II", "ISO VG 10", "ISO VG 15", "ISO VG 22", "ISO VG 32",
+    "ISO VG 46", "ISO VG 68", "ISO VG 100", "ISO VG 150", "ISO VG 220", "ISO VG 320", "ISO VG 460", "data_sheet",
+]  # fmt: skip
+GRADE = "ISO VG "
 HOTTEST_C = 350.0
+# Keys that tell a grade or a data sheet more closely; a scene without them is saved without them.
+DATA_KEYS = ("base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3")
+# Keys of [traction] that ask for one curve for all loads.
+CURVE_KEYS = ("mu_0", "mu_m", "mu_inf", "u_m_m_s", "constants")
 # Models whose traction follows pressure and temperature.
 RHEOLOGIES = ("thermal_newtonian", "eyring", "limiting_shear")
 
@@ -34,8 +46,18 @@ def _four_numbers(value: Any) -> Any:
 class Lubricant(Strict):
     """The oil, its temperature and where it is."""
 
-    oil: Literal["MIL-L-7808", "MIL-L-23699"]
-    """The oil, with its viscosity over temperature and its pressure coefficient."""
+    oil: OilName
+    """The oil, with its viscosity over temperature and its pressure coefficient; of a grease, its base oil. "data_sheet"
+    takes viscosities_C_mm2_s and density_kg_m3."""
+    base_oil: Literal["mineral", "naphthenic", "PAO", "ester", "PAG"] | None = None
+    """Base of a grade or a data sheet, from which its pressure coefficient, density, heat capacity, conductivity and limit
+    of traction are estimated (rbdyn/properties/oils.py); mineral where left out."""
+    viscosity_index: Annotated[float, Field(ge=0.0, le=400.0)] | None = None
+    """Viscosity index of a grade; by base oil where left out: mineral 95, naphthenic 50, PAO and ester 140, PAG 200."""
+    viscosities_C_mm2_s: Annotated[list[list[float]], Field(min_length=2, max_length=2)] | None = None  # noqa: N815
+    """Two points [temperature in C, kinematic viscosity in mm^2/s] of a data sheet."""
+    density_kg_m3: Annotated[float, Field(ge=500.0, le=3000.0)] | None = None
+    """Density of the oil at 15 C."""
     temperature_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C), BeforeValidator(_no_kelvin)]  # noqa: N815
     """Temperature of the oil in the contacts."""
     viscosity_mPas: Positive | None = None  # noqa: N815
@@ -53,10 +75,96 @@ class Lubricant(Strict):
     """Where the oil begins ahead of the edge of a contact, in its half-widths; flooded where left out. ADORE-style
     inputs have 10, which leaves the film whole and takes 5 to 19 % of the rolling resistance."""
 
+    @model_validator(mode="after")
+    def _known(self) -> Lubricant:
+        given = [key for key in DATA_KEYS if getattr(self, key) is not None]
+        if self.oil in OILS or self.oil in TURBINE_OILS:
+            return or_refuse(
+                self,
+                [
+                    f"lubricant.{key} = {getattr(self, key)}: {self.oil} tells its own; leave it out, or set lubricant.oil to a "
+                    "grade or to 'data_sheet'"
+                    for key in given
+                ],
+            )
+        if self.oil == "data_sheet":
+            return or_refuse(self, self._data_sheet_faults())
+        if self.viscosities_C_mm2_s is not None:
+            said = f"lubricant.viscosities_C_mm2_s and lubricant.oil = {self.oil!r} contradict each other"
+            return or_refuse(self, [f"{said}: leave the one out or set the other to 'data_sheet'"])
+        return self
+
+    def _data_sheet_faults(self) -> list[str]:
+        found = []
+        if self.viscosity_index is not None:
+            found.append(
+                f"lubricant.viscosity_index = {self.viscosity_index:g}: two viscosities tell it; leave it out or name a grade"
+            )
+        if self.density_kg_m3 is None:
+            found.append("lubricant.density_kg_m3: missing; lubricant.oil = 'data_sheet' needs that at 15 C")
+        points = self.viscosities_C_mm2_s
+        if points is None:
+            found.append(
+                "lubricant.viscosities_C_mm2_s: missing; lubricant.oil = 'data_sheet' needs two, [[40, 32], [100, 5.4]]"
+            )
+        elif any(len(point) != 2 for point in points):
+            found.append(
+                "lubricant.viscosities_C_mm2_s: each point is [temperature in C, viscosity in mm2/s]; mend the list"
+            )
+        else:
+            (cold, thick), (hot, thin) = sorted(points)
+            if not (-60.0 <= cold < hot <= HOTTEST_C and thick > thin > 0.5):
+                found.append(
+                    f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature, from -60 to {HOTTEST_C:g} C, to no less "
+                    "than 0.5 mm2/s; mend them"
+                )
+        return found
+
+    @model_serializer(mode="wrap")
+    def _without_empty_data(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        saved: dict[str, Any] = handler(self)
+        return {key: value for key, value in saved.items() if value is not None or key not in DATA_KEYS}
+
+    def _base(self) -> BaseOil:
+        return BASE_OILS[self.base_oil or "mineral"]
+
+    def _fluid(self) -> Fluid:
+        """A grade, a data sheet or a turbine oil at any temperature."""
+        if self.oil in TURBINE_OILS:
+            return TURBINE_OILS[self.oil]
+        if self.viscosities_C_mm2_s is None:
+            fluid = grade_oil(float(self.oil.removeprefix(GRADE)), self._base(), self.viscosity_index)
+        else:
+            first, second = ((point[0], point[1]) for point in self.viscosities_C_mm2_s)
+            fluid = Fluid(Walther.through(first, second), self._base(), self._base().density)
+        return fluid if self.density_kg_m3 is None else fluid._replace(density=self.density_kg_m3)
+
+    @property
+    def estimates(self) -> tuple[str, ...]:
+        """A sentence on what is estimated of the oil, where its name does not tell all."""
+        if self.oil in OILS:
+            return ()
+        oil, told = self.in_service, []
+        if self.viscosity_mPas is None:
+            index = self._base().viscosity_index if self.viscosity_index is None else self.viscosity_index
+            by_index = f" and its viscosity index of {index:g} (D2270)" if self.oil.startswith(GRADE) else ""
+            told.append(f"{1e3 * oil.viscosity:.3g} mPa s by ASTM D341{by_index}")
+        if self.pressure_coefficient_1_GPa is None:
+            told.append(
+                f"pressure coefficient {1e9 * oil.pressure_coefficient:.3g} 1/GPa by Gold, within {100.0 * GOLD_SPREAD:g} %"
+            )
+        told.append(
+            f"density {oil.density:.3g} kg/m^3"
+            + (" within 3 %" if self.oil.startswith(GRADE) and not self.density_kg_m3 else "")
+        )
+        told.append(f"conductivity {oil.conductivity:.2g} W/(m K) and traction by base oil")
+        base = "ester" if self.oil in TURBINE_OILS else self.base_oil or "mineral"
+        return (f"lubricant: {self.oil} ({base}) is estimated at {self.temperature_C:g} C: {', '.join(told)}",)
+
     @property
     def in_service(self) -> Oil:
         """The oil at its temperature, with what the scene replaces."""
-        oil = oil_at(self.oil, self.temperature_C)
+        oil = oil_at(self.oil, self.temperature_C) if self.oil in OILS else self._fluid().at(self.temperature_C)
         if self.viscosity_mPas is not None:
             viscosity = self.viscosity_mPas * 1e-3
             slope = oil.viscosity_slope * viscosity / oil.viscosity
@@ -66,13 +174,36 @@ class Lubricant(Strict):
         return oil
 
 
+def with_traction_of_oil(scene: Any) -> Any:
+    """Tables of a scene, with the traction that goes with its oil where [traction] leaves it out.
+
+    MIL-L-7808 and MIL-L-23699 keep the defaults of ``Traction``. Oils that are told by a grade or a data sheet yield at the
+    limit of their base oil; other turbine oils are taken as MIL-L-23699 in a thermal film, of which they are the class.
+    """
+    oil, traction = (
+        scene.get(table, {}) if isinstance(scene, Mapping) else None for table in ("lubricant", "traction")
+    )
+    if not isinstance(oil, Mapping) or not isinstance(traction, Mapping):
+        return scene
+    name, base = oil.get("oil"), oil.get("base_oil") or "mineral"
+    default: dict[str, Any] = {}
+    if name in ("MIL-L-85734", *TURBINE_OILS):
+        default = {"model": "thermal_newtonian", "rheology_oil": "MIL-L-23699"}
+    elif isinstance(name, str) and (name.startswith(GRADE) or name == "data_sheet") and base in BASE_OILS:
+        default = {"model": "limiting_shear", "limiting_shear_ratio": BASE_OILS[base].shear_ratio}
+    if any(key in traction for key in CURVE_KEYS):
+        default.pop("model", None)
+    return {**scene, "traction": {**default, **traction}} if default else scene
+
+
 class Traction(Strict):
     """Traction of the races. The defaults are an ADORE-style set for a turbine-engine oil."""
 
     model: Literal["four_constant", "thermal_newtonian", "eyring", "limiting_shear", "coulomb", "off"] = "four_constant"
     """Law of the traction. four_constant: one curve for all loads, as in the paper, too hard for lightly loaded
     rollers, so skidding is under-predicted; thermal_newtonian, eyring, limiting_shear: by pressure and temperature;
-    coulomb: dry."""
+    coulomb: dry. Where left out limiting_shear for oils by grade or data sheet, thermal_newtonian for turbine oils
+    beside MIL-L-7808 and MIL-L-23699."""
     mu_0: NonNegative = 0.0
     """Traction coefficient without slip, of an ADORE-style set for a turbine-engine oil."""
     mu_m: NonNegative = 0.050
@@ -84,7 +215,8 @@ class Traction(Strict):
     constants: Annotated[tuple[float, float, float, float] | None, BeforeValidator(_four_numbers)] = None
     """A, B [s/m], C [s/m], D of (A + B u) exp(-C u) + D, instead of mu_0, mu_m, mu_inf and u_m_m_s."""
     rheology_oil: RheologyOil | None = None
-    """Oil of the thermal_newtonian constants of Gupta et al. 1981; lubricant.oil where left out."""
+    """Oil of the thermal_newtonian constants of Gupta et al. 1981; lubricant.oil where left out, MIL-L-23699 for turbine
+    oils that have none of their own."""
     eyring_stress_MPa: Positive = 5.0  # noqa: N815
     """Eyring stress: 3 to 10 MPa for mineral oils (Johnson and Tevaarwerk 1977)."""
     limiting_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.07

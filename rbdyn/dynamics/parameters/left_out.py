@@ -11,6 +11,8 @@ import numpy as np
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.dynamics.forces.drag import AIR_DENSITY
 from rbdyn.dynamics.parameters.geometry import cage_rim_diameter, kinematics, reduced_radii
+from rbdyn.life.minimum_load import minimum_loads
+from rbdyn.life.rollers import dynamic_capacity, static_capacity
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
 
@@ -163,6 +165,26 @@ def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
         elif item.matters is not None and item.matters(scene):
             notes.append(f"left out: {item.name}; {item.changes}")
     return tuple(notes)
+
+
+def light_load_notes(scene: Scene) -> tuple[str, ...]:
+    """A note where even the largest load is below what a maker asks for, with every maker's rule."""
+    drawing, operation = scene.bearing, scene.operation
+    diameter, pitch = drawing.roller_diameter_mm * 1e-3, drawing.pitch_diameter_mm * 1e-3
+    sizes = drawing.rollers, diameter, drawing.effective_length_mm * 1e-3, pitch
+    capacity = drawing.dynamic_capacity_N or dynamic_capacity(*sizes)
+    speed = operation.inner_speed_rpm - operation.outer_speed_rpm
+    rules, load = minimum_loads(pitch, speed, capacity, static_capacity(*sizes)), operation.largest_load_N
+    missed = sum(load < least for least in rules.values())
+    if not missed:
+        return ()
+    told = ", ".join(
+        f"{1e-3 * least:.2g} kN ({rule})" for rule, least in sorted(rules.items(), key=lambda item: item[1])
+    )
+    return (
+        f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {told}; no rule is safe, "
+        "cage_slip tells",
+    )
 
 
 def heat_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:

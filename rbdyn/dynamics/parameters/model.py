@@ -225,10 +225,9 @@ def _pocket(scene: Scene, oil: Oil) -> Any:
 
 
 def _guide(scene: Scene, oil: Oil) -> NoGuide | OuterGuide | InnerGuide:
-    laws, cage = scene.model, scene.cage
-    if laws.guide_land == "off" or cage.guidance == "roller":
+    laws, cage, clearance = scene.model, scene.cage, scene.guide_clearance_m
+    if clearance is None:
         return NoGuide()
-    clearance = 0.5e-3 * cage.guide_clearance_mm
     land = 0.5e-3 * scene.land_diameter_mm
     journal = land - clearance if cage.guidance == "outer" else land
     film: Any = NoFilm()

@@ -33,7 +33,8 @@ def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Gener
     offsets = generator.uniform(-0.2, 0.2, z) * pocket / pitch_radius
     direction, cage_angle = generator.uniform(0.0, 2.0 * np.pi, 2)
     angles = cage_angle + 2.0 * np.pi * np.arange(z) / z + offsets
-    offset = 0.1 * min(0.5e-3 * scene.cage.guide_clearance_mm, 0.5 * pocket)
+    guide = scene.cage.guide_clearance_mm
+    offset = 0.1 * (0.5 * pocket if guide is None else min(0.5e-3 * guide, 0.5 * pocket))
     radii = np.empty(z)
     ring_x = static_share(bearing, angles, motion.cage_speed, acting.load_x, radii)
     cosine, sine = np.cos(angles), np.sin(angles)

@@ -1,0 +1,127 @@
+"""The command ``rbdyn new``. Physics is imported inside it, so that help comes at once."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rbdyn.cli.options import Json
+from rbdyn.cli.terminal import guarded, print_json
+from rbdyn.faults import InputError, one_line, refuse
+
+if TYPE_CHECKING:
+    from rbdyn.properties.catalogue import Designation, Envelope
+
+TEMPERATURE_C, OIL, CLEARANCE = 70.0, "ISO VG 68", "CN"
+# Limits of a number that is typed, and its unit.
+LIMITS = {
+    "--speed": (-1e6, 1e6, "rpm"),
+    "--load": (0.0, 1e7, "N"),
+    "--preload": (-1e8, 1e8, "N"),
+    "--temperature": (-60.0, 220.0, "C"),
+    "--bore": (1.0, 2000.0, "mm"),
+    "--outside": (2.0, 4000.0, "mm"),
+    "--width": (0.5, 1000.0, "mm"),
+}
+
+
+def new(
+    designation: Annotated[
+        list[str], typer.Argument(metavar="DESIGNATION", help="Bearing: NU210, NU 1010 M, 6208 C3, 7208B.")
+    ],
+    speed: Annotated[float | None, typer.Option(metavar="RPM", help="Speed of the inner ring.")] = None,
+    load: Annotated[float | None, typer.Option(metavar="N", help="Radial load.")] = None,
+    preload: Annotated[float | None, typer.Option(metavar="N", help="Axial preload of a ball bearing.")] = None,
+    oil: Annotated[
+        str, typer.Option(metavar="NAME", help='"ISO VG 32 PAO", "grease VG 100", 23699, "Jet Oil II".')
+    ] = OIL,
+    temperature: Annotated[float, typer.Option(metavar="C", help="Temperature of the oil.")] = TEMPERATURE_C,
+    clearance: Annotated[str | None, typer.Option(metavar="CLASS", help="C2, CN, C3 or C4; CN if left out.")] = None,
+    bore: Annotated[float | None, typer.Option(metavar="MM", help="Bore, where the table lacks the bearing.")] = None,
+    outside: Annotated[float | None, typer.Option(metavar="MM", help="Outside diameter.")] = None,
+    width: Annotated[float | None, typer.Option(metavar="MM", help="Width.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Write a commented scene of a catalogue bearing, its interior estimated, on standard output."""
+    with guarded(as_json):
+        from rbdyn.cli import new_scene
+        from rbdyn.cli.template import filled
+        from rbdyn.properties.catalogue import read_designation
+        from rbdyn.properties.oils import oil_named
+        from rbdyn.scene import Scene
+
+        words, sizes = " ".join(designation), {"--bore": bore, "--outside": outside, "--width": width}
+        numbers = {"--speed": speed, "--load": load, "--preload": preload, "--temperature": temperature, **sizes}
+        faults = [fault for name, value in numbers.items() if value is not None and (fault := _fault(name, value))]
+        lubricant, named = _read(oil_named, "--oil", oil, faults), _read(read_designation, "DESIGNATION", words, faults)
+        refuse(faults)
+        assert lubricant is not None and named is not None
+        rollers = named.kind == "cylindrical_roller"
+        refuse(_misfits(named, speed, preload, clearance))
+        told = re.search(r"\bC[234]\b", named.suffix)
+        wanted = clearance.upper() if clearance else told.group() if told else CLEARANCE
+        asked = new_scene.Asked(speed, load, preload, lubricant, temperature, wanted)
+        fill = new_scene.roller_values if rollers else new_scene.ball_values
+        values = _read(lambda text: fill(named, _envelope(named, sizes), asked), "DESIGNATION", words, faults)
+        refuse(faults)
+        template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
+        text = filled(template.read_text(encoding="utf-8"), values)
+        data = tomllib.loads(text)
+        refuse(getattr(Scene.from_dict(data, "rbdyn new"), "unit_notes", ()))
+        if as_json:
+            print_json(data)
+        else:
+            print(text)
+
+
+def _fault(option: str, value: float) -> str | None:
+    least, largest, unit = LIMITS[option]
+    if not math.isfinite(value):
+        return f"{option} {value}: is not a finite number; write a plain number"
+    if least <= value <= largest:
+        return None
+    kelvin = value - 273.15
+    meant = unit == "C" and least <= kelvin <= largest
+    mend = f"if {value:g} K are meant, write {kelvin:.4g}" if meant else "mend it"
+    return f"{option} {value:g}: must be from {least:g} to {largest:g} {unit}; {mend}"
+
+
+def _read(reader: Any, name: str, text: str, faults: list[str]) -> Any:
+    """What ``reader`` makes of a text; None, and one more fault, where it refuses it."""
+    try:
+        return reader(text)
+    except ValueError as error:
+        faults.append(f"{name} {one_line(text)}: {error}")
+        return None
+
+
+def _misfits(named: Designation, speed: float | None, preload: float | None, clearance: str | None) -> list[str]:
+    """Options that the bearing has no use for."""
+    found, rollers = [], named.kind == "cylindrical_roller"
+    if rollers and speed is not None and abs(speed) < 0.1:
+        found.append(f"--speed {speed:g}: a run is counted in shaft turns; give at least 0.1")
+    if rollers and preload is not None:
+        found.append(f"--preload {preload:g}: is one of ball bearings; leave it out")
+    if named.kind == "angular_contact_ball" and clearance is not None:
+        found.append(f"--clearance {clearance}: an angular contact bearing has a contact angle instead; leave it out")
+    return found
+
+
+def _envelope(named: Designation, sizes: dict[str, float | None]) -> Envelope:
+    """Boundary dimensions as typed or as the catalogue lists them. Raises ValueError, InputError."""
+    from rbdyn.properties.catalogue import Envelope, envelope
+
+    given = [value for value in sizes.values() if value is not None]
+    if not given:
+        return envelope(named)
+    if len(given) < len(sizes):
+        missing = ", ".join(option for option, value in sizes.items() if value is None)
+        raise InputError([f"{missing}: missing; give all of {', '.join(sizes)} in mm, or none for a listed bearing"])
+    if given[0] >= given[1]:
+        raise InputError([f"--bore {given[0]:g}: not below --outside {given[1]:g}; mend them"])
+    return Envelope(*given)

@@ -1,0 +1,162 @@
+"""What goes into the scene of a catalogue bearing: its estimated interior, a usual cage, its oil, its operating point."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from typing import Any, NamedTuple
+
+from rbdyn.life.minimum_load import REFERENCE_SPEED_FACTOR
+from rbdyn.properties.catalogue import Designation, Envelope, ball_interior, radial_clearance, roller_interior
+from rbdyn.properties.materials import MATERIALS
+from rbdyn.properties.oils import NamedOil
+
+# Glass-filled polyamide as [materials] takes it, and its density [g/mm^3]; a bar of it has 5e5 to 1e7 N/m.
+POLYAMIDE = (
+    "{ elastic_modulus_GPa = 5.0, poisson_ratio = 0.35, density_kg_m3 = 1300.0, thermal_expansion_1e_6_K = 40.0 }"
+)
+POLYAMIDE_DENSITY, POLYAMIDE_BAR = 1.3e-3, 3e6
+# Suffixes of cages: what guides them, what they are made of.
+CAGES = {
+    "MA": ("outer", "brass"),
+    "ML": ("outer", "brass"),
+    "MB": ("inner", "brass"),
+    "M": ("roller", "brass"),
+    "P": ("roller", "polyamide"),
+    "TVP2": ("roller", "polyamide"),
+    "J": ("roller", "aisi_4340"),
+}
+USUAL_CAGE = "MA"
+# Share of the bearing's width; clearances in roller and pitch diameters. A cage is half a roller thick, as scenes estimate it.
+CAGE_WIDTH, POCKET_CLEARANCE, GUIDE_CLEARANCE, SMALLEST_CLEARANCE_MM = 0.95, 0.03, 0.004, 0.05
+# SKF's friction model: K_rs of grease and K_Z of cylindrical roller bearings.
+GREASE_STARVATION, ROLLER_GEOMETRY = 6e-8, 5.1
+OIL_FRACTION, GREASE_FRACTION = 0.02, 0.005
+# Axial over radial load, by tan(contact angle), that loads half of the balls (NSK).
+HALF_LOADED = 1.216
+# Of the reference speed and of C, where nothing is told.
+USUAL_SPEED, USUAL_LOAD, USUAL_PRELOAD = 0.5, 0.1, 0.01
+
+
+class Asked(NamedTuple):
+    """What the user asks for; None where it is left to this module."""
+
+    speed: float | None
+    load: float | None
+    preload: float | None
+    oil: NamedOil
+    temperature: float
+    clearance: str
+
+
+def roller_values(named: Designation, sizes: Envelope, asked: Asked) -> dict[str, Any]:
+    """Values of ``roller_scene.toml``. Raises ValueError for impossible dimensions or an unlisted clearance."""
+    from rbdyn.life.rollers import dynamic_capacity
+
+    inside = roller_interior(sizes, named.series == "10")
+    diameter, pitch, listed = inside.roller_diameter, inside.pitch_diameter, sizes.dynamic_capacity
+    by_iso = dynamic_capacity(inside.rollers, diameter * 1e-3, inside.effective_length * 1e-3, pitch * 1e-3)
+    volume = math.pi / 4.0 * (pitch - diameter) ** 2 * sizes.outside
+    ratings = "" if listed is None else f", C = {1e-3 * listed:g} kN, C0 = {1e-3 * (sizes.static_capacity or 0.0):g} kN"
+    common = _common(named, sizes, asked, REFERENCE_SPEED_FACTOR / pitch, listed or by_iso)
+    grease = asked.oil.grease
+    return {
+        **inside._asdict(),
+        **common,
+        **_clearance(sizes.bore, asked.clearance, named.kind),
+        **_cage(named, sizes.width, inside.roller_length, inside.rollers, diameter, pitch),
+        "ratings": ratings,
+        "ring_mass": 1e-9 * MATERIALS["bearing_steel"].density * volume,
+        "listed_capacity": listed,
+        "capacity_share": by_iso / (listed or by_iso),
+        "oil_fraction": GREASE_FRACTION if grease else OIL_FRACTION,
+        "starvation": _grease_factor(sizes, common["speed"], asked) if grease else None,
+        "starvation_by": "estimated: SKF's starvation by grease at this speed, x 0.5 to 1.5",
+    }
+
+
+def ball_values(named: Designation, sizes: Envelope, asked: Asked) -> dict[str, Any]:
+    """Values of ``ball_scene.toml``. Raises ValueError as ``roller_values``."""
+    from rbdyn.life.ball_capacity import dynamic_capacity
+
+    inside = ball_interior(sizes, named)
+    deep, angle = inside.contact_angle is None, math.radians(inside.contact_angle or 0.0)
+    capacity = dynamic_capacity(inside.balls, inside.ball_diameter * 1e-3, inside.pitch_diameter * 1e-3, angle)
+    common = _common(named, sizes, asked, REFERENCE_SPEED_FACTOR / inside.pitch_diameter, capacity)
+    preload, why = asked.preload, ""
+    if preload is None and not deep:
+        preload = float(f"{max(USUAL_PRELOAD * capacity, HALF_LOADED * common['load'] * math.tan(angle)):.2g}")
+        why = "not told: loads half of the balls, 1.216 F_r tan(contact angle), or 0.01 C"
+    told = _clearance(sizes.bore, asked.clearance, named.kind) if deep else dict.fromkeys(CLEARANCE_VALUES)
+    return {**inside._asdict(), **common, **told, "preload": preload, "preload_by": why}
+
+
+def _common(named: Designation, sizes: Envelope, asked: Asked, reference: float, capacity: float) -> dict[str, Any]:
+    """What both kinds of bearing have: name, boundary dimensions, oil, speed [rpm] and load [N]."""
+    oil, base, grease = asked.oil
+    speed, load = asked.speed, asked.load
+    speed = float(f"{USUAL_SPEED * reference:.2g}") if speed is None else speed
+    load = float(f"{USUAL_LOAD * capacity:.2g}") if load is None else load
+    return {
+        "name": named.name,
+        "kind": named.kind,
+        "bore": sizes.bore,
+        "outside": sizes.outside,
+        "width": sizes.width,
+        "oil": oil,
+        "oil_by": "base oil of the grease" if grease else "",
+        "base_oil": (base or "mineral") if oil.startswith("ISO VG") else None,
+        "base_oil_by": "" if base else "not told; or naphthenic, PAO, ester, PAG",
+        "temperature": asked.temperature,
+        "speed": speed,
+        "speed_by": "not told, half of the " if asked.speed is None else "",
+        "reference": round(reference, -2),
+        "load": load,
+        "load_by": "not told: " if asked.load is None else "",
+        "load_share": load / capacity,
+    }
+
+
+CLEARANCE_VALUES = ("clearance", "clearance_class", "lower", "upper")
+
+
+def _clearance(bore: float, name: str, kind: str) -> dict[str, Any]:
+    lower, upper = (1e-3 * limit for limit in radial_clearance(bore, name, kind))
+    return dict(zip(CLEARANCE_VALUES, (round(0.5 * (lower + upper), 4), name, lower, upper), strict=True))
+
+
+def _cage(
+    named: Designation, width: float, length: float, rollers: int, diameter: float, pitch: float
+) -> dict[str, Any]:
+    """A cage of the kind that the suffix names, about the pitch circle."""
+    suffix = re.sub(r"^(EC|E)", "", named.suffix.split(" ")[0])
+    guidance, material = CAGES.get(suffix, CAGES[USUAL_CAGE])
+    soft, landed = material == "polyamide", guidance != "roller"
+    density = POLYAMIDE_DENSITY if soft else 1e-6 * MATERIALS[material].density
+    pocket = max(round(POCKET_CLEARANCE * diameter, 2), SMALLEST_CLEARANCE_MM)
+    across = CAGE_WIDTH * width
+    area = math.pi * pitch * across - rollers * (diameter + pocket) * length
+    guide = max(round(GUIDE_CLEARANCE * pitch, 2), SMALLEST_CLEARANCE_MM)
+    return {
+        "cage_by": f"{'as the suffix tells' if suffix in CAGES else 'assumed'}: {material}, guided by the {guidance}{' ring' if landed else 's'}",
+        "guidance": guidance,
+        "guide_clearance": guide if landed else None,
+        "pocket_clearance": pocket,
+        "cage_mass": 0.5 * diameter * area * density,
+        "land_width": max(round(0.5 * (across - length), 2), 0.5) if landed else None,
+        "cage_material": POLYAMIDE if soft else json.dumps(material),
+        "bar_stiffness": POLYAMIDE_BAR if soft else None,
+        "bar_stiffness_by": "assumed: polyamide, 5e5 to 1e7",
+    }
+
+
+def _grease_factor(sizes: Envelope, speed: float, asked: Asked) -> float:
+    """exp(-K_rs nu n (d + D) sqrt(K_Z/(2 (D - d)))) of SKF's friction model, nu in mm^2/s, n in rpm."""
+    from rbdyn.scene.lubricant import Lubricant
+
+    told = {"oil": asked.oil.oil, "base_oil": asked.oil.base_oil, "temperature_C": asked.temperature}
+    oil = Lubricant.model_validate(told).in_service
+    shape = (sizes.bore + sizes.outside) * math.sqrt(ROLLER_GEOMETRY / (2.0 * (sizes.outside - sizes.bore)))
+    kinematic = 1e6 * oil.viscosity / oil.density
+    return round(max(math.exp(-GREASE_STARVATION * kinematic * abs(speed) * shape), 0.01), 3)

@@ -1,0 +1,126 @@
+"""``rbdyn new`` and ``doe new`` as a user meets them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+QUICK = ("turns=3", "discard_turns=2", "replicates=2", "impact_window_turns=1", "companion=false", "extend=false")
+SET = [part for assignment in QUICK for part in ("--set", f"numerics.{assignment}")]
+NU_210 = ("NU210", "--speed", "6000", "--load", "2000", "--oil", "ISO VG 32", "--temperature", "70")
+NU_1010 = ("NU", "1010", "--speed", "9000", "--load", "3000", "--oil", "VG 15 PAO", "--temperature", "60")
+
+
+def study(*arguments):
+    """``doe`` in a process of its own."""
+    program = "from doe.cli import run; run()"
+    return subprocess.run(
+        [sys.executable, "-c", program, *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.parametrize(("arguments", "cage_rpm"), [(NU_210, 2532.0), (NU_1010, 3981.0)], ids=["NU 210", "NU 1010"])
+def test_command_line_from_a_designation_to_a_run(command, tmp_path, arguments, cage_rpm):
+    """Command line: a designation, an oil and an operating point give a scene that runs, its cage near the epicyclic speed."""
+    written = command("new", *arguments)
+    assert written.returncode == 0 and written.stderr == "" and "estimated" in written.stdout
+    path = tmp_path / "my.toml"
+    path.write_text(written.stdout, encoding="utf-8")
+    ran = command("simulate", path, "--json", *SET)
+    assert ran.returncode == 0, ran.stderr
+    result = json.loads(ran.stdout)
+    assert result["cage_speed_rpm"]["value"] == pytest.approx(cage_rpm, rel=0.03)
+    assert 50.0 < result["power_loss_W"]["value"] < 1000.0
+    assert any(note.startswith("lubricant: ISO VG") for note in result["notes"])
+    assert result["scene"]["traction"]["model"] == "limiting_shear"
+
+
+def test_command_line_balls_with_a_preload(command, tmp_path):
+    """Command line: a 7208 with a preload has an equilibrium in which every ball bears."""
+    path = tmp_path / "my.toml"
+    asked = ("7208", "--speed", "6000", "--load", "1000", "--preload", "2500", "--oil", "grease VG 100")
+    path.write_text(command("new", *asked).stdout, encoding="utf-8")
+    record = json.loads(command("ball", path, "--json").stdout)
+    assert record["status"] == "ok" and min(ball["inner_load_N"] for ball in record["balls"]) > 0.0
+    assert record["life"]["L10_h"] > 1000.0
+
+
+def test_command_line_json_is_the_scene(command):
+    """Command line: --json prints what reading the TOML gives, and loads no compiler."""
+    told = json.loads(command("new", *NU_210, "--json").stdout)
+    assert told == tomllib.loads(command("new", *NU_210).stdout)
+    assert told["operation"] == {"inner_speed_rpm": 6000.0, "radial_load_N": 2000.0}
+    program = "import sys; sys.argv = ['rbdyn', 'new', 'NU210']\nfrom rbdyn.cli import run\ntry:\n    run()\nexcept SystemExit:\n    pass\n"
+    program += "print('numba' in sys.modules, 'pandas' in sys.modules, file=sys.stderr)"
+    light = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert light.stderr.split() == ["False", "False"]
+
+
+def test_command_line_suffixes_and_grease(command):
+    """Command line: suffixes tell cage and clearance, grease starves, a size that is not listed takes its dimensions."""
+
+    def scene(*arguments):
+        return json.loads(command("new", *arguments, "--json").stdout)
+
+    soft = scene("NU", "315", "TVP2", "C3", "--oil", "grease VG 100")
+    assert soft["cage"]["guidance"] == "roller" and "guide_clearance_mm" not in soft["cage"]
+    assert soft["materials"]["cage"]["density_kg_m3"] == 1300.0 and soft["model"]["pocket_bar_stiffness_N_m"] == 3e6
+    assert 0.3 < soft["model"]["rolling_resistance_factor"] < 1.0 and soft["lubricant"]["oil_fraction"] == 0.005
+    assert soft["bearing"]["radial_clearance_mm"] == pytest.approx(0.5e-3 * (65 + 100))
+    own = scene("NU2210", "--bore", "51", "--outside", "91", "--width", "24", "--clearance", "c2")
+    assert "dynamic_capacity_N" not in own["bearing"] and own["bearing"]["radial_clearance_mm"] == 0.025
+    ball = scene("6208-2RS", "C3")
+    assert ball["bearing"]["radial_clearance_mm"] == 0.024 and "contact_angle_deg" not in ball["bearing"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("XY99",), ["DESIGNATION XY99: is no designation known here"]),
+        (("6230",), ["add --bore, --outside and --width"]),
+        (("NU210", "--oil", "castor"), ["--oil castor: is no oil known here; write ISO VG 10"]),
+        (("NU210", "--load", "-5"), ["--load -5: must be from 0"]),
+        (("NU210", "--load", "nan", "--temperature", "343"), ["--load nan", "if 343 K are meant, write 69.85"]),
+        (("NU210", "--clearance", "C9"), ["C9 is no clearance class; choose one of C2, CN, C3, C4"]),
+        (("7208", "--clearance", "C3"), ["has a contact angle instead"]),
+        (("NU210", "--speed", "0"), ["--speed 0: a run is counted in shaft turns"]),
+        (("NU210", "--preload", "5"), ["--preload 5: is one of ball bearings"]),
+        (("NU210", "--bore", "50"), ["--outside, --width: missing; give all of"]),
+        (("NU210", "--bore", "50", "--outside", "40", "--width", "10"), ["--bore 50: not below --outside 40"]),
+        (("NU210", "--bore", "50", "--outside", "52", "--width", "10"), ["leaves no room for rings and rollers"]),
+    ],
+)
+def test_command_line_bad_input(command, arguments, words):
+    """Command line: each fault is one sentence with the option and its value; exit 2; the same as JSON."""
+    refused = command("new", *arguments)
+    assert refused.returncode == 2 and refused.stdout == ""
+    assert len(refused.stderr.splitlines()) == len(words)
+    assert all(word in refused.stderr for word in words), refused.stderr
+    told = command("new", *arguments, "--json")
+    assert told.returncode == 2 and json.loads(told.stdout)["faults"] == refused.stderr.splitlines()
+
+
+@pytest.mark.parametrize(("designation", "factors"), [("NU210", 3), ("NU 210 M", 2)])
+def test_command_line_study_of_a_new_scene(command, tmp_path, designation, factors):
+    """Command line: ``doe new`` writes a study that ``doe design`` takes, with the clearances that act."""
+    scene, path = tmp_path / 'my "own" # scene.toml', tmp_path / "study.toml"
+    scene.write_text(command("new", designation).stdout, encoding="utf-8")
+    written = study("new", scene)
+    assert written.returncode == 0, written.stderr
+    path.write_text(written.stdout, encoding="utf-8")
+    assert json.loads(study("new", scene, "--json").stdout) == tomllib.loads(written.stdout)
+    design = json.loads(study("design", path, "--json").stdout)
+    assert len(design["runs"]) == {3: 20, 2: 14}[factors]
+    assert written.stdout.count("[[factor]]") == factors and len(written.stdout.split("resolution")) == factors + 1
+
+
+def test_command_line_no_study_of_balls(command, tmp_path):
+    """Command line: a ball bearing is not simulated in time, so has no study."""
+    scene = tmp_path / "ball.toml"
+    scene.write_text(command("new", "6208").stdout, encoding="utf-8")
+    refused = study("new", scene)
+    assert refused.returncode == 2 and "use rbdyn ball" in refused.stderr and refused.stdout == ""
