@@ -214,6 +214,38 @@ def outer_result(outer: Scene) -> Any:
     return simulate(outer, workers=1)
 
 
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, NDArray[np.float64]]:
+    """Every number that pictures show, by the name of their file: of lines, points, bars, cells and whiskers."""
+    from matplotlib.figure import Figure
+
+    shown: dict[str, NDArray[np.float64]] = {}
+    save = Figure.savefig
+
+    def kept(figure: Figure, path: Any, **options: Any) -> None:
+        parts = [np.zeros(0)]
+        for axis in figure.axes:
+            parts += [np.ravel(line.get_xydata()) for line in axis.lines]
+            parts += [
+                np.ravel(each.get_array()) for each in (*axis.images, *axis.collections) if each.get_array() is not None
+            ]
+            parts += [np.ravel(each.get_offsets()) for each in axis.collections]
+            parts += [
+                np.ravel(segment) for each in axis.collections for segment in getattr(each, "get_segments", list)()
+            ]
+            parts += [np.ravel(each.get_xy()) for each in axis.patches]
+        shown[Path(path).name] = np.ma.filled(np.ma.concatenate(parts), np.nan).astype(float)
+        save(figure, path, **options)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    return shown
+
+
+def lacking(shown: NDArray[np.float64], wanted: Any) -> list[float]:
+    """Numbers that a picture should show and does not."""
+    return [value for value in np.ravel(wanted) if not np.isclose(shown, value, rtol=1e-12, atol=0.0).any()]
+
+
 @pytest.fixture(scope="session")
 def command() -> Callable[..., subprocess.CompletedProcess[str]]:
     """``command(*arguments, **environment)``: run ``rbdyn`` in a process of its own."""

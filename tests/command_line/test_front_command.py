@@ -68,7 +68,7 @@ def test_record_carries_errors_convergence_and_gains(tmp_path):
     assert record["picks"]["knee"]["factors"] == record["pick"]["factors"]
     for point in record["front"]:
         assert all(error > 0.0 for error in point["errors"].values())
-        assert 0.0 <= point["non_dominated_probability"] <= 1.0
+        assert 0.0 < point["non_dominated_probability"] <= 1.0
     assert set(record["predicted_gains"]) == set(study.responses)
     for gain in record["predicted_gains"].values():
         assert gain["verdict"] in ("better", "worse", "within error")

@@ -8,7 +8,6 @@ import time
 from datetime import datetime
 from pathlib import Path
 
-import pytest
 from doe_command import doe, invoke, loaded_by
 from instant_runs import instantly
 from short_studies import short_study, silent
@@ -40,10 +39,11 @@ def test_study_that_never_ran_is_all_missing(tmp_path):
 def test_running_study_tells_who_runs_what_and_how_long_it_will_take(tmp_path, monkeypatch, capsys):
     study = Study.load(short_study(tmp_path))
     instantly(monkeypatch.setattr, seconds=0.02, faulty=(2, 4))
-    records = {}
+    records, passed, begun = {}, {}, time.perf_counter()
 
     def look(done: int, total: int) -> None:
         if done in (0, 8, 20):
+            passed.setdefault(done, time.perf_counter() - begun)
             records.setdefault(done, study_status(study, tmp_path))
 
     run_design(study, tmp_path, 2, look)
@@ -55,9 +55,9 @@ def test_running_study_tells_who_runs_what_and_how_long_it_will_take(tmp_path, m
     for claim in middle["running"]:
         assert claim["pid"] == os.getpid() and claim["label"] == f"design run {claim['run']}"
         assert abs(datetime.fromisoformat(claim["since"]).timestamp() - time.time()) < 60.0
-    # Two threads, 12 runs of 0.02 s.
-    assert 0.1 < middle["left_s"] < 10.0
-    assert middle["spent_s"] == pytest.approx(8 * 0.02, rel=1.0)
+    # Two threads, runs of 0.02 s and more: 8 have ended, 12 are left.
+    assert 8 * 0.02 <= middle["spent_s"] <= 2.0 * passed[8]
+    assert 12 * 0.01 <= middle["left_s"] <= 12 / 8 * passed[8]
     (group,) = middle["failures"]
     assert group["runs"] == [2, 4] and "the oil froze" in group["cause"]
     assert last["status"] == "finished" and last["left_s"] == 0.0

@@ -65,7 +65,7 @@ def test_literature_table4(effort):
 
 
 def test_literature_friction_formulas(effort):
-    """Literature: SKF 151 W of rolling, Palmgren 117, 154 and 265 W at 24000 rpm and 1300 N; the races take as much."""
+    """Literature: SKF 151 W of rolling, Palmgren 117, 154 and 265 W at 24000 rpm and 1300 N; ours in the races is 0.89 of SKF's."""
     from published.operating import friction
 
     row = friction(effort, (12000, 24000), (1300, 2600)).frame.set_index(["speed_rpm", "load_N"]).loc[(24000, 1300)]
@@ -73,7 +73,7 @@ def test_literature_friction_formulas(effort):
     assert row["palmgren_2_W"] == pytest.approx(117.0, abs=1.0)
     assert row["palmgren_3_W"] == pytest.approx(154.0, abs=1.0)
     assert row["palmgren_6_W"] == pytest.approx(265.0, abs=1.0)
-    assert row["races_W"] == pytest.approx(row["skf_rolling_W"] + row["skf_sliding_W"], rel=0.25)
+    assert row["races_W"] / (row["skf_rolling_W"] + row["skf_sliding_W"]) == pytest.approx(0.892, abs=0.02)
 
 
 def test_literature_friction_totals():

@@ -146,9 +146,15 @@ def test_unit_response_to_a_shifted_groove(bench, response):
     assert response.tilt[:2] == pytest.approx([2.0 / Z / bench.row.lever, 0.0], rel=1e-5, abs=1e-5)
     assert response.axial[0] == pytest.approx(-1.0 / Z, rel=1e-6)
     angle = solve(bench.row, bench.control, bench.load).inner_angle[0]
-    # Along the contact a ball gives way by cos(a) of a radial and sin(a) of an axial shift.
-    assert response.axial[1] == pytest.approx(-math.cos(angle) / math.sin(angle) / Z, rel=0.1)
-    assert response.axial[2] == pytest.approx(1.0 / math.sin(angle) / Z, rel=0.1)
+    # Along the contact a ball gives way by cos(a) of a radial and sin(a) of an axial shift; across it, it turns under its
+    # load, with Q/s for a stiffness, s the distance of the groove centres: a share e of that along it, Q' = 1.5 Q/d.
+    row = bench.row
+    stretched = row.radial[0] / math.cos(angle)
+    turn = (stretched - math.hypot(row.axial[0], row.radial[0])) / (1.5 * stretched)
+    cotangent = 1.0 / math.tan(angle)
+    held = Z * (1.0 + turn * cotangent**2)
+    assert response.axial[1] == pytest.approx(-cotangent * (1.0 - turn) / held, rel=1e-3)
+    assert response.axial[2] == pytest.approx(1.0 / math.sin(angle) / held, rel=1e-3)
     assert response.axial[3] == pytest.approx(response.axial[2], rel=1e-4)
 
 

@@ -253,7 +253,7 @@ def test_unit_not_finite_is_a_status(outer):
 
 
 def test_oracle_stiffness(make_scene, outer, evaluate):
-    """Oracle: where stability holds the steps, the eigenvalue seen is the largest of the Jacobian, within a third; where
+    """Oracle: where stability holds the steps, the eigenvalue seen is the largest of the Jacobian, within 15 %; where
     accuracy holds them, none is.
     """
     heavy = make_scene("operation.radial_load_N=26000.0")
@@ -268,7 +268,7 @@ def test_oracle_stiffness(make_scene, outer, evaluate):
     k[0], power[0], loads[0] = evaluate(stiff.bearing, y)
     compiled_jacobian(stiff.bearing, y, np.zeros(n), k, power, loads, scratch(10), found)
     radius = np.abs(np.linalg.eigvals(dense(found.matrix))).max()
-    assert largest_eigenvalue(stiff.carry.stiffness) == pytest.approx(radius, rel=0.33)
+    assert largest_eigenvalue(stiff.carry.stiffness) == pytest.approx(radius, rel=0.15)
 
 
 def test_unit_auto(make_scene, outer):
@@ -287,7 +287,7 @@ def test_unit_auto(make_scene, outer):
     held = simulate(explicit, workers=2)
     assert held.cost["held_by_stability"] > 0.9 and held.cost["implicit_runs"] == 0
     assert any("held by stability" in note and "'auto'" in note for note in held.notes)
-    assert result.cost["eigenvalue_1_s"] == pytest.approx(held.cost["eigenvalue_1_s"], rel=0.3)
+    assert result.cost["eigenvalue_1_s"] == pytest.approx(held.cost["eigenvalue_1_s"], rel=0.1)
 
 
 def test_unit_tolerance_scales(make_scene, outer):

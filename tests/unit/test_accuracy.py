@@ -6,9 +6,11 @@ import json
 
 import numpy as np
 import pytest
+from conftest import lacking
 
 from rbdyn import accuracy
 from rbdyn.accuracy.rollers import replication, slicing, tolerances, work_precision
+from rbdyn.accuracy.rollers.pictures import SMALLEST_BIAS
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.faults import InputError, RunError
 
@@ -50,13 +52,19 @@ def test_unit_failed_tolerances_stay_in_the_table(make_scene):
     assert table.cells[1][:2] == ("0.1", "failed")
 
 
-def test_unit_default_study_has_statistics_and_trajectories(outer, tmp_path):
+def test_unit_default_study_has_statistics_and_trajectories(outer, tmp_path, drawn):
     """Unit: record, sheets and pictures of both; keys that others read."""
     report = work_precision.study(outer, turns=0.02, rtols=(1e-2, 1e-3))
     files = accuracy.write(report, tmp_path)
     assert files == ["accuracy.json", "accuracy.csv", "trajectory.csv", "accuracy.png", "trajectory.png"]
-    assert all((tmp_path / name).stat().st_size > 100 for name in files)
     saved = json.loads((tmp_path / "accuracy.json").read_text())
+    assert len((tmp_path / "accuracy.csv").read_text().splitlines()) == 1 + len(saved["rows"])
+    trajectories = saved["trajectory"]["rows"]
+    assert len((tmp_path / "trajectory.csv").read_text().splitlines()) == 1 + len(trajectories)
+    assert not lacking(
+        drawn["accuracy.png"], [[row["turn_ms"], max(row["power_gap"], SMALLEST_BIAS)] for row in saved["rows"]]
+    )
+    assert drawn["trajectory.png"].size >= 2 * len(trajectories)  # a point a row
     assert {"format", "status", "rows", "conclusion", "turns", "replicates", "machine", "versions"} <= set(saved)
     assert saved["format"] == "rbdyn.accuracy/1" and len(saved["rows"]) == 2
     methods = {row["method"] for row in saved["trajectory"]["rows"]}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, lacking
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -290,14 +290,20 @@ def test_trend_speed_drives_the_contact_angles_apart(grid):
     assert (np.diff(apart, axis=1) > 0.0).all() and (np.diff(apart[:, 1:], axis=0) < 0.0).all()
 
 
-def test_unit_pictures(grid, tmp_path):
-    """Unit: few lines are lines, many a map; an equilibrium gives three pictures; none is empty."""
+def test_unit_pictures(grid, tmp_path, drawn):
+    """Unit: few lines are lines, many a map; an equilibrium gives three pictures; each shows its figures."""
     names = pictures.pictures(grid, tmp_path)
+    assert not lacking(drawn["angles.png"], grid.grid("inner_angle_max_deg"))
+    assert not lacking(drawn["pressure_and_life.png"], grid.grid("L10_Mrev"))
+    assert not lacking(drawn["stiffness.png"], grid.grid("stiffness_x_N_per_um"))
     names += pictures.pictures(sweep(scene_with(), {LOAD: np.linspace(100.0, 400.0, 8), SPEED: [1e4, 2e4]}), tmp_path)
     assert names == ["angles.png", "pressure_and_life.png", "stiffness.png", "map.png"]
-    names += ball_pictures.pictures(equilibrium(scene_with()), tmp_path)
+    one = equilibrium(scene_with())
+    names += ball_pictures.pictures(one, tmp_path)
     assert names[4:] == ["loads.png", "angles.png", "section.png"]
-    assert all((tmp_path / name).stat().st_size > 10_000 for name in names)
+    assert drawn.keys() == set(names)
+    for picture, figure in (("loads.png", "inner_load_N"), ("angles.png", "inner_angle_deg")):
+        assert not lacking(drawn[picture], [ball[figure] for ball in one.record["balls"]])
 
 
 def test_unit_labels_carry_units():

@@ -64,7 +64,7 @@ def test_a_response_made_by_a_power_is_found(power, recommended, words):
     x = np.linspace(-1.0, 1.0, 30)
     z = 3.0 + 2.0 * x + np.random.default_rng(1).normal(0.0, 0.02, x.size)
     found = box_cox(np.column_stack([np.ones(30), x]), z**power)
-    assert found["lambda"] == pytest.approx(1.0 / power, abs=0.2)
+    assert found["lambda"] == pytest.approx(1.0 / power, rel=0.01)
     assert found["recommended"] == recommended
     assert words in found["sentence"]
 

@@ -198,10 +198,10 @@ def test_grades_follow_the_standard():
     assert list(grades)[:3] == ["IT01", "IT0", "IT1"]
     assert list(grades)[-1] == "IT18"
     assert list(grades.values()) == sorted(grades.values())
-    # ISO 286-1 lists rounded values for 6 to 10 mm; the formula at 9 mm lies within a tenth of them.
+    # ISO 286-1 for 6 to 10 mm.
     listed = {"IT1": 1, "IT2": 1.5, "IT3": 2.5, "IT4": 4, "IT5": 6, "IT6": 9, "IT7": 15, "IT8": 22, "IT11": 90}
     for grade, micrometres in listed.items():
-        assert 1e3 * grades[grade] == pytest.approx(micrometres, rel=0.11)
+        assert 1e3 * grades[grade] == pytest.approx(micrometres, rel=1e-12)
 
 
 def test_snapping_takes_the_widest_grade_that_fits():

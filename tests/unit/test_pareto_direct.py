@@ -129,7 +129,8 @@ def test_hypervolume_of_noisy_points_is_corrected_for_luck():
     volumes, stated = zip(*(noisy_hypervolume(costs, errors, *scale, draws=60) for costs in drawn), strict=True)
     truth = hypervolume(exact, *scale)
     assert abs(np.mean(volumes) - truth) < 0.5 * abs(believed - truth)
-    assert np.std(volumes) == pytest.approx(np.mean(stated), rel=0.5)
+    # A spread from 40 draws has an error of 11 %: three of these.
+    assert np.std(volumes) == pytest.approx(np.mean(stated), rel=0.33)
 
 
 def test_surrogate_that_stops_short_loses_what_it_misses(found):
