@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.cli.terminal import FAILED, hand_over, output_folder, print_table, progress_bar
+from rbdyn.cli.terminal import FAILED, hand_over, keeping, output_folder, print_table, progress_bar
 from rbdyn.result import write_json
 
 if TYPE_CHECKING:
@@ -38,8 +38,9 @@ def run(scene: BallScene, texts: Sequence[str], out: Path | None, source: Path, 
     folder = output_folder(out, "rbdyn ball", source) if out else None
     from rbdyn.quasistatic.sweep.run import sweep
 
-    with progress_bar("sweeping", quiet or as_json) as progress:
-        found = sweep(scene, keys, progress)
+    kept_in = folder / "sweep.part.npz" if folder else None
+    with keeping(kept_in), progress_bar("sweeping", quiet or as_json) as progress:
+        found = sweep(scene, keys, progress, kept_in)
     files = write(found, folder) if folder else []
     hand_over(found.as_dict, as_json, lambda: show(found, quiet), folder, files)
     for places in found.failures.values():

@@ -34,18 +34,19 @@ from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 SEVERAL_ROOTS = ("inner", "half")
 
 
-def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> BallResult:
+def equilibrium(scene: BallScene | Scene, start: BallResult | tuple[Solution, ...] | None = None) -> BallResult:
     """Equilibrium of a ball bearing under its load: angles, loads, stiffness, stress and life.
 
-    ``start``: a result nearby, which saves time. The result's ``status`` tells where there is none; nothing is raised for it.
+    ``start``: a result nearby, or the solutions of its rows, which saves time. The result's ``status`` tells where there is none; nothing is raised for it.
     Raises InputError for a scene of rollers.
     """
     scene = balls_only(scene)
+    before = start.rows if isinstance(start, BallResult) else start or ()
     if isinstance(scene, DoubleDeckerScene):
-        return _double_decker(scene, start)
+        return _double_decker(scene, before)
     assert isinstance(scene, SingleRowScene)
     model = row_of(scene)
-    warm = start.rows[0] if start is not None and start.rows else None
+    warm = before[0] if before else None
     began = time.perf_counter()
     solution = SOLVERS[scene.model.solver](model.row, model.control, load_of(scene), given_of(scene), warm)
     took = time.perf_counter() - began
@@ -91,9 +92,9 @@ def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> 
     return [{**displacement_record(root.displacement), "balls": ball_records(root.figures)} for root in found]
 
 
-def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallResult:
+def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> BallResult:
     model = double_decker_of(scene)
-    warm = (start.rows[0], start.rows[1]) if start is not None and len(start.rows) == 2 else None
+    warm = (before[0], before[1]) if len(before) == 2 else None
     began = time.perf_counter()
     solution = solve_double_decker(model.stack, load_of(scene), given_of(scene), model.middle_given, warm)
     took = time.perf_counter() - began

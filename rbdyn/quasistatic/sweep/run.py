@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,15 +20,17 @@ from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.remarks import Rating, Remark, overloads, remarks, tipping
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport
-from rbdyn.quasistatic.row.equilibrium import LOST, OK, SENTENCES, resolved
+from rbdyn.quasistatic.row.equilibrium import FIGURES, LOST, OK, SENTENCES, Solution, resolved
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.row.newton import CONVERGED
 from rbdyn.quasistatic.row.ring import RING
 from rbdyn.quasistatic.row.space import space
 from rbdyn.quasistatic.sweep.figures import Columns, ring_columns, row_columns
 from rbdyn.quasistatic.sweep.march import LEVER, Found, Points, empty, leaves, march_through
+from rbdyn.quasistatic.sweep.partial import Partial, Solved, as_text, from_text
 from rbdyn.quasistatic.sweep.points import Axis, axes_of, scenes, snake
 from rbdyn.quasistatic.sweep.result import SweepResult
+from rbdyn.records.kept import code_version, run_key
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import SingleRowScene
 
@@ -58,11 +61,15 @@ class Walked(NamedTuple):
 
 
 def sweep(
-    scene: BallScene | Scene, keys: Mapping[str, Sequence[float]], progress: Progress | None = None
+    scene: BallScene | Scene,
+    keys: Mapping[str, Sequence[float]],
+    progress: Progress | None = None,
+    kept_in: Path | None = None,
 ) -> SweepResult:
     """Equilibrium at every point of the grid of ``keys``: dotted names of numbers in the scene, and their values.
 
     List items count from 1, ``operation.load_N[3]``. Values rise or fall. Points without an equilibrium are records of their cause.
+    Interrupted, it leaves what is done in the file ``kept_in``, and goes on from there when it is called again.
     Raises InputError for keys that cannot be swept and naming a point that the scene refuses.
     """
     scene = balls_only(scene)
@@ -70,7 +77,10 @@ def sweep(
     order = snake(axes)
     began = time.perf_counter()
     compiled = isinstance(scene, SingleRowScene) and scene.model.solver == "convex" and "bearing.balls" not in keys
-    walked = (_march if compiled else _one_by_one)(scene, axes, order, progress or (lambda done, total: None))
+    given = {"scene": scene.model_dump(mode="json"), "keys": {axis.key: axis.values for axis in axes}}
+    partial = Partial(kept_in, run_key(given, code_version(__name__)) if kept_in else "")
+    walked = (_march if compiled else _one_by_one)(scene, axes, order, progress or (lambda done, total: None), partial)
+    partial.remove()
     shape = tuple(len(axis.values) for axis in axes)
     # From the order of the snake to that of the table.
     visited = np.ravel_multi_index(np.array(order).T, shape)
@@ -86,7 +96,7 @@ def sweep(
         tuple(walked.statuses[place] for place in back),
         walked.cold,
         time.perf_counter() - began,
-        scene.model_dump(mode="json"),
+        given["scene"],
         {name: _sorted(balls, back) for name, balls in walked.balls.items()},
         grouped(walked.remarks, visited, walked.statuses),
     )
@@ -121,16 +131,35 @@ def _sorted(balls: Sequence[Vector] | Vector, back: NDArray[np.int64]) -> list[G
     return [(np.array(places), np.array([balls[back[place]] for place in places])) for places in sizes.values()]
 
 
-def _march(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress) -> Walked:
+def _march(
+    scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress, partial: Partial
+) -> Walked:
     """A single row through the compiled loop."""
     assert isinstance(scene, SingleRowScene)
     model, points, ratings = _packed(scene, axes, order)
     row, size, count = model.row, model.row.cosine.size, len(order)
-    found, at, warm = empty(count, size), space(size), False
-    for first in range(0, count, CHUNK):
-        last = min(first + CHUNK, count)
-        warm = march_through(model.control, row.cosine, row.sine, points, first, last, warm, at, found)
-        progress(last, count)
+    found, at, warm, done = empty(count, size), space(size), False, 0
+    if kept := partial.read():
+        for name, array in found._asdict().items():
+            array[: len(kept[name])] = kept[name]
+        for name, array in at._asdict().items():
+            array[:] = kept[f"start_{name}"]
+        warm, done = bool(kept["warm"]), int(kept["done"])
+    whole: dict[str, Any] = {"done": 0}
+    try:
+        for first in range(done, count, CHUNK):
+            last = min(first + CHUNK, count)
+            # An interrupt may fall between the call and what follows it.
+            whole = {f"start_{name}": array.copy() for name, array in at._asdict().items()} | {
+                "warm": warm,
+                "done": first,
+            }
+            warm = march_through(model.control, row.cosine, row.sine, points, first, last, warm, at, found)
+            progress(last, count)
+    except KeyboardInterrupt:
+        if whole["done"]:
+            partial.write(whole | {name: array[: whole["done"]] for name, array in found._asdict().items()})
+        raise
     *ring, balls = resolved(found.displacement, found.taken, found.matrix, found.figures, points.numbers[:, LEVER])
     columns = _columns(points, found, ring, balls, ratings)
     statuses = [OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST) for outcome in found.outcome.tolist()]
@@ -200,37 +229,50 @@ def _columns(points: Points, found: Found, ring: Sequence[Vector], balls: Vector
     }
 
 
-def _one_by_one(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress) -> Walked:
+def _one_by_one(
+    scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress, partial: Partial
+) -> Walked:
     """Any bearing, through ``rbdyn.equilibrium``."""
-    rows: list[dict[str, float]] = []
-    statuses: list[str] = []
-    figures_of: dict[str, list[Vector]] = {}
-    notes: list[tuple[int, Remark]] = []
-    before: BallResult | None = None
-    balls, cold = 0, 0
-    for place, (_, point) in enumerate(list(scenes(scene, axes, order))):
-        # A start needs as many balls; their number is only swept in a single row.
-        count = point.bearing.balls if isinstance(point, SingleRowScene) else 0
-        if count != balls:
-            before, balls = None, count
-        result = equilibrium(point, before)
-        started = before is not None
-        if started and not result.found:
-            result, started = equilibrium(point), False
-        cold += not started
-        statuses.append(result.status)
-        rows.append({})
-        if result.found:
-            rows[-1], by_row, found = _figures(point, result)
-            notes += [(place, remark) for remark in found]
-        for name in ("row",) if isinstance(point, SingleRowScene) else ("inner", "outer"):
-            size = count or getattr(point.bearing, name).balls
-            figures_of.setdefault(name, []).append(by_row[name] if result.found else np.full((size, 6), np.nan))
-        before = result if result.found else None
-        progress(place + 1, len(order))
-    names = dict.fromkeys(name for row in rows for name in row)
-    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
-    return Walked(columns, statuses, figures_of, cold, notes)
+    kept = partial.read()
+    solved = from_text(str(kept["points"])) if kept else []
+    points = list(scenes(scene, axes, order))
+    try:
+        for place in range(len(solved), len(points)):
+            solved.append(_solve(points[place][1], solved[-1].rows if solved else ()))
+            progress(place + 1, len(order))
+    except KeyboardInterrupt:
+        if solved:
+            partial.write({"points": as_text(solved)})
+        raise
+    names = dict.fromkeys(name for point in solved for name in point.figures)
+    columns = {name: np.array([point.figures.get(name, np.nan) for point in solved]) for name in names}
+    return Walked(
+        columns,
+        [point.status for point in solved],
+        {name: [point.balls[name] for point in solved] for name in solved[0].balls},
+        sum(point.cold for point in solved),
+        [(place, remark) for place, point in enumerate(solved) for remark in point.remarks],
+    )
+
+
+def _solve(scene: BallScene, before: tuple[Solution, ...]) -> Solved:
+    """One point, started from the rows before it where these have as many balls and lead there."""
+    rows = (
+        {"row": scene.bearing}
+        if isinstance(scene, SingleRowScene)
+        else dict(zip(("inner", "outer"), scene.outermost_rows, strict=True))
+    )
+    sizes = [row.balls for row in rows.values()]
+    started = [len(row.balls) for row in before] == sizes
+    result = equilibrium(scene, before if started else ())
+    if started and not result.found:
+        result, started = equilibrium(scene), False
+    if not result.found:
+        nothing = {name: np.full((size, FIGURES), np.nan) for name, size in zip(rows, sizes, strict=True)}
+        return Solved(result.status, {}, nothing, [], (), not started)
+    figures, balls, remarks = _figures(scene, result)
+    # Of a remark that is not about this point there is nothing to say.
+    return Solved(result.status, figures, balls, [one for one in remarks if one.where[0]], result.rows, not started)
 
 
 def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Vector], list[Remark]]:

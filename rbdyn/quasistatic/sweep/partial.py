@@ -1,0 +1,97 @@
+"""What an interrupted sweep leaves beside its results: the same sweep goes on from there, to the same bits."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbdyn.quasistatic.remarks import Remark
+from rbdyn.quasistatic.row.equilibrium import Solution
+
+Arrays = dict[str, NDArray[Any]]
+
+
+class Partial(NamedTuple):
+    """The file ``path`` for the sweep ``key``; without a path nothing is kept."""
+
+    path: Path | None
+    key: str
+
+    def read(self) -> Arrays:
+        """The arrays kept, none where there is no such file, it is of another sweep, or broken."""
+        if self.path is None:
+            return {}
+        try:
+            with np.load(self.path, allow_pickle=False) as file:
+                found = dict(file)
+        except (OSError, ValueError, zipfile.BadZipFile):
+            return {}
+        return found if str(found.pop("key", "")) == self.key else {}
+
+    def write(self, arrays: Mapping[str, Any]) -> None:
+        """Keep arrays in place of those before, whole or not at all. Raises OSError."""
+        if self.path is None:
+            return
+        new = self.path.with_name(f"{self.path.name}.new")
+        with new.open("wb") as file:
+            np.savez(file, key=self.key, **arrays)
+        os.replace(new, self.path)
+
+    def remove(self) -> None:
+        """Remove the file: the sweep is done."""
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
+
+
+class Solved(NamedTuple):
+    """One point: status, figures, those of each ball by row of balls, remarks, solutions of the rows, and whether the start
+    was not the point before."""
+
+    status: str
+    figures: dict[str, float]
+    balls: dict[str, NDArray[np.float64]]
+    remarks: list[Remark]
+    rows: tuple[Solution, ...]
+    cold: bool
+
+
+def as_text(points: list[Solved]) -> str:
+    """The points as JSON, every number with all its digits."""
+    return json.dumps(
+        [(*point[:3], [_said(one) for one in point.remarks], *point[4:]) for point in points], default=_list
+    )
+
+
+def from_text(text: str) -> list[Solved]:
+    """Inverse of ``as_text``."""
+    return [
+        Solved(
+            status,
+            figures,
+            {name: np.array(values) for name, values in balls.items()},
+            [Remark(word, np.array([True]), functools.partial(_as_said, said)) for word, said in remarks],
+            tuple(Solution._make(np.array(x) if isinstance(x, list) else x for x in row) for row in rows),
+            cold,
+        )
+        for status, figures, balls, remarks, rows, cold in json.loads(text)
+    ]
+
+
+def _said(remark: Remark) -> tuple[str, str]:
+    return remark.word, remark.sentence(0)
+
+
+def _as_said(sentence: str, _: int) -> str:
+    return sentence
+
+
+def _list(array: NDArray[Any]) -> Any:
+    return array.tolist()
