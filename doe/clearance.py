@@ -24,7 +24,7 @@ from doe.running.runner import Give, Ran, RunResult, Take, run_points
 from doe.running.store import Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
-from rbdyn.kept import code_version, run_key
+from rbdyn.records.kept import code_version, run_key
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 

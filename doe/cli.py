@@ -11,19 +11,21 @@ with Loading():
     from doe.commands.design import design
     from doe.commands.fit import fit
     from doe.commands.front import front
+    from doe.commands.keys import keys
     from doe.commands.new import new
     from doe.commands.status import status
     from doe.commands.study import study
     from rbdyn.cli import streams
+    from rbdyn.cli.options import Version
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 
-for command in (new, study, status, design, fit, front, chain):
+for command in (new, study, status, design, fit, front, chain, keys):
     app.command()(command)
 
 
 @app.callback()
-def main() -> None:
+def main(version: Version = False) -> None:
     """Designed experiments on a bearing: from clearances to part dimensions with tolerances."""
 
 

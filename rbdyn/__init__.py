@@ -54,6 +54,12 @@ def load(path: str) -> SimulationResult:
 def __getattr__(name: str) -> object:
     from importlib import import_module
 
+    if name == "__version__":
+        return import_module("importlib.metadata").version("rbdyn")
     if name not in _HOMES:
         raise AttributeError(f"module 'rbdyn' has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOMES, "__version__"])

@@ -2,44 +2,26 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 import json
 import math
 import os
 import platform
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.faults import InputError, bounded, read_text
+from rbdyn.records.record import Record, derived, keyed, told
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMAT = "rbdyn.simulation/3"
-# Figures with errors: their keys in JSON and tables, and their names here.
-FIGURES = {
-    "impact_force_N": "impact_force",
-    "impact_contact_force_N": "impact_contact_force",
-    "whirl_deviation_ratio": "whirl_deviation_ratio",
-    "power_loss_W": "power_loss",
-    "cage_speed_rpm": "cage_speed_rpm",
-    "cage_slip": "cage_slip",
-}
-# The same of what JSON holds as it is.
-PLAIN = {"power_terms_W": "power_terms", "clearance_um": "clearance"} | {
-    name: name
-    for name in (
-        *("status", "races", "impact_window_turns", "transient_turns", "counted_turns", "target"),
-        *("cost", "replicates", "seed", "versions", "scene"),
-    )
-}
+Saved = TypeVar("Saved")
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(Record):
     """A figure with the half-widths of its 95 % intervals; None where an error was not estimated.
 
     ``effective_samples``: how many independent batches would tell as much of it as the correlated ones of the run.
@@ -59,26 +41,30 @@ class Quantity:
         known = [error for error in (self.statistical_error, self.numerical_error) if error is not None]
         return math.hypot(*known) if known else None
 
-    def as_dict(self) -> dict[str, float | None]:
-        """JSON form."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Quantity:
-        """Inverse of ``as_dict``. Raises TypeError for anything else."""
-        errors = ("statistical_error", "numerical_error")
-        if not all(isinstance(x, (int, float)) or (x is None and name in errors) for name, x in dict(data).items()):
-            raise TypeError(data)
-        return cls(**data)
-
     def __str__(self) -> str:
         errors = [f"± {self.statistical_error:.2g} (statistical)" if self.statistical_error is not None else ""]
         errors.append(f"± {self.numerical_error:.2g} (numerical)" if self.numerical_error is not None else "")
         return " ".join((f"{self.value:.5g}", *filter(None, errors)))
 
 
-@dataclass(frozen=True)
-class SimulationResult:
+class SavedRecord(Record):
+    """A record of which a file tells: ``FORMAT`` stands in it, and ``WHAT`` it is in messages."""
+
+    FORMAT: ClassVar[str]
+    WHAT: ClassVar[str]
+    format: str = derived(lambda self: self.FORMAT)
+
+    def save(self, path: Path | str) -> None:
+        """Write JSON, whole or not at all."""
+        write_json(path, self.as_dict())
+
+    @classmethod
+    def load(cls, path: Path | str) -> Self:
+        """Read a saved record. Raises InputError when the file is missing or not such a one."""
+        return read_record(path, cls.FORMAT, cls.WHAT, cls.from_dict)
+
+
+class SimulationResult(SavedRecord):
     """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input.
 
     ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of
@@ -89,84 +75,46 @@ class SimulationResult:
     ``target``: what a run to a target accuracy chose, reached and cost, None for any other.
     """
 
-    status: str
-    impact_force: Quantity
-    impact_contact_force: Quantity
+    FORMAT = "rbdyn.simulation/3"
+    WHAT = "simulation result"
+    impact_force: Quantity = keyed("impact_force_N")
+    impact_contact_force: Quantity = keyed("impact_contact_force_N")
     whirl_deviation_ratio: Quantity
-    power_loss: Quantity
+    power_loss: Quantity = keyed("power_loss_W")
     cage_speed_rpm: Quantity
     cage_slip: Quantity
-    power_gap: float
-    power_terms: dict[str, float]
-    max_inner_load: float
-    max_outer_load: float
-    max_land_load: float
+    power_gap: float = keyed("power_balance", "relative_gap")
+    max_inner_load: float = keyed("loads", "max_inner_N")
+    max_outer_load: float = keyed("loads", "max_outer_N")
+    max_land_load: float = keyed("loads", "max_land_N")
+    notes: tuple[str, ...]
+    power_terms: dict[str, float] = keyed("power_terms_W")
+    clearance: dict[str, float] = keyed("clearance_um")
+    status: str
     races: dict[str, dict[str, float]]
-    clearance: dict[str, float]
     impact_window_turns: float
     transient_turns: float | None
     counted_turns: float
+    target: dict[str, Any] | None
     cost: dict[str, float]
     replicates: int
     seed: int
-    notes: tuple[str, ...]
     versions: dict[str, str]
     scene: dict[str, Any]
-    target: dict[str, Any] | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form, which shares nothing with the result."""
-        return {
-            "format": FORMAT,
-            **{key: getattr(self, name).as_dict() for key, name in FIGURES.items()},
-            "power_balance": {"relative_gap": self.power_gap},
-            "loads": {
-                "max_inner_N": self.max_inner_load,
-                "max_outer_N": self.max_outer_load,
-                "max_land_N": self.max_land_load,
-            },
-            "notes": list(self.notes),
-            **{key: copy.deepcopy(getattr(self, name)) for key, name in PLAIN.items()},
-        }
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> SimulationResult:
-        """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
-        figures: dict[str, Any] = {name: Quantity.from_dict(data[key]) for key, name in FIGURES.items()}
-        return cls(
-            **figures,
-            **{name: data[key] for key, name in PLAIN.items()},
-            power_gap=data["power_balance"]["relative_gap"],
-            **{f"max_{part}_load": data["loads"][f"max_{part}_N"] for part in ("inner", "outer", "land")},
-            notes=tuple(data["notes"]),
-        )
 
     def table(self) -> pd.DataFrame:
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 
-        rows = {key: getattr(self, name).as_dict() for key, name in FIGURES.items()}
+        figures = ((path[0], getattr(self, one.name)) for one, path in told(self))
+        rows = {key: figure.as_dict() for key, figure in figures if isinstance(figure, Quantity)}
         return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
 
-    def save(self, path: Path | str) -> None:
-        """Write JSON, whole or not at all."""
-        write_json(path, self.as_dict())
 
-    @classmethod
-    def load(cls, path: Path | str) -> SimulationResult:
-        """Read a saved result. Raises InputError when the file is missing or not such a result."""
-        from pydantic import TypeAdapter
-
-        what = "simulation result"
-        data = read_record(path, FORMAT, what)
-        try:
-            return TypeAdapter(cls).validate_json(json.dumps(asdict(cls.from_dict(data))), strict=True)
-        except (ValueError, KeyError, TypeError):
-            raise InputError([f"{path}: not a whole {what}; run the scene again"]) from None
-
-
-def read_record(path: Path | str, form: str, what: str) -> dict[str, Any]:
-    """A ``what`` saved as JSON in the format ``form``. Raises InputError when the file is missing or holds no such."""
+def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[str, Any]], Saved]) -> Saved:
+    """A ``what`` saved as JSON in the format ``form``, as ``restore`` makes it of that. Raises InputError when the file is
+    missing or holds no such, or none that is whole.
+    """
     if not Path(path).is_file():
         raise InputError([f"{path}: cannot be read (no such file); check the path"])
     text = read_text(Path(path))
@@ -178,7 +126,10 @@ def read_record(path: Path | str, form: str, what: str) -> dict[str, Any]:
     if found != form:
         old = f"format is {found}, not {form}; run the scene again"
         raise InputError([f"{path}: {old if isinstance(found, str) else f'not a saved {what}; check the path'}"])
-    return bounded(data, str(path))
+    try:
+        return restore(bounded(data, str(path)))
+    except (AttributeError, KeyError, TypeError, ValueError):
+        raise InputError([f"{path}: not a whole {what}; run the scene again"]) from None
 
 
 def write_json(path: Path | str, data: dict[str, Any]) -> None:

@@ -74,6 +74,18 @@ EVERYTHING = (
 )
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config: pytest.Config) -> None:
+    """Two processes where pytest-xdist is installed and nothing else is asked for; a file's tests stay in one."""
+    if not config.pluginmanager.hasplugin("xdist") or hasattr(config, "workerinput"):
+        return
+    option = config.option
+    if option.numprocesses is None and option.dist == "no" and not option.usepdb:
+        option.numprocesses = 2
+    if option.numprocesses and option.dist == "no":
+        option.dist = "loadfile"
+
+
 def law_types(parameters: Any) -> set[type]:
     """Types of all NamedTuples within the parameters of a bearing: they choose what is compiled."""
     if not isinstance(parameters, tuple):
@@ -200,6 +212,38 @@ def outer_result(outer: Scene) -> Any:
     from rbdyn.dynamics.simulate import simulate
 
     return simulate(outer, workers=1)
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, NDArray[np.float64]]:
+    """Every number that pictures show, by the name of their file: of lines, points, bars, cells and whiskers."""
+    from matplotlib.figure import Figure
+
+    shown: dict[str, NDArray[np.float64]] = {}
+    save = Figure.savefig
+
+    def kept(figure: Figure, path: Any, **options: Any) -> None:
+        parts = [np.zeros(0)]
+        for axis in figure.axes:
+            parts += [np.ravel(line.get_xydata()) for line in axis.lines]
+            parts += [
+                np.ravel(each.get_array()) for each in (*axis.images, *axis.collections) if each.get_array() is not None
+            ]
+            parts += [np.ravel(each.get_offsets()) for each in axis.collections]
+            parts += [
+                np.ravel(segment) for each in axis.collections for segment in getattr(each, "get_segments", list)()
+            ]
+            parts += [np.ravel(each.get_xy()) for each in axis.patches]
+        shown[Path(path).name] = np.ma.filled(np.ma.concatenate(parts), np.nan).astype(float)
+        save(figure, path, **options)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    return shown
+
+
+def lacking(shown: NDArray[np.float64], wanted: Any) -> list[float]:
+    """Numbers that a picture should show and does not."""
+    return [value for value in np.ravel(wanted) if not np.isclose(shown, value, rtol=1e-12, atol=0.0).any()]
 
 
 @pytest.fixture(scope="session")

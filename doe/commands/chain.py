@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
-from doe.commands.options import Json, Save
+from doe.commands.options import Save
 from doe.commands.steps import save
-from rbdyn.cli.terminal import BAD_INPUT, guarded, print_json
+from rbdyn.cli.options import Json, flag
+from rbdyn.cli.terminal import BAD_INPUT, guarded, hand_over
 from rbdyn.faults import InputError
 
 
@@ -20,10 +21,8 @@ def chain(
     ],
     out: Save = None,
     as_json: Json = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Parts only.")] = False,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Also yields by distribution, quantiles, classes.")
-    ] = False,
+    quiet: Annotated[bool, flag("--quiet", "-q", says="Parts only.")] = False,
+    verbose: Annotated[bool, flag("--verbose", "-v", says="Also yields by distribution, quantiles, classes.")] = False,
 ) -> None:
     """Solve dimension chains: limits, yield, contributions, allocation. One that misses its limits is refused."""
     with guarded(as_json):
@@ -41,11 +40,12 @@ def chain(
             raise InputError(faults)
         record = chains_record(results) if several else next(iter(results.values())).as_dict()
         save(out, path, "chain.json", record)
-        if as_json:
-            print_json(record)
-        else:
+
+        def show() -> None:
             for name, result in results.items():
                 print_chain(name, result, quiet, verbose)
+
+        hand_over(lambda: record, as_json, show)
         refused = {name: result.status for name, result in results.items() if result.refused}
         for name, status in refused.items():
             print(f"{path}: {f'chain {name}: ' if several else ''}{status}", file=sys.stderr)

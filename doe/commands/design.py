@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from doe.commands.options import Json, Save, StudyPath
+from doe.commands.options import Save, StudyPath
 from doe.commands.steps import save
-from rbdyn.cli.terminal import guarded, print_json
+from rbdyn.cli.options import Json, flag
+from rbdyn.cli.terminal import guarded, hand_over
 
 
 def design(
     path: StudyPath,
     out: Save = None,
     as_json: Json = False,
-    as_csv: Annotated[bool, typer.Option("--csv", help="Print a CSV table and nothing else.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Actual values only.")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also seeds and leverages.")] = False,
+    as_csv: Annotated[bool, flag("--csv", says="Print a CSV table and nothing else.")] = False,
+    quiet: Annotated[bool, flag("--quiet", "-q", says="Actual values only.")] = False,
+    verbose: Annotated[bool, flag("--verbose", "-v", says="Also seeds and leverages.")] = False,
 ) -> None:
     """Print the design: every run, and how well the runs can tell what is asked of them."""
     with guarded(as_json):
@@ -33,9 +32,6 @@ def design(
         points = design_of(loaded)
         record = design_record(loaded, points, evaluation(loaded, points))
         save(out, path, "design.json", record)
-        if as_json:
-            print_json(record)
-        elif as_csv:
-            print_csv(record)
-        else:
-            print_design(record, quiet, verbose)
+        hand_over(
+            lambda: record, as_json, lambda: print_csv(record) if as_csv else print_design(record, quiet, verbose)
+        )

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from doe.commands.options import Data, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
+from doe.commands.options import Data, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import Effort, fitted, keeping_runs, save
-from rbdyn.cli.terminal import guarded, print_json
+from rbdyn.cli.options import Json, flag
+from rbdyn.cli.terminal import guarded, hand_over
 
 
 def fit(
@@ -21,7 +20,7 @@ def fit(
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Also residual, leverage and Cook's distance of each run.")
+        bool, flag("--verbose", "-v", says="Also residual, leverage and Cook's distance of each run.")
     ] = False,
 ) -> None:
     """Fit the response surfaces and print their analysis of variance."""
@@ -38,7 +37,4 @@ def fit(
 
             for name, rows in fit_tables(surfaces).items():
                 pd.DataFrame(rows).to_csv(out / name, index=False)
-        if as_json:
-            print_json(record)
-        else:
-            print_fit(surfaces, quiet, verbose, loaded.factors)
+        hand_over(lambda: record, as_json, lambda: print_fit(surfaces, quiet, verbose, loaded.factors))

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doe.commands.options import Data, Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Workers
+from doe.commands.options import Data, Direct, Out, Quiet, Retry, Scheduler, StudyPath, Workers
 from doe.commands.steps import Effort, fitted, keeping_runs, save, searched
-from rbdyn.cli.terminal import guarded, print_json
+from rbdyn.cli.options import Json, flag
+from rbdyn.cli.terminal import guarded, hand_over
 from rbdyn.faults import InputError, refuse
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def front(
     direct: Direct = False,
     as_json: Json = False,
     quiet: Quiet = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Also every point of the front.")] = False,
+    verbose: Annotated[bool, flag("--verbose", "-v", says="Also every point of the front.")] = False,
 ) -> None:
     """Find the Pareto front on the response surfaces."""
     with guarded(as_json), keeping_runs(out):
@@ -59,10 +60,7 @@ def front(
 
             record["direct"] = direct_record(loaded, searched(loaded, found, effort))
         save(out, path, "front.json", record)
-        if as_json:
-            print_json(record)
-        else:
-            print_front(record, verbose)
+        hand_over(lambda: record, as_json, lambda: print_front(record, verbose))
 
 
 def _point(study: Study, text: str) -> list[float]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from doe.commands.options import Json
+from rbdyn.cli.options import Json
 from rbdyn.cli.terminal import guarded, print_json
 
 # Name of a clearance in tables, its place in the scene, and its step as a share of its value: the axial runs of a rotatable

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from doe.commands.options import Json, Out, Quiet, StudyPath
-from rbdyn.cli.terminal import guarded, print_json
+from doe.commands.options import Out, Quiet, StudyPath
+from rbdyn.cli.options import Json
+from rbdyn.cli.terminal import guarded, hand_over
 
 
 def status(path: StudyPath, out: Out = None, as_json: Json = False, quiet: Quiet = False) -> None:
@@ -16,7 +17,4 @@ def status(path: StudyPath, out: Out = None, as_json: Json = False, quiet: Quiet
         from doe.study_file import Study
 
         record = study_status(Study.load(path), out or Path(f"{path.stem}_results"))
-        if as_json:
-            print_json(record)
-        else:
-            print_status(record, quiet)
+        hand_over(lambda: record, as_json, lambda: print_status(record, quiet))

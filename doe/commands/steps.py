@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbdyn.cli.terminal import keeping, output_folder, progress_bar
+from rbdyn.faults import RunError
 
 if TYPE_CHECKING:
     from doe.pareto import ParetoFront
@@ -80,5 +81,10 @@ def _store_folder(out: Path | None, source: Path) -> Iterator[Path]:
     if out is not None:
         yield output_folder(out, "doe", source)
         return
+    from doe.running.failure import StoppedError
+
     with tempfile.TemporaryDirectory() as folder:
-        yield Path(folder)
+        try:
+            yield Path(folder)
+        except StoppedError as error:
+            raise RunError("{}; without --out no finished run is kept: {}".format(*error.args)) from None

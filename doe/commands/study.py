@@ -9,8 +9,9 @@ from typing import Any
 
 import typer
 
-from doe.commands.options import Direct, Json, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
+from doe.commands.options import Direct, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
 from doe.commands.steps import keeping_runs
+from rbdyn.cli.options import Json
 from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json, progress_bar
 
 

@@ -39,75 +39,103 @@ class ClosingLink(Strict):
     """Limits of the closing link, mm."""
 
     lower_mm: Bounded
+    """Lower limit of the closing link."""
     upper_mm: Bounded
+    """Upper limit of the closing link."""
 
 
 class Cost(Strict):
     """Cost of a tolerance T in mm, a + b/T^k, between the narrowest and the widest that the process gives."""
 
     a: NonNegative = 0.0
+    """Cost of the part without its tolerance."""
     b: Positive
+    """Cost that falls with the tolerance T in mm, as b/T^k."""
     k: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
+    """Exponent of the tolerance."""
     narrowest_mm: NonNegative = 0.0
+    """Narrowest tolerance that the process gives."""
     widest_mm: Positive | None = None
+    """Widest tolerance worth making; without bound where left out."""
 
 
 class PressFit(Strict):
-    """Change of the diameter ``raceway_mm`` by the fit of the link ``shaft`` in the link ``bore``, after Lamé.
-
-    A raceway wider than the fit stands on the outer part and grows; one narrower stands on the inner part and
-    shrinks: the value is then negative. ``fit_mm`` is the nominal of ``bore`` unless given. ``shaft_bore_mm`` is
-    the bore of the inner part (0, or the raceway on it), ``outside_mm`` the outside of the outer part (the raceway
-    on it, else to be given). ``interference_change_mm`` is what roughness, temperature and rotation add to the
-    interference, negative where they take some. A loose fit changes nothing.
-    """
+    """Change of a diameter by a fit, after Lamé. A loose fit changes nothing."""
 
     shaft: str
+    """Link of the inner part's diameter."""
     bore: str
+    """Link of the outer part's diameter."""
     raceway_mm: Positive
+    """Diameter whose change the link is. Wider than the fit it stands on the outer part and grows, narrower on the
+    inner one and shrinks."""
     fit_mm: Positive | None = None
+    """Diameter of the fit; the nominal of bore where left out."""
     shaft_bore_mm: NonNegative | None = None
+    """Bore of the inner part; 0, or the raceway on it, where left out."""
     outside_mm: Positive | None = None
+    """Outside of the outer part; the raceway on it where left out, else to be given."""
     shaft_modulus_GPa: Positive = 206.0  # noqa: N815
+    """Young's modulus of the inner part; steel."""
     bore_modulus_GPa: Positive = 206.0  # noqa: N815
+    """Young's modulus of the outer part; steel."""
     shaft_poisson: Poisson = 0.3
+    """Poisson's ratio of the inner part; steel."""
     bore_poisson: Poisson = 0.3
+    """Poisson's ratio of the outer part; steel."""
     interference_change_mm: Bounded = 0.0
+    """What roughness, temperature and rotation add to the interference; negative where they take some."""
 
 
 class ThermalGrowth(Strict):
     """Growth of the link ``of`` by a temperature rise, with the deviations of that rise."""
 
     of: str
+    """Link that grows."""
     expansion_per_K: Annotated[float, Field(ge=-1.0, le=1.0)]  # noqa: N815
+    """Linear thermal expansion."""
     temperature_rise_K: Bounded  # noqa: N815
+    """Temperature rise."""
     upper_K: Bounded = 0.0  # noqa: N815
+    """Upper deviation of the temperature rise."""
     lower_K: Bounded = 0.0  # noqa: N815
+    """Lower deviation of the temperature rise."""
 
 
 class Link(Strict):
-    """One link. ``mean_mm`` is a deviation from the nominal, like ``upper_mm`` and ``lower_mm``.
-
-    ``fit`` gives the deviations by a code: "k5", "H7" of ISO 286, or "P5 bore", "Normal outside" of ISO 492.
-    ``capability`` is T/(6 sigma) of a normal or truncated normal part. ``position`` says where an allocated
-    tolerance lies: one side, so that it can only shorten the closing link, both sides, or by a letter of ISO 286.
-    """
+    """One link: a dimension with its deviations from the nominal, or a function of links before it."""
 
     name: Annotated[str, Field(min_length=1)]
+    """Name of the link."""
     coefficient: Bounded
+    """What the closing link changes by per unit of this link; 0 for one that only functions use."""
     nominal_mm: Bounded | None = None
+    """Nominal of a dimension."""
     upper_mm: Bounded | None = None
+    """Upper deviation."""
     lower_mm: Bounded | None = None
+    """Lower deviation."""
     fit: str | None = None
+    """Deviations by a code instead: "k5", "H7" of ISO 286, or "P5 bore", "Normal outside" of ISO 492."""
     distribution: Distribution = "normal"
+    """How the parts made scatter."""
     mean_mm: Bounded | None = None
+    """Mean of the parts made, as a deviation from the nominal; the middle of the tolerance where left out."""
     capability: Positive = 1.0
+    """T/(6 sigma) of a normal or truncated normal part."""
     fixed: bool = False
+    """Whether the tolerance stays as given when tolerances are allocated."""
     position: Position = "unilateral"
+    """Where an allocated tolerance lies: on one side, so that it can only shorten the closing link, on both, or by a
+    letter of ISO 286."""
     cost: Cost | None = None
+    """Cost of the tolerance."""
     press_fit: PressFit | None = None
+    """Makes the link the change of a diameter by a press fit."""
     thermal_growth: ThermalGrowth | None = None
+    """Makes the link the growth of another by temperature."""
     expression: str | None = None
+    """Makes the link an expression of links that stand before it."""
 
     @property
     def is_dimension(self) -> bool:
@@ -121,51 +149,63 @@ class Link(Strict):
 
 
 class Allocate(Strict):
-    """How tolerances are shared; ``adjust`` names the part whose nominal is moved.
-
-    Default: the first part that is not fixed, of positive coefficient if there is one. ``target_yield`` is what
-    mode "yield" keeps. ``grades`` narrows each tolerance to a grade of ISO 286; ``spend_slack`` then widens grades
-    as long as the limits allow: where the curves save most, without curves the finest grade first.
-    """
+    """How tolerances are shared."""
 
     method: Literal["equal", "iso286", "cost"] = "equal"
+    """How tolerances are shared: equal ones, in the ratios of ISO 286's tolerance units, or at the least cost."""
     mode: Mode = "worst_case"
+    """What must stay within the limits: the worst case, the root sum square, or target_yield of the assemblies."""
     grades: bool = False
+    """Whether each tolerance is narrowed to a grade of ISO 286."""
     spend_slack: bool = False
+    """Whether grades are widened as long as the limits allow: where the curves save most, without curves the finest
+    grade first."""
     target_yield: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9973
+    """Share of the assemblies that mode = "yield" keeps within the limits; 3 sigma."""
     adjust: str | None = None
+    """Part whose nominal is moved; where left out the first that is not fixed, of positive coefficient if there is one.
+    """
 
 
 class MonteCarlo(Strict):
     """Size and seed of the Monte Carlo of the assemblies."""
 
     samples: Samples = 1_000_000
+    """Assemblies drawn."""
     seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the assemblies."""
 
 
 class Selective(Strict):
-    """Selective assembly: ``first`` and ``second`` sorted in classes and matched class by class.
-
-    Classes are of equal width over the tolerance, or of equal share of each part's production.
-    """
+    """Selective assembly: two parts sorted in classes and matched class by class."""
 
     first: str
+    """First of the two parts that are sorted and matched class by class."""
     second: str
+    """Second of the two parts."""
     classes: Annotated[int, Field(ge=2, le=100)] = 4
+    """Number of classes."""
     by: Literal["width", "probability"] = "width"
-    # All sizes of all parts are kept.
+    """Classes of equal width over the tolerance, or of equal share of each part's production."""
     samples: Annotated[int, Field(ge=1, le=10_000_000)] = 200_000
+    """Parts drawn; all sizes of all parts are kept."""
     seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the parts."""
 
 
 class Chain(Strict):
     """A closing link, its links and the wish for their tolerances."""
 
     closing_link: ClosingLink
+    """The gap or dimension that the links make."""
     link: Annotated[list[Link], Field(min_length=1)]
+    """The links."""
     allocate: Allocate = Allocate()
+    """How tolerances are shared."""
     monte_carlo: MonteCarlo = MonteCarlo()
+    """Monte Carlo of the assemblies."""
     selective: Selective | None = None
+    """Selective assembly of two parts."""
 
     @property
     def width_mm(self) -> float:

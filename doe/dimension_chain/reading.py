@@ -18,12 +18,14 @@ class NamedChain(Chain):
     """A chain among others."""
 
     name: Annotated[str, Field(min_length=1)]
+    """Name of the chain."""
 
 
 class Chains(Strict):
     """A file of several chains."""
 
     chain: Annotated[list[NamedChain], Field(min_length=1)]
+    """The chains."""
 
 
 def read_chain(path: Path | str) -> Chain:

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -21,45 +19,31 @@ from doe.dimension_chain.distributions import quantile
 from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.links import DIGITS, SLACK, ClosingLink, Interval, Part, Selective
 from doe.dimension_chain.yields import standard_error
+from rbdyn.records.record import Record, derived, keyed
 
 MOST_CLASSES = 100
 
 
-@dataclass(frozen=True)
-class SelectiveAssembly:
+class SelectiveAssembly(Record):
     """What matching in classes gives.
 
     ``matched`` is the share of the pairs made of which each class holds both parts; ``good`` the share of the matched
-    assemblies within the limits, with its ``standard_error``, ``random`` that of assemblies at random. ``yield`` of
-    the whole is matched times good. ``worst_case_mm`` holds over all classes, ``edges_mm`` are the sizes at which
+    assemblies within the limits, with its ``standard_error``, ``random`` that of assemblies at random. The yield of
+    the ``whole`` is matched times good. ``worst_case_mm`` holds over all classes, ``edges_mm`` are the sizes at which
     each part is sorted. ``classes_needed``: the fewest classes whose worst case keeps the limits, None above 100.
     """
 
     classes: int
+    whole: float = derived(lambda self: self.matched * self.good, "yield")
     matched: float
-    good: float
+    good: float = keyed("good_of_matched")
     random: float
     standard_error: float
-    matched_deviation_mm: float
-    random_deviation_mm: float
+    matched_deviation_mm: float = keyed("standard_deviation_mm", "matched")
+    random_deviation_mm: float = keyed("standard_deviation_mm", "random")
     worst_case_mm: Interval
-    edges_mm: dict[str, list[float]]
+    edges_mm: dict[str, list[float]] = keyed("class_limits_mm")
     classes_needed: int | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain numbers, lists and dicts, ready for JSON."""
-        return {
-            "classes": self.classes,
-            "yield": self.matched * self.good,
-            "matched": self.matched,
-            "good_of_matched": self.good,
-            "random": self.random,
-            "standard_error": self.standard_error,
-            "standard_deviation_mm": {"matched": self.matched_deviation_mm, "random": self.random_deviation_mm},
-            "worst_case_mm": list(self.worst_case_mm),
-            "class_limits_mm": self.edges_mm,
-            "classes_needed": self.classes_needed,
-        }
 
 
 def selective_assembly(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -28,13 +27,15 @@ from doe.dimension_chain.yields import (
     standard_error,
 )
 from rbdyn.faults import InputError
+from rbdyn.records.record import Record, derived, keyed, unsaid
 
 # Shares below the quantiles: the median, 95 %, and the 99.73 % of plus and minus three standard deviations.
 QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
+# What is told of an allocated part.
+ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade")
 
 
-@dataclass(frozen=True)
-class Linearisation:
+class Linearisation(Record):
     """How far a chain with functions is from its linear form at mid-tolerance, mm.
 
     ``worst_case_error_mm``: the larger distance of the linear worst case from the true one. ``mean_shift_mm`` and
@@ -48,8 +49,7 @@ class Linearisation:
     deviation_error_percent: float | None
 
 
-@dataclass(frozen=True)
-class ChainResult:
+class ChainResult(Record):
     """The closing link of a chain, mm, and the allocated parts.
 
     ``yields`` maps "as_given" (each part's own distribution), "normal", "truncated_normal" and "uniform" (all
@@ -62,65 +62,37 @@ class ChainResult:
     nearer of them from the mean, over six and three standard deviations, None where nothing varies. ``cost`` is that of the allocation, where all have curves.
     """
 
-    nominal_mm: float
-    worst_case_mm: Interval
-    rss_mm: Interval
-    yields: dict[str, float]
-    standard_errors: dict[str, float]
+    nominal_mm: float = keyed("closing_link", "nominal_mm")
+    worst_case_mm: Interval = keyed("closing_link", "worst_case_mm")
+    rss_mm: Interval = keyed("closing_link", "rss_mm")
+    yields: dict[str, float] = keyed("yield")
+    standard_error: float = derived(lambda self: max(self.standard_errors.values()), "yield", "standard_error")
     contributions: dict[str, dict[str, float]]
-    allocation: tuple[Part, ...]
+    allocated: dict[str, Any] = derived(
+        lambda self: {part.name: {key: getattr(part, key) for key in ALLOCATED} for part in self.allocation},
+        "allocation",
+    )
     status: str
-    mean_mm: float
-    standard_deviation_mm: float
-    quantiles_mm: dict[float, float]
+    mean_mm: float = keyed("distribution", "mean_mm")
+    standard_deviation_mm: float = keyed("distribution", "standard_deviation_mm")
+    cp: float | None = keyed("distribution", "cp")
+    cpk: float | None = keyed("distribution", "cpk")
+    quantiles_mm: dict[float, float] = keyed("distribution", "quantiles_mm")
+    standard_errors: dict[str, float] = keyed("yield_standard_errors")
     rejected: dict[str, dict[str, float]]
-    exact_yields: dict[str, float] | None
+    exact_yields: dict[str, float] | None = keyed("exact_yield")
     normal_yield: float
-    cp: float | None
-    cpk: float | None
     linearisation: Linearisation | None
     cost: float | None
-    selective: SelectiveAssembly | None
+    selective: SelectiveAssembly | None = keyed("selective_assembly")
     samples: int
     seed: int
-
-    @property
-    def standard_error(self) -> float:
-        """The largest standard error of the yields."""
-        return max(self.standard_errors.values())
+    allocation: tuple[Part, ...] = unsaid()
 
     @property
     def refused(self) -> bool:
         """Whether the given deviations miss the limits."""
         return self.status.startswith("refused")
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain numbers, lists and dicts, ready for JSON."""
-        shown = ("nominal_mm", "upper_mm", "lower_mm", "grade")
-        return {
-            "closing_link": {
-                "nominal_mm": self.nominal_mm,
-                "worst_case_mm": list(self.worst_case_mm),
-                "rss_mm": list(self.rss_mm),
-            },
-            "yield": {**self.yields, "standard_error": self.standard_error},
-            "contributions": self.contributions,
-            "allocation": {part.name: {key: getattr(part, key) for key in shown} for part in self.allocation},
-            "status": self.status,
-            "distribution": {
-                **{key: getattr(self, key) for key in ("mean_mm", "standard_deviation_mm", "cp", "cpk")},
-                "quantiles_mm": {f"{share:g}": size for share, size in self.quantiles_mm.items()},
-            },
-            "yield_standard_errors": self.standard_errors,
-            "rejected": self.rejected,
-            "exact_yield": self.exact_yields,
-            "normal_yield": self.normal_yield,
-            "linearisation": None if self.linearisation is None else asdict(self.linearisation),
-            "cost": self.cost,
-            "selective_assembly": None if self.selective is None else self.selective.as_dict(),
-            "samples": self.samples,
-            "seed": self.seed,
-        }
 
 
 def solve(

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import special
@@ -20,38 +19,28 @@ from doe.arrays import Array, Whole
 from doe.response_surface.anova import AnovaRow, ratio, sum_within
 from doe.response_surface.diagnostics import p_text
 from doe.response_surface.least_squares import LeastSquares
+from rbdyn.records.record import Record, derived, keyed, unsaid
 
 
-@dataclass(frozen=True)
-class KnownVariance:
+class KnownVariance(Record):
     """Comparison of a fit with known variances.
 
     ``chi_square`` of the residual over the known variance, with ``df`` and ``p``; ``pure_error`` is the ANOVA
     row of the replicate variance at the repeated points, whose ``f`` is pure error over it and whose ``p`` is
     two-sided (f and p None without repeats); ``covariance`` of the surface's coefficients from the known
-    variances alone; ``dof`` of the variance of one run (None: known exactly).
+    variances alone and their ``standard_errors``; ``dof`` of the variance of one run (None: known exactly).
     """
 
     chi_square: float
     df: int
     p: float | None
-    pure_error: AnovaRow
+    mean_square_ratio: float = derived(lambda self: self.chi_square / self.df)
+    pure_error_ratio: float | None = derived(lambda self: self.pure_error["f"])
+    pure_error_p: float | None = derived(lambda self: self.pure_error["p"])
+    dof: float | None = keyed("variance_dof")
+    standard_errors: Array = derived(lambda self: np.sqrt(np.diag(self.covariance)))
     covariance: Array
-    dof: float | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON."""
-        return {
-            "chi_square": self.chi_square,
-            "df": self.df,
-            "p": self.p,
-            "mean_square_ratio": self.chi_square / self.df,
-            "pure_error_ratio": self.pure_error["f"],
-            "pure_error_p": self.pure_error["p"],
-            "variance_dof": self.dof,
-            "standard_errors": np.sqrt(np.diag(self.covariance)).tolist(),
-            "covariance": self.covariance.tolist(),
-        }
+    pure_error: AnovaRow = unsaid()
 
 
 def compare(
@@ -96,12 +85,12 @@ def describe_known_variance(name: str, found: KnownVariance, alpha: float) -> li
         verdict = f"{p_text(found.p)}), the surface misses no more than that explains"
     else:
         verdict = f"{p_text(found.p)}), the surface misses more than that explains"
-    share = math.sqrt(found.chi_square / found.df)
+    share = math.sqrt(found.mean_square_ratio)
     sentences = [
         f"{against} degrees of freedom ({verdict}; standard errors here come from the residual and are {share:.3g} "
         "times those of the known variance alone."
     ]
-    f, p = found.pure_error["f"], found.pure_error["p"]
+    f, p = found.pure_error_ratio, found.pure_error_p
     if f is None or p is None:
         return sentences
     head = f"{name}: repeated runs scatter with {f:.3g} times the variance that their replicates tell ({p_text(p)}): "

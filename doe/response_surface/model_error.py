@@ -14,8 +14,8 @@ Variance Components (1992), for the estimate.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+import math
+from typing import Literal
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from doe.arrays import Array, Whole
 from doe.response_surface.anova import AnovaRow, find
 from doe.response_surface.known_variance import KnownVariance
 from doe.response_surface.least_squares import LeastSquares
+from rbdyn.records.record import Record, derived
 
 Source = Literal["repeats", "known variance"]
 
@@ -30,17 +31,13 @@ SIGNIFICANT = 0.05
 REACH = 1.0  # coded units within which what a surface misses stays alike: half the edge of the cube of a design
 
 
-@dataclass(frozen=True)
-class ModelError:
+class ModelError(Record):
     """Variance of what a surface misses anywhere, on the scale of the fit and ``dof`` degrees of freedom; what told it."""
 
     variance: float
     dof: int
     told_by: Source
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON."""
-        return asdict(self) | {"standard_deviation": float(np.sqrt(self.variance))}
+    standard_deviation: float = derived(lambda self: math.sqrt(self.variance))
 
 
 def model_error(

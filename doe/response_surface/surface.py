@@ -29,13 +29,18 @@ from doe.response_surface.goodness import goodness, observation_variance
 from doe.response_surface.known_variance import KnownVariance, compare
 from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import ModelError, model_error
+from rbdyn.records.record import plain
 
 Weighting = Literal["equal", "replicates"]
 Transform = Literal["none", "box_cox"] | float
 
 STATISTICS = (
     *("anova", "lack_of_fit", "pure_error", "r2", "adjusted_r2", "predicted_r2", "press"),
-    *("cv_percent", "adequate_precision", "stationary_point"),
+    *("cv_percent", "adequate_precision", "stationary_point", "terms"),
+)
+DETAILS = (
+    *("covariance", "residual_dof", "observation_variance", "actual_coefficients", "weighting", "transform", "box_cox"),
+    *("blocks", "elimination", "canonical", "known_variance", "model_error", "diagnostics", "rival"),
 )
 
 
@@ -172,25 +177,11 @@ class Surface:
         return {
             "model": self.model,
             "coefficients": coefficients,
-            **{key: getattr(self, key) for key in STATISTICS},
-            "terms": list(self.terms),
+            **{key: plain(getattr(self, key)) for key in STATISTICS},
             "standard_errors": {row["term"]: row["standard_error"] for row in table},
             "vif": {row["term"]: row["vif"] for row in table if row["term"] != "1"},
             "tests": {row["term"]: {key: row[key] for key in ("t", "p", "low", "high")} for row in table},
-            "covariance": self.covariance.tolist(),
-            "residual_dof": self.residual_dof,
-            "observation_variance": self.observation_variance,
-            "actual_coefficients": self.actual_coefficients,
-            "weighting": self.weighting,
-            "transform": self.transform,
-            "box_cox": self.box_cox,
-            "blocks": self.blocks,
-            "elimination": self.elimination,
-            "canonical": self.canonical,
-            "known_variance": None if self.known_variance is None else self.known_variance.as_dict(),
-            "model_error": None if self.model_error is None else self.model_error.as_dict(),
-            "diagnostics": self.diagnostics,
-            "rival": self.rival,
+            **{key: plain(getattr(self, key)) for key in DETAILS},
         }
 
     @cached_property

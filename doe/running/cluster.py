@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from doe.running.failure import StoppedError
 from doe.running.runner import Ran
-from rbdyn.faults import InputError, RunError
+from rbdyn.faults import InputError
 
 # A scheduler that does not shake hands, take up a client or have a worker within so long [s] is not there.
 KNOCK_S, CONNECT_S, WORKERS_S = 2.0, 4.0, 10.0
@@ -28,7 +29,7 @@ def run_on_cluster(
 
     ``tasks`` is called once the cluster is there. A task whose worker is lost runs again on another; one that was lost
     again and again is handed over as lost. Raises InputError when there is no cluster to start on, or its workers run
-    other code; RunError when it goes away.
+    other code; StoppedError when it goes away.
     """
     with _client(address) as client:
         texts = tasks()
@@ -42,19 +43,19 @@ def run_on_cluster(
             except queue.Empty:
                 alone_s = 0.0 if _workers(client) else alone_s + LOOK_S
                 if client.status != "running" or alone_s > DESERTED_S:
-                    raise RunError(f"--scheduler {address}: {_gone(client)}") from None
+                    raise _gone(address, client) from None
                 continue
             if isinstance(answer, InputError):
                 raise answer
             if isinstance(answer, BaseException):
-                raise RunError(f"--scheduler {address}: {_gone(client)}") from answer
+                raise _gone(address, client) from answer
             ended(*answer)
             left -= 1
 
 
-def _gone(client: Any) -> str:
+def _gone(address: str, client: Any) -> StoppedError:
     what = "its workers are gone" if client.status == "running" else "the scheduler is gone"
-    return f"{what}; finished runs are kept: start again when the cluster is back"
+    return StoppedError(f"--scheduler {address}: {what}", "start again when the cluster is back")
 
 
 def _workers(client: Any) -> int:

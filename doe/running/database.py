@@ -11,7 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from rbdyn.faults import InputError, RunError
+from doe.running.failure import StoppedError
+from rbdyn.faults import InputError
 
 FORMAT, VERSION = "doe.store", "2"
 SCHEMA = (
@@ -120,10 +121,8 @@ class Database:
             yield
         except sqlite3.Error as error:
             if getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-                raise RunError(
-                    f"{self.path}: cannot be written ({error}); finished runs are kept: make room on the disk and start "
-                    "again"
-                ) from None
+                what, mend = f"{self.path}: cannot be written ({error})", "make room on the disk and start again"
+                raise StoppedError(what, mend) from None
             mend = MENDS.get(getattr(error, "sqlite_errorcode", 0) & 0xFF, "move it away")
             raise InputError([f"{self.path}: cannot be used as a store of runs ({error}); {mend}"]) from None
 

@@ -28,6 +28,13 @@ class Failure:
         return f"{self.label}: {self.cause}"
 
 
+class StoppedError(RunError):
+    """Runs that something from outside has stopped; arguments: what, and the mend after which they go on."""
+
+    def __str__(self) -> str:
+        return "{}; finished runs are kept: {}".format(*self.args)
+
+
 def grouped(failures: Iterable[Failure]) -> list[dict[str, Any]]:
     """Failures by cause, the most frequent first: ``{"cause", "runs", "labels"}``.
 

@@ -25,7 +25,7 @@ from doe.running.database import Database
 from doe.running.failure import Failure
 from doe.running.owner import BEAT_S, LEASE_S, Owner, this_process
 from rbdyn.faults import InputError, RunError
-from rbdyn.kept import digest_of
+from rbdyn.records.kept import digest_of
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from doe.arrays import Array
 from doe.running.failure import Failure
 from doe.study.goals import goals_of
+from doe.study.predicted import verdict
 from doe.study_file import Study
 from rbdyn.faults import RunError
 
@@ -62,9 +63,7 @@ class Gain:
     @property
     def verdict(self) -> str:
         """Whether the change is larger than its error."""
-        if abs(self.percent) <= self.error:
-            return "within error"
-        return "better" if self.percent > 0.0 else "worse"
+        return verdict(self.percent, self.error)
 
 
 def confirm(

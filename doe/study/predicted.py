@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,40 +13,39 @@ from doe.designs import to_coded
 from doe.study.drawn import jacobian, predict_all
 from doe.study.goals import goals_of
 from doe.study_file import Study
+from rbdyn.records.record import Record, derived, keyed, unsaid
 
 if TYPE_CHECKING:
     from doe.response_surface import Surface
 
 
-@dataclass(frozen=True)
-class PredictedGain:
+def verdict(percent: float, error: float | None) -> str:
+    """Whether a gain is more than its error."""
+    if error is None:
+        return "without error"
+    if abs(percent) <= error:
+        return "within error"
+    return "better" if percent > 0.0 else "worse"
+
+
+class PredictedGain(Record):
     """Improvement [%] of a mean response over the baseline, with two 95 % half widths [%].
 
     ``error`` is that of the difference of the two predictions: the errors that they share cancel (contrast c'Vc, and
     what the model misses at either point, with the degrees of freedom of `Surface.interval_dof`). ``scatter`` is by how much two single runs at one point differ (pure error of
-    the replicates). Either is None where the runs do not tell it.
+    the replicates), and ``within_scatter`` whether the gain is no more. Either is None where the runs do not tell it.
     """
 
-    response: str
-    baseline: float
-    value: float
+    response: str = unsaid()
+    baseline: float = unsaid()
+    value: float = unsaid()
     percent: float
-    error: float | None
-    scatter: float | None
-
-    @property
-    def verdict(self) -> str:
-        """Whether the gain is more than its error."""
-        if self.error is None:
-            return "without error"
-        if abs(self.percent) <= self.error:
-            return "within error"
-        return "better" if self.percent > 0.0 else "worse"
-
-    @property
-    def within_scatter(self) -> bool | None:
-        """Whether two single runs at one point may differ by as much."""
-        return None if self.scatter is None else abs(self.percent) <= self.scatter
+    error: float | None = keyed("error_percent")
+    verdict: str = derived(lambda self: verdict(self.percent, self.error))
+    scatter: float | None = keyed("single_run_scatter_percent")
+    within_scatter: bool | None = derived(
+        lambda self: None if self.scatter is None else abs(self.percent) <= self.scatter, "within_single_run_scatter"
+    )
 
     @property
     def sentence(self) -> str:

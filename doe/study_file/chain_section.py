@@ -12,21 +12,25 @@ from rbdyn.faults import InputError, Strict, read_toml
 
 
 class StudyChain(Strict):
-    """Dimension chain whose closing link is the picked value of ``factor``, within +- ``half_width_mm``.
-
-    Without ``half_width_mm`` the tolerance that the study finds for the factor is taken. ``link``, ``allocate``,
-    ``monte_carlo`` and ``selective`` are those of a CHAIN.toml (see `doe.dimension_chain.links`), or stand in ``file``,
-    which lies beside the study, under the chain's name.
-    """
+    """Dimension chain whose closing link is the picked value of a factor. Its links stand here or in a file."""
 
     name: Annotated[str, Field(min_length=1)]
+    """Name of the chain."""
     factor: str
+    """The factor whose picked value the chain must close."""
     half_width_mm: Annotated[float, Field(gt=0.0)] | None = None
+    """Half width of the closing link about the pick; the tolerance that the study derives for the factor where left
+    out."""
     file: str | None = None
+    """CHAIN.toml beside the study, which has the links under the chain's name."""
     link: list[dict[str, Any]] = []
+    """Links, as in a CHAIN.toml."""
     allocate: dict[str, Any] = {}
+    """How tolerances are shared, as in a CHAIN.toml."""
     monte_carlo: dict[str, Any] = {}
+    """Monte Carlo of the assemblies, as in a CHAIN.toml."""
     selective: dict[str, Any] | None = None
+    """Selective assembly, as in a CHAIN.toml."""
 
     @model_validator(mode="after")
     def _links_are_somewhere(self) -> StudyChain:

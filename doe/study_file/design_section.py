@@ -16,18 +16,20 @@ FINEST = 1e-9
 
 
 class Factor(Strict):
-    """A factor: its name in tables, its key in the scene, and its values at coded 0 and per coded unit.
-
-    The pick is rounded to a multiple of ``resolution``, the smallest step that a drawing makes. ``tolerance`` is the
-    half width of what manufacture makes of it.
-    """
+    """A factor: its name, its key in the scene, its values."""
 
     name: Name
+    """Name of the factor in tables and messages."""
     key: Annotated[str, Field(min_length=3)]
+    """Its key in the scene, such as cage.pocket_clearance_mm."""
     centre: Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+    """Value at coded 0."""
     step: Positive
+    """Change of the value per coded unit."""
     resolution: Positive | None = None
+    """Smallest step that a drawing makes, to which the pick is rounded; not rounded where left out."""
     tolerance: Positive | None = None
+    """Half width of what manufacture makes of it."""
 
     @model_validator(mode="after")
     def _levels_differ(self) -> Self:
@@ -55,23 +57,28 @@ KEYS_OF = {
 
 
 class Design(Strict):
-    """Which runs are made, and in which order.
-
-    ``centre_replicates``: 6 for central composite and Box-Behnken designs unless given, else none. ``blocks``:
-    orthogonal blocks, the cube in ``cube_blocks`` of them. ``levels`` of a full factorial, ``runs`` of a Latin
-    hypercube or Sobol sequence. A run's seed is ``seed`` plus its place in the standard order, whatever ``order``.
-    """
+    """Which runs are made, and in which order."""
 
     kind: Kind = "central_composite"
+    """Kind of design."""
     alpha: Alpha | Annotated[float, Field(gt=0.0, le=10.0)] = "rotatable"
+    """Distance of the star points of a central composite design in coded units, by a rule or as a number."""
     cube: Literal["full", "resolution_v"] = "full"
+    """Cube of a central composite design: all corners, or a fraction of resolution V."""
     centre_replicates: Annotated[int, Field(ge=0, le=100)] | None = None
+    """Runs at the centre: 6 for central composite and Box-Behnken designs where left out, else none."""
     blocks: bool = False
+    """Whether the runs are made in orthogonal blocks."""
     cube_blocks: Literal[1, 2, 4] = 1
+    """Blocks into which the cube is cut; needs blocks = true."""
     levels: Annotated[int, Field(ge=2, le=100)] = 3
+    """Levels a factor of a full factorial."""
     runs: Annotated[int, Field(ge=2, le=10000)] = 60
+    """Runs of a Latin hypercube or Sobol sequence."""
     order: Literal["standard", "random"] = "standard"
+    """Order of the runs. A run's seed is seed plus its place in the standard order, whatever this is."""
     seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the design and of its runs."""
 
     @property
     def centres(self) -> int:

@@ -11,19 +11,20 @@ from rbdyn.fields import or_refuse
 
 
 class Goal(Strict):
-    """What is wanted of a response.
-
-    ``goal``: small, large, near ``target``, or nothing ("none": watched, or held by its limits only). ``lower`` and
-    ``upper`` are limits that it must keep. ``weight`` is its weight in the desirability and weights picks. ``desired``
-    are the ends of its desirability: nil at one, full at the other (for a target nil at both).
-    """
+    """What is wanted of a response."""
 
     goal: Literal["min", "max", "target", "none"] = "min"
+    """What is wanted: small, large, near target, or nothing (watched, or held by its limits only)."""
     target: float | None = None
+    """Value to come near to, for goal = "target"."""
     lower: float | None = None
+    """Limit that the response must not fall below."""
     upper: float | None = None
+    """Limit that the response must not exceed."""
     weight: Annotated[float, Field(gt=0.0)] = 1.0
+    """Weight in the desirability and weights picks."""
     desired: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    """Ends of the desirability: nil at one, full at the other (for a target nil at both)."""
 
     @model_validator(mode="after")
     def _goal_is_whole(self) -> Self:
@@ -46,43 +47,51 @@ class Goal(Strict):
 
 
 class Front(Strict):
-    """NSGA-II on the surfaces, within the region of the design.
-
-    ``pick``: the rule that makes the pick, among the points that dominate the baseline. ``draws``: surfaces drawn for
-    its uncertainty. ``tolerance_aware``: a second front of what the tolerances of the factors leave of a point, its
-    worst case or its ``quantile`` over ``tolerance_samples`` parts of the ``distribution``.
-    """
+    """NSGA-II on the surfaces, within the region of the design."""
 
     population: Annotated[int, Field(ge=8, le=10000)] = 100
+    """Points of a generation."""
     generations: Annotated[int, Field(ge=1, le=100000)] = 200
+    """Generations of the search."""
     seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the search."""
     pick: Literal["knee", "desirability", "weights"] = "knee"
+    """Rule that makes the pick among the points of the front that dominate the baseline."""
     draws: Annotated[int, Field(ge=100, le=100000)] = 1000
+    """Surfaces drawn for the front's uncertainty."""
     tolerance_aware: Literal["none", "worst_case", "quantile"] = "none"
+    """A second front, of what the factors' tolerances leave of a point: its worst case or its quantile."""
     quantile: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
+    """Quantile of a tolerance-aware front."""
     distribution: Literal["normal", "uniform"] = "normal"
+    """How parts scatter within the tolerances."""
     tolerance_samples: Literal[64, 128, 256, 512, 1024, 2048, 4096] = 256
+    """Parts drawn for a quantile."""
 
 
 class Direct(Strict):
-    """NSGA-II on the simulator itself.
-
-    ``replicates`` of each evaluation, each of ``turns`` shaft turns of which the first ``discard_turns`` are left out as
-    transient; without them a run is as long as a design run. What is counted must hold a whole window of the impact.
-    ``confidence`` at which differences count in the search;
-    ``resample``: share of the evaluations for fresh runs of the points found; ``set`` replaces keys of the scene.
-    """
+    """NSGA-II on the simulator itself."""
 
     evaluations: Annotated[int, Field(ge=50, le=10_000_000)] = 2000
+    """Runs of the simulator that the search may make."""
     population: Annotated[int, Field(ge=8, le=10000)] = 50
-    # Fewer than a design run has: the search makes up for it by the number of its runs.
+    """Points of a generation."""
     replicates: Annotated[int, Field(ge=2, le=10000)] = 3
+    """Replicates of each evaluation; fewer than a design run has: the search makes up for it by the number of its runs.
+    """
     turns: Annotated[float, Field(gt=0.0)] | None = None
+    """Shaft turns of an evaluation, the discarded ones included; as long as a design run where left out. What is
+    counted must hold a whole window of the impact."""
     discard_turns: Annotated[float, Field(ge=0.0)] | None = None
+    """Of those turns, the first ones that are left out as transient."""
     seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the search and its runs."""
     confidence: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
+    """Confidence at which differences count in the search."""
     resample: Annotated[float, Field(ge=0.1, le=0.9)] = 0.3
+    """Share of the evaluations for fresh runs of the points of the front."""
     set: list[str] = []
+    """Keys of the scene that are replaced, as "key=value"."""
 
     @model_validator(mode="after")
     def _something_is_counted(self) -> Direct:
@@ -94,17 +103,20 @@ class Direct(Strict):
 
 
 class Tolerances(Strict):
-    """Widest tolerances of the factors about the pick: ``probability`` that a part keeps the share ``keep`` of every
-    predicted gain, and all limits.
-
-    ``aim``: "ratios" keeps the ratios of the factors' own tolerances (of their steps, where one has none); "product"
-    and "sum" maximise that of the half widths. ``surface_uncertainty``: count the errors of the surfaces too.
-    """
+    """Widest tolerances of the factors about the pick."""
 
     probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+    """Probability that a part keeps its share of every predicted gain, and all limits."""
     keep: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    """Share of each predicted gain that must be kept."""
     aim: Literal["ratios", "product", "sum"] = "ratios"
+    """"ratios" keeps the ratios of the factors' own tolerances (of their steps, where one has none); "product" and
+    "sum" maximise that of the half widths."""
     distribution: Literal["normal", "uniform"] = "normal"
+    """How parts scatter within the tolerances."""
     surface_uncertainty: bool = False
+    """Whether the errors of the surfaces count too."""
     samples: Annotated[int, Field(ge=100, le=1_000_000)] = 4096
+    """Parts drawn."""
     seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the parts."""

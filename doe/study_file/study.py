@@ -23,64 +23,80 @@ class SceneFile(Strict):
     """Scene that every run starts from; ``set`` replaces keys of it for the design runs."""
 
     file: str
+    """The scene file, beside the study."""
     set: list[str] = []
+    """Keys of the scene that are replaced for the design runs, as "key=value"."""
 
 
 class Fitted(Strict):
-    """How a surface is fitted to a response.
-
-    ``weighting``: "replicates" weighs each run by the inverse of its variance, known from the replicates of
-    the simulation. ``transform``: of Box and Cox, the recommended one or with the exponent given.
-    """
+    """How a surface is fitted to a response."""
 
     model: Literal["linear", "interaction", "quadratic", "reduced"] = "quadratic"
+    """Terms of the surface; "reduced" keeps those of the quadratic that are significant, with their hierarchy."""
     weighting: Literal["equal", "replicates"] = "equal"
+    """"replicates" weighs each run by the inverse of its variance, known from the replicates of the simulation."""
     transform: Literal["none", "box_cox"] | Annotated[float, Field(ge=-5.0, le=5.0)] = "none"
+    """Transform of Box and Cox before the fit: none, the recommended one, or with the exponent given."""
 
 
 class Response(Fitted, Goal):
     """A response of the simulation, the surface fitted to it and what is wanted of it."""
 
     name: Name
+    """Name of the response: a figure of the simulation, or a column of the table."""
 
 
 class Confirmation(Strict):
-    """Simulation at the baseline and at the pick; ``set`` replaces keys of the scene.
-
-    ``limit_probability``: with which the simulated pick must keep each limit. Where it does not, the next best point of
-    the front is simulated, ``tries`` points at most.
-    """
+    """Simulation at the baseline and at the pick."""
 
     replicates: Annotated[int, Field(ge=2, le=10000)] = 16
-    # One chance in twenty of a broken limit, as the 95 % intervals leave everywhere else.
+    """Replicates of each confirmed point."""
     limit_probability: Annotated[float, Field(ge=0.5, le=0.9999)] = 0.95
-    # The second already knows what the surfaces missed at the first; each takes a simulation and a search.
+    """Probability with which the simulated pick must keep each limit: one chance in twenty of a broken one, as the 95 %
+    intervals leave everywhere else."""
     tries: Annotated[int, Field(ge=1, le=20)] = 4
+    """Points of the front that are simulated at most until one keeps its limits: the second already knows what the
+    surfaces missed at the first; each takes a simulation and a search."""
     set: list[str] = []
+    """Keys of the scene that are replaced, as "key=value"."""
 
 
 class Reference(Strict):
-    """A published table of the same design to stand beside; ``why`` says what to expect, by response."""
+    """A published table of the same design to stand beside."""
 
     file: str
+    """The published table, beside the study."""
     label: str
+    """Name of the source."""
     why: dict[str, str] = {}
+    """What to expect of each response, by its name."""
 
 
 class StudyFile(Strict):
     """The whole file."""
 
     scene: SceneFile
+    """The scene that every run starts from."""
     factor: Annotated[list[Factor], Field(min_length=2, max_length=8)]
+    """The factors."""
     response: Annotated[list[Response], Field(min_length=1)]
+    """The responses."""
     design: Design = Design()
+    """Which runs are made."""
     front: Front = Front()
+    """The search on the surfaces."""
     direct: Direct = Direct()
+    """The search on the simulator, with --direct."""
     tolerances: Tolerances | None = None
+    """The widest tolerances of the factors about the pick; none where left out."""
     confirmation: Confirmation = Confirmation()
+    """The simulation at the baseline and at the pick."""
     baseline: dict[str, float] = {}
+    """Values of the original design by factor; the centre where left out."""
     chain: list[StudyChain] = []
+    """Dimension chains that the pick's clearances close."""
     reference: Reference | None = None
+    """A published table of the same design to stand beside."""
 
     @model_validator(mode="after")
     def _names_agree(self) -> Self:

@@ -1,7 +1,7 @@
 """The command ``rbdyn``. Physics is imported inside the commands, so that help comes at once.
 
 - ``app``: simulate, map, accuracy, show; ``ball``: the command of ball bearings, its output (``ball_output``), studies
-  (``ball_studies``) and sweeps (``ball_sweep``)
+  (``ball_studies``) and sweeps (``ball_sweep``); ``keys``: what every key of an input file means
 - ``new``: a scene of a catalogue bearing, from ``new_scene`` and a ``template``
 - ``options``, ``ranges``: arguments that several commands share, lists of numbers as they are typed
 - ``terminal``: exit codes, messages, output folders, progress, for ``doe`` too; ``streams``, ``loading``: streams that

@@ -1,4 +1,4 @@
-"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball`` and ``new`` stand beside."""
+"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball``, ``new`` and ``keys`` stand beside."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rbdyn.cli.ball import ball
+from rbdyn.cli.keys import command as keys
 from rbdyn.cli.new import new
 from rbdyn.cli.options import (
     Json,
@@ -20,30 +21,33 @@ from rbdyn.cli.options import (
     Set,
     Turns,
     Verbose,
+    Version,
     Workers,
     count_option,
+    flag,
     folder_option,
     study_flag,
     verbose_flag,
 )
-from rbdyn.cli.terminal import FAILED, guarded, hand_over, keeping, output_folder, print_json, print_table, progress_bar
+from rbdyn.cli.terminal import FAILED, guarded, hand_over, keeping, output_folder, print_table, progress_bar
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
     from rbdyn.result import SimulationResult
     from rbdyn.scene import Scene
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 
 # Length of the history that --out draws.
 TRACE_TURNS = 10.0
 
 app.command()(ball)
+app.command("keys")(keys)
 app.command()(new)
 
 
 @app.callback()
-def main() -> None:
+def main(version: Version = False) -> None:
     """Dynamics of rolling bearings: forces, whirl and power loss with their errors."""
 
 
@@ -291,8 +295,8 @@ def show(
     out: Annotated[Path | None, folder_option("Write here; by default in 'show' beside the result.")] = None,
     turns: Annotated[float | None, typer.Option(help="Counted shaft turns to show; at most 20 unless given.")] = None,
     replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
-    animate: Annotated[bool, typer.Option("--animate", help="Also a moving picture and a player.")] = False,
-    lyapunov: Annotated[bool, typer.Option("--lyapunov", help="Also the largest Lyapunov exponent.")] = False,
+    animate: Annotated[bool, flag("--animate", says="Also a moving picture and a player.")] = False,
+    lyapunov: Annotated[bool, flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, verbose_flag("Also peaks of the spectra.")] = False,
@@ -305,7 +309,4 @@ def show(
         folder = output_folder(out or asked.path.parent / "show", "rbdyn show", asked.path)
         with progress_bar("showing", quiet or as_json) as progress:
             record = motion.write(asked, folder, animate, lyapunov, progress)
-        if as_json:
-            print_json(record)
-        else:
-            motion.print_record(record, folder, quiet, verbose)
+        hand_over(lambda: record, as_json, lambda: motion.print_record(record, quiet, verbose), folder, record["files"])

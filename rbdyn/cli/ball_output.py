@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.cli.terminal import print_table
-from rbdyn.quasistatic.result import BallResult
+from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
 from rbdyn.scene import BallScene
 
 if TYPE_CHECKING:
@@ -17,28 +17,26 @@ if TYPE_CHECKING:
 
 def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
     """Print a result as tables; the reason on standard error where there is none."""
-    record = result.record
     if not result.found:
         print(f"no equilibrium: {result.status}", file=sys.stderr)
         return
-    for name in ("inner", "outer") if "inner" in record else ("",):
-        _print_row(f"{name} row" if name else "", record[name] if name else record, verbose)
-    if "middle_ring" in record:
-        _print_middle_ring(record)
-    held = record["reaction"]["moment_Nm"]
+    for name, row in result.row_reports.items():
+        _print_row(f"{name} row" if name else "", row, verbose)
+    report = result.reached
+    if isinstance(report, DoubleDeckerReport):
+        _print_middle_ring(report)
+    held = report.reaction["moment_Nm"] if report.reaction else {}
     if any(held.values()):
         print("moment on the inner ring: " + ", ".join(f"about {axis} {held[axis]:.4g} N m" for axis in "xy"))
-    if "fits" in record:
-        _print_fits(record["fits"])
-    if "runout" in record:
-        told = record["runout"]
+    if result.fits is not None:
+        _print_fits(result.fits)
+    if (runout := result.runout) is not None:
         print(
-            f"runout over {told['turns']} turns: radial {told['indicator_um']:.3g} um by an indicator, {told['minimum_zone_um']:.3g} um "
-            f"between circles, axial {told['axial_um']:.3g} um, face {told['face_um']:.3g} um; asynchronous {told['asynchronous_radial_um']:.3g} um"
+            f"runout over {runout['turns']} turns: radial {runout['indicator_um']:.3g} um by an indicator, {runout['minimum_zone_um']:.3g} um "
+            f"between circles, axial {runout['axial_um']:.3g} um, face {runout['face_um']:.3g} um; asynchronous {runout['asynchronous_radial_um']:.3g} um"
         )
-    if not quiet:
-        for note in record.get("notes", ()):
-            print(f"note: {note}")
+    for note in () if quiet else result.notes or ():
+        print(f"note: {note}")
 
 
 def with_runout(scene: BallScene, result: BallResult) -> tuple[BallResult, pd.DataFrame | None]:
@@ -48,7 +46,7 @@ def with_runout(scene: BallScene, result: BallResult) -> tuple[BallResult, pd.Da
     from rbdyn.cli.ball_studies import runout_record
 
     record, followed = runout_record(scene)
-    return replace(result, record={**result.record, "runout": record}), followed.table()
+    return replace(result, runout=record), followed.table()
 
 
 def write(result: BallResult, folder: Path, path: pd.DataFrame | None = None) -> list[str]:
@@ -66,11 +64,11 @@ def write(result: BallResult, folder: Path, path: pd.DataFrame | None = None) ->
     return files
 
 
-def _print_row(title: str, record: dict[str, Any], verbose: bool) -> None:
-    place, tilt, stiffness = record["displacement_mm"], record["tilt_mrad"], record["stiffness"]
+def _print_row(title: str, row: RowReport, verbose: bool) -> None:
+    place, tilt, stiffness = row.displacement_mm, row.tilt_mrad, row.stiffness
     header = ("azimuth [deg]", "inner angle [deg]", "outer angle", "inner load [N]", "outer load", "centrifugal [N]")
     keys = ("azimuth_deg", "inner_angle_deg", "outer_angle_deg", "inner_load_N", "outer_load_N", "centrifugal_force_N")
-    rows = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in record["balls"]]
+    rows = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in row.balls]
     print_table(title, header, rows)
     print(
         "ring: "
@@ -78,17 +76,17 @@ def _print_row(title: str, record: dict[str, Any], verbose: bool) -> None:
         + ", "
         + ", ".join(f"tilt {axis} {tilt[axis]:.4g} mrad" for axis in "xy")
     )
-    for race, contact in record["contacts"].items():
+    for race, contact in row.contacts.items():
         film = (
             f", film {contact['central_film_um']:.3g} um, lambda {contact['lambda_ratio']:.2g}"
             if "central_film_um" in contact
             else ""
         )
         print(
-            f"{race} race: up to {contact['load_N']:.4g} N, {record['max_stress_MPa'][race]:.0f} MPa over "
+            f"{race} race: up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa over "
             f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} um{film}"
         )
-    life = record["life"]
+    life = row.life
     if life["L10_Mrev"] is not None:
         hours = f", {life['L10_h']:.4g} h" if life["L10_h"] is not None else ""
         print(f"life L10r: {life['L10_Mrev']:.4g} million turns{hours} ({life['method']})")
@@ -98,16 +96,16 @@ def _print_row(title: str, record: dict[str, Any], verbose: bool) -> None:
             "stiffness [N/m, N, N m]",
             ("", "x", "y", "z", "tilt x", "tilt y"),
             [
-                (name, *(f"{value:.4g}" for value in row))
-                for name, row in zip(("x", "y", "z", "tilt x", "tilt y"), stiffness["matrix_SI"], strict=True)
+                (name, *(f"{value:.4g}" for value in values))
+                for name, values in zip(("x", "y", "z", "tilt x", "tilt y"), stiffness["matrix_SI"], strict=True)
             ],
         )
-        searches = f"{record['searches']} searches, " if "searches" in record else ""
-        print(f"{searches}{record['iterations']} Newton steps, {record['residual_N']:.2g} N left over")
+        searches = "" if row.searches is None else f"{row.searches} searches, "
+        print(f"{searches}{row.iterations} Newton steps, {row.residual_N:.2g} N left over")
 
 
-def _print_middle_ring(record: dict[str, Any]) -> None:
-    middle, place, stiffness = record["middle_ring"], record["displacement_mm"], record["stiffness"]
+def _print_middle_ring(report: DoubleDeckerReport) -> None:
+    middle, place, stiffness = report.middle_ring, report.displacement_mm, report.stiffness
     share = "" if middle["speed_share"] is None else f", {100.0 * middle['speed_share']:.4g} % of the speed"
     print(f"middle ring: {middle['speed_rpm']:.5g} rpm{share} ({middle['speed_status']})")
     print(

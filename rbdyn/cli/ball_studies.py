@@ -73,10 +73,10 @@ def _table(scene: BallScene, key: str, values: Sequence[float], found: Sweep) ->
     """Figures, balls and notes of the points scanned."""
     points, places = found.points, np.arange(len(values))
     solutions, ratings = [point.solution for point in points], [point.rating for point in points]
-    balls, displacement, reaction, stiffness = (
-        np.array([getattr(solution, name) for solution in solutions])
-        for name in ("told", "displacement", "reaction", "stiffness")
-    )
+    balls = np.array([solution.figures for solution in solutions])
+    displacement = np.array([solution.displacement for solution in solutions])
+    reaction = np.array([solution.reaction for solution in solutions])
+    stiffness = np.array([solution.stiffness for solution in solutions])
     statuses = tuple(solution.status for solution in solutions)
     columns = ring_columns(displacement, reaction, stiffness) | row_columns(balls, ratings)
     for column in columns.values():

@@ -8,6 +8,11 @@ from typing import Annotated, Any
 import typer
 
 
+def flag(*names: str, says: str, **more: Any) -> Any:
+    """An option without a value; help shows no type for it."""
+    return typer.Option(*names, metavar="", help=says, **more)
+
+
 def folder_option(says: str) -> Any:
     """``--out`` of a command that writes other files than ``Out`` says."""
     return typer.Option(metavar="DIR", help=says)
@@ -15,12 +20,12 @@ def folder_option(says: str) -> Any:
 
 def verbose_flag(says: str) -> Any:
     """``--verbose`` of a command that tells other things than ``Verbose`` says."""
-    return typer.Option("--verbose", "-v", help=says)
+    return flag("--verbose", "-v", says=says)
 
 
 def study_flag(name: str, studies: str) -> Any:
     """A flag that asks for another study than the usual one."""
-    return typer.Option(name, help=f"{studies}, instead.")
+    return flag(name, says=f"{studies}, instead.")
 
 
 def count_option(least: int, says: str) -> Any:
@@ -28,6 +33,15 @@ def count_option(least: int, says: str) -> Any:
     return typer.Option(min=least, max=100_000, metavar="N", help=says)
 
 
+def _tell_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(f"rbdyn {version('rbdyn')}")
+        raise typer.Exit()
+
+
+Version = Annotated[bool, flag("--version", says="Print the version.", callback=_tell_version, is_eager=True)]
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to simulate.")]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replace a key; repeatable.")]
 Turns = Annotated[float | None, typer.Option(help="Counted shaft turns [numerics.turns].")]
@@ -35,6 +49,6 @@ Replicates = Annotated[int | None, typer.Option(help="Seeded replicates [numeric
 Seed = Annotated[int | None, typer.Option(help="Seed [numerics.seed].")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all processors by default.")]
 Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no notes.")]
+Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
+Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
 Verbose = Annotated[bool, verbose_flag("Also print power terms and cost.")]

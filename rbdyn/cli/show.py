@@ -210,7 +210,7 @@ def _peaks(spectrum: Spectrum, unit: float) -> list[dict[str, float]]:
     return [{"frequency_Hz": f, "amplitude": unit * amplitude} for f, amplitude in spectrum.peaks(PEAKS)]
 
 
-def print_record(record: dict[str, Any], folder: Path, quiet: bool, verbose: bool) -> None:
+def print_record(record: dict[str, Any], quiet: bool, verbose: bool) -> None:
     """The figures a person looks for first; verbosely, the peaks of the spectra too."""
     quantiles, away = record["whirl_ratio_quantiles"], record["eccentricity_um"]
     of = "" if away["guide_clearance"] is None else f" of {away['guide_clearance']:.4g}"
@@ -250,4 +250,3 @@ def print_record(record: dict[str, Any], folder: Path, quiet: bool, verbose: boo
     if not quiet:
         for note in record["notes"]:
             print(f"note: {note}")
-    print(f"written to {folder}: {', '.join(record['files'])}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import json
 import os
 import sys
@@ -17,6 +16,7 @@ import typer
 from rbdyn.cli.loading import INTERRUPTED
 from rbdyn.cli.streams import FAILED
 from rbdyn.faults import InputError, RunError
+from rbdyn.records.kept import digest_of
 from rbdyn.result import write_json
 
 BAD_INPUT = 2
@@ -62,8 +62,8 @@ def hand_over(
     record: Callable[[], dict[str, Any]],
     as_json: bool,
     show: Callable[[], None],
-    folder: Path | None,
-    files: Sequence[str],
+    folder: Path | None = None,
+    files: Sequence[str] = (),
 ) -> None:
     """The ``record`` as JSON; else what ``show`` prints, and the names of the files written, where there is a folder."""
     if as_json:
@@ -95,7 +95,7 @@ def output_folder(path: Path, command: str, source: Path) -> Path:
     mark, source = path / MARK, source.resolve()
     try:
         path.mkdir(parents=True, exist_ok=True)
-        digest = hashlib.sha256(source.read_bytes()).hexdigest()
+        digest = digest_of(source.read_bytes())
         # From the folder on, so that both can be moved, or mounted elsewhere, together.
         own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
         found = json.loads(mark.read_text(encoding="utf-8")) if mark.exists() and len(os.listdir(path)) > 1 else own

@@ -9,8 +9,9 @@ from __future__ import annotations
 import functools
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 SITE = Path(__file__).parents[2]
 # What draws or prints changes no figure.
@@ -28,30 +29,31 @@ _KERNELS = re.compile(
 @functools.cache
 def source_digest(*roots: str) -> str:
     """SHA-256 of the code that modules such as ``rbdyn.dynamics.simulate`` run, as it lies on disk at the first call."""
-    digest = hashlib.sha256()
-    for module, code in sorted(code_behind(roots).items()):
-        digest.update(f"{module}\n{code}\n".encode())
-    return digest.hexdigest()
+    return _digest(code_behind(roots))
 
 
 @functools.cache
 def compiled_digest() -> str:
     """SHA-256 of the code from which machine code is made: every module of kernels and what it imports."""
-    parts = [path for path in (SITE / "rbdyn").rglob("*.py") if _KERNELS.search(path.read_text(encoding="utf-8"))]
-    return source_digest(*sorted(".".join(path.relative_to(SITE).with_suffix("").parts) for path in parts))
+    texts = {path: path.read_text(encoding="utf-8") for path in (SITE / "rbdyn").rglob("*.py")}
+    parts = [path.relative_to(SITE).with_suffix("").parts for path, text in texts.items() if _KERNELS.search(text)]
+    return _digest(code_behind([".".join(names) for names in parts], texts))
 
 
-def code_behind(roots: Sequence[str]) -> dict[str, str]:
-    """Modules that the roots need, with what of their text runs; of these packages only."""
+def code_behind(roots: Sequence[str], texts: Mapping[Path, str] = MappingProxyType({})) -> dict[str, str]:
+    """Modules that the roots need, with what of their text runs; of these packages only. ``texts``: files read already."""
     own = {"rbdyn", *(root.partition(".")[0] for root in roots)}
     code: dict[str, str] = {}
-    waiting = list(roots)
+    waiting, seen = list(roots), set[str]()
     while waiting:
         module = waiting.pop()
-        path = _path(module)
-        if module in code or path is None or module.startswith(SILENT):
+        if module in seen or module.startswith(SILENT):
             continue
-        code[module] = what_runs(path.read_text(encoding="utf-8"))
+        seen.add(module)
+        path = _path(module)
+        if path is None:
+            continue
+        code[module] = what_runs(texts[path] if path in texts else path.read_text(encoding="utf-8"))
         for package, names in _IMPORT.findall(code[module]):
             if package.partition(".")[0] in own:
                 waiting += [package, *(f"{package}.{name}" for name in re.findall(r"\w+", names))]
@@ -66,6 +68,13 @@ def what_runs(text: str) -> str:
 
     bare = _PROSE.sub(kept, text)
     return "\n".join(line for line in _TYPING.sub("", bare).splitlines() if line.strip())
+
+
+def _digest(code: Mapping[str, str]) -> str:
+    digest = hashlib.sha256()
+    for module, text in sorted(code.items()):
+        digest.update(f"{module}\n{text}\n".encode())
+    return digest.hexdigest()
 
 
 def _path(module: str) -> Path | None:

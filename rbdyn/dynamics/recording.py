@@ -46,11 +46,14 @@ class Batches:
         """Length of an impact window [shaft turns]."""
         return self.length * self.per_window
 
+    def count(self, counted: float) -> int:
+        """Batches of a run of so many turns after the warm-up [shaft turns]."""
+        return self.first + math.ceil(counted / self.length - 1e-9)
+
     def ends(self, counted: float) -> NDArray[np.float64]:
         """Ends of all batches [shaft turns] of a run of so many turns after the warm-up; the last may be shorter."""
         begin = float(self.warm_up[-1]) if self.first else 0.0
-        count = math.ceil(counted / self.length - 1e-9)
-        after = np.minimum(np.arange(1, count + 1) * self.length, counted)
+        after = np.minimum(np.arange(1, self.count(counted) - self.first + 1) * self.length, counted)
         return np.concatenate((self.warm_up, begin + after))
 
 

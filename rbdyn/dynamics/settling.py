@@ -130,7 +130,7 @@ def whole_windows(scene: Scene) -> float:
 
 
 def next_stage(scene: Scene, runs: Sequence[Replicate], stage: Stage) -> Stage | None:
-    """How to go on from counted ``runs``: None where nothing drifts, or where that would pass the scene's limit.
+    """How to go on from counted ``runs``: None where nothing drifts, or where that would pass the scene's limit or memory.
 
     Where ``discard_turns = "auto"`` left fewer turns than asked for, they are made up first.
     """
@@ -140,15 +140,26 @@ def next_stage(scene: Scene, runs: Sequence[Replicate], stage: Stage) -> Stage |
     missing = numerics.turns - runs[0].duration / scene.turn_s
     if missing > 1e-6 * numerics.turns:
         longer = stage._replace(turns=stage.turns + math.ceil(missing / window - 1e-9) * window)
-        return longer if warm_up + longer.turns <= longest else None
+        return longer if warm_up + longer.turns <= longest and fits(scene, longer.turns) else None
     if not drifting(runs):
         return None
     for growth in GROWTH if stage.looks == 0 else GROWTH[-1:]:
-        turns = math.ceil((growth * (warm_up + stage.turns) - warm_up) / window - 1e-9) * window
-        if warm_up + turns <= longest:
+        turns = grown(scene, stage, growth)
+        if warm_up + turns <= longest and fits(scene, turns):
             counted = math.ceil(0.5 * (warm_up + turns) / window) * batches.per_window
-            return Stage(len(batches.ends(turns)) - counted, turns, stage.looks + 1)
+            return Stage(batches.count(turns) - counted, turns, stage.looks + 1)
     return None
+
+
+def grown(scene: Scene, stage: Stage, growth: float) -> float:
+    """Turns after the warm-up, in whole windows, of a run so many times as long."""
+    warm_up, window = scene.numerics.warm_up_turns, scene.impact_window_turns
+    return math.ceil((growth * (warm_up + stage.turns) - warm_up) / window - 1e-9) * window
+
+
+def fits(scene: Scene, turns: float) -> bool:
+    """Whether all replicates and companions have memory for so many turns after the warm-up."""
+    return batches_of(scene).count(turns) <= scene.numerics.most_batches
 
 
 def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, extends: bool) -> tuple[str, ...]:
@@ -165,6 +176,8 @@ def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, extends:
         )
     if scene.operation.schedule is None and drifting(runs):
         mend = "raise numerics.extend_limit" if extends else "lengthen numerics.turns or set numerics.extend = true"
+        if not fits(scene, grown(scene, stage, GROWTH[-1])):
+            mend = "take fewer replicates: there is no memory for longer ones"
         notes.append(
             f"transient: figures still drift over the {counted:.4g} turns counted; their errors hold what the drift shows, "
             f"yet it may go farther; {mend}"

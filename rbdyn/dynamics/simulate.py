@@ -99,6 +99,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         impact_window_turns=scene.impact_window_turns,
         transient_turns=ensemble.transient_turns,
         counted_turns=runs[0].duration / scene.turn_s,
+        target=None,
         cost={
             "wall_s": wall_s,
             "compile_s": compile_s,

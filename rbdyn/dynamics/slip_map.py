@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +24,8 @@ from rbdyn.dynamics.statistics.bias import companion_tolerance
 from rbdyn.dynamics.statistics.error_bars import quantities, settled
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError
-from rbdyn.kept import Kept, code_version, run_key
+from rbdyn.records.kept import Kept, code_version, run_key
+from rbdyn.records.record import Record, derived, keyed, spread
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene
 
@@ -38,61 +38,34 @@ FIGURES = ("cage_slip", "power_loss_W", "impact_force_N", "whirl_deviation_ratio
 POINTS = "map_points.jsonl"
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(Record):
     """One speed and load; ``figures`` is empty where ``status`` tells why the run could not go on."""
 
     inner_speed_rpm: float
     radial_load_N: float  # noqa: N815
     status: str
-    figures: dict[str, Quantity]
-    power_gap: float | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        return {
-            "inner_speed_rpm": self.inner_speed_rpm,
-            "radial_load_N": self.radial_load_N,
-            "status": self.status,
-            **{name: figure.as_dict() for name, figure in self.figures.items()},
-            "power_balance": {"relative_gap": self.power_gap},
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Point:
-        """Inverse of ``as_dict``. Raises KeyError for anything else."""
-        figures = {name: Quantity.from_dict(data[name]) for name in FIGURES if name in data}
-        place = (data["inner_speed_rpm"], data["radial_load_N"])
-        return cls(*place, data["status"], figures, data["power_balance"]["relative_gap"])
+    figures: dict[str, Quantity] = spread()
+    power_gap: float | None = keyed("power_balance", "relative_gap")
 
 
-@dataclass(frozen=True)
-class SlipMap:
+class SlipMap(Record):
     """Points in rows of rising load, speeds rising within; ``wall_s`` is what they took."""
 
+    format: str = derived(lambda self: FORMAT)
+    status: str = derived(
+        lambda self: f"{len(self.failed)} of {len(self.points)} points failed" if self.failed else "ok"
+    )
     speeds_rpm: tuple[float, ...]
     loads_N: tuple[float, ...]  # noqa: N815
     points: tuple[Point, ...]
-    wall_s: float
+    wall_s: float = keyed("cost", "wall_s")
     seed: int
+    versions: dict[str, str] = derived(lambda self: versions())
 
     @property
     def failed(self) -> list[Point]:
         """Points without figures."""
         return [point for point in self.points if not point.figures]
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON of ``rbdyn map``."""
-        return {
-            "format": FORMAT,
-            "status": "ok" if not self.failed else f"{len(self.failed)} of {len(self.points)} points failed",
-            "speeds_rpm": list(self.speeds_rpm),
-            "loads_N": list(self.loads_N),
-            "points": [point.as_dict() for point in self.points],
-            "cost": {"wall_s": self.wall_s},
-            "seed": self.seed,
-            "versions": versions(),
-        }
 
     def table(self) -> pd.DataFrame:
         """A row a point; figures with their 95 % errors."""

@@ -32,18 +32,11 @@ def pictures(result: BallResult, folder: Path) -> list[str]:
     """Draw loads.png, angles.png and section.png of an equilibrium; returns the names, none where nothing was found."""
     if not result.found:
         return []
-    rows = rows_of(result.record)
+    rows = {f"{name} row" if name else "": row.balls for name, row in result.row_reports.items()}
     loads(rows, folder / "loads.png")
     angles(rows, folder / "angles.png")
-    section(result.record, folder / "section.png")
+    section(rows, result.scene["bearing"], folder / "section.png")
     return ["loads.png", "angles.png", "section.png"]
-
-
-def rows_of(record: Mapping[str, Any]) -> dict[str, Balls]:
-    """The balls of each row of a result, by a title for it."""
-    if "balls" in record:
-        return {"": record["balls"]}
-    return {f"{name} row": record[name]["balls"] for name in ("inner", "outer")}
 
 
 def column(balls: Balls, name: str) -> Vector:
@@ -114,10 +107,8 @@ def angles_on(
     plain(axis)
 
 
-def section(record: Mapping[str, Any], path: Path) -> None:
+def section(rows: Mapping[str, Balls], bearing: Mapping[str, Any], path: Path) -> None:
     """Axial section of each row at its most loaded ball, to scale: grooves, contact lines, angles and loads."""
-    bearing = record["scene"]["bearing"]
-    rows = rows_of(record)
     drawings = [bearing] if len(rows) == 1 else [bearing["inner"], bearing["outer"]]
     figure, axes = plt.subplots(1, len(rows), figsize=(5.6 * len(rows), 5.9), squeeze=False)
     for axis, (title, balls), drawing in zip(axes[0], rows.items(), drawings, strict=True):

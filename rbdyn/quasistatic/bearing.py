@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,18 @@ from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of, load_record, middle_record
 from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.remarks import Rating, overloads, remarks, sentences, tipping
-from rbdyn.quasistatic.result import FORMAT, BallResult, ball_records, displacement_record, stiffness_record
+from rbdyn.quasistatic.result import (
+    BallResult,
+    DoubleDeckerReport,
+    RowReport,
+    ball_records,
+    displacement_record,
+    stiffness_record,
+)
 from rbdyn.quasistatic.roots import other_roots
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.quasistatic.row.model import RPM, RowModel, given_of, load_of, row_of
-from rbdyn.quasistatic.row_report import film_record, row_record
+from rbdyn.quasistatic.row_report import film_record, row_report
 from rbdyn.quasistatic.solvers import SOLVERS
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
@@ -41,14 +49,14 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
     began = time.perf_counter()
     solution = SOLVERS[scene.model.solver](model.row, model.control, load_of(scene), given_of(scene), warm)
     took = time.perf_counter() - began
-    head, tail = _frame(scene, solution.status, took)
+    nothing = _nothing(scene, solution.status, took)
     if not solution.found:
-        return BallResult({**head, **tail})
-    rating, table = row_rating(scene, model), solution.told[np.newaxis]
+        return nothing
+    rating, table = row_rating(scene, model), solution.figures[np.newaxis]
     if why := overloads(table, [rating]):
-        return BallResult({**head, "status": why[0], **tail})
-    record = row_record(rating, solution, film_record(scene, rating, solution, ("inner_ring", "outer_ring")))
-    record["reaction"] = load_record(solution.reaction)
+        return replace(nothing, status=why[0])
+    film = film_record(scene, rating, solution, ("inner_ring", "outer_ring"))
+    report = row_report(rating, solution, film, load_record(solution.reaction))
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
     notes = [
         *_oil_notes(scene),
@@ -60,8 +68,8 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
             f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load under this raceway control, see "
             "other_roots; this one is reached from one common cage speed"
         )
-    roots = {"other_roots": others} if others is not None else {}
-    return BallResult({**head, **record, **grown, **roots, "notes": notes, **tail}, (solution,), (rating,))
+    found = {"report": report, **grown, "other_roots": others, "notes": notes}
+    return replace(nothing, **found, rows=(solution,), ratings=(rating,))
 
 
 def _oil_notes(scene: BallScene) -> list[str]:
@@ -80,7 +88,7 @@ def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> 
     if scene.model.raceway_control not in SEVERAL_ROOTS or scene.model.solver != "convex":
         return None
     found = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
-    return [{**displacement_record(root.displacement), "balls": ball_records(root.told)} for root in found]
+    return [{**displacement_record(root.displacement), "balls": ball_records(root.figures)} for root in found]
 
 
 def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallResult:
@@ -89,9 +97,9 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
     began = time.perf_counter()
     solution = solve_double_decker(model.stack, load_of(scene), given_of(scene), model.middle_given, warm)
     took = time.perf_counter() - began
-    head, tail = _frame(scene, solution.status, took)
+    nothing = _nothing(scene, solution.status, took)
     if not solution.found:
-        return BallResult({**head, **tail})
+        return nothing
     rows = solution.inner, solution.outer
     rings = {"inner": ("inner_ring", "middle_ring"), "outer": ("middle_ring", "outer_ring")}
     operation, below, above, middle = scene.operation, scene.bearing.inner, scene.bearing.outer, model.split.speed / RPM
@@ -99,35 +107,37 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
         Rating(below, model.inner, reference_capacities(below), (operation.inner_speed_rpm, middle)),
         Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed_rpm)),
     )
-    layers: dict[str, Any] = {}
+    layers: dict[str, RowReport] = {}
     notes = _oil_notes(scene)
     for name, rating, row in zip(rings, ratings, rows, strict=True):
-        if why := overloads(row.told[np.newaxis], [rating]):
-            return BallResult({**head, "status": f"{name} row {why[0]}", **tail})
-        layers[name] = row_record(rating, row, film_record(scene, rating, row, rings[name]))
-        notes += sentences(remarks(row.told[np.newaxis], [rating], name))
+        if why := overloads(row.figures[np.newaxis], [rating]):
+            return replace(nothing, status=f"{name} row {why[0]}")
+        layers[name] = row_report(rating, row, film_record(scene, rating, row, rings[name]), None)
+        notes += sentences(remarks(row.figures[np.newaxis], [rating], name))
     notes += sentences([tipping(solution.displacement[np.newaxis, 3:], scene)])
     grown = growth_record(
         scene, dict(zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True))
     )
-    whole = {
+    report = DoubleDeckerReport(
         **displacement_record(solution.displacement),
-        "stiffness": stiffness_record(solution.stiffness),
-        "reaction": load_record(solution.reaction),
-        "middle_ring": middle_record(model, solution),
-        "residual_N": solution.residual,
-        "iterations": solution.steps + sum(row.steps for row in rows),
-    }
-    return BallResult({**head, **whole, **layers, **grown, "notes": notes, **tail}, rows, ratings)
+        stiffness=stiffness_record(solution.stiffness),
+        reaction=load_record(solution.reaction),
+        middle_ring=middle_record(model, solution),
+        residual_N=solution.residual,
+        iterations=solution.steps + sum(row.steps for row in rows),
+        inner=layers["inner"],
+        outer=layers["outer"],
+    )
+    return replace(nothing, report=report, **grown, notes=notes, rows=rows, ratings=ratings)
 
 
-def _frame(scene: BallScene, status: str, took: float) -> tuple[dict[str, Any], dict[str, Any]]:
-    """How every record begins and ends."""
-    head = {
-        "format": FORMAT,
-        "status": status,
-        "raceway_control": scene.model.raceway_control,
-        "solver": scene.model.solver,
-    }
-    tail = {"cost": {"solve_us": 1e6 * took}, "versions": versions(), "scene": scene.model_dump(mode="json")}
-    return head, tail
+def _nothing(scene: BallScene, status: str, took: float) -> BallResult:
+    """A result that has found nothing yet."""
+    return BallResult(
+        status=status,
+        raceway_control=scene.model.raceway_control,
+        solver=scene.model.solver,
+        cost={"solve_us": 1e6 * took},
+        versions=versions(),
+        scene=scene.model_dump(mode="json"),
+    )

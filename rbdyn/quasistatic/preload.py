@@ -86,7 +86,7 @@ def solved(value: float, case: Case, start: Solution | None = None) -> Point:
         solution = solve(case.rating.model.row, case.rating.model.control, case.load, case.given)
     if not solution.found:
         return Point(value, solution, case.rating)
-    peak = np.max(list(pressures(solution.told[np.newaxis], [case.rating]).values()))
+    peak = np.max(list(pressures(solution.figures[np.newaxis], [case.rating]).values()))
     life = solution_life(solution, case.rating.capacities, turning_rings(*case.rating.speeds))
     return Point(value, solution, case.rating, float(peak), life.million_turns)
 

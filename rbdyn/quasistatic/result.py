@@ -2,41 +2,90 @@
 
 from __future__ import annotations
 
-import copy
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.quasistatic.remarks import Rating
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
-from rbdyn.result import read_record, write_json
+from rbdyn.records.record import Record, spread, unsaid
+from rbdyn.result import SavedRecord
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMAT = "rbdyn.ball/1"
 
+class RowReport(Record):
+    """Equilibrium of one row, units in the names: place of its inner ring, a table a ball, and what each race bears.
 
-@dataclass(frozen=True)
-class BallResult:
-    """Equilibrium of a ball bearing.
-
-    ``record``: what ``as_dict`` gives and ``save`` writes, units in the names. ``rows``: the solved rows in SI, one, or the
-    inner and the outer one of a double-decker; empty for a result that was loaded or that found no equilibrium. ``ratings``: what
-    their pressures and lives rest on.
+    ``life``: None where nothing is loaded, in hours also where nothing turns. ``searches``: starting values tried, of a solver
+    that tries some. ``reaction``: the load that the ring takes, of a bearing of this row alone.
     """
 
-    record: dict[str, Any]
-    rows: tuple[Solution, ...] = ()
-    ratings: tuple[Rating, ...] = ()
+    displacement_mm: dict[str, float]
+    tilt_mrad: dict[str, float]
+    balls: list[dict[str, float]]
+    max_stress_MPa: dict[str, float]  # noqa: N815
+    contacts: dict[str, dict[str, float]]
+    stiffness: dict[str, Any]
+    life: dict[str, Any]
+    needed_friction: float
+    residual_N: float  # noqa: N815
+    iterations: int
+    searches: int | None = None
+    reaction: dict[str, dict[str, float]] | None = None
 
-    @property
-    def status(self) -> str:
-        """ "ok", or why there is no equilibrium."""
-        return str(self.record["status"])
+
+class DoubleDeckerReport(Record):
+    """Equilibrium of a double-decker: of its inner ring, its middle ring and both rows."""
+
+    displacement_mm: dict[str, float]
+    tilt_mrad: dict[str, float]
+    stiffness: dict[str, Any]
+    reaction: dict[str, dict[str, float]]
+    middle_ring: dict[str, Any]
+    residual_N: float  # noqa: N815
+    iterations: int
+    inner: RowReport
+    outer: RowReport
+
+
+class BallResult(SavedRecord, kw_only=True):
+    """Equilibrium of a ball bearing, ``scene`` the resolved input; ``status``: "ok", or why there is none.
+
+    ``report``: what was found, None where nothing was. ``ring_growth_um``, ``fits``: where the scene asks for growth or tells
+    a mounting. ``other_roots``: more equilibria of the same load, where they are looked for. ``runout``: of the turning ring,
+    where the command has followed it. ``rows``: the solved rows in SI, one, or the inner and the outer one of a
+    double-decker; empty for a result that was loaded or that found no equilibrium. ``ratings``: what their pressures and lives
+    rest on.
+    """
+
+    FORMAT = "rbdyn.ball/1"
+    WHAT = "equilibrium"
+    status: str
+    raceway_control: str
+    solver: str
+    report: RowReport | DoubleDeckerReport | None = spread(default=None)
+    ring_growth_um: dict[str, float] | None = None
+    fits: dict[str, Any] | None = None
+    other_roots: list[dict[str, Any]] | None = None
+    notes: list[str] | None = None
+    cost: dict[str, float]
+    versions: dict[str, str]
+    scene: dict[str, Any]
+    runout: dict[str, float] | None = None
+    rows: tuple[Solution, ...] = unsaid(default=())
+    ratings: tuple[Rating, ...] = unsaid(default=())
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
+        result = super().from_dict(data)
+        if result.found and result.report is None:
+            raise KeyError("an equilibrium without its figures")
+        return result
 
     @property
     def found(self) -> bool:
@@ -45,31 +94,30 @@ class BallResult:
 
     @property
     def displacement(self) -> NDArray[np.float64]:
-        """(x, y, z [m], theta_x, theta_y [rad]) of the inner ring. Raises KeyError where there is no equilibrium."""
-        place, tilt = self.record["displacement_mm"], self.record["tilt_mrad"]
+        """(x, y, z [m], theta_x, theta_y [rad]) of the inner ring. Raises ValueError where there is no equilibrium."""
+        report = self.reached
+        place, tilt = report.displacement_mm, report.tilt_mrad
         return 1e-3 * np.array([place["x"], place["y"], place["z"], tilt["x"], tilt["y"]])
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form, which shares nothing with the result."""
-        return copy.deepcopy(self.record)
+    @property
+    def reached(self) -> RowReport | DoubleDeckerReport:
+        """What was found. Raises ValueError where nothing was."""
+        if self.report is None:
+            raise ValueError(f"there is no equilibrium: {self.status}")
+        return self.report
+
+    @property
+    def row_reports(self) -> dict[str, RowReport]:
+        """What was found of each row, by its name: "inner" and "outer", or "" for a single one. Raises ValueError as ``reached``."""
+        report = self.reached
+        return {"": report} if isinstance(report, RowReport) else {"inner": report.inner, "outer": report.outer}
 
     def table(self) -> pd.DataFrame:
         """A row a ball: azimuth, angles, loads, centrifugal force, gyroscopic moment; units in the names."""
         import pandas as pd
 
-        if "balls" in self.record:
-            return pd.DataFrame(self.record["balls"])
-        layers = {name: pd.DataFrame(self.record[name]["balls"]) for name in ("inner", "outer")}
-        return pd.concat(layers, names=["row", "ball"]).reset_index()
-
-    def save(self, path: Path | str) -> None:
-        """Write JSON, whole or not at all."""
-        write_json(path, self.record)
-
-    @classmethod
-    def load(cls, path: Path | str) -> BallResult:
-        """Read a saved result. Raises InputError when the file is missing or not such a result."""
-        return cls(read_record(path, FORMAT, "equilibrium"))
+        layers = {name: pd.DataFrame(row.balls) for name, row in self.row_reports.items()}
+        return layers[""] if "" in layers else pd.concat(layers, names=["row", "ball"]).reset_index()
 
 
 def displacement_record(displacement: NDArray[np.float64]) -> dict[str, Any]:

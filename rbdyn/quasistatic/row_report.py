@@ -13,32 +13,32 @@ from rbdyn.contact.hertz_point import PointContact, peak_pressure
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.fatigue import solution_life, turning_rings
 from rbdyn.quasistatic.remarks import Rating, needed_friction
-from rbdyn.quasistatic.result import ball_records, displacement_record, stiffness_record
+from rbdyn.quasistatic.result import RowReport, ball_records, displacement_record, stiffness_record
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.quasistatic.row.model import RPM
 from rbdyn.scene.ball import BallScene
 
 
-def row_record(rating: Rating, solution: Solution, film: dict[str, Any]) -> dict[str, Any]:
-    """One row in JSON form; ``film``: as ``film_record`` gives it."""
+def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reaction: dict[str, Any] | None) -> RowReport:
+    """Report of one row; ``film``: as ``film_record`` gives it."""
     contacts = {"inner": rating.model.inner_contact, "outer": rating.model.outer_contact}
     loads = {"inner": solution.inner_load, "outer": solution.outer_load}
-    searches = {} if solution.searches is None else {"searches": solution.searches}
-    return {
+    return RowReport(
         **displacement_record(solution.displacement),
-        "balls": ball_records(solution.told),
-        "max_stress_MPa": {race: 1e-6 * float(np.max(peak_pressure(contacts[race], loads[race]))) for race in contacts},
-        "contacts": {
+        balls=ball_records(solution.figures),
+        max_stress_MPa={race: 1e-6 * float(np.max(peak_pressure(contacts[race], loads[race]))) for race in contacts},
+        contacts={
             race: {**contact_record(contacts[race], float(loads[race].max())), **film.get(race, {})}
             for race in contacts
         },
-        "stiffness": stiffness_record(solution.stiffness),
-        "life": life_record(rating, solution),
-        "needed_friction": float(needed_friction(solution.told[np.newaxis], [rating])[0]),
-        "residual_N": solution.residual,
-        "iterations": solution.steps,
-        **searches,
-    }
+        stiffness=stiffness_record(solution.stiffness),
+        life=life_record(rating, solution),
+        needed_friction=float(needed_friction(solution.figures[np.newaxis], [rating])[0]),
+        residual_N=solution.residual,
+        iterations=solution.steps,
+        searches=solution.searches,
+        reaction=reaction,
+    )
 
 
 def contact_record(contact: PointContact, load: float) -> dict[str, float]:

@@ -34,15 +34,25 @@ class Scene(SceneFile):
     """Everything a simulation of a cylindrical roller bearing needs. ``load`` of a ball bearing's file gives a BallScene."""
 
     bearing: Bearing
+    """The drawing of the bearing."""
     cage: Cage
+    """The drawing of the cage."""
     lubricant: Lubricant
+    """The oil."""
     operation: Operation
+    """Speeds and loads."""
     mounting: Mounting | None = None
+    """Fits, temperatures, shaft and housing; without it the clearance is that in operation."""
     support: Support | None = None
+    """Flexible, damped support of the outer ring; without it the ring is held."""
     materials: Materials = Materials()
+    """What each part is made of."""
     traction: Traction = Traction()
+    """Traction of the races."""
     model: Laws = Laws()
+    """The laws of each interaction."""
     numerics: Numerics = Numerics()
+    """Tolerance, length and replication of a run."""
 
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:

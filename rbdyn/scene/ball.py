@@ -28,10 +28,15 @@ class Prescribed(Strict):
     """Displacements of the inner ring that are prescribed instead of loads; those left out follow from the load."""
 
     x_mm: Annotated[float, Field(ge=-10.0, le=10.0)] | None = None
+    """Displacement along x, the radial load's direction."""
     y_mm: Annotated[float, Field(ge=-10.0, le=10.0)] | None = None
+    """Displacement along y."""
     z_mm: Annotated[float, Field(ge=-10.0, le=10.0)] | None = None
+    """Axial displacement."""
     tilt_x_mrad: Annotated[float, Field(ge=-200.0, le=200.0)] | None = None
+    """Tilt about x."""
     tilt_y_mrad: Annotated[float, Field(ge=-200.0, le=200.0)] | None = None
+    """Tilt about y."""
 
     @property
     def values(self) -> tuple[float | None, ...]:
@@ -47,19 +52,27 @@ class BallOperation(Strict):
     """Speeds and load on the inner ring. x is radial, z axial; the outer ring is the reference."""
 
     inner_speed_rpm: Speed = 0.0
+    """Speed of the inner ring."""
     outer_speed_rpm: Speed = 0.0
-    # Along x; instead of load_N.
+    """Speed of the outer ring."""
     radial_load_N: Force | None = None  # noqa: N815
+    """Load along x; instead of load_N."""
     axial_load_N: Force | None = None  # noqa: N815
+    """Load along z, the axis; instead of load_N."""
     load_N: Annotated[list[Force], Field(min_length=3, max_length=3)] | None = None  # noqa: N815
+    """Load along x, y, z."""
     moment_Nm: Annotated[list[Moment], Field(min_length=2, max_length=2)] | None = None  # noqa: N815
-    # fixed: the shaft holds the ring at operation.prescribed.tilt_x_mrad and tilt_y_mrad, 0 where left out, as a shaft in two
-    # bearings does; a lone ring is free: a 7208 under 1000 N across and 1500 N along the axis tips by 3 mrad and lasts half as long.
+    """Moments about x and y."""
     tilt: Literal["free", "fixed"] = "fixed"
+    """fixed: the shaft holds the ring at operation.prescribed.tilt_x_mrad and tilt_y_mrad, 0 where left out, as a shaft
+    in two bearings does; a lone ring is free: a 7208 under 1000 N across and 1500 N along the axis tips by 3 mrad and
+    lasts half as long."""
     prescribed: Prescribed = Prescribed()
-    # A spring's axial force, on top of the load; or how far nut and spacer push the inner ring in after it touches.
+    """Displacements of the inner ring instead of loads."""
     preload_N: Force = 0.0  # noqa: N815
+    """A spring's axial force, on top of the load."""
     preload_um: Annotated[float, Field(ge=-2000.0, le=2000.0)] | None = None
+    """How far nut and spacer push the inner ring in after it touches; instead of preload_N."""
 
     @model_validator(mode="after")
     def _consistent(self) -> BallOperation:
@@ -121,43 +134,60 @@ class BallOperation(Strict):
 class BallModel(Strict):
     """Hypotheses and solver."""
 
-    # Which race balls roll on without spin; "hybrid" weighs both by friction, "common_cage" knows no gyroscopic moment.
     raceway_control: Literal["outer", "inner", "half", "hybrid", "common_cage"] = "outer"
-    # "unsigned" drops the sign of the gyroscopic moment, as many texts do; with the inner ring turning it is negative.
+    """Which race balls roll on without spin; "hybrid" weighs both by friction, "common_cage" knows no gyroscopic
+    moment."""
     gyroscopic: bool | Literal["unsigned"] = True
-    # Race control sets in as the inner contact load rises to this share of the centrifugal force; below, balls go with the cage.
-    # A smaller share lets a light ball have several orbits: its centrifugal force then changes faster than its load.
+    """Whether balls have a gyroscopic moment; "unsigned" drops its sign, as many texts do: with the inner ring turning
+    it is negative."""
     light_load_share: Annotated[float, Field(ge=1e-3, le=10.0)] = 0.3
-    # Largest friction coefficient that may hold a ball's gyroscopic moment: beyond that of any oiled or boundary contact, so
-    # that it only ends what no friction could hold; the ball then slips about that axis.
+    """Race control sets in as the inner contact load rises to this share of the centrifugal force; below, balls go with
+    the cage. A smaller share lets a light ball have several orbits: its centrifugal force then changes faster than its
+    load."""
     friction_limit: Annotated[float, Field(ge=1e-3, le=10.0)] = 0.3
-    # Growth of rotating rings: of a thick ring, or by the formula of Hu et al. (double-decker papers) for comparison.
+    """Largest friction coefficient that may hold a ball's gyroscopic moment: beyond that of any oiled or boundary
+    contact, so that it only ends what no friction could hold; the ball then slips about that axis."""
     ring_expansion: bool = False
+    """Whether rotation widens the rings."""
     ring_expansion_form: Literal["thick_ring", "paper"] = "thick_ring"
+    """Growth of a thick ring, or by the formula of Hu et al. (double-decker papers) for comparison."""
     solver: Literal["convex", "finite_search", "newton"] = "convex"
+    """convex: guarded Newton method, from anywhere; finite_search: the search of Hu et al. 2021; newton: Newton's
+    method from the loaded ring. The last two are for comparison."""
 
 
 class BallMaterials(Strict):
     """What balls and rings are made of: a name, or a table of numbers. A ring left out is as ``rings``."""
 
     ball: MaterialName | CustomMaterial = "bearing_steel"
+    """Material of the balls."""
     rings: MaterialName | CustomMaterial = "bearing_steel"
+    """Material of all rings that have no key of their own."""
     inner_ring: MaterialName | CustomMaterial | None = None
+    """Material of the inner ring; as rings where left out."""
     middle_ring: MaterialName | CustomMaterial | None = None
+    """Material of the middle ring of a double-decker; as rings where left out."""
     outer_ring: MaterialName | CustomMaterial | None = None
+    """Material of the outer ring; as rings where left out."""
 
 
 class BallScene(SceneFile):
     """Everything the equilibrium of a ball bearing needs."""
 
     bearing: BallBearing | DoubleDecker
+    """The drawing: one row, or two rows with a ring between."""
     operation: BallOperation
+    """Speeds and load."""
     model: BallModel = BallModel()
+    """Hypotheses and solver."""
     materials: BallMaterials = BallMaterials()
+    """What balls and rings are made of."""
     lubricant: Lubricant | None = None
-    # What ``quasistatic.runout_model.follow_ring`` follows; ``rbdyn.equilibrium`` is that of the perfect bearing.
+    """The oil, for film thickness and life."""
     errors: FormErrors | None = None
+    """Form errors of grooves and balls, whose runout is followed; the equilibrium is that of the perfect bearing."""
     mounting: Mounting | None = None
+    """Fits, temperatures, shaft and housing."""
 
     @model_validator(mode="after")
     def _rings_known(self) -> Self:
@@ -185,6 +215,7 @@ class SingleRowScene(BallScene):
     """A scene of one row."""
 
     bearing: BallBearing
+    """The drawing of a single row."""
 
     @model_validator(mode="after")
     def _errors_fit(self) -> SingleRowScene:
@@ -198,6 +229,7 @@ class DoubleDeckerScene(BallScene):
     """A scene of two rows one inside the other."""
 
     bearing: DoubleDecker
+    """The drawing of two rows with a ring between."""
 
     @model_validator(mode="after")
     def _solvable(self) -> DoubleDeckerScene:

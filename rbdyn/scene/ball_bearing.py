@@ -18,29 +18,36 @@ GrooveFactor = Annotated[float, Field(gt=0.5, le=1.0)]
 
 
 class BallRow(Strict):
-    """Geometry of one row of balls.
-
-    A groove factor is the groove's radius over the ball's diameter. Either the unloaded contact angle a_0 or the diametral
-    clearance P_d is given, one follows from the other: cos a_0 = 1 - P_d/(2 B), B = (f_i + f_o - 1) D. A negative
-    clearance, an interference, has a contact angle of 0.
-    """
+    """Geometry of one row of balls. Of contact angle and clearance one is given, or both that agree."""
 
     balls: Annotated[int, Field(ge=3, le=500)]
+    """Number of balls."""
     ball_diameter_mm: Annotated[float, Field(ge=0.1, le=500.0)]
+    """Diameter of a ball."""
     pitch_diameter_mm: Annotated[float, Field(ge=1.0, le=10000.0)]
+    """Diameter of the circle through the balls' centres."""
     inner_groove_factor: GrooveFactor
+    """Radius of the inner groove over the ball's diameter: 0.515 to 0.53 in catalogue bearings."""
     outer_groove_factor: GrooveFactor
+    """Radius of the outer groove over the ball's diameter: 0.515 to 0.53 in catalogue bearings."""
     contact_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] | None = None
+    """Unloaded contact angle a_0; follows from radial_clearance_mm where left out: cos a_0 = 1 - P_d/(2 B), B = (f_i +
+    f_o - 1) D."""
     radial_clearance_mm: Annotated[float, Field(ge=-2.0, le=5.0)] | None = None
-    # What mounting changes of the diametral clearance after the contact angle was measured; negative takes clearance away.
+    """Diametral clearance P_d; follows from contact_angle_deg where left out. Negative is an interference, with a
+    contact angle of 0."""
     clearance_change_um: Annotated[float, Field(ge=-2000.0, le=2000.0)] = 0.0
-    # Basic dynamic capacity of the catalogue; by ISO 281 from the dimensions where left out.
+    """What mounting changes of the diametral clearance after the contact angle was measured; negative takes clearance
+    away."""
     dynamic_capacity_N: Positive | None = None  # noqa: N815
-    # Load at which the most loaded ball has a pressure of 4200 MPa (ISO 76); by Hertz from the dimensions where left out.
+    """Basic dynamic capacity of the catalogue; by ISO 281 from the dimensions where left out."""
     static_capacity_N: Positive | None = None  # noqa: N815
-    # Bore of the inner and outside diameter of the outer ring: only for the growth of rotating rings.
+    """Load at which the most loaded ball has a pressure of 4200 MPa (ISO 76); by Hertz from the dimensions where left
+    out."""
     bore_mm: Positive | None = None
+    """Bore of the inner ring; only for the growth of rotating rings."""
     outside_diameter_mm: Positive | None = None
+    """Outside diameter of the outer ring; only for the growth of rotating rings."""
 
     @model_validator(mode="after")
     def _fits(self) -> BallRow:
@@ -133,31 +140,38 @@ class BallBearing(BallRow):
     """A single row: angular contact or deep groove."""
 
     kind: Literal["angular_contact_ball", "deep_groove_ball"]
+    """Kind of bearing."""
 
 
 class MiddleRing(Strict):
     """The ring between the rows of a double-decker bearing: it floats, and only friction turns it."""
 
-    # Its speed, where it is known; otherwise by speed_split.
     speed_rpm: Speed | None = None
-    # "oil": rows of equal oil friction (Hu et al., eq 13); "torque_balance": oil and load after Palmgren; needs [lubricant].
+    """Speed of the middle ring, where it is known; otherwise by speed_split."""
     speed_split: Literal["oil", "torque_balance"] = "oil"
-    # Palmgren's f0 of each row: oil mist 1.7, grease 2, oil bath 3.3, oil jet 6.6 as commonly cited.
+    """What turns the middle ring. "oil": rows of equal oil friction (Hu et al., eq 13); "torque_balance": oil and load
+    after Palmgren; needs [lubricant]."""
     inner_oil_factor: Positive = 3.3
+    """Palmgren's f0 of the inner row: oil mist 1.7, grease 2, oil bath 3.3, oil jet 6.6 as commonly cited."""
     outer_oil_factor: Positive = 3.3
-    # fixed: it stays square to the outer ring; as operation.tilt where left out.
+    """Palmgren's f0 of the outer row."""
     tilt: Literal["free", "fixed"] | None = None
-    # Axial distance of the inner row's ball plane from the outer row's, the bearing unloaded.
+    """fixed: the middle ring stays square to the outer ring; as operation.tilt where left out."""
     axial_offset_mm: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
+    """Axial distance of the inner row's ball plane from the outer row's, the bearing unloaded."""
 
 
 class DoubleDecker(Strict):
     """Two rows one inside the other; the ring between them floats."""
 
     kind: Literal["double_decker_ball"]
+    """Kind of bearing."""
     inner: BallRow
+    """The row on the inner ring."""
     outer: BallRow
+    """The row in the outer ring."""
     middle: MiddleRing = MiddleRing()
+    """The ring between the rows."""
 
     @model_validator(mode="after")
     def _nests(self) -> DoubleDecker:

@@ -20,49 +20,61 @@ class Harmonic(Strict):
     """One harmonic of a raceway's radius: amplitude cos(order (angle - phase)), angle and phase counted on the ring."""
 
     order: Annotated[int, Field(ge=1, le=2000)]
+    """Waves around the circumference."""
     amplitude_um: Annotated[float, Field(ge=-500.0, le=500.0)]
+    """Amplitude of the radius."""
     phase_deg: float = 0.0
+    """Angle of a crest on the ring."""
 
 
 class Bearing(Strict):
-    """Geometry of a cylindrical roller bearing.
-
-    ``radial_clearance_mm`` is diametral: outer raceway less inner raceway less twice the roller. It is split evenly
-    about the pitch diameter; negative is a preload. ``roller_length_mm`` is the whole roller (mass, inertia, drag),
-    ``effective_length_mm`` the part that carries load.
-    """
+    """Geometry of a cylindrical roller bearing. Clearances are diametral."""
 
     kind: Literal["cylindrical_roller"]
+    """Kind of bearing."""
     rollers: Annotated[int, Field(ge=2, le=500)]
+    """Number of rollers."""
     roller_diameter_mm: Annotated[float, Field(ge=0.5, le=500.0)]
+    """Diameter of a roller."""
     roller_length_mm: Annotated[float, Field(ge=0.5, le=1000.0)]
+    """Whole length of a roller: mass, inertia and drag."""
     effective_length_mm: Annotated[float, Field(ge=0.1, le=1000.0)]
+    """Part of the roller's length that carries load, without the rounded ends."""
     pitch_diameter_mm: Annotated[float, Field(ge=2.0, le=5000.0)]
+    """Diameter of the circle through the rollers' centres, on which the clearance is split evenly."""
     radial_clearance_mm: Annotated[float, Field(ge=-0.2, le=2.0)]
-    # "logarithmic" is the reference profile of ISO/TS 16281; the others take the key named after them.
+    """Diametral clearance: outer raceway less inner raceway less twice the roller; negative is a preload. With
+    [mounting] that of the loose parts."""
     roller_profile: Literal["cylinder", "crowned", "logarithmic", "lundberg", "table"] = "cylinder"
+    """Drop of the roller towards its ends: "logarithmic" is the reference profile of ISO/TS 16281; the others but the
+    cylinder take the key named after them."""
     crown_radius_mm: Positive | None = None
-    # Load at which the Lundberg profile spreads its pressure evenly.
+    """Radius of the crown, for roller_profile = "crowned"."""
     lundberg_load_N: Positive | None = None  # noqa: N815
-    # Points (distance from the middle in mm, drop in um), joined by straight lines; mirrored where all lie on one side.
+    """Load at which the Lundberg profile spreads its pressure evenly, for roller_profile = "lundberg"."""
     profile_table_mm_um: Annotated[list[list[float]], Field(min_length=2)] | None = None
-    # Tilt of the inner against the outer ring, about the axis across ``tilt_direction_deg`` (counted from the load).
+    """Points (distance from the middle in mm, drop in um), joined by straight lines, mirrored where all lie on one
+    side, for roller_profile = "table"."""
     tilt_mrad: Annotated[float, Field(ge=-20.0, le=20.0)] = 0.0
+    """Tilt of the inner against the outer ring, about the axis across tilt_direction_deg."""
     tilt_direction_deg: float = 0.0
-    # Share of that tilt between roller and inner race: a roller between equal contacts settles half-way (Harris).
+    """Direction in which the inner ring tilts, from that of the load."""
     inner_tilt_share: Fraction = 0.5
-    # Each roller's diameter less the nominal one; or a seeded normal spread.
+    """Share of the tilt between roller and inner race: a roller between equal contacts settles half-way (Harris)."""
     roller_diameter_errors_um: list[float] | None = None
+    """Each roller's diameter less the nominal one, instead of roller_diameter_spread_um."""
     roller_diameter_spread_um: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    # Harmonics of the raceway radii: out-of-round (orders 2, 3: lobes against skidding) and waviness.
+    """Standard deviation of a seeded normal spread of the rollers' diameters."""
     outer_waviness: list[Harmonic] = []
+    """Harmonics of the outer raceway's radius: out-of-round (orders 2, 3: lobes against skidding) and waviness."""
     inner_waviness: list[Harmonic] = []
-    # Basic dynamic capacity of the catalogue; by ISO 281 from the dimensions where left out.
+    """Harmonics of the inner raceway's radius; they turn with the ring."""
     dynamic_capacity_N: Positive | None = None  # noqa: N815
-    # Inner ring with what of the shaft moves with it, 1 to 5 kg for a main shaft of this size. A drawing gives the ring
-    # alone (0.04 kg in the bearing of Chen et al. 2022) and the part of the rotor's mass that this bearing carries. With
-    # 0.3, 1 and 3 kg that bearing has impacts of 91, 86 and 93 N and a whirl of 0.51, 0.41 and 0.55.
+    """Basic dynamic capacity of the catalogue; by ISO 281 from the dimensions where left out."""
     inner_ring_mass_kg: Annotated[float, Field(ge=LIGHTEST_RING_KG, le=1e5)] = 1.0
+    """Inner ring with what of the shaft moves with it, 1 to 5 kg for a main shaft of this size. A drawing gives the
+    ring alone (0.04 kg in the bearing of Chen et al. 2022) and the part of the rotor's mass that this bearing carries.
+    With 0.3, 1 and 3 kg that bearing has impacts of 91, 86 and 93 N and a whirl of 0.51, 0.41 and 0.55."""
 
     @property
     def raceway_diameters_mm(self) -> tuple[float, float]:
@@ -160,30 +172,37 @@ class Bearing(Strict):
 
 
 class Cage(Strict):
-    """Cage and guide land. Clearances are diametral; ``pocket_clearance_mm`` is pocket width less roller diameter."""
+    """Cage and guide land. Clearances are diametral."""
 
     guidance: Literal["outer", "inner", "roller"]
-    # Needed where a ring guides the cage; under guidance by the rollers it is none.
+    """What guides the cage: a land of the outer ring, of the inner ring, or the rollers in their pockets."""
     guide_clearance_mm: Annotated[
         Annotated[float, Field(gt=0.0, le=10.0), NotVanishing] | None, Field(validate_default=True)
     ] = None
+    """Diametral clearance between cage and guide land; needed where a ring guides the cage."""
     pocket_clearance_mm: Annotated[float, Field(gt=0.0, le=10.0), NotVanishing]
+    """Pocket width less roller diameter."""
     mass_g: Annotated[float, Field(ge=0.01, le=1e6)]
-    # Of a roller on a pocket wall: on a drawing, the straight part of the wall that the roller's cylinder meets, less
-    # the breaks of both edges. Where left out, contact (and lips) take the roller's effective length and a film the
-    # whole roller; where given, all take this.
+    """Mass of the cage."""
     pocket_contact_length_mm: Positive | None = None
-    # Without a drawing: land at the pitch diameter + 2/3 roller (outer) or - 2/3 roller (inner), cage body from there
-    # to the pitch diameter -+ 1/3 roller (49.5 mm and 40.5 mm for the bearing of Chen et al. 2022).
+    """Contact of a roller on a pocket wall: on a drawing, the straight part of the wall that the roller's cylinder
+    meets, less the breaks of both edges. Where left out, contact (and lips) take the roller's effective length and a
+    film the whole roller; where given, all take this."""
     land_diameter_mm: Positive | None = None
+    """Diameter of the guide land; where left out the pitch diameter + 2/3 roller (outer) or - 2/3 roller (inner): 49.5
+    mm and 40.5 mm for the bearing of Chen et al. 2022."""
     inertia_kg_mm2: Positive | None = None
-    # Centre of mass off the middle, towards the first pocket; 0 to 100 um.
+    """Moment of inertia of the cage about its axis; where left out that of a ring from the land to the pitch diameter
+    -+ 1/3 roller."""
     imbalance_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 0.0
-    # Radial play between roller and pocket lips, where rollers guide the cage; the pocket clearance where left out.
-    # Without lips nothing would hold such a cage: free rollers give way along their orbit.
+    """Centre of mass off the middle, towards the first pocket: 0 to 100 um."""
     pocket_radial_clearance_mm: Positive | None = None
+    """Radial play between roller and pocket lips, where rollers guide the cage; the pocket clearance where left out.
+    Without lips nothing would hold such a cage: free rollers give way along their orbit."""
     lands: Annotated[int, Field(ge=1, le=4)] = 2
+    """Number of guide lands side by side."""
     land_width_mm: Positive = 3.0
+    """Width of one guide land."""
 
     @field_validator("guide_clearance_mm")
     @classmethod
@@ -216,10 +235,13 @@ class CustomMaterial(Strict):
     """A material by its numbers."""
 
     elastic_modulus_GPa: Annotated[float, Field(gt=0.0, le=2000.0), NotVanishing]  # noqa: N815
+    """Young's modulus."""
     poisson_ratio: Annotated[float, Field(ge=0.0, lt=0.5)]
+    """Poisson's ratio."""
     density_kg_m3: Annotated[float, Field(ge=100.0, le=30000.0)]
-    # That of steel unless given.
+    """Density of the material."""
     thermal_expansion_1e_6_K: Annotated[float, Field(ge=0.0, le=200.0)] = 12.0  # noqa: N815
+    """Linear thermal expansion in 1e-6 per K; that of steel unless given."""
 
 
 MaterialName = Literal[
@@ -232,5 +254,8 @@ class Materials(Strict):
     """What each part is made of: a name, or a table of numbers."""
 
     roller: MaterialName | CustomMaterial = "bearing_steel"
+    """Material of the rollers."""
     rings: MaterialName | CustomMaterial = "bearing_steel"
+    """Material of both rings."""
     cage: MaterialName | CustomMaterial = "bronze"
+    """Material of the cage."""

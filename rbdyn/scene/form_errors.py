@@ -16,55 +16,73 @@ LARGEST_ERROR = 0.01
 
 
 class RandomWaviness(Strict):
-    """Orders ``lowest_order`` to ``highest_order`` in random phases, ``height_um`` from peak to valley together.
-
-    Amplitudes fall as order^-decay on the average. Ground raceways: between 1 and 2.
-    """
+    """Waves in random phases, ``lowest_order`` to ``highest_order``."""
 
     lowest_order: Order = 1
+    """Lowest order of the waves drawn."""
     highest_order: Order
+    """Highest order of the waves drawn."""
     height_um: Annotated[float, Field(gt=0.0, le=500.0), NotVanishing]
+    """Height from peak to valley of all waves together."""
     decay: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
+    """Amplitudes fall as order^-decay on the average; ground raceways: between 1 and 2."""
 
 
 class BallHarmonic(Strict):
     """One harmonic of the sphericity of balls, from order 2: order 1 is no form."""
 
     order: Annotated[int, Field(ge=2, le=2000)]
+    """Waves around a ball, from 2: order 1 is no form."""
     amplitude_um: Annotated[float, Field(ge=-500.0, le=500.0)]
-    # Drawn for each ball by errors.seed where left out.
+    """Amplitude of the ball's radius."""
     phase_deg: float | None = None
-    # Numbers of the balls that have it, from 1; every ball where left out.
+    """Angle of a crest; drawn for each ball by errors.seed where left out."""
     balls: list[Annotated[int, Field(ge=1)]] | None = None
+    """Numbers of the balls that have it, from 1; every ball where left out."""
 
 
 class FormErrors(Strict):
     """Form errors of grooves and balls, and how finely and how long the turning ring is followed.
 
-    Each error of a groove is given by its harmonics, drawn at random, or both added. Roundness is radial, side-sway
-    axial (order 1 proper, others are axial waviness), groove radius the width of the groove at a fixed bottom.
+    Each error of a groove is given by its harmonics, drawn at random, or both added.
     """
 
     inner_roundness: list[Harmonic] = []
+    """Radial harmonics of the inner groove."""
     outer_roundness: list[Harmonic] = []
+    """Radial harmonics of the outer groove."""
     inner_side_sway: list[Harmonic] = []
+    """Axial harmonics of the inner groove: order 1 is side-sway proper, others axial waviness."""
     outer_side_sway: list[Harmonic] = []
+    """Axial harmonics of the outer groove: order 1 is side-sway proper, others axial waviness."""
     inner_groove_radius: list[Harmonic] = []
+    """Harmonics of the inner groove's radius, the width of the groove at a fixed bottom."""
     outer_groove_radius: list[Harmonic] = []
+    """Harmonics of the outer groove's radius, the width of the groove at a fixed bottom."""
     inner_roundness_random: RandomWaviness | None = None
+    """Radial waves of the inner groove drawn by errors.seed, on top of the given ones."""
     outer_roundness_random: RandomWaviness | None = None
+    """Radial waves of the outer groove drawn by errors.seed, on top of the given ones."""
     inner_side_sway_random: RandomWaviness | None = None
+    """Axial waves of the inner groove drawn by errors.seed, on top of the given ones."""
     outer_side_sway_random: RandomWaviness | None = None
+    """Axial waves of the outer groove drawn by errors.seed, on top of the given ones."""
     inner_groove_radius_random: RandomWaviness | None = None
+    """Waves of the inner groove's radius drawn by errors.seed, on top of the given ones."""
     outer_groove_radius_random: RandomWaviness | None = None
+    """Waves of the outer groove's radius drawn by errors.seed, on top of the given ones."""
     ball_sphericity: list[BallHarmonic] = []
-    # Each ball's diameter less the nominal one; or the standard deviation of a seeded normal spread.
+    """Harmonics of the balls' radius."""
     ball_diameter_errors_um: list[float] | None = None
+    """Each ball's diameter less the nominal one, instead of ball_diameter_spread_um."""
     ball_diameter_spread_um: NonNegative = 0.0
+    """Standard deviation of a seeded normal spread of the balls' diameters."""
     seed: Annotated[int, Field(ge=0)] = 1
-    # Steps to a turn of the inner ring against the outer; turns, since the cage does not come round with the ring.
+    """Seed of all that is drawn."""
     steps: Annotated[int, Field(ge=8, le=100_000)] = 360
+    """Steps to a turn of the inner ring against the outer."""
     turns: Annotated[int, Field(ge=1, le=10_000)] = 8
+    """Turns of the inner ring that are followed, since the cage does not come round with the ring."""
 
     @model_validator(mode="after")
     def _sensible(self) -> FormErrors:

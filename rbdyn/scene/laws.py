@@ -20,50 +20,68 @@ Restitution = Annotated[float, Field(gt=0.0, le=1.0), NotVanishing]
 class Laws(Strict):
     """The laws of each interaction and what they need. What is off is neither computed nor compiled."""
 
-    # Load against approach: Palmgren is the one of Chen et al. 2022; the rivals lie within 7 %.
     line_contact: Literal["palmgren", "iso16281", "dowson_higginson", "houpert"] = "palmgren"
-    # Slices of a roller; one is exact where there is neither profile nor tilt, 31 are taken where there is.
+    """Load of a roller against its approach. Palmgren's is the law of Chen et al. 2022; the rivals lie within 7 %."""
     slices: Annotated[int, Field(ge=1, le=1001)] | None = None
+    """Slices of a roller; where left out 1, which is exact where there is neither profile nor tilt, and 31 where there
+    is one."""
     race_damping: Literal["viscous", "hunt_crossley", "off"] = "viscous"
-    # Share of critical damping (ADORE-style input 0.05; 0.1 elsewhere), engaged over about half a film thickness.
+    """Damping of the races: a share of the critical one, Hunt and Crossley's, or none."""
     race_damping_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.05
+    """Share of critical damping, engaged over race_damping_engagement_um (ADORE-style input 0.05; 0.1 elsewhere)."""
     race_damping_engagement_um: Positive = 0.1
-    # 0.08 to 0.32 s/m for metals.
+    """Approach over which viscous damping sets in: about half a film thickness."""
     race_damping_alpha_s_m: Positive = 0.2
+    """Hunt and Crossley's alpha of the races, for race_damping = "hunt_crossley": 0.08 to 0.32 s/m for metals."""
     pocket: Literal["contact", "off"] = "contact"
-    # Cross-bar in series with the contact. Rests on the 1e7 to 1e8 N/m told of metal cages, which count the cage's rims
-    # and ring in. A drawing gives, for a clamped bar of length L pushed in its middle, 192 E I/L^3 (384 for an even push;
-    # I = thickness width^3/12) and, in series, 10/3 G A/L of shear, which rules in short bars: 5e8 N/m in the bearing of
-    # Chen et al. 2022. With 1e7, 5e7 and 2e8 N/m that has impacts of 47, 86 and 118 N and a whirl of 0.42, 0.41 and 0.38.
+    """Contact of rollers and pocket walls; "off" lets rollers and cage pass through each other."""
     pocket_bar_stiffness_N_m: Positive | Literal["rigid"] = 5e7  # noqa: N815
-    # Hunt and Crossley's alpha, 0.75 unless given (restitution 1 - alpha v: 0.5 to 0.7 for steel on wetted bronze at
-    # 0.5 m/s; 0 is undamped).
+    """Stiffness of a cross-bar, in series with the contact. Rests on the 1e7 to 1e8 N/m stated for metal cages, which
+    count the cage's rims and ring in. A drawing gives, for a clamped bar of length L pushed in its middle, 192 E I/L^3
+    (384 for an even push; I = thickness width^3/12) and, in series, 10/3 G A/L of shear, which rules in short bars: 5e8
+    N/m in the bearing of Chen et al. 2022. With 1e7, 5e7 and 2e8 N/m that has impacts of 47, 86 and 118 N and a whirl
+    of 0.42, 0.41 and 0.38."""
     pocket_damping_alpha_s_m: NonNegative | None = None
-    # Or by a restitution at an impact speed, instead of alpha.
+    """Hunt and Crossley's alpha of the pocket walls; 0.75 where left out (restitution 1 - alpha v: 0.5 to 0.7 for steel
+    on wetted bronze at 0.5 m/s), 0 is undamped."""
     pocket_restitution: Restitution | None = None
+    """Restitution of roller and pocket wall at pocket_restitution_speed_m_s, instead of pocket_damping_alpha_s_m."""
     pocket_restitution_speed_m_s: Positive = 0.5
+    """Impact speed at which pocket_restitution holds."""
     pocket_friction: NonNegative = 0.05
-    # Film on both walls that wedge and squeeze make together, with its shear; it hands over to contact at the floor (the
-    # critical pocket film of ADORE-style inputs is 0.8 um). The fill is the share of the wall that has oil.
+    """Friction coefficient of roller and pocket wall."""
     pocket_film: bool = False
+    """Oil film on both pocket walls, which wedge and squeeze make together, with its shear; it hands over to contact at
+    its floor."""
     pocket_film_floor_um: Positive = 0.8
+    """Film thickness at which the pocket wall touches: the critical pocket film of ADORE-style inputs is 0.8 um."""
     pocket_fill: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 1.0
+    """Share of a pocket wall that has oil; 1 is flooded."""
     guide_land: Literal["film", "dry", "off"] = "film"
-    # Film below which the land touches (critical film of ADORE-style inputs), and how full of oil the land is.
+    """Force of the guide land on the cage: short journal bearing over dry contact, dry contact alone, or none."""
     land_film_floor_um: Positive = 3.0
+    """Film thickness below which the land touches: the critical film of ADORE-style inputs."""
     land_fill: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 1.0
+    """Share of the land that is full of oil; 1 is flooded."""
     land_damping_alpha_s_m: NonNegative | None = None
+    """Hunt and Crossley's alpha of the land's dry contact; 0.75 where left out, 0 is undamped."""
     land_restitution: Restitution | None = None
+    """Restitution of cage and land at land_restitution_speed_m_s, instead of land_damping_alpha_s_m."""
     land_restitution_speed_m_s: Positive = 0.5
+    """Impact speed at which land_restitution holds."""
     land_friction: NonNegative = 0.05
+    """Friction coefficient of the land's dry contact."""
     rolling_resistance: Literal["biboulet_houpert", "off"] = "biboulet_houpert"
-    # What multiplies it, in force and in power. Isothermal elastohydrodynamic solutions of one contact put 1 at 0.97 to
-    # 1.15 (2 F u is lost a contact: F is a force per surface); SKF's rolling moments of ten catalogue bearings want 0.5 to
-    # 1.3, the less the faster, the lighter loaded and the thicker the oil (examples/published/friction_totals.py).
+    """Rolling resistance of the races by the hydrodynamic inlet (Biboulet and Houpert 2010), or none."""
     rolling_resistance_factor: Annotated[float, Field(gt=0.0, le=5.0), NotVanishing] = 1.0
+    """What multiplies the rolling resistance, in force and in power. Isothermal elastohydrodynamic solutions of one
+    contact put 1 at 0.97 to 1.15 (2 F u is lost a contact: F is a force per surface); SKF's rolling moments of ten
+    catalogue bearings want 0.5 to 1.3, the less the faster, the lighter loaded and the thicker the oil
+    (examples/published/friction_totals.py)."""
     drag: Literal["cylinder", "off"] = "cylinder"
-    # A free cylinder; packed rollers shield each other (0.3 to 0.5).
+    """Drag of the rollers in the mixture of oil and air, as cylinders across a flow, or none."""
     drag_coefficient: NonNegative = 1.0
+    """What multiplies the drag: 1 is a free cylinder; packed rollers shield each other (0.3 to 0.5)."""
 
     @model_validator(mode="after")
     def _agrees(self) -> Laws:
@@ -93,30 +111,39 @@ class Laws(Strict):
 class Numerics(Strict):
     """Tolerance, length and replication of a run."""
 
-    # rk45: explicit Dormand-Prince. rk43: explicit, by Kutta's 3/8 rule. rosenbrock: linearly implicit RODAS4, for scenes
-    # whose explicit steps are held by stability. auto: rk43 from rtol 5e-3 on, below it rk45, unless a trial at the start
-    # of a run shows the implicit one to be cheaper.
     method: Literal["auto", "rk45", "rk43", "rosenbrock"] = "auto"
-    # Per step, of the approach and speed of a race contact at its mean load share. At 1e-2 impact, whirl and loss of the
-    # bearing of Chen et al. 2022 are off by -0.05 +- 0.12, +0.1 +- 0.4 and 0.000 +- 0.008 %, at 1e-1 by -0.6, -4.0 and
-    # +0.025 % (against rk45 at 1e-4).
+    """Integrator. rk45: explicit Dormand-Prince; rk43: explicit, by Kutta's 3/8 rule; rosenbrock: linearly implicit
+    RODAS4, for scenes whose explicit steps are held by stability. auto: rk43 from rtol 5e-3 on, below it rk45, unless a
+    trial at the start of a run shows the implicit one to be cheaper."""
     rtol: Annotated[float, Field(ge=1e-13, le=0.1)] = 1e-2
+    """Tolerance of a step, of the approach and speed of a race contact at its mean load share. At 1e-2 impact, whirl
+    and loss of the bearing of Chen et al. 2022 are off by -0.05 +- 0.12, +0.1 +- 0.4 and 0.000 +- 0.008 %, at 1e-1 by
+    -0.6, -4.0 and +0.025 % (against rk45 at 1e-4)."""
     turns: Annotated[float, Field(gt=0.0, le=1e6)] = 100
-    # "auto": what the series of the run show to be its transient, at least a batch; else so many turns.
+    """Shaft turns that are counted, after discard_turns."""
     discard_turns: Annotated[float, Field(ge=0.0, le=1e6)] | Literal["auto"] = 20.0
-    # Where the figures of the counted turns drift, run on and count the last half, at most so many times the turns asked
-    # for in all (rbdyn.dynamics.settling); counted turns are filled up to whole impact windows.
+    """Shaft turns before the counted ones, left out as transient; "auto" takes what the series of the run show, at
+    least a batch."""
     extend: bool = True
+    """Where the figures of the counted turns drift, run on and count the last half; counted turns are filled up to
+    whole impact windows."""
     extend_limit: Annotated[float, Field(ge=1.0, le=1000.0)] = 8.0
+    """Longest run that extend makes, as a multiple of the turns asked for."""
     replicates: Annotated[int, Field(ge=1, le=10000)] = 8
+    """Runs of the same scene from different starts; they tell the statistical error."""
     seed: Annotated[int, Field(ge=0)] = 1
-    # The largest force grows with the time one waits for it, so it is taken over windows of a fixed length.
+    """Seed of all random starts and spreads: equal scenes of equal seed and version give equal bits."""
     impact_window_turns: Annotated[float, Field(gt=0.0), NotVanishing] = 20
+    """Window over which the largest force is taken, for it grows with the time one waits; several windows are averaged.
+    """
     samples_per_turn: Annotated[int, Field(ge=8, le=100000)] = 512
-    # Repeats a share of the replicates at another tolerance to find the numerical error.
+    """Samples of the motion a shaft turn, for whirl and histories."""
     companion: bool = True
+    """Repeat a share of the replicates at ten times the tolerance to estimate the numerical error."""
     companion_share: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.25
+    """Share of the replicates that companion repeats."""
     step_budget_per_turn: Annotated[int, Field(ge=100)] = 100_000
+    """Steps a shaft turn after which a run gives up, with where and why."""
 
     @property
     def warm_up_turns(self) -> float:
@@ -128,13 +155,16 @@ class Numerics(Strict):
         """How many replicates are repeated."""
         return math.ceil(self.companion_share * self.replicates - 1e-9) if self.companion else 0
 
+    @property
+    def most_batches(self) -> int:
+        """Batches for which each replicate and companion has memory."""
+        return MOST_KEPT // (self.replicates + self.companions)
+
     @model_validator(mode="after")
     def _fits_into_memory(self) -> Numerics:
-        runs = self.replicates + self.companions
-        most = MOST_KEPT // runs
-        if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > most:
+        if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > self.most_batches:
             raise ValueError(
-                f"turns = {self.turns:g}: {runs} replicates and companions have memory for {most} turns each, warm-up "
-                "included; take fewer turns or replicates"
+                f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have memory for "
+                f"{self.most_batches} turns each, warm-up included; take fewer turns or replicates"
             )
         return self

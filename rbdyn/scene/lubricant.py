@@ -44,32 +44,36 @@ def _four_numbers(value: Any) -> Any:
 
 
 class Lubricant(Strict):
-    """The oil and its temperature; ``viscosity_mPas`` and ``pressure_coefficient_1_GPa`` replace the oil's own."""
+    """The oil, its temperature and where it is."""
 
-    # Of a grease, its base oil. "data_sheet" takes viscosities_C_mm2_s and density_kg_m3.
     oil: OilName
-    # Of a grade or a data sheet: its pressure coefficient, density, heat capacity, conductivity and limit of traction are
-    # estimated from it (rbdyn/properties/oils.py); mineral where left out.
+    """The oil, with its viscosity over temperature and its pressure coefficient; of a grease, its base oil. "data_sheet"
+    takes viscosities_C_mm2_s and density_kg_m3."""
     base_oil: Literal["mineral", "naphthenic", "PAO", "ester", "PAG"] | None = None
-    # Of a grade; by base oil where left out: mineral 95, naphthenic 50, PAO and ester 140, PAG 200.
+    """Base of a grade or a data sheet, from which its pressure coefficient, density, heat capacity, conductivity and limit
+    of traction are estimated (rbdyn/properties/oils.py); mineral where left out."""
     viscosity_index: Annotated[float, Field(ge=0.0, le=400.0)] | None = None
-    # Two points [temperature in C, kinematic viscosity in mm^2/s] of a data sheet.
+    """Viscosity index of a grade; by base oil where left out: mineral 95, naphthenic 50, PAO and ester 140, PAG 200."""
     viscosities_C_mm2_s: Annotated[list[list[float]], Field(min_length=2, max_length=2)] | None = None  # noqa: N815
-    # At 15 C.
+    """Two points [temperature in C, kinematic viscosity in mm^2/s] of a data sheet."""
     density_kg_m3: Annotated[float, Field(ge=500.0, le=3000.0)] | None = None
+    """Density of the oil at 15 C."""
     temperature_C: Annotated[float, Field(ge=-60.0, le=HOTTEST_C), BeforeValidator(_no_kelvin)]  # noqa: N815
+    """Temperature of the oil in the contacts."""
     viscosity_mPas: Positive | None = None  # noqa: N815
-    # alpha of viscosity exp(alpha p): 5 to 25 for oils.
+    """Dynamic viscosity at temperature_C, in place of the oil's own."""
     pressure_coefficient_1_GPa: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] | None = None  # noqa: N815
-    # Share of oil in the mixture that rollers plough through: 0.2 to 5 % for jet lubrication.
+    """alpha of viscosity exp(alpha p), in place of the oil's own: 5 to 25 for oils."""
     oil_fraction: Fraction = 0.02
-    # Root mean square. Honed races and rollers of aircraft bearings have 0.03 to 0.1; 0.05 gives Lambda = 2.4 to 2.9
-    # in the bearing of Chen et al. 2022 at 100 C, 0.1 gives 1.2 to 1.45.
+    """Share of oil in the mixture that rollers plough through: 0.2 to 5 % for jet lubrication."""
     roller_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
+    """Roughness of the rollers, root mean square. Honed rollers of aircraft bearings have 0.03 to 0.1; 0.05 on both
+    gives Lambda = 2.4 to 2.9 in the bearing of Chen et al. 2022 at 100 C, 0.1 gives 1.2 to 1.45."""
     race_roughness_um: Annotated[float, Field(gt=0.0, le=100.0), NotVanishing] = 0.05
-    # Where the oil begins ahead of the edge of a contact, in its half-widths; flooded where left out. ADORE-style inputs
-    # have 10, which leaves the film whole and takes 5 to 19 % of the rolling resistance.
+    """Roughness of the races, root mean square. Honed races of aircraft bearings have 0.03 to 0.1."""
     inlet_distance: Positive | None = None
+    """Where the oil begins ahead of the edge of a contact, in its half-widths; flooded where left out. ADORE-style
+    inputs have 10, which leaves the film whole and takes 5 to 19 % of the rolling resistance."""
 
     @model_validator(mode="after")
     def _known(self) -> Lubricant:
@@ -174,38 +178,47 @@ def with_traction_of_oil(scene: Any) -> Any:
 
 
 class Traction(Strict):
-    """Traction of the races. The defaults are an ADORE-style set for a turbine-engine oil.
-
-    One load-independent set drives lightly loaded rollers too hard and so under-predicts skidding. The models
-    ``thermal_newtonian``, ``eyring`` and ``limiting_shear`` follow the pressure and the temperature instead.
-    """
+    """Traction of the races. The defaults are an ADORE-style set for a turbine-engine oil."""
 
     model: Literal["four_constant", "thermal_newtonian", "eyring", "limiting_shear", "coulomb", "off"] = "four_constant"
+    """Law of the traction. four_constant: one curve for all loads, as in the paper, too hard for lightly loaded
+    rollers, so skidding is under-predicted; thermal_newtonian, eyring, limiting_shear: by pressure and temperature;
+    coulomb: dry. Where left out limiting_shear for oils by grade or data sheet, thermal_newtonian for turbine oils
+    beside MIL-L-7808 and MIL-L-23699."""
     mu_0: NonNegative = 0.0
+    """Traction coefficient without slip, of an ADORE-style set for a turbine-engine oil."""
     mu_m: NonNegative = 0.050
+    """Largest traction coefficient, at the slip u_m_m_s."""
     mu_inf: NonNegative = 0.036
+    """Traction coefficient at large slip."""
     u_m_m_s: Positive = 1.0
-    # A, B [s/m], C [s/m], D of (A + B u) exp(-C u) + D, instead of the four numbers above.
+    """Slip at which traction is largest."""
     constants: Annotated[tuple[float, float, float, float] | None, BeforeValidator(_four_numbers)] = None
-    # Oil of the thermal_newtonian constants of Gupta et al. 1981; lubricant.oil where left out. Oils beside MIL-L-7808 and
-    # MIL-L-23699 have other defaults (with_traction_of_oil).
+    """A, B [s/m], C [s/m], D of (A + B u) exp(-C u) + D, instead of mu_0, mu_m, mu_inf and u_m_m_s."""
     rheology_oil: RheologyOil | None = None
-    # 3 to 10 MPa for mineral oils (Johnson and Tevaarwerk 1977).
+    """Oil of the thermal_newtonian constants of Gupta et al. 1981; lubricant.oil where left out, MIL-L-23699 for turbine
+    oils that have none of their own."""
     eyring_stress_MPa: Positive = 5.0  # noqa: N815
-    # Shear stress over pressure at which limiting_shear yields: 0.05 to 0.10 (Bair and Winer 1979).
+    """Eyring stress: 3 to 10 MPa for mineral oils (Johnson and Tevaarwerk 1977)."""
     limiting_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.07
-    # The same as a cap of thermal_newtonian and eyring, whose stress grows without bound past 1.5 GPa.
+    """Shear stress over pressure at which limiting_shear yields: 0.05 to 0.10 (Bair and Winer 1979)."""
     largest_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.1
-    # mixed: asperities carry the share exp(-b Lambda^c) of a load (Zhou and Hoeprich 1991) and rub dry.
+    """Cap on shear stress over pressure of thermal_newtonian and eyring, whose stress grows without bound past 1.5 GPa.
+    """
     friction: Literal["film", "mixed"] = "film"
+    """film: the oil carries all; mixed: asperities carry the share exp(-b Lambda^c) of a load (Zhou and Hoeprich 1991)
+    and rub dry."""
     boundary_friction: NonNegative = 0.1
-    # Raceways of a tapered roller bearing, composite roughness 0.16 um (Lubricants 11, 2023, 369, Table 4). They
-    # belong to a surface finish: Zhou and Hoeprich give no general values.
+    """Friction coefficient of asperities, for friction = "mixed"."""
     asperity_b: Positive = 2.32
+    """b of the asperities' share exp(-b Lambda^c): raceways of a tapered roller bearing, composite roughness 0.16 um
+    (Lubricants 11, 2023, 369, Table 4). It belongs to a surface finish: Zhou and Hoeprich give no general values."""
     asperity_c: Positive = 0.97
+    """c of the asperities' share exp(-b Lambda^c), of the same source."""
     coulomb: NonNegative = 0.1
-    # Slip over which friction changes sign, where it would otherwise jump.
+    """Friction coefficient of dry races, for model = "coulomb"."""
     blend_speed_m_s: Positive = 0.02
+    """Slip over which friction changes sign, where it would otherwise jump."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Traction:

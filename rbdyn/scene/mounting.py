@@ -27,32 +27,39 @@ class Raceways(Protocol):
 class Mounting(Strict):
     """Fits, temperatures, shaft and housing. With this table, bearing.radial_clearance_mm is that of the loose parts.
 
-    Interferences are diametral at the reference temperature, positive tight, negative loose. Each temperature is
-    that of a whole part.
+    Each temperature is that of a whole part.
     """
 
     bore_mm: Positive
+    """Bore of the inner ring."""
     outside_diameter_mm: Positive
-    # A solid shaft.
+    """Outside diameter of the outer ring."""
     shaft_bore_mm: NonNegative = 0.0
-    # Outer diameter of the housing.
+    """Bore of the shaft; 0 is a solid one."""
     housing_diameter_mm: Positive
+    """Outer diameter of the housing."""
     inner_interference_um: float = 0.0
+    """Diametral interference of inner ring and shaft at the reference temperature; negative is loose."""
     outer_interference_um: float = 0.0
-    # Of the drawing: where the diameters, the interferences and the clearance were measured.
+    """Diametral interference of outer ring and housing at the reference temperature; negative is loose."""
     reference_temperature_C: Celsius = 20.0  # noqa: N815
-    # Both rings at the reference temperature unless given.
+    """Temperature of the drawing, at which diameters, interferences and clearance were measured."""
     inner_ring_temperature_C: Celsius | None = None  # noqa: N815
+    """Temperature of the inner ring; the reference temperature where left out."""
     outer_ring_temperature_C: Celsius | None = None  # noqa: N815
-    # Of rollers or balls; the mean of the rings unless given.
+    """Temperature of the outer ring; the reference temperature where left out."""
     roller_temperature_C: Celsius | None = None  # noqa: N815
-    # As their rings unless given.
+    """Temperature of rollers or balls; the mean of the rings where left out."""
     shaft_temperature_C: Celsius | None = None  # noqa: N815
+    """Temperature of the shaft; that of the inner ring where left out."""
     housing_temperature_C: Celsius | None = None  # noqa: N815
+    """Temperature of the housing; that of the outer ring where left out."""
     shaft_material: MaterialName | CustomMaterial = "bearing_steel"
+    """Material of the shaft."""
     housing_material: MaterialName | CustomMaterial = "bearing_steel"
-    # Whether rotation widens the rings.
+    """Material of the housing."""
     rotation: bool = True
+    """Whether rotation widens the rings."""
 
     @model_validator(mode="after")
     def _nests(self) -> Mounting:

@@ -17,16 +17,16 @@ SLOWEST_RPM = 0.1
 
 
 class Schedule(Strict):
-    """Inner speed and radial load over time from the start of the run, the discarded turns included.
-
-    "linear" and "smooth" (half cosines) run from point to point; "step" holds each value until the next time.
-    Before the first and after the last point values stay.
-    """
+    """Inner speed and radial load over time; before the first and after the last point values stay."""
 
     time_s: Annotated[list[NonNegative], Field(min_length=1)]
+    """Times of the points, from the start of the run, the discarded turns included."""
     inner_speed_rpm: list[Speed] | None = None
+    """Speed of the inner ring at each time."""
     radial_load_N: list[Load] | None = None  # noqa: N815
+    """Radial load at each time."""
     shape: Literal["linear", "smooth", "step"] = "smooth"
+    """"linear" and "smooth" (half cosines) run from point to point; "step" holds each value until the next time."""
 
     @model_validator(mode="after")
     def _matches(self) -> Schedule:
@@ -54,15 +54,22 @@ class Operation(Strict):
     """
 
     inner_speed_rpm: Speed
+    """Speed of the inner ring; negative turns clockwise."""
     radial_load_N: Load  # noqa: N815
+    """Load on the inner ring along x."""
     outer_speed_rpm: Speed = 0.0
-    # Turn with the inner ring: a load, and the unbalance of the shaft.
+    """Speed of the outer ring."""
     rotating_load_N: Load = 0.0  # noqa: N815
+    """Load that turns with the inner ring."""
     unbalance_g_mm: NonNegative = 0.0
-    # Weight is off unless asked for: beside centrifugal forces it is small. 9.81 where it counts.
+    """Unbalance of the shaft; its force grows with the square of the speed."""
     gravity_m_s2: NonNegative = 0.0
+    """Acceleration of gravity; off unless given, for beside centrifugal forces weight is small. 9.81 where it counts.
+    """
     gravity_direction_deg: float = 0.0
+    """Direction of gravity, from that of the load."""
     schedule: Schedule | None = None
+    """Inner speed and radial load over time, instead of constant ones."""
 
     @model_validator(mode="after")
     def _turns(self) -> Operation:
@@ -92,5 +99,8 @@ class Support(Strict):
     """Flexible, damped support of the outer ring: a squirrel cage (1e7 to 1e8 N/m) with a squeeze film (1e3 to 1e4 N s/m)."""
 
     stiffness_N_m: Positive  # noqa: N815
+    """Stiffness of the outer ring's support: 1e7 to 1e8 N/m for a squirrel cage."""
     damping_N_s_m: NonNegative  # noqa: N815
+    """Damping of the outer ring's support: 1e3 to 1e4 N s/m for a squeeze film."""
     outer_ring_mass_kg: Annotated[float, Field(ge=LIGHTEST_RING_KG, le=1e5)] = 0.5
+    """Outer ring with what moves with it."""

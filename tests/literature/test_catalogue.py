@@ -169,9 +169,7 @@ def test_unit_designations(text, name):
     assert read_designation(text).name == name
 
 
-@pytest.mark.parametrize(
-    "text", ["", "NU", "NU2", "210", "608", "22210", "NA4905", "NU999", "NU" * 5000, "一二三"]
-)
+@pytest.mark.parametrize("text", ["", "NU", "NU2", "210", "608", "22210", "NA4905", "NU999", "NU" * 5000, "一二三"])
 def test_unit_unknown_designations(text):
     """Unit: what is no designation of these kinds is refused with what may be written."""
     with pytest.raises(ValueError, match="is no designation known here; write NU"):

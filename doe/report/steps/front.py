@@ -98,16 +98,7 @@ def asked_point_record(study: Study, surfaces: list[Surface], front: ParetoFront
 
 def gains_record(gains: list[PredictedGain]) -> dict[str, Any]:
     """JSON of predicted gains, by response."""
-    return {
-        gain.response: {
-            "percent": gain.percent,
-            "error_percent": gain.error,
-            "verdict": gain.verdict,
-            "single_run_scatter_percent": gain.scatter,
-            "within_single_run_scatter": gain.within_scatter,
-        }
-        for gain in gains
-    }
+    return {gain.response: gain.as_dict() for gain in gains}
 
 
 def _with_optimism(gains: list[PredictedGain], optimism: Array | None) -> dict[str, Any]:

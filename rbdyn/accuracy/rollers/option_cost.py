@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError, set_key
+from rbdyn.records.record import Record, derived, unsaid
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.options/1"
@@ -62,35 +62,28 @@ OPTIONS: dict[str, tuple[str, ...]] = {
 }
 
 
-@dataclass(frozen=True)
-class OptionCost:
-    """Median processor time per right-hand side [ns] with the option and of the scene beside it, the largest relative
-    power gap, the seconds it took to compile (or to load from disk), what the program holds with the option and without
-    it, and the modules that only the option loads."""
+class OptionCost(Record):
+    """Median processor time per right-hand side [ns] with the option, of the scene beside it and their difference, the
+    largest relative power gap, the seconds it took to compile (or to load from disk), what the program holds with the
+    option and without it, and the modules that only the option loads."""
 
     option: str
     with_ns: float
     without_ns: float
+    difference_ns: float = derived(lambda self: self.with_ns - self.without_ns)
     power_gap: float
     compile_s: float
-    holds: Footprint
-    plain_holds: Footprint
-    modules: tuple[str, ...]
-
-    @property
-    def difference_ns(self) -> float:
-        """What the option costs [ns]; negative where it saves."""
-        return self.with_ns - self.without_ns
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        times = ("option", "with_ns", "without_ns", "difference_ns", "power_gap", "compile_s")
-        sizes = {
-            f"{which}{name}": size
-            for which, held in (("with_", self.holds), ("without_", self.plain_holds))
+    sizes: dict[str, int] = derived(
+        lambda self: {
+            f"{which}_{name}": size
+            for which, held in (("with", self.holds), ("without", self.plain_holds))
             for name, size in asdict(held).items()
-        }
-        return {name: getattr(self, name) for name in times} | sizes | {"modules": list(self.modules)}
+        },
+        spread=True,
+    )
+    modules: tuple[str, ...]
+    holds: Footprint = unsaid()
+    plain_holds: Footprint = unsaid()
 
 
 def _added(size: str) -> Callable[[OptionCost], str]:
@@ -134,7 +127,7 @@ def option_costs(
                 gap = run.power_gap if which == 0 else gap
         with_ns, without_ns = (float(np.median(found)) for found in times)
         holds = footprint(option, bearing)
-        rows.append(OptionCost(name, with_ns, without_ns, gap, compile_s, holds, plain_holds, needed))
+        rows.append(OptionCost(name, with_ns, without_ns, gap, compile_s, needed, holds, plain_holds))
         counted.step()
     return rows
 

@@ -37,13 +37,28 @@ def logarithmic(axis: Axes, across: str, up: str) -> None:
 
 def work_precision(rows: Sequence[Row], path: Path, sought: float) -> None:
     """Bias of each output and gap of the power balance against the time of a shaft turn, marked with rtol."""
+    labels = "relative bias, or gap of the power balance", "processor time of a shaft turn [ms]"
+    biases_at_work(rows, path, sought, labels, "turn_ms", ("gap of the power balance", "power_gap"), "rtol")
+
+
+def biases_at_work(
+    rows: Sequence[Any], path: Path, sought: float, labels: tuple[str, str], time: str, line: tuple[str, str], mark: str
+) -> None:
+    """Bias of each output against the field ``time`` of the rows, beside a named line of another field, whose points bear
+    the field ``mark``."""
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
-    logarithmic(axis, "relative bias, or gap of the power balance", "processor time of a shaft turn [ms]")
-    times = [row.turn_ms for row in rows]
+    logarithmic(axis, *labels)
+    times, errors, marks = ([getattr(row, name) for row in rows] for name in (time, line[1], mark))
     ends = outputs_at_work(axis, rows, times, sought)
-    marks = [f"{row.rtol:g}" for row in rows]
-    ends.append(marked(axis, "gap of the power balance", [row.power_gap for row in rows], times, marks))
-    finish_biased(axis, "rtol", ends, sought)
+    ends.append(marked(axis, line[0], errors, times, [f"{each:g}" for each in marks]))
+    axis.margins(0.12)
+    axis.axvline(sought, color=GREY, linewidth=0.8, linestyle=":")
+    axis.set_title(
+        f"grey: {mark}; whiskers: to bias plus 95 % error; open marks: that error hides whether it is {100.0 * sought:g} %",
+        fontsize=9,
+        color=GREY,
+    )
+    label_ends(axis, ends)
     save(figure, path)
 
 
@@ -82,14 +97,3 @@ def marked(axis: Axes, name: str, errors: Sequence[float], times: Sequence[float
         axis.annotate(mark, (error, time), fontsize=7, color=GREY, xytext=(-5, -9),
                       textcoords="offset points", ha="right")  # fmt: skip
     return list(zip(errors, times, strict=True)), name, "black"
-
-
-def finish_biased(axis: Axes, mark: str, ends: list[Named], sought: float) -> None:
-    axis.margins(0.12)
-    axis.axvline(sought, color=GREY, linewidth=0.8, linestyle=":")
-    axis.set_title(
-        f"grey: {mark}; whiskers: to bias plus 95 % error; open marks: that error hides whether it is {100.0 * sought:g} %",
-        fontsize=9,
-        color=GREY,
-    )
-    label_ends(axis, ends)

@@ -179,14 +179,7 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
 
 def _draw(rows: Sequence[Row], path: Any, sought: float) -> None:
     """Error of the load and bias of each output against the time of a right-hand side, marked with slices."""
-    from rbdyn.accuracy.rollers.pictures import finish_biased, logarithmic, marked, outputs_at_work
-    from rbdyn.plots.style import plt, save
+    from rbdyn.accuracy.rollers.pictures import biases_at_work
 
-    figure, axis = plt.subplots(figsize=(7.6, 5.0))
-    logarithmic(axis, "relative error", "processor time of a right-hand side [ns]")
-    times = [row.rhs_ns for row in rows]
-    ends = outputs_at_work(axis, rows, times, sought)
-    marks = [f"{row.slices}" for row in rows]
-    ends.append(marked(axis, "load at equal approach", [row.load_error for row in rows], times, marks))
-    finish_biased(axis, "slices", ends, sought)
-    save(figure, path)
+    labels = "relative error", "processor time of a right-hand side [ns]"
+    biases_at_work(rows, path, sought, labels, "rhs_ns", ("load at equal approach", "load_error"), "slices")

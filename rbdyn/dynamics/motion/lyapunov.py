@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +17,7 @@ from rbdyn.dynamics.parameters.geometry import absolute_tolerance
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_half_width
+from rbdyn.records.record import Record, derived, keyed, unsaid
 from rbdyn.scene import Scene
 
 Array = NDArray[np.float64]
@@ -34,44 +33,24 @@ ALIGN_TURNS = 3.0
 BLOCKS, SHORTEST_BLOCK_TURNS = 20, 1.0
 
 
-@dataclass(frozen=True)
-class LyapunovExponent:
-    """Largest exponent [1/s] with the half-width of its 95 % interval, None where there is one block.
+class LyapunovExponent(Record):
+    """Largest exponent [1/s] and a shaft turn, with the half-widths of their 95 % intervals, None where there is one block.
 
     ``blocks``: exponents of the parts of the run [1/s], (blocks,); ``separation``, ``rtol``: in the norm of the errors.
     """
 
     per_second: float
-    half_width: float | None
-    turn_s: float
-    blocks: Array
+    half_width: float | None = keyed("per_second_half_width")
+    per_turn: float = derived(lambda self: self.per_second * self.turn_s)
+    per_turn_half_width: float | None = derived(
+        lambda self: None if self.half_width is None else self.half_width * self.turn_s
+    )
     turns: float
     separation: float
     rtol: float
     cost: dict[str, float]
-
-    @property
-    def per_turn(self) -> float:
-        """Exponent per shaft turn."""
-        return self.per_second * self.turn_s
-
-    @property
-    def per_turn_half_width(self) -> float | None:
-        """Half-width of its 95 % interval per shaft turn."""
-        return None if self.half_width is None else self.half_width * self.turn_s
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
-        return {
-            "per_second": self.per_second,
-            "per_second_half_width": self.half_width,
-            "per_turn": self.per_turn,
-            "per_turn_half_width": self.per_turn_half_width,
-            "turns": self.turns,
-            "separation": self.separation,
-            "rtol": self.rtol,
-            "cost": self.cost,
-        }
+    turn_s: float = unsaid()
+    blocks: Array = unsaid()
 
 
 def lyapunov_exponent(

@@ -61,7 +61,7 @@ class Solution(NamedTuple):
         return self.status == OK
 
     @property
-    def told(self) -> Vector:
+    def figures(self) -> Vector:
         """(Z, FIGURES): figures of the balls, as ``solve_row`` gives them."""
         return np.stack(self[3:9], axis=1)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.faults import InputError
 from rbdyn.quasistatic.result import ball_columns, ball_records
+from rbdyn.records.record import plain
 from rbdyn.result import read_record, versions, write_json
 
 if TYPE_CHECKING:
@@ -137,7 +136,7 @@ class SweepResult:
         ]
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON form."""
+        """JSON form, which shares nothing with the sweep: the table by points, where the sweep holds it by columns."""
         return {
             "format": FORMAT,
             "status": self.status,
@@ -147,10 +146,10 @@ class SweepResult:
                 {"cause": cause, "points": len(at), "first": self.at(at[0]), "status": self.statuses[at[0]]}
                 for cause, at in self.failures.items()
             ],
-            "notes": list(self.notes),
+            "notes": plain(self.notes),
             "cost": {"wall_s": self.wall_s, "cold_starts": self.cold},
             "versions": versions(),
-            "scene": copy.deepcopy(self.scene),
+            "scene": plain(self.scene),
         }
 
     def save(self, path: Path | str) -> None:
@@ -163,17 +162,17 @@ class SweepResult:
     @classmethod
     def load(cls, path: Path | str) -> SweepResult:
         """Read a sweep saved as JSON. Raises InputError when the file is missing or not such a sweep."""
-        data = read_record(path, FORMAT, "sweep")
-        try:
-            keys = {key: tuple(values) for key, values in data["keys"].items()}
-            points = data["points"]
-            names = dict.fromkeys(name for point in points for name in point if name not in (*keys, "status"))
-            columns = {name: np.array([_number(point, name) for point in points], dtype=np.float64) for name in names}
-            cost = data["cost"]
-            statuses = tuple(point["status"] for point in points)
-            return cls(keys, columns, statuses, cost["cold_starts"], cost["wall_s"], data["scene"], notes=data["notes"])
-        except (ValueError, KeyError, TypeError, AttributeError):
-            raise InputError([f"{path}: not a whole sweep; sweep again"]) from None
+        return read_record(path, FORMAT, "sweep", cls._of_json)
+
+    @classmethod
+    def _of_json(cls, data: dict[str, Any]) -> SweepResult:
+        keys = {key: tuple(values) for key, values in data["keys"].items()}
+        points = data["points"]
+        names = dict.fromkeys(name for point in points for name in point if name not in (*keys, "status"))
+        columns = {name: np.array([_number(point, name) for point in points], dtype=np.float64) for name in names}
+        cost = data["cost"]
+        statuses = tuple(point["status"] for point in points)
+        return cls(keys, columns, statuses, cost["cold_starts"], cost["wall_s"], data["scene"], notes=data["notes"])
 
     def _places(self) -> dict[str, NDArray[Any]]:
         """Values of the keys at every point, a column a key."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.remarks import Rating, Remark, overloads, remarks, tipping
-from rbdyn.quasistatic.result import BallResult
+from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport
 from rbdyn.quasistatic.row.equilibrium import LOST, OK, SENTENCES, resolved
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.row.newton import CONVERGED
@@ -235,19 +235,19 @@ def _one_by_one(scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[in
 
 def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Vector], list[Remark]]:
     """Figures of one point, what is known of each ball by row, and remarks."""
-    record = result.record
-    load = record["reaction"]
-    reaction = np.array([*load["load_N"].values(), *load["moment_Nm"].values()])
-    stiffness = np.array(record["stiffness"]["matrix_SI"])
+    report = result.reached
+    assert report.reaction is not None
+    reaction = np.array([*report.reaction["load_N"].values(), *report.reaction["moment_Nm"].values()])
+    stiffness = np.array(report.stiffness["matrix_SI"])
     columns = ring_columns(result.displacement[np.newaxis], reaction[np.newaxis], stiffness[np.newaxis])
     balls, found = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
     names = ("row",) if len(result.rows) == 1 else ("inner", "outer")
     for name, rating, solution in zip(names, result.ratings, result.rows, strict=True):
-        balls[name] = solution.told
-        found += remarks(solution.told[np.newaxis], [rating], name.removeprefix("row"))
+        balls[name] = solution.figures
+        found += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
         prefix = "" if name == "row" else f"{name}_row_"
         columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
     figures = {name: float(value[0]) for name, value in columns.items()}
-    if "middle_ring" in record:
-        figures["middle_ring_speed_rpm"] = record["middle_ring"]["speed_rpm"]
-    return {**figures, "residual_N": record["residual_N"], "iterations": float(record["iterations"])}, balls, found
+    if isinstance(report, DoubleDeckerReport):
+        figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]
+    return {**figures, "residual_N": report.residual_N, "iterations": float(report.iterations)}, balls, found

@@ -1,0 +1,17 @@
+"""``doe keys``."""
+
+from __future__ import annotations
+
+from rbdyn.cli.keys import AsSchema, Word, run
+from rbdyn.cli.options import Json
+from rbdyn.cli.terminal import guarded
+
+
+def keys(word: Word = None, as_schema: AsSchema = False, as_json: Json = False) -> None:
+    """Tell what every key of a study or of a dimension chain means, its unit, range and default."""
+    with guarded(as_json):
+        from doe.dimension_chain.links import Chain
+        from doe.dimension_chain.reading import Chains
+        from doe.study_file import StudyFile
+
+        run({"study": StudyFile, "chain": Chain, "file of chains": Chains}, word, as_schema, as_json)

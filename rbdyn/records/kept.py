@@ -1,0 +1,59 @@
+"""Finished parts of a long command, a line each in a file beside its results: one that was stopped goes on from there.
+
+A line is there whole or not at all: it begins with the SHA-256 of the rest, and what does not fit it is not read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from rbdyn.compiled.sources import source_digest
+from rbdyn.result import versions
+
+
+class Kept:
+    """Records by key in the file ``path``; without one nothing is kept."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        self._found: dict[str, Any] = {}
+        if path is not None and path.exists():
+            for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+                digest, _, text = line.partition(" ")
+                if digest == digest_of(text):
+                    self._found.update([json.loads(text)])
+
+    def get(self, key: str) -> Any:
+        """The record of a key, or None."""
+        return self._found.get(key)
+
+    def put(self, key: str, record: Any) -> None:
+        """Keep a record; it is on the disk when this returns. Raises OSError."""
+        if self.path is None:
+            return
+        text = json.dumps([key, record])
+        # Begun on a new line, lest the end of one that was cut short spoil it.
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(f"\n{digest_of(text)} {text}\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def run_key(scene: dict[str, Any], version: str) -> str:
+    """Key of a run: hash of its resolved scene and of the version that runs it."""
+    return digest_of(json.dumps([version, scene], sort_keys=True))
+
+
+def code_version(*modules: str) -> str:
+    """Version of all that the bits of a run depend on, the code that simulates it and these modules included."""
+    packages = {name: version for name, version in versions().items() if name != "python"}
+    return json.dumps({**packages, "sources": source_digest("rbdyn.dynamics.simulate", *modules)}, sort_keys=True)
+
+
+def digest_of(content: str | bytes) -> str:
+    """SHA-256 of a text or of the content of a file."""
+    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()

@@ -1,0 +1,116 @@
+"""Records: frozen dataclasses whose fields, listed once, are the keys of their JSON form, in this order.
+
+A field stands under its own name, unless it is ``keyed`` otherwise, ``spread`` or ``unsaid``; ``derived`` ones follow from
+the others; one whose default is None is left out where it is None.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import MISSING, Field, dataclass, field, fields
+from types import UnionType
+from typing import Any, Literal, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
+
+# What fields are declared to be, of a class.
+_kinds: Callable[[Any], dict[str, Any]] = functools.cache(get_type_hints)
+
+
+def keyed(*path: str, **options: Any) -> Any:
+    """A field under another key than its name, or under keys one within the other; ``options`` as of ``dataclasses.field``."""
+    return field(metadata={"path": path}, **options)
+
+
+def spread(**options: Any) -> Any:
+    """A table or record whose keys stand among those of its owner; None has none. Read, it gets all keys of no other field."""
+    return keyed(**options)
+
+
+def derived(by: Callable[[Any], Any], *path: str, spread: bool = False, init: Literal[False] = False) -> Any:
+    """A field that follows from the others, once they are set."""
+    return field(init=init, repr=False, metadata={"by": by} | ({"path": path} if path or spread else {}))
+
+
+def unsaid(**options: Any) -> Any:
+    """A field of which JSON does not tell."""
+    return field(metadata={"path": None}, **options)
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, unsaid))
+@dataclass(frozen=True)
+class Record:
+    """Base of all records, which makes frozen dataclasses of them; ``kw_only``: with named arguments only."""
+
+    def __init_subclass__(cls, kw_only: bool = False) -> None:
+        dataclass(frozen=True, kw_only=kw_only)(cls)
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            if "by" in one.metadata:
+                object.__setattr__(self, one.name, one.metadata["by"](self))
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form, which shares nothing with the record: plain numbers, lists and tables, units in the names."""
+        found: dict[str, Any] = {}
+        for one, path in told(self):
+            value = plain(getattr(self, one.name))
+            if value is None and one.default is None:
+                continue
+            table = found
+            for key in path[:-1]:
+                table = table.setdefault(key, {})
+            table.update({path[-1]: value} if path else value or {})
+        return found
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
+        taken = {key for _, path in told(cls) for key in path[:1]}
+        found: dict[str, Any] = {}
+        for one, path in told(cls):
+            if not one.init or (path and one.default is None and path[0] not in data):
+                continue
+            value: Any = data if path else {key: value for key, value in data.items() if key not in taken}
+            for key in path:
+                value = value[key]
+            if path or value or one.default is MISSING:
+                found[one.name] = restored(_kinds(cls)[one.name], value)
+        return cls(**found)
+
+
+def told(record: Record | type[Record]) -> list[tuple[Field[Any], tuple[str, ...]]]:
+    """Fields of which JSON tells, each with its keys there from the outermost in; one that is spread has none of its own."""
+    paths = ((one, one.metadata.get("path", (one.name,))) for one in fields(record))
+    return [(one, path) for one, path in paths if path is not None]
+
+
+def plain(value: Any) -> Any:
+    """JSON form of a value, which shares nothing with it; arrays become lists."""
+    if isinstance(value, Record):
+        return value.as_dict()
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def restored(kind: Any, value: Any) -> Any:
+    """A value of JSON as the ``kind`` that a field is declared to be. Raises KeyError or TypeError where it is none."""
+    origin, of = get_origin(kind), get_args(kind)
+    if kind is Any:
+        return value
+    if origin in (UnionType, Union):
+        for each in of:
+            with suppress(KeyError, TypeError):
+                return restored(each, value)
+    elif origin is dict and isinstance(value, dict):
+        return {key: restored(of[1], each) for key, each in value.items()}
+    elif origin in (list, tuple) and isinstance(value, list):
+        return origin(restored(of[0], each) for each in value)
+    elif isinstance(kind, type) and issubclass(kind, Record) and isinstance(value, dict):
+        return kind.from_dict(value)
+    elif type(value) is kind or (kind is float and type(value) is int):
+        return value
+    raise TypeError(f"{value!r} is not of {kind}")

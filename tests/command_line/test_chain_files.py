@@ -1,0 +1,135 @@
+"""Files of chains: the three clearances of the example bearing, several chains in one file, chains of a study."""
+
+import json
+from pathlib import Path
+
+import pytest
+from chains import by_name
+from doe_command import doe
+
+from doe.dimension_chain import read_chains, solve
+from doe.report.steps.chain import print_chain
+from doe.study_file.chain_section import StudyChain, chain_table
+from rbdyn.faults import InputError, read_toml
+from rbdyn.mounting.rings import MountedRings, Ring, mounted_clearance
+from rbdyn.properties.materials import Material
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+BEARING = EXAMPLES / "bearing_chains.toml"
+
+
+@pytest.fixture(scope="module")
+def solved():
+    return {name: solve(chain, samples=100_000) for name, chain in read_chains(BEARING).items()}
+
+
+def test_the_chains_of_the_bearing_meet_the_clearances_of_its_scene(solved):
+    scene = read_toml(EXAMPLES / "cylindrical_roller.toml")
+    wanted = {
+        "radial": scene["bearing"]["radial_clearance_mm"],
+        "guide": scene["cage"]["guide_clearance_mm"],
+        "pocket": scene["cage"]["pocket_clearance_mm"],
+    }
+    limits = {each["name"]: each["closing_link"] for each in read_toml(BEARING)["chain"]}
+    for name, clearance in wanted.items():
+        assert (limits[name]["lower_mm"] + limits[name]["upper_mm"]) / 2 == pytest.approx(clearance), name
+        assert solved[name].status == "ok: deviations allocated"
+    assert solved["pocket"].worst_case_mm == pytest.approx((0.295, 0.305))
+    assert solved["radial"].yields["as_given"] >= 0.9973 - 3 * solved["radial"].standard_errors["as_given"]
+
+
+def test_the_radial_chain_loses_what_the_rings_of_the_simulator_lose(solved):
+    part = by_name(solved["radial"])
+    steel = Material(206e9, 0.3, 7827.0)
+    sizes = {name: each.nominal_mm + each.mean_mm for name, each in part.items()}
+    initial = sizes["outer_raceway"] - sizes["inner_raceway"] - 2 * sizes["rollers"]
+    rings = MountedRings(
+        shaft=Ring(0.0, 0.0135, steel),
+        inner_ring=Ring(0.0135, 0.01725, steel),
+        outer_ring=Ring(0.02626, 0.03, steel),
+        housing=Ring(0.03, 0.04, steel),
+        inner_interference=1e-3 * (sizes["shaft_seat"] - sizes["ring_bore"]),
+        outer_interference=1e-3 * (sizes["ring_outside"] - sizes["housing_bore"]),
+    )
+    mounted = mounted_clearance(1e-3 * initial, rings, 0.009, steel)
+    low, high = solved["radial"].rss_mm
+    assert (low + high) / 2 == pytest.approx(1e3 * mounted.operating, abs=1e-9)
+
+
+def test_the_example_of_all_keys_is_solved():
+    chain = read_chains(EXAMPLES / "guide_chain_options.toml")["guide_chain_options"]
+    result = solve(chain, samples=100_000)
+    assert result.yields["as_given"] >= 0.999
+    assert all(by_name(result)[link.name].grade for link in chain.free)
+    assert result.selective.good >= result.yields["as_given"] - 3 * result.standard_errors["as_given"]
+
+
+def test_matching_rings_narrows_the_clearance(solved):
+    found = solved["radial"].selective
+    assert found.matched_deviation_mm < 0.75 * found.random_deviation_mm
+
+
+def test_graded_parts_stand_at_their_letters(solved):
+    part = by_name(solved["guide"])
+    assert (part["guide_land"].lower_mm, part["cage_outside"].upper_mm) == (0.0, 0.0)
+    assert {each.grade for each in part.values()} == {"IT7"}
+
+
+def test_several_chains_print_one_json_object():
+    shown = doe("chain", str(BEARING), "--json")
+    assert shown.returncode == 0, shown.stderr
+    record = json.loads(shown.stdout)
+    assert list(record) == ["chains", "status"] and record["status"] == "ok"
+    assert list(record["chains"]) == ["radial", "guide", "pocket"]
+    assert {"closing_link", "yield", "contributions", "allocation", "status"} <= set(record["chains"]["guide"])
+
+
+def test_text_shows_parts_limits_yield_ppm_contributions_and_classes(solved, capsys):
+    for name, result in solved.items():
+        print_chain(name, result, verbose=True)
+    text = capsys.readouterr().out
+    for words in (
+        "48.1300 +0.0250/0", "in worst case", "by root sum square", "ppm below", "contributions", "█",
+        "matched in 4 classes", "a linear chain would miss", "quantiles of the closing link",
+    ):  # fmt: skip
+        assert words in text, words
+
+
+def test_one_refused_chain_among_several_refuses_the_file(tmp_path):
+    printed = (EXAMPLES / "pocket_chain_as_printed.toml").read_text(encoding="utf-8")
+    right = (EXAMPLES / "pocket_chain.toml").read_text(encoding="utf-8")
+
+    def named(name, text):
+        body = text.replace("[[link]]", "[[chain.link]]").replace("[closing_link]", "[chain.closing_link]")
+        return f'[[chain]]\nname = "{name}"\n' + body.replace("[allocate]", "[chain.allocate]")
+
+    path = tmp_path / "two.toml"
+    path.write_text(named("right", right) + "\n" + named("printed", printed), encoding="utf-8")
+    shown = doe("chain", str(path), "--json")
+    assert shown.returncode == 2
+    assert json.loads(shown.stdout)["status"] == "refused: printed"
+    assert f"{path}: chain printed: refused: the given deviations" in shown.stderr
+    path.write_text(named("right", right) + named("right", right.replace("-1.0", "0.0")), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_chains(path)
+    assert caught.value.faults == [
+        f'{path}: chain.name = "right": used 2 times; name each once',
+        f'{path}: chain "right": link "roller_diameter": coefficient = 0: must not be zero; set it, remove the link, '
+        "or use it in a function",
+    ]
+
+
+def test_a_study_takes_its_own_width_or_the_tolerance_found():
+    link = [{"name": "a", "coefficient": 1.0, "nominal_mm": 0.3}]
+    own = StudyChain(name="pocket", factor="p", half_width_mm=0.005, link=link)
+    assert chain_table(own, EXAMPLES, 0.3, 0.02)["closing_link"] == {"lower_mm": 0.295, "upper_mm": 0.305}
+    found = StudyChain(name="pocket", factor="p", link=link)
+    assert chain_table(found, EXAMPLES, 0.3, 0.02)["closing_link"] == pytest.approx(
+        {"lower_mm": 0.28, "upper_mm": 0.32}
+    )
+    with pytest.raises(InputError, match="chain pocket: half_width_mm: missing"):
+        chain_table(found, EXAMPLES, 0.3)
+    beside = StudyChain(name="guide", factor="g", half_width_mm=0.02, file="bearing_chains.toml")
+    table = chain_table(beside, EXAMPLES, 0.15)
+    assert [each["name"] for each in table["link"]] == ["guide_land", "cage_outside"]
+    assert table["closing_link"] == pytest.approx({"lower_mm": 0.13, "upper_mm": 0.17})

@@ -1,0 +1,187 @@
+"""``doe fit``: errors and blocks of a table, what is printed and written, what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner, Result
+
+from doe.cli import app
+from doe.report.steps.fit import print_fit
+from doe.running.failure import StoppedError
+from doe.study.runs import read_runs
+from doe.study.surfaces import fit_surfaces
+from doe.study_file import Study
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+TABLE = pd.read_csv(EXAMPLES / "ccd_table4.csv")
+RESPONSES = ["impact_force_N", "whirl_deviation_ratio", "power_loss_W"]
+
+
+def run(folder: Path, table: pd.DataFrame | str, *options: str, replace: tuple[str, str] = ("", "")) -> Result:
+    """The command on a table and the example study, changed by ``replace``."""
+    study(folder, replace)
+    text = table if isinstance(table, str) else table.to_csv(index=False)
+    (folder / "table.csv").write_text(text, encoding="utf-8")
+    return CliRunner().invoke(app, ["fit", str(folder / "study.toml"), "--data", str(folder / "table.csv"), *options])
+
+
+def study(folder: Path, replace: tuple[str, str] = ("", "")) -> Path:
+    """The example study with linear models, which are quick, in a folder of its own."""
+    text = (EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8").replace('"quadratic"', '"linear"')
+    path = folder / "study.toml"
+    path.write_text(text.replace(*replace) if replace[0] else text, encoding="utf-8")
+    return path
+
+
+def with_errors() -> pd.DataFrame:
+    """Table 4 with half-widths and their replicates, its runs in two blocks."""
+    half = {f"{name}_error": 0.02 * TABLE[name] for name in RESPONSES}
+    return TABLE.assign(**half, replicates=8, block=np.arange(20) % 2)
+
+
+def test_errors_replicates_and_blocks_of_a_table_reach_the_fit(tmp_path):
+    with_errors().to_csv(tmp_path / "table.csv", index=False)
+    loaded = Study.load(study(tmp_path, ('model = "linear"', 'model = "linear"\nweighting = "replicates"')))
+    runs = read_runs(loaded, tmp_path / "table.csv")
+    assert runs.errors == pytest.approx(0.02 * runs.values)
+    assert runs.replicates.tolist() == [8] * 20 and runs.block.tolist() == [0, 1] * 10
+    surface = fit_surfaces(loaded, runs)[0]
+    assert surface.weighting == "replicates" and set(surface.blocks) == {"0", "1"}
+    assert surface.data.standard_errors == pytest.approx(0.02 * runs.values[:, 0] / 2.364624, rel=1e-6)
+    assert surface.known_variance.dof == pytest.approx(7)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory) -> tuple[str, Path]:
+    """What a verbose fit of the first response prints, and the folder that it writes."""
+    folder = tmp_path_factory.mktemp("fit")
+    text = (EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8")
+    start = text.index("[[response]]", text.index("[[response]]") + 1)
+    others = text[start : text.index("[front]")]
+    path = folder / "study.toml"
+    path.write_text(text.replace(others, "").partition("[reference]")[0], encoding="utf-8")
+    with_errors().to_csv(folder / "table.csv", index=False)
+    options = ["--data", str(folder / "table.csv"), "--verbose", "--out", str(folder)]
+    shown = CliRunner().invoke(app, ["fit", str(path), *options])
+    assert shown.exit_code == 0, shown.output
+    return shown.output, folder
+
+
+def test_tables_are_written_beside_the_record(finished):
+    printed, folder = finished
+    record = json.loads((folder / "fit.json").read_text(encoding="utf-8"))["responses"][RESPONSES[0]]
+    tables = [pd.read_csv(folder / f"{name}.csv") for name in ("coefficients", "anova", "runs")]
+    coefficients, anova, runs = tables
+    assert all(list(table["response"]) == [RESPONSES[0]] * len(table) for table in tables)
+    assert list(runs["run"]) == list(range(1, 21))
+    assert runs["cook"].tolist() == pytest.approx([run["cook"] for run in record["diagnostics"]["runs"]])
+    found = coefficients.set_index("term")
+    assert found["coefficient"].to_dict() == pytest.approx(record["coefficients"])
+    assert found["standard_error"].to_dict() == pytest.approx(record["standard_errors"])
+    assert found["actual_units"].to_dict() == pytest.approx(record["actual_coefficients"])
+    assert list(anova["source"]) == [row["source"] for row in record["anova"]]
+    assert {"block", "replicate_variance"} <= set(anova["source"])
+    assert record["rival"]["recommended"] in ("polynomial", "gaussian_process")
+    assert set(record["sentences"]) <= set(printed.splitlines())
+
+
+def test_a_statistician_recognises_the_tables(finished):
+    printed, _ = finished
+    for words in ("sum of squares", "mean square", "standard error", "95 % from", "VIF", "cook", "***"):
+        assert words in printed
+    assert "A = radial_clearance_mm, B = guide_clearance_mm" in printed
+
+
+def test_equations_are_in_coded_and_in_actual_units(tmp_path, capsys):
+    TABLE.to_csv(tmp_path / "table.csv", index=False)
+    loaded = Study.load(study(tmp_path))
+    surfaces = fit_surfaces(loaded, read_runs(loaded, tmp_path / "table.csv"))
+    print_fit(surfaces[:1])
+    printed = capsys.readouterr().out
+    assert "impact_force_N = +203.7 +22.979 A +17.186 B +32.248 C (coded)" in printed
+    assert "impact_force_N = -133.26 +4595.7 A +343.72 B +644.96 C (actual units)" in printed
+    print_fit(surfaces, quiet=True)
+    quiet = capsys.readouterr().out.splitlines()
+    assert all(line.partition(":")[0] in RESPONSES for line in quiet if line)
+
+
+MODEL = 'model = "linear"\ngoal'
+HEADER = ",".join(TABLE.columns)
+
+
+@pytest.mark.parametrize(
+    ("table", "replace", "words"),
+    [
+        (TABLE.drop(columns="power_loss_W"), ("", ""), "column 'power_loss_W' is missing; add it"),
+        (TABLE.head(4), ("", ""), "4 runs are too few for the linear model; give at least 5"),
+        (TABLE.assign(guide_clearance_mm=0.15), ("", ""), "cannot tell B from the other terms"),
+        (TABLE.assign(power_loss_W=9.0), ("", ""), "power_loss_W: all 20 values are 9, so there is nothing to fit"),
+        (TABLE, (MODEL, f"weighting = 'replicates'\n{MODEL}"), 'weighting = "replicates" needs'),
+        (
+            with_errors().assign(impact_force_N_error=-1.0),
+            (MODEL, f"weighting = 'replicates'\n{MODEL}"),
+            "the error of run 1 is -",
+        ),
+        (
+            TABLE.assign(impact_force_N=TABLE["impact_force_N"] - 200),
+            (MODEL, f"transform = 'box_cox'\n{MODEL}"),
+            "a power transform needs positive values",
+        ),
+        (TABLE, (MODEL, f"transform = 'log'\n{MODEL}"), "transform = 'log': choose one of 'none' or 'box_cox', or"),
+        (TABLE, (MODEL, f"weighting = 'none'\n{MODEL}"), "choose one of 'equal' or 'replicates'"),
+        (TABLE.assign(block=0.5), ("", ""), "block in row 1 = 0.5: is not a whole number; mend it"),
+        (TABLE.assign(power_loss_W_error="wide"), ("", ""), "power_loss_W_error in row 1 = 'wide': is not a finite"),
+        (
+            TABLE.to_csv(index=False).replace(HEADER, HEADER.replace("power_loss_W", "impact_force_N"), 1),
+            ("", ""),
+            "column 'impact_force_N' comes 2 times; keep one",
+        ),
+    ],
+)
+def test_bad_input_is_a_sentence_and_exit_2(tmp_path, table, replace, words):
+    shown = run(tmp_path, table, "--out", str(tmp_path / "out"), replace=replace)
+    assert shown.exit_code == 2
+    assert any(words in line for line in shown.stderr.splitlines()), shown.stderr
+    assert "Traceback" not in shown.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_all_faults_of_a_table_at_once(tmp_path):
+    table = TABLE.drop(columns="power_loss_W").assign(block="one", impact_force_N="many")
+    faults = run(tmp_path, table).stderr.splitlines()
+    assert len(faults) == 41 and len(set(faults)) == 41
+
+
+def test_rows_of_one_run_are_its_replicates(tmp_path):
+    """Closed form: three rows 2 apart have a mean whose half width is 4.30265 x 2 / sqrt(3)."""
+    spread = [TABLE.assign(impact_force_N=TABLE["impact_force_N"] + shift) for shift in (-2.0, 0.0, 2.0)]
+    rows = pd.concat(spread)
+    rows.to_csv(tmp_path / "rows.csv", index=False)
+    runs = read_runs(Study.load(study(tmp_path)), tmp_path / "rows.csv")
+    assert runs.values == pytest.approx(TABLE[RESPONSES].to_numpy())
+    assert runs.errors[:, 0] == pytest.approx([4.302653 * 2.0 / np.sqrt(3.0)] * 20)
+    assert runs.replicates.tolist() == [3] * 20
+    rows.iloc[20, rows.columns.get_loc("guide_clearance_mm")] = 0.1234
+    refused = run(tmp_path, rows)
+    assert refused.exit_code == 2
+    assert "guide_clearance_mm of run 1 is 0.1234 in one replicate and 0.15 in another" in refused.output
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_run_that_is_stopped_says_what_is_kept(tmp_path, monkeypatch, kept):
+    """Unit: a full disk or a lost cluster leaves the finished runs in the folder of ``--out``, and nowhere without one."""
+
+    def stop(*arguments, **options):
+        raise StoppedError("the scheduler is gone", "start again")
+
+    monkeypatch.setattr("doe.clearance.run_scenes", stop)
+    path = study(tmp_path)
+    (tmp_path / "cylindrical_roller.toml").write_text((EXAMPLES / "cylindrical_roller.toml").read_text())
+    found = CliRunner().invoke(app, ["fit", str(path), *(["--out", str(tmp_path / "out")] if kept else [])])
+    where = "finished runs are kept" if kept else "without --out no finished run is kept"
+    assert found.exit_code == 1 and found.stderr == f"the scheduler is gone; {where}: start again\n"

@@ -1,0 +1,136 @@
+"""``rbdyn keys`` and ``doe keys``: every key described, and a schema that accepts what the commands accept."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+from jsonschema import Draft202012Validator
+from typer.testing import CliRunner
+
+import rbdyn
+from doe.cli import app as doe_app
+from doe.dimension_chain.reading import Chains
+from doe.study_file import StudyFile
+from rbdyn.cli.app import app as rbdyn_app
+from rbdyn.cli.keys import _models, descriptions, keys, schema
+from rbdyn.scene import Scene
+from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
+
+EXAMPLES = next(parent for parent in Path(__file__).parents if (parent / "pyproject.toml").exists()) / "examples"
+SCENES = {"roller bearing": Scene, "ball bearing": SingleRowScene, "double-decker": DoubleDeckerScene}
+
+
+def printed(app, *arguments, code=0):
+    """Standard output of ``keys``."""
+    shown = CliRunner().invoke(app, ["keys", *arguments])
+    assert shown.exit_code == code, shown.output
+    return shown.stdout
+
+
+def is_scene(path):
+    """Whether a TOML file is a scene, a study or chains."""
+    return "kind" in tomllib.loads(path.read_text(encoding="utf-8")).get("bearing", {})
+
+
+@pytest.mark.parametrize("model", _models([*SCENES.values(), StudyFile, Chains]), ids=lambda model: model.__name__)
+def test_every_key_says_what_it_means(model):
+    """Command line: no key without a whole sentence of its own."""
+    for name, text in descriptions(model).items():
+        assert text.endswith((".", ".)")) and len(text.split()) > 1 and text.rstrip(".") != name, name
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.rglob("*.toml")), ids=lambda path: path.name)
+def test_schema_accepts_every_example_and_refuses_a_slip(path):
+    """Command line: an editor that knows the schema marks no example, and marks a key that is none."""
+    app = rbdyn_app if is_scene(path) else doe_app
+    found = json.loads(printed(app, "--schema"))
+    Draft202012Validator.check_schema(found)
+    validator = Draft202012Validator(found)
+    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert list(validator.iter_errors(data)) == []
+    assert list(validator.iter_errors({**data, "bearings": {}}))
+
+
+def test_schema_tells_ranges_defaults_and_descriptions():
+    """Command line: numbers of the schema are those of the validation."""
+    pocket = json.loads(printed(rbdyn_app, "--schema"))["$defs"]["Cage"]["properties"]["pocket_clearance_mm"]
+    assert pocket == {
+        "exclusiveMinimum": 0.0,
+        "maximum": 10.0,
+        "type": "number",
+        "description": "Pocket width less roller diameter.",
+    }
+
+
+def test_keys_are_those_of_a_scene_that_gives_all():
+    """Command line: the keys listed of a roller bearing are exactly those of its model, at any depth."""
+
+    def names(data, prefix=""):
+        for key, value in data.items():
+            yield f"{prefix}{key}"
+            tables = value if isinstance(value, list) else [value]
+            for each in tables:
+                if isinstance(each, dict):
+                    yield from names(each, f"{prefix}{key}{'[]' if isinstance(value, list) else ''}.")
+
+    listed = {key.key for key in keys({"roller bearing": Scene})}
+    scene = Scene.load(EXAMPLES / "all_options.toml").model_dump(mode="json")
+    assert set(names(scene)) <= listed
+    tables = {name for name, value in scene.items() if isinstance(value, dict)}
+    for table in tables:
+        of_table = {name.split(".")[1].removesuffix("[]") for name in listed if name.startswith(f"{table}.")}
+        assert of_table == set(scene[table])
+
+
+def test_a_word_is_looked_up_in_names_and_descriptions():
+    """Command line: one word narrows the list; the unit, the range and the default stand with the name."""
+    shown = printed(rbdyn_app, "clearance")
+    assert (
+        "cage.pocket_clearance_mm: number above 0 to 10, mm, required\n    Pocket width less roller diameter." in shown
+    )
+    assert "cage.mass_g" not in shown and "model.land_film_floor_um" not in shown
+    assert printed(rbdyn_app, "CAGE.MASS_G").splitlines()[2] == "cage.mass_g: number from 0.01 to 1e+06, g, required"
+    assert "numerics.rtol: number from 1e-13 to 0.1, default 0.01" in printed(rbdyn_app, "rtol")
+    assert "factor[].key: text, required" in printed(doe_app, "factor")
+    assert "link[].capability: number above 0, default 1" in printed(doe_app, "capability")
+
+
+def test_keys_as_json_and_a_word_that_no_key_has():
+    """Command line: one JSON object; a word that stands nowhere is bad input."""
+    found = json.loads(printed(rbdyn_app, "speed_rpm", "--json"))["keys"]
+    speed = next(key for key in found if key["key"] == "operation.inner_speed_rpm")
+    assert (speed["unit"], speed["required"], speed["default"]) == ("rpm", True, None)
+    assert json.loads(printed(rbdyn_app, "wheel", "--json", code=2))["status"] == "refused"
+    assert printed(doe_app, "wheel", code=2) == ""
+
+
+def test_a_key_that_kinds_share_is_listed_once():
+    """Command line: what means the same for rollers and balls stands once, what differs stands with each."""
+    found = [key.key for key in keys(SCENES)]
+    assert found.count("lubricant.temperature_C") == 1
+    assert found.count("operation.radial_load_N") == 2
+    assert all(
+        "description" in table for each in schema(SCENES)["$defs"].values() for table in each["properties"].values()
+    )
+
+
+@pytest.mark.parametrize("app", [rbdyn_app, doe_app], ids=["rbdyn", "doe"])
+def test_version_and_completion(app):
+    """Command line: the version alone, and what completes commands in a shell."""
+    shown = CliRunner().invoke(app, ["--version"])
+    assert (shown.exit_code, shown.stdout) == (0, f"rbdyn {rbdyn.__version__}\n")
+    assert "--install-completion" in CliRunner().invoke(app, ["--help"]).stdout
+
+
+def test_help_shows_no_type_of_a_flag():
+    """Command line: a flag takes no value, and help speaks of none."""
+    shown = CliRunner().invoke(doe_app, ["fit", "--help"]).stdout
+    lines = [line for line in shown.splitlines() if "--json" in line or "--retry" in line]
+    assert len(lines) == 2 and not any("bool" in line.lower() for line in lines)
+
+
+def test_package_shows_its_names():
+    """Command line: in a shell of Python the names of the library and its version complete."""
+    assert {"Scene", "simulate", "equilibrium", "load", "__version__"} <= set(dir(rbdyn))
+    assert all(getattr(rbdyn, name) is not None for name in rbdyn.__all__)

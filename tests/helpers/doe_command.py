@@ -1,0 +1,30 @@
+"""The command ``doe`` in processes of its own: what it prints, and what it loads."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+HEAVY = {"numba", "scipy", "pandas", "sklearn", "pymoo", "matplotlib"}
+
+
+def doe(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the command in a process of its own."""
+    return subprocess.run([sys.executable, "-m", "doe", *arguments], capture_output=True, text=True, timeout=300)
+
+
+def loaded_by(code: str) -> set[str]:
+    """Heavy packages in memory after running ``code`` in a fresh interpreter."""
+    tail = "; import sys; print(sorted({name.split('.')[0] for name in sys.modules}))"
+    shown = subprocess.run([sys.executable, "-c", code + tail], capture_output=True, text=True, check=True)
+    return HEAVY & set(eval(shown.stdout.splitlines()[-1]))
+
+
+def invoke(*arguments: str) -> str:
+    """Code that runs the command inside an interpreter and survives its exit."""
+    return (
+        "import contextlib, io; from doe.cli import app\n"
+        "with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):\n"
+        f"    app({list(arguments)!r})\n"
+        "0"
+    )

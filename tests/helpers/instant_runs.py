@@ -1,0 +1,90 @@
+"""Studies whose simulations take no time: results made of the scene alone, for tests of what surrounds them.
+
+As a program: ``python instant_runs.py SECONDS_A_RUN STUDY.toml DIR WORKERS`` runs the design like that, and tells the
+responses and the seeds that ran or leaves as a command does; with ``--whole`` it is ``doe study``, with the seeds on
+standard error.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+from rbdyn.faults import RunError
+from rbdyn.result import Quantity, SimulationResult, versions
+from rbdyn.scene import Scene
+
+
+def instant_result(scene: Scene) -> SimulationResult:
+    """A result whose figures follow the clearances, with the seed as scatter."""
+    cage, seed = scene.cage, scene.numerics.seed
+    base = 100.0 * cage.pocket_clearance_mm + 30.0 * cage.guide_clearance_mm + (seed * 7 % 5) * 0.1
+    figures = {
+        name: Quantity(base * scale, 0.01 * base * scale, None, 10.0)
+        for name, scale in (
+            ("impact_force", 1.0),
+            ("impact_contact_force", 1.0),
+            ("whirl_deviation_ratio", 0.01),
+            ("power_loss", 3.0),
+            ("cage_speed_rpm", 200.0),
+            ("cage_slip", 0.001),
+        )
+    }
+    return SimulationResult(
+        status="ok", **figures, power_gap=0.0, power_terms={}, max_inner_load=1.0, max_outer_load=1.0,
+        max_land_load=1.0, races={}, clearance={}, impact_window_turns=1.0, transient_turns=None, counted_turns=1.0, target=None, cost={},
+        replicates=scene.numerics.replicates, seed=seed, notes=(), versions=versions(),
+        scene=scene.model_dump(mode="json"),
+    )  # fmt: skip
+
+
+def instantly(patch: Any, seconds: float = 0.0, faulty: Collection[int] = ()) -> list[int]:
+    """Let simulations end after ``seconds``, those of the ``faulty`` seeds in a fault; returns the seeds that ran.
+
+    ``patch(target, name, value)`` replaces an attribute, such as ``monkeypatch.setattr``.
+    """
+    from rbdyn.dynamics import run
+    from rbdyn.dynamics import simulate as module
+
+    ran: list[int] = []
+
+    def simulate(scene: Scene, workers: int | None, progress: Any, stop: Any) -> SimulationResult:
+        ran.append(scene.numerics.seed)
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            stop.check()
+            time.sleep(0.001)
+        if scene.numerics.seed in faulty:
+            raise RunError(f"replicate 1 (seed {scene.numerics.seed}) stopped at t = 1e-05 s: the oil froze")
+        return instant_result(scene)
+
+    patch(module, "simulate", simulate)
+    patch(run, "prepare", lambda scene, bearing: 0.0)
+    return ran
+
+
+def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = False) -> None:
+    """The program."""
+    from doe.commands.steps import keeping_runs
+    from doe.commands.study import study as doe_study
+    from doe.study.runs import run_design
+    from doe.study_file import Study
+    from rbdyn.cli.terminal import guarded, output_folder, print_json
+
+    ran = instantly(setattr, seconds)
+    if whole:
+        doe_study(study, out, workers, as_json=True)
+        print(ran, file=sys.stderr)
+        return
+    with guarded(as_json=True), keeping_runs(out):
+        runs = run_design(Study.load(study), output_folder(out, "doe", study), workers, lambda done, total: None)
+        print_json({"values": runs.values.tolist(), "ran": ran})
+
+
+if __name__ == "__main__":
+    import typer
+
+    typer.run(main)

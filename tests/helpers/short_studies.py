@@ -1,0 +1,50 @@
+"""The example study on a simulation that is short, and what its store holds."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from pathlib import Path
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SHORT = "turns=3,discard_turns=1,replicates=2,companion=false,impact_window_turns=1"
+
+
+def short_study(folder: Path, settings: str = SHORT, replace: tuple[str, str] = ("", "")) -> Path:
+    """The example study with a short simulation, in a folder of its own."""
+    for name in ("cylindrical_roller.toml", "ccd_table4.csv", "bearing_chains.toml"):
+        shutil.copy(EXAMPLES / name, folder)
+    text = (EXAMPLES / "clearance_study.toml").read_text(encoding="utf-8")
+    lines = [f'"numerics.{each}"' for each in settings.split(",")]
+    first = next(line for line in text.splitlines() if line.startswith("set = "))
+    text = text.replace(first, f"set = [{', '.join(lines)}]").replace("replicates = 16", "replicates = 2")
+    pocket = 'factor = "pocket_clearance_mm"\n'
+    text = text.replace(pocket, pocket + "half_width_mm = 0.005\n")
+    text = text.replace("generations = 200", "generations = 20")
+    text = text.replace(*replace) if replace[0] else text
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def silent(done: int, total: int) -> None:
+    """Progress that nobody watches."""
+
+
+def stored(path: Path) -> int:
+    """Finished runs in a store that another process may be making."""
+    try:
+        return len(rows(path))
+    except sqlite3.Error:
+        return 0
+
+
+def rows(path: Path) -> dict[str, str]:
+    """Results in a store by key."""
+    if not path.exists():
+        return {}
+    connection = sqlite3.connect(path)
+    try:
+        return dict(connection.execute("SELECT key, result FROM runs WHERE status = 'done'"))
+    finally:
+        connection.close()

@@ -1,0 +1,166 @@
+"""Fuzz: mutated inputs are read or refused in sentences of one bounded line, and quickly; nothing is simulated."""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from doe.dimension_chain import read_chains
+from doe.study.checked import check_study
+from doe.study.design import design_of
+from doe.study_file import Study
+from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError
+from rbdyn.quasistatic.sweep.result import FORMAT as SWEEP_FORMAT
+from rbdyn.quasistatic.sweep.result import SweepResult
+from rbdyn.result import SimulationResult
+from rbdyn.scene import Scene
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SCENES = ("cylindrical_roller", "all_options", "angular_contact_ball", "angular_contact_7014", "deep_groove_ball",
+          "double_decker", "published/nu215")  # fmt: skip
+CHAINS = ("pocket_chain", "bearing_chains", "pocket_chain_as_printed", "guide_chain_options")
+SECONDS = 2.0
+# A function of a chain's links is written in a language of its own, with tests of its own.
+EXPRESSION = re.compile(rb"expression[^\n]*")
+TOKEN = re.compile(rb"\"[^\"\n]*\"|[\w.+-]+|[^\w\s]|\n")
+EXTREMES = [
+    b"0", b"-1", b"1e300", b"-1e-300", b"1e400", b"inf", b"nan", b"9" * 25, b"9" * 5000, b"true", b"2020-01-01", b"1e-12",
+    b'""', b"'x'", b"[]", b"{}", b"[" * 150, b"\\u0000", b'"' + b"y" * 5000 + b'"', b"0x" + b"f" * 40, b"07:00:00", b"null",
+    b"1,5", b";", b"Key", b".a" * 40, b"\xef\xbb\xbf", b"\xe9", b"\x00", b'"""', b"1_000", b"1e154", b"2147483648", b"5e-324",
+]  # fmt: skip
+
+
+def mutated(random: random.Random, data: bytes) -> bytes:
+    """The bytes with one to three changes: of tokens, numbers, keys, lines or bytes."""
+    for _ in range(random.choice((1, 1, 2, 3))):
+        tokens = list(TOKEN.finditer(data))
+        if not tokens:
+            return data
+        start, end = random.choice(tokens).span()
+        other = random.choice(tokens)
+        numbers = [each for each in tokens if each[0][:1].isdigit()]
+        lines = data.splitlines(keepends=True)
+        line = random.randrange(len(lines))
+        kind = random.randrange(10)
+        if kind == 0:
+            data = data[:start] + data[end:]
+        elif kind == 1:
+            data = data[:start] + other[0] + data[start:]
+        elif kind == 2:
+            data = data[:start] + other[0] + data[end:]
+        elif kind in (3, 4, 5) and numbers:
+            start, end = random.choice(numbers).span()
+            data = data[:start] + random.choice(EXTREMES) + data[end:]
+        elif kind == 6:
+            data = data[: random.randrange(len(data))]
+        elif kind == 7:
+            data = b"".join([*lines[:line], lines[line], *lines[line:]])
+        elif kind == 8:
+            at = random.randrange(len(data))
+            data = data[:at] + random.randbytes(random.randrange(1, 5)) + data[at + random.randrange(3) :]
+        else:
+            data = data[:start] + data[start:end].swapcase() + b"_" * random.randrange(2) + data[end:]
+    return data
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """The examples' files, and saved results like those that the commands write."""
+    folder = tmp_path_factory.mktemp("fuzz")
+    for path in (*EXAMPLES.glob("*.toml"), *EXAMPLES.glob("published/*.toml"), EXAMPLES / "ccd_table4.csv"):
+        shutil.copy(path, folder)
+    quantity = {"value": 1.5, "statistical_error": 0.1, "numerical_error": None, "effective_samples": 4.0}
+    names = (
+        "impact_force_N",
+        "impact_contact_force_N",
+        "whirl_deviation_ratio",
+        "power_loss_W",
+        "cage_speed_rpm",
+        "cage_slip",
+    )
+    result = {
+        "format": SimulationResult.FORMAT, "status": "ok", **dict.fromkeys(names, quantity), "power_balance": {"relative_gap": 1e-3},
+        "power_terms_W": {"drag": 2.0}, "loads": {"max_inner_N": 1.0, "max_outer_N": 2.0, "max_land_N": 0.0},
+        "races": {"inner": {"pressure_MPa": 900.0}}, "clearance_um": {"drawn": 20.0}, "impact_window_turns": 1.0,
+        "transient_turns": None, "counted_turns": 2.0, "target": None, "cost": {"wall_s": 1.0}, "replicates": 2, "seed": 1,
+        "notes": ["none"], "versions": {"rbdyn": "1"}, "scene": Scene.load(EXAMPLES / "cylindrical_roller.toml").model_dump(mode="json"),
+    }  # fmt: skip
+    sweep = {
+        "format": SWEEP_FORMAT, "keys": {"operation.axial_load_N": [1.0, 2.0]}, "cost": {"wall_s": 1.0, "cold_starts": 1},
+        "points": [{"operation.axial_load_N": x, "status": "ok", "x_mm": 0.1} for x in (1.0, 2.0)], "scene": {}, "notes": [],
+    }  # fmt: skip
+    for name, record in (("result", result), ("sweep", sweep)):
+        (folder / f"{name}.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
+    return folder
+
+
+def read_result(path: Path) -> object:
+    """A saved result and its scene, as ``rbdyn show`` reads them."""
+    return Scene.from_dict(SimulationResult.load(path).scene, f"{path}: scene")
+
+
+def read_study(path: Path) -> object:
+    """A study and its design, as ``doe design`` reads them."""
+    study = Study.load(path)
+    if (study.file.design.runs, study.file.design.levels) <= (200, 3):
+        design_of(study)
+    return study
+
+
+def read_table(path: Path) -> object:
+    """A table, as ``doe fit --data`` reads it."""
+    return Study.load(EXAMPLES / "clearance_study.toml").read_table(path)
+
+
+def outcome(read: Callable[[Path], object], path: Path) -> str:
+    """Whether the file is read or refused; anything else fails."""
+    start = time.perf_counter()
+    try:
+        found = "read" if read(path) is not None else "nothing"
+    except InputError as error:
+        found = "refused"
+        assert 1 <= len(error.faults) <= MOST_FAULTS
+        for fault in error.faults:
+            assert fault.isprintable() and 10 < len(fault) <= LONGEST_SENTENCE, fault
+    assert time.perf_counter() - start < SECONDS
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("read", "names", "count"),
+    [
+        (Scene.load, [f"{Path(name).name}.toml" for name in SCENES], 6000),
+        (read_study, ["clearance_study.toml"], 4000),
+        (lambda path: check_study(Study.load(path)) or "checked", ["clearance_study.toml"], 300),
+        (read_chains, [f"{name}.toml" for name in CHAINS], 4000),
+        (read_table, ["ccd_table4.csv"], 3000),
+        (read_result, ["result.json"], 2000),
+        (SweepResult.load, ["sweep.json"], 1000),
+    ],
+    ids=["scenes", "studies", "checked studies", "chains", "tables", "results", "sweeps"],
+)
+def test_mutated_input_is_read_or_refused_in_sentences(folder, read, names, count):
+    """Fuzz: every mutation of an example; what was refused or read is counted, so that neither is all."""
+    draw, ends = random.Random(names[0]), []
+    path = folder / f"mutated{Path(names[0]).suffix}"
+    for number in range(count):
+        whole = (folder / names[number % len(names)]).read_bytes()
+        kept = EXPRESSION.findall(whole)
+        data = mutated(draw, whole)
+        if EXPRESSION.findall(data) != kept:
+            continue
+        path.write_bytes(data)
+        try:
+            ends.append(outcome(read, path))
+        except BaseException as error:
+            error.add_note(f"{names[number % len(names)]}, mutation {number}, is left in {path}")
+            raise
+    assert min(ends.count("read"), ends.count("refused")) > len(ends) // 50

@@ -1,0 +1,162 @@
+"""Accuracy studies: bias over tolerances, slices, replicates, the files they write, and the command."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from conftest import lacking
+
+from rbdyn import accuracy
+from rbdyn.accuracy.rollers import replication, slicing, tolerances, work_precision
+from rbdyn.accuracy.rollers.pictures import SMALLEST_BIAS
+from rbdyn.dynamics.statistics.batch_means import student_half_width
+from rbdyn.faults import InputError, RunError
+
+EXAMPLE = "examples/cylindrical_roller.toml"
+
+
+@pytest.fixture(scope="module")
+def found(outer):
+    """Three tolerances on the shared scene."""
+    return accuracy.statistics_bias(outer, (1e-4, 5e-2, 1e-2))
+
+
+def test_unit_tighter_tolerance_takes_more_steps_and_closes_better(found):
+    """Unit: rows go from the loosest tolerance to the tightest."""
+    rows = found.rows
+    assert [row.rtol for row in rows] == [5e-2, 1e-2, 1e-4] and found.failures == {}
+    assert rows[0].steps_per_turn < rows[1].steps_per_turn < rows[2].steps_per_turn
+    assert rows[0].power_gap > rows[1].power_gap > rows[2].power_gap
+
+
+def test_unit_reference_row_has_no_bias(found):
+    """Unit: the tightest is the reference of the others."""
+    rows = found.rows
+    assert set(rows[-1].bias) == {"impact_force_N", "whirl_deviation_ratio", "power_loss_W"}
+    assert set(rows[-1].bias.values()) == {0.0}
+    for row in rows[:-1]:
+        for name, bias in row.bias.items():
+            assert row.value[name] == pytest.approx(rows[-1].value[name] * (1.0 + bias))
+
+
+def test_unit_failed_tolerances_stay_in_the_table(make_scene):
+    """Unit: a tolerance that a run does not survive is told at the end; without a reference there is no study."""
+    # Tighter tolerances take more steps: here the reference is the one that goes over the budget.
+    with pytest.raises(RunError, match="step budget"):
+        accuracy.statistics_bias(make_scene("numerics.step_budget_per_turn=400"), (1e-4, 1e-2))
+    rows = accuracy.statistics_bias(make_scene(), (1e-2,)).rows
+    table = tolerances.table(tolerances.StatisticsBias(rows, {0.1: "step budget used up"}))
+    assert [len(cells) for cells in table.cells] == [len(table.header)] * 2
+    assert table.cells[1][:2] == ("0.1", "failed")
+
+
+def test_unit_default_study_has_statistics_and_trajectories(outer, tmp_path, drawn):
+    """Unit: record, sheets and pictures of both; keys that others read."""
+    report = work_precision.study(outer, turns=0.02, rtols=(1e-2, 1e-3))
+    files = accuracy.write(report, tmp_path)
+    assert files == ["accuracy.json", "accuracy.csv", "trajectory.csv", "accuracy.png", "trajectory.png"]
+    saved = json.loads((tmp_path / "accuracy.json").read_text())
+    assert len((tmp_path / "accuracy.csv").read_text().splitlines()) == 1 + len(saved["rows"])
+    trajectories = saved["trajectory"]["rows"]
+    assert len((tmp_path / "trajectory.csv").read_text().splitlines()) == 1 + len(trajectories)
+    assert not lacking(
+        drawn["accuracy.png"], [[row["turn_ms"], max(row["power_gap"], SMALLEST_BIAS)] for row in saved["rows"]]
+    )
+    assert drawn["trajectory.png"].size >= 2 * len(trajectories)  # a point a row
+    assert {"format", "status", "rows", "conclusion", "turns", "replicates", "machine", "versions"} <= set(saved)
+    assert saved["format"] == "rbdyn.accuracy/1" and len(saved["rows"]) == 2
+    methods = {row["method"] for row in saved["trajectory"]["rows"]}
+    assert methods == {"rbdyn RK45", "RK4, fixed step", "velocity Verlet"}
+
+
+def test_rate_load_of_slices_converges(make_scene):
+    """Rate: more slices, less error of the load; 31 keep it within 1 % for a crowned roller."""
+    scene = make_scene("bearing.roller_profile=crowned", "bearing.crown_radius_mm=800.0")
+    errors = slicing.load_errors(scene, (5, 15, 31, 121))
+    assert errors[5] > errors[15] > errors[31] > errors[121]
+    assert errors[31] < 0.01 and errors[121] < 0.002
+
+
+def test_unit_slices_study(everything, tmp_path):
+    """Unit: a row a number of slices, the finest the reference; a plain cylinder has nothing to study."""
+    numbers = {"turns": 2.0, "discard_turns": 1.0, "replicates": 2, "impact_window_turns": 2.0}
+    scene = everything.model_copy(update={"numerics": everything.numerics.model_copy(update=numbers)})
+    report = slicing.study(scene, counts=(31, 9))
+    assert [row["slices"] for row in report.record["rows"]] == [9, 31]
+    assert set(report.record["rows"][1]["bias"].values()) == {0.0}
+    assert accuracy.write(report, tmp_path) == ["slices.json", "slices.csv", "slices.png"]
+
+
+def test_unit_slices_of_a_cylinder_are_refused(outer):
+    """Unit: one slice is exact for it."""
+    with pytest.raises(InputError, match=r"bearing\.roller_profile = 'cylinder'"):
+        accuracy.study("slices", outer)
+
+
+def test_unit_expected_half_width_is_that_of_student():
+    """Unit: for the whole sample it is Student's interval; a quarter of a large one is twice as wide."""
+    sample = np.random.default_rng(1).normal(5.0, 1.0, 400)
+    assert replication.expected_half_width(sample, 400) == pytest.approx(student_half_width(sample) / sample.mean())
+    ratio = replication.expected_half_width(sample, 100) / replication.expected_half_width(sample, 400)
+    assert ratio == pytest.approx(2.0, rel=0.02)
+
+
+def test_rate_scatter_of_independent_turns():
+    """Rate: means of independent turns scatter by one over root of turns; copies of one turn do not."""
+    turns = (10, 20, 40, 80)
+    draws = [np.random.default_rng(seed) for seed in range(40)]
+    free = [replication.slope(turns, [10.0 + draw.normal(size=(200, n)).mean(axis=1) for n in turns]) for draw in draws]
+    assert np.mean([found.power for found in free]) == pytest.approx(-0.5, abs=0.02)
+    assert np.mean([found.as_expected for found in free]) > 0.8
+    stuck = replication.slope(turns, [10.0 + draws[0].normal(size=200) for _ in turns])
+    assert not stuck.as_expected
+
+
+def test_unit_replicates_study(outer, tmp_path):
+    """Unit: more replicates, a narrower interval and more time, from one pool."""
+    report = replication.study(outer, turns=(2.0, 4.0), pool=4)
+    rows = report.record["rows"]
+    assert [(row["replicates"], row["turns"]) for row in rows] == [(2, 2.0), (4, 2.0), (2, 4.0), (4, 4.0)]
+    assert rows[1]["cpu_s"] == pytest.approx(2.0 * rows[0]["cpu_s"])
+    assert all(rows[1]["half_width"][name] < rows[0]["half_width"][name] for name in tolerances.OUTPUTS)
+    assert accuracy.write(report, tmp_path) == ["replicates.json", "replicates.csv", "replicates.png"]
+
+
+def test_command_accuracy(command, tmp_path):
+    """Command line: JSON alone on standard output, files beside it."""
+    settings = ("numerics.turns=2", "numerics.discard_turns=1", "numerics.replicates=2")
+    sets = [word for setting in settings for word in ("--set", setting)]
+    good = command("accuracy", EXAMPLE, *sets, "--trajectory", "0.02", "--json", "--out", tmp_path)
+    assert good.returncode == 0, good.stderr
+    record = json.loads(good.stdout)
+    assert record["trajectory"]["turns"] == 0.02 and len(record["rows"]) == len(tolerances.TOLERANCES)
+    assert (tmp_path / "trajectory.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("flags", "told"),
+    [
+        (("--methods", "--slices"), "--methods and --slices"),
+        (("--trajectory", "3"), "--trajectory 3: past a turn"),
+        (("--replicates", "--trajectory", "0.5"), "leave it out"),
+        (("--slices",), "bearing.roller_profile"),
+        (("--options", "--sought-percent", "2"), "--sought-percent 2: --options judges no means"),
+        (("--set", "numerics.replicates=1", "--slices"), "bearing.roller_profile"),
+        (("--set", "numerics.replicates=1", "--methods"), "numerics.replicates = 1"),
+    ],
+)
+def test_command_accuracy_refuses(command, flags, told):
+    """Command line: one sentence and exit code 2 for studies that cannot be."""
+    bad = command("accuracy", EXAMPLE, *flags)
+    assert bad.returncode == 2 and told in bad.stderr and "Traceback" not in bad.stderr
+
+
+def test_unit_package_is_cheap_to_import():
+    """Unit: neither numba nor scipy comes with the names of the package."""
+    import subprocess
+    import sys
+
+    program = "import sys; from rbdyn import accuracy; accuracy.STUDIES; sys.exit('numba' in sys.modules or 'scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

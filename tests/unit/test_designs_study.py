@@ -1,0 +1,135 @@
+"""The design of a study: settings, seeds, faults in sentences, what the command prints."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from doe import clearance
+from doe.cli import app
+from doe.designs import central_composite
+from doe.study.design import check_runs, design_of, evaluation
+from doe.study.runs import design_points
+from doe.study_file import Study
+from rbdyn.faults import InputError
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLE = EXAMPLES / "clearance_study.toml"
+
+
+def study_file(folder: Path, design: str, factors: int = 3, model: str = "quadratic") -> Path:
+    """A study of some factors with the given lines under [design]."""
+    lines = ["[scene]", 'file = "scene.toml"', "[design]", design]
+    for number in range(factors):
+        lines += ["[[factor]]", f'name = "f{number}"', f'key = "table.f{number}"', "centre = 10.0", "step = 2.0"]
+    for name in ("one", "two"):
+        lines += ["[[response]]", f'name = "{name}"', f'model = "{model}"']
+    path = folder / "study.toml"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return path
+
+
+def shown(path: Path, *options: str) -> str:
+    """What ``doe design`` prints, on an exit code of 0."""
+    result = CliRunner().invoke(app, ["design", str(path), *options])
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def test_example_study_keeps_its_points_order_and_seeds():
+    record = json.loads(shown(EXAMPLE, "--json"))
+    coded = np.array([list(run["coded"].values()) for run in record["runs"]])
+    assert np.array_equal(coded, central_composite(3, alpha=8**0.25, centre_replicates=6))
+    assert [run["seed"] for run in record["runs"]] == list(range(1, 21))
+    assert [run["kind"] for run in record["runs"]] == ["cube"] * 8 + ["axial"] * 6 + ["centre"] * 6
+    assert record["evaluation"]["model"] == "quadratic"
+    assert len(record["evaluation"]["leverage"]) == 20
+
+
+def test_random_order_gives_every_point_its_own_seed(tmp_path):
+    text = EXAMPLE.read_text(encoding="utf-8").replace("[design]", '[design]\norder = "random"')
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "cylindrical_roller.toml").write_bytes((EXAMPLES / "cylindrical_roller.toml").read_bytes())
+    study, plain = Study.load(tmp_path / "study.toml"), Study.load(EXAMPLE)
+    design = design_of(study)
+    mixed = clearance.design_scenes(study, study.centre + design.coded * study.step, design.order.tolist())
+    given = clearance.design_scenes(plain, plain.centre + design_points(plain) * plain.step)
+    assert [scene.numerics.seed for scene in mixed] != [scene.numerics.seed for scene in given]
+    assert {scene.model_dump_json() for scene in mixed} == {scene.model_dump_json() for scene in given}
+
+
+@pytest.mark.parametrize(
+    ("lines", "factors", "runs", "reach"),
+    [
+        ('kind = "box_behnken"\nblocks = true', 4, 30, 1.0),
+        ('cube = "resolution_v"', 5, 32, 2.0),
+        ('alpha = "spherical"\ncentre_replicates = 4', 3, 18, 3**0.5),
+        ("alpha = 2", 3, 20, 2.0),
+        ('kind = "full_factorial"', 3, 27, 1.0),
+        ('kind = "latin_hypercube"\nruns = 25\ncentre_replicates = 3', 3, 28, 1.0),
+        ('kind = "sobol"\nruns = 40\nseed = 9', 3, 40, 1.0),
+    ],
+)
+def test_every_kind_is_built_and_evaluated(tmp_path, lines, factors, runs, reach):
+    study = Study.load(study_file(tmp_path, lines, factors))
+    design = design_of(study)
+    assert design.coded.shape == (runs, factors)
+    assert design.reach == pytest.approx(reach)
+    found = evaluation(study, design)
+    assert found["region"]["shape"] == ("box" if reach == 1.0 and factors == 3 else "ball")
+    assert 0.0 < found["efficiency_percent"]["g"] <= 100.0
+
+
+@pytest.mark.parametrize(
+    ("lines", "factors", "words"),
+    [
+        ('alpha = "rotable"', 3, ["design.alpha = 'rotable': choose one of 'rotatable'"]),
+        ('cube = "resolution_v"', 4, ["design.cube = 'resolution_v'", "4 factors, only for 5 to 8"]),
+        ('kind = "box_behnken"', 8, ["design.kind = 'box_behnken': tabulated for 3 to 7 factors, not for 8"]),
+        ('kind = "box_behnken"\nblocks = true', 3, ["design.blocks = true", "no orthogonal blocks"]),
+        ("blocks = true\ncube_blocks = 4", 3, ["design.cube_blocks = 4: 8 corners of 3 factors"]),
+        ("cube_blocks = 2\nlevels = 4", 3, ["design.levels: kind = 'central_composite' has no", "design.cube_blocks = 2: needs"]),
+        ('kind = "sobol"\nalpha = 1.5', 3, ["design.alpha: kind = 'sobol' has no such key"]),
+        ('kind = "full_factorial"\nlevels = 30', 4, ["design.levels = 30: 4 factors give 810000 runs"]),
+    ],
+)  # fmt: skip
+def test_impossible_settings_are_named(tmp_path, lines, factors, words):
+    path = study_file(tmp_path, lines, factors)
+    with pytest.raises(InputError) as refused:
+        design_of(Study.load(path))
+    assert all(word in str(refused.value) for word in words), str(refused.value)
+    assert all(fault.startswith(f"{path}: design.") for fault in refused.value.faults)
+
+
+@pytest.mark.parametrize(
+    ("lines", "model", "words"),
+    [
+        ('kind = "sobol"\nruns = 10', "quadratic", "the 10 runs of the design are too few; it needs 11 (10 terms and"),
+        ('kind = "sobol"\nruns = 4', "linear", "it needs 5 (4 terms and one to judge the fit)"),
+        ('kind = "full_factorial"\nlevels = 2\ncentre_replicates = 4', "reduced", "cannot tell B^2, C^2 from"),
+        ('alpha = "spherical"\ncentre_replicates = 0', "quadratic", "cannot tell C^2 from the other terms"),
+    ],
+)
+def test_runs_that_do_not_suffice_are_named_for_every_response(tmp_path, lines, model, words):
+    path = study_file(tmp_path, lines, 3, model)
+    with pytest.raises(InputError) as refused:
+        check_runs(Study.load(path), design_of(Study.load(path)))
+    for number, fault in enumerate(refused.value.faults, 1):
+        assert fault.startswith(f"{path}: response[{number}].model = '{model}': ")
+        assert words in fault
+    assert len(refused.value.faults) == 2
+
+
+def test_command_prints_blocks_and_what_the_design_can_tell(tmp_path):
+    path = study_file(tmp_path, 'alpha = "orthogonal_blocks"\nblocks = true\norder = "random"')
+    text = shown(path, "--verbose")
+    for words in ("block", "seed", "D 13.7", "orthogonal to the terms", "VIF", "power for 2 sigma", "lack of fit 5"):
+        assert words in text
+    assert "VIF" not in shown(path, "--quiet")
+    rows = shown(path, "--csv").splitlines()
+    assert rows[0] == "run,block,f0,f1,f2"
+    assert [row.split(",")[1] for row in rows[1:]] == ["1"] * 12 + ["2"] * 8

@@ -1,0 +1,224 @@
+"""The slip map and the cost of options: points, failures, tables, files, and the command."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import lacking
+
+from rbdyn import accuracy
+from rbdyn.accuracy.rollers.option_cost import OPTIONS, option_costs, study, with_options
+from rbdyn.cli.app import _write_map as write
+from rbdyn.cli.ranges import axis_values
+from rbdyn.dynamics.slip_map import FIGURES, POINTS, slip_map
+from rbdyn.faults import InputError
+from rbdyn.scene import Scene
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"
+SPEEDS, LOADS = (12000.0, 24000.0), (60.0, 1300.0)
+
+
+@pytest.fixture(scope="module")
+def found(outer):
+    """A map of four points."""
+    return slip_map(outer, SPEEDS, LOADS, workers=2)
+
+
+def test_unit_map_is_what_single_runs_give(found, outer):
+    """Unit: a point equals the simulation of that scene, bit for bit; rows are loads, columns speeds."""
+    from rbdyn.dynamics.simulate import simulate
+
+    alone = simulate(with_options(outer, ("operation.inner_speed_rpm=12000.0",)), workers=1)
+    point = next(p for p in found.points if (p.inner_speed_rpm, p.radial_load_N) == (12000.0, 1300.0))
+    assert point.figures["cage_slip"] == alone.cage_slip
+    assert point.figures["impact_force_N"] == alone.impact_force
+    assert found.grid("cage_slip")[1, 0] == alone.cage_slip.value
+    assert found.failed == []
+
+
+def test_physics_light_load_slips_more(found):
+    """Trend: at both speeds the cage slips more under 60 N than under 1300 N, beyond the errors of both."""
+    slips = {(p.inner_speed_rpm, p.radial_load_N): p.figures["cage_slip"] for p in found.points}
+    for speed in SPEEDS:
+        light, heavy = slips[speed, 60.0], slips[speed, 1300.0]
+        assert light.value - light.statistical_error > heavy.value + heavy.statistical_error
+
+
+def test_unit_map_saves_table_picture_and_json(found, tmp_path, drawn):
+    """Unit: files are whole; the table has a row a point and a column an error."""
+    files = write(found, tmp_path)
+    saved = json.loads((tmp_path / "map.json").read_text())
+    assert files == ["map.json", "map.csv", "map.png"]
+    assert not lacking(drawn["map.png"], [100.0 * found.grid("cage_slip"), found.grid("power_loss_W")])
+    assert saved["format"] == "rbdyn.map/1" and saved["status"] == "ok" and len(saved["points"]) == 4
+    table = found.table()
+    assert len(table) == 4 and {f"{name}_statistical_error" for name in FIGURES} <= set(table.columns)
+
+
+def test_unit_failed_points_are_records(make_scene):
+    """Unit: a point that cannot go on tells why, the others go on, and the grid has a gap there."""
+    # A steady scene takes about 400 steps a turn; under a heavy load stability holds explicit steps to many more.
+    budget = ("numerics.step_budget_per_turn=700", "numerics.method=rk45")
+    scene = make_scene(*budget, "numerics.replicates=1")
+    found = slip_map(scene, (24000.0,), (1300.0, 400000.0), workers=1)
+    assert [point.status == "ok" for point in found.points] == [True, False]
+    assert "step budget" in found.failed[0].status
+    assert np.isnan(found.grid("cage_slip")[1, 0]) and np.isfinite(found.grid("cage_slip")[0, 0])
+    assert found.as_dict()["status"] == "1 of 2 points failed"
+
+
+def counted(monkeypatch) -> list[float]:
+    """Loads of the runs that a map begins from here on."""
+    from rbdyn.dynamics import slip_map as module
+
+    ran, usual = [], module.run_replicate
+
+    def run(scene, *rest):
+        ran.append(scene.operation.radial_load_N)
+        return usual(scene, *rest)
+
+    monkeypatch.setattr(module, "run_replicate", run)
+    return ran
+
+
+def interrupt(done: int, total: int) -> None:
+    """Progress that is stopped by Ctrl-C in the middle."""
+    if done == total // 2:
+        raise KeyboardInterrupt
+
+
+def test_unit_interrupted_map_goes_on_with_the_same_bits(outer, found, tmp_path, monkeypatch):
+    """Unit: what was finished is not run again; figures equal those of an uninterrupted map to the last bit."""
+    path = tmp_path / POINTS
+    ran = counted(monkeypatch)
+    with pytest.raises(KeyboardInterrupt):
+        slip_map(outer, SPEEDS, LOADS, 1, interrupt, path)
+    kept = path.read_bytes()
+    assert len(kept.split()) > 2 and lines(path) == 2 and LOADS[1] not in ran[:4]
+    ran.clear()
+    assert slip_map(outer, SPEEDS, LOADS, 1, None, path).points == found.points
+    assert ran == 4 * [LOADS[1]]
+    ran.clear()
+    # A finer map takes over what it shares; of a line cut short nothing is read.
+    path.write_bytes(path.read_bytes()[:-9])
+    finer = slip_map(outer, SPEEDS, (60.0, 600.0, 1300.0), 2, None, path)
+    assert sorted(ran) == 4 * [600.0] + 2 * [1300.0]
+    assert (*finer.points[:2], *finer.points[4:]) == found.points
+
+
+def test_unit_map_of_another_scene_or_code_runs_again(make_scene, tmp_path, monkeypatch):
+    """Unit: a kept point is of its scene and of the code that ran it; a failed one is kept with its cause."""
+    budget = ("numerics.step_budget_per_turn=100", "numerics.method=rk45")
+    place = ((24000.0,), (1300.0,), 1, None, tmp_path / POINTS)
+    ran = counted(monkeypatch)
+    first = slip_map(make_scene(*budget), *place)
+    assert slip_map(make_scene(*budget), *place).points == first.points and len(ran) == 2
+    assert "step budget" in first.failed[0].status
+    slip_map(make_scene(*budget, "numerics.seed=2"), *place)
+    assert len(ran) == 4
+    monkeypatch.setattr("rbdyn.records.kept.source_digest", lambda *roots: "edited")
+    slip_map(make_scene(*budget), *place)
+    assert len(ran) == 6
+
+
+@pytest.mark.slow
+def test_command_line_killed_map_resumes(command, tmp_path):
+    """Command line: after SIGKILL and after Ctrl-C, which tells what is kept, the map is that of an undisturbed run."""
+    where = ("--speed", "12000,24000", "--load", "200:1300:3", "--workers", "1", "--turns", "60", "--replicates", "2")
+    arguments = ("map", str(EXAMPLE), *where, "--set", "numerics.companion=false")
+    assert command(*arguments, "--out", tmp_path / "whole").returncode == 0
+    out = tmp_path / "out"
+    for count, number in ((1, signal.SIGKILL), (3, signal.SIGINT)):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rbdyn", *arguments, "--out", str(out)],
+            stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )  # fmt: skip
+        deadline = time.monotonic() + 120.0
+        while time.monotonic() < deadline and not ((out / POINTS).exists() and lines(out / POINTS) >= count):
+            time.sleep(0.01)
+        process.send_signal(number)
+        _, said = process.communicate()
+        assert process.returncode == (-signal.SIGKILL if number == signal.SIGKILL else 130), said
+    assert said.strip() == f"interrupted; what was finished is kept in {out / POINTS}: start again to go on"
+    assert 3 <= lines(out / POINTS) < 6
+    assert command(*arguments, "--out", out).returncode == 0
+    one, two = (json.loads((folder / "map.json").read_text()) for folder in (tmp_path / "whole", out))
+    assert one["points"] == two["points"] and lines(out / POINTS) == 6
+    stopped = subprocess.Popen(
+        [sys.executable, "-m", "rbdyn", *arguments, "--json"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    time.sleep(5.0)
+    stopped.send_signal(signal.SIGINT)
+    shown, said = stopped.communicate()
+    assert (stopped.returncode, json.loads(shown)["status"]) == (130, "interrupted")
+    assert said.strip() == "interrupted; nothing was kept"
+
+
+def lines(path: Path) -> int:
+    """Points that a file of them holds."""
+    return sum(bool(line.strip()) for line in path.read_text().splitlines())
+
+
+def test_unit_axis_values():
+    """Unit: both ways to write an axis, and what is refused."""
+    assert axis_values("1000:3000:3", "--speed") == [1000.0, 2000.0, 3000.0]
+    assert axis_values("5,7.5", "--load") == [5.0, 7.5]
+    for wrong in ("1:2", "a,b", "3,2", "1:nan:2", "1,1", ""):
+        with pytest.raises(InputError, match="--load"):
+            axis_values(wrong, "--load")
+
+
+def test_unit_map_refuses_a_schedule(make_scene):
+    """Unit: a scene that schedules its own load cannot be mapped."""
+    scene = make_scene("operation.schedule={time_s=[0.0],radial_load_N=[100.0]}")
+    with pytest.raises(InputError, match=r"operation\.schedule"):
+        slip_map(scene, SPEEDS, LOADS)
+
+
+def test_command_map(command, tmp_path):
+    """Command line: JSON alone on standard output; an impossible load is refused by name."""
+    arguments = ("map", "examples/cylindrical_roller.toml", "--speed", "24000", "--turns", "2", "--replicates", "1")
+    short = ("--set", "numerics.discard_turns=1", "--set", "numerics.companion=false")
+    good = command(*arguments, *short, "--load", "300,1300", "--json")
+    assert good.returncode == 0, good.stderr
+    assert [point["radial_load_N"] for point in json.loads(good.stdout)["points"]] == [300.0, 1300.0]
+    bad = command(*arguments, *short, "--load", "-5,300")
+    assert bad.returncode == 2 and "radial_load_N" in bad.stderr and "Traceback" not in bad.stderr
+
+
+def test_unit_every_option_is_a_scene():
+    """Unit: every option, alone, is lawful for the bearing of the paper and changes the scene."""
+    scene = Scene.load("examples/cylindrical_roller.toml")
+    for name, assignments in OPTIONS.items():
+        assert with_options(scene, assignments) != scene, name
+
+
+def test_unit_option_costs(outer, tmp_path):
+    """Unit: an option is timed beside the scene; one that contradicts the scene is left out."""
+    options = {
+        "contact law of ISO/TS 16281": OPTIONS["contact law of ISO/TS 16281"],
+        "impossible": ("model.pocket_film_floor_um=1e6", "model.pocket_film=true"),
+    }
+    rows = option_costs(outer, options)
+    assert [row.option for row in rows] == ["contact law of ISO/TS 16281"]
+    row = rows[0]
+    assert row.with_ns > 0.0 and row.without_ns > 0.0 and 0.0 < row.power_gap < 0.01
+    # The same types of laws: the compiled code is shared, so both cost the same but for noise.
+    assert row.difference_ns == row.with_ns - row.without_ns
+    assert row.holds == row.plain_holds and row.modules == ()
+    assert row.holds.state == 60 and row.holds.instructions > 1000
+    found = study(outer, options=options)
+    assert accuracy.write(found, tmp_path) == ["options.json", "options.csv"]
+    assert found.record["format"] == "rbdyn.options/1"
+    saved = found.record["options"][0]
+    assert saved["option"] == row.option
+    assert saved["with_parameter_bytes"] == saved["without_parameter_bytes"] > 0

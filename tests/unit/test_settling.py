@@ -1,0 +1,290 @@
+"""Runs that go on until they have settled: tests of drift, what slow change adds to an error, lengthening, coverage."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rbdyn.accuracy.rollers import coverage
+from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
+from rbdyn.dynamics.forces.state import CAGE_ANGLE
+from rbdyn.dynamics.integrators.method import explicit_method
+from rbdyn.dynamics.parameters.geometry import CAGE_SHARES, absolute_tolerance, roller_radii
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.start import start_state
+from rbdyn.dynamics.recording import Recording, record
+from rbdyn.dynamics.run import Run, with_numerics
+from rbdyn.dynamics.settling import run_until_settled, whole_windows
+from rbdyn.dynamics.simulate import simulate
+from rbdyn.dynamics.statistics.drift import drift_of, drifting, slow_change, unseen_regime
+from rbdyn.dynamics.statistics.metrics import CAGE_SPEED, POWER_LOSS, Replicate
+from rbdyn.faults import RunError
+from rbdyn.result import Quantity
+
+
+def made_of(loss, first=0, per_window=1, impact=None):
+    """A replicate of batches of one second with these losses [W] and impacts [N], which are the losses unless given."""
+    count = len(loss)
+    work, largest, whirl = np.zeros((count, POWERS)), np.zeros((count, LOADS)), np.ones((count, 3))
+    work[:, 0] = loss
+    largest[:, POCKET_LOAD] = largest[:, POCKET_CONTACT_LOAD] = loss if impact is None else impact
+    whirl[:, 0] = 10.0
+    ones = np.ones(count)
+    return Replicate(first, per_window, ones, whirl, work, largest, ones, ones, np.zeros(count + 1), 1.0, 1, 0, 1, 0.0)
+
+
+def noisy(draw, replicates, length, trend=lambda turns: 0.0 * turns, first=0):
+    turns = np.arange(length)
+    return [made_of(100.0 + trend(turns) + draw.normal(size=length), first) for _ in range(replicates)]
+
+
+@pytest.mark.parametrize("replicates", [1, 2, 4, 8])
+def test_oracle_drift_of_noise_and_of_a_slope(replicates):
+    """Oracle: noise is said to drift in about 5 of 100 runs whatever the replicates, a slope of 1.5 sd in nearly all
+    (in most, where one or two replicates must tell it from their own memory).
+    """
+    draw = np.random.default_rng(2)
+    false = sum(drift_of(POWER_LOSS, noisy(draw, replicates, 60)).significant for _ in range(400))
+    # Four standard errors of 400 trials about 0.05; drifts below a thousandth (0.1 W) do not count.
+    assert false / 400 <= 0.05 + 4.0 * math.sqrt(0.05 * 0.95 / 400)
+    slope = lambda turns: 1.5 * turns / 30.0  # noqa: E731
+    found = [drift_of(POWER_LOSS, noisy(draw, replicates, 60, slope)) for _ in range(50)]
+    assert np.mean([drift.significant for drift in found]) >= (0.9 if replicates > 2 else 0.6)
+    assert np.mean([drift.size for drift in found]) == pytest.approx(1.5, abs=0.3)
+
+
+def test_unit_drift_matters_from_a_thousandth_on():
+    """Unit: a drift without scatter is one only beyond a thousandth of the figure; a run of one batch has none."""
+    for step, expected in ((0.05, False), (0.2, True)):
+        runs = [made_of(np.repeat([100.0, 100.0 + step], 10)) for _ in range(4)]
+        assert drift_of(POWER_LOSS, runs).significant is expected
+        assert drifting(runs) is expected
+    assert drift_of(POWER_LOSS, [made_of([100.0])] * 4) is None
+
+
+def test_oracle_bias_of_a_transient_that_halves():
+    """Oracle: of a transient that halves from half to half the mean is off by just the bias told; of a faster one by less."""
+    for quotient in (0.5, 0.2):
+        tail = 100.0 + 8.0 * quotient ** (np.arange(40) / 20.0)
+        runs = [made_of(tail) for _ in range(4)]
+        bias = drift_of(POWER_LOSS, runs).bias
+        off = float(tail.mean()) - 100.0
+        assert bias == pytest.approx(off, rel=1e-9) if quotient == 0.5 else bias > off
+
+
+def test_unit_unseen_regime():
+    """Unit: the stretch of two windows farthest from the mean, over one more than the replicates."""
+    plain, odd = made_of(np.full(40, 100.0), per_window=5), np.full(40, 100.0)
+    odd[:10] = 110.0
+    runs = [plain, plain, plain, made_of(odd, first=20, per_window=5).counted_from(20)]
+    runs = [run.counted_from(20) for run in runs]
+    assert unseen_regime(POWER_LOSS, runs, since=20) == 0.0
+    assert unseen_regime(POWER_LOSS, runs, since=0) == pytest.approx(10.0 / 5.0)
+    assert slow_change(POWER_LOSS, POWER_LOSS, runs, 0, steady=True) == pytest.approx(2.0)
+    assert slow_change(POWER_LOSS, POWER_LOSS, runs, 0, steady=False) == 0.0
+    assert slow_change(CAGE_SPEED, CAGE_SPEED, runs, 0, steady=True) == 0.0
+
+
+class Written:
+    """A recording whose losses are written beforehand: noise about what ``settles`` gives for each turn."""
+
+    def __init__(self, scene, replicate, settles, warm_up):
+        draw = np.random.default_rng(replicate)
+        self.loss = 100.0 + settles(np.arange(2000)) + 0.1 * draw.normal(size=2000)
+        self.scene, self.warm_up = scene, warm_up
+
+    def to(self, turns):
+        run = made_of(self.loss[: round(self.warm_up + turns)], self.warm_up)
+        return replace(run, durations=run.durations * self.scene.turn_s, work=run.work * self.scene.turn_s)
+
+
+def settled_run(scene, settles, workers=1, progress=None):
+    warm_up = int(scene.numerics.warm_up_turns)
+
+    def start(replicate, rtol, stop):
+        return Written(scene, replicate, settles, warm_up)
+
+    return run_until_settled(scene, start, workers, progress, Stop())
+
+
+@pytest.fixture
+def example(outer):
+    numbers = {
+        "turns": 40.0, "discard_turns": 20.0, "replicates": 4, "impact_window_turns": 10.0, "extend": True, "companion": True,
+    }  # fmt: skip
+    return outer.model_copy(update={"numerics": outer.numerics.model_copy(update=numbers)})
+
+
+def test_unit_a_run_that_drifts_goes_on(example):
+    """Unit: settled runs stay; one that drifts gets four, then eight times as long and counts its last half, and says so."""
+    steady = settled_run(example, lambda turns: 0.0 * turns)
+    assert [len(run.durations) for run in steady.runs] == [60] * 4 and steady.runs[0].first == 20
+    assert [len(run.durations) for run in steady.companions] == [60] and not steady.notes
+    slow = settled_run(example, lambda turns: -20.0 * np.exp(-turns / 20.0))
+    assert {(len(run.durations), run.first) for run in (*slow.runs, *slow.companions)} == {(240, 120)}
+    assert "each replicate ran 240 shaft turns in place of 60, of which the last 120 count" in slow.notes[0]
+    assert slow.since == 20
+    endless = settled_run(example, lambda turns: 0.01 * turns)
+    assert {(len(run.durations), run.first) for run in endless.runs} == {(480, 240)}
+    assert "still drift over the 240 turns" in endless.notes[1] and "numerics.extend_limit" in endless.notes[1]
+
+
+def test_unit_lengthening_is_bounded_and_can_be_forbidden(example, monkeypatch):
+    """Unit: ``extend_limit`` and memory bound it, ``extend = false`` forbids it, a schedule has none; workers change nothing."""
+
+    def ramp(turns):
+        return 0.05 * turns
+
+    limited = example.model_copy(update={"numerics": example.numerics.model_copy(update={"extend_limit": 3.0})})
+    assert len(settled_run(limited, ramp).runs[0].durations) == 120
+    # Room for 150 batches each of four replicates and a companion: twice 60 fit, four times do not.
+    monkeypatch.setattr("rbdyn.scene.laws.MOST_KEPT", 150 * 5)
+    full = settled_run(example, ramp)
+    assert {len(run.durations) for run in (*full.runs, *full.companions)} == {120}
+    assert "still drift" in full.notes[1] and full.notes[1].endswith(
+        "take fewer replicates: there is no memory for longer ones"
+    )
+    monkeypatch.undo()
+    fixed = example.model_copy(update={"numerics": example.numerics.model_copy(update={"extend": False})})
+    found = settled_run(fixed, ramp)
+    assert len(found.runs[0].durations) == 60 and "set numerics.extend = true" in found.notes[0]
+    told = []
+    one, two = settled_run(example, ramp), settled_run(example, ramp, 2, lambda *step: told.append(step))
+    assert all(np.array_equal(a.work, b.work) for a, b in zip(one.runs, two.runs, strict=True))
+    done = [step[0] for step in told]
+    assert done == sorted(done) and all(count <= total for count, total in told) and done[-1] == told[-1][1]
+
+
+def test_unit_whole_windows_are_counted(example):
+    """Unit: turns are filled up to whole windows; a failing companion costs the numerical error only."""
+    odd = example.model_copy(update={"numerics": example.numerics.model_copy(update={"turns": 32.0})})
+    assert whole_windows(odd) == 40.0 and whole_windows(example) == 40.0
+    assert len(settled_run(odd, lambda turns: 0.0 * turns).runs[0].durations) == 60
+
+    def start(replicate, rtol, stop):
+        if rtol > example.numerics.rtol:
+            raise RunError("replicate 1 stopped")
+        return Written(example, replicate, lambda turns: 0.0 * turns, 20)
+
+    found = run_until_settled(example, start, 1, None, Stop())
+    assert len(found.runs) == 4 and not found.companions and "replicate 1 stopped" in found.fault
+
+
+def test_invariant_a_recording_that_goes_on_keeps_its_bits(outer):
+    """Invariant: stopping and going on at a window's end changes no bit of a run."""
+    bearing = roller_bearing(outer)
+    halting = Recording(Run(outer, bearing, 0, 0.01, Stop()))
+    for turns in (2.0, 4.0):
+        halting.to(turns)
+    whole = record(Run(outer, bearing, 0, 0.01, Stop()))
+    for name in ("whirl", "work", "largest", "cage_angle", "energy", "durations"):
+        assert np.array_equal(getattr(halting.replicate, name), getattr(whole, name))
+
+
+def test_unit_every_replicate_starts_at_an_angle_of_its_own(outer):
+    """Unit: cage angles fill the circle; rollers stand in their pockets at each."""
+    bearing = roller_bearing(outer)
+    z = bearing.rollers
+    angles = []
+    for seed in range(40):
+        y = start_state(outer, bearing, np.random.default_rng(seed))
+        angles.append(y[5 * z + CAGE_ANGLE])
+        rollers = np.arctan2(y[z : 2 * z], y[:z]) - angles[-1] - 2.0 * np.pi * np.arange(z) / z
+        away = np.angle(np.exp(1j * rollers)) * 0.5e-3 * outer.bearing.pitch_diameter_mm
+        assert np.abs(away).max() <= 0.2e-3 * outer.cage.pocket_clearance_mm * (1.0 + 1e-9)
+    assert np.histogram(angles, bins=4, range=(0.0, 2.0 * np.pi))[0].min() >= 3
+
+
+def test_unit_method_and_cage_tolerance(outer):
+    """Unit: Kutta's pair from 5e-3 on, a given method as given; the cage's speeds at a share of the tolerance."""
+    assert [explicit_method("auto", rtol) for rtol in (0.1, 0.01, 5e-3, 4e-3)] == [*["rk43"] * 3, "rk45"]
+    assert explicit_method("rk45", 0.1) == "rk45" and explicit_method("rk43", 1e-6) == "rk43"
+    bearing = roller_bearing(outer)
+    z = bearing.rollers
+    explicit, implicit = (absolute_tolerance(outer, bearing, 0.01, name) for name in ("rk43", "rosenbrock"))
+    roller, cage = 2 * z, 5 * z + 3
+    assert explicit[cage] / explicit[roller] == pytest.approx(CAGE_SHARES["rk43"])
+    assert implicit[cage] / implicit[roller] == pytest.approx(CAGE_SHARES["rosenbrock"])
+
+
+def test_unit_coverage_counts(outer_result):
+    """Unit: shares, widths and offsets of hand-made results, and what is concluded from them."""
+    names = ("impact_force", "impact_contact_force", "whirl_deviation_ratio", "power_loss", "cage_speed_rpm")
+
+    def result(value, statistical, numerical):
+        figures = {name: Quantity(value, statistical, numerical, 9.0) for name in names}
+        return replace(outer_result, **figures)
+
+    truth = result(100.0, 0.0, None)
+    results = [result(100.0 + off, 3.0, 4.0) for off in (0.0, 3.5, 4.9, 5.1)]
+    one = coverage.row("power_loss_W", truth, results)
+    assert (one.covered, one.statistical_alone) == (0.75, 0.25)
+    assert one.half_width == pytest.approx(0.05) and one.offset == pytest.approx(0.03375)
+    wide = coverage.row("power_loss_W", result(100.0, 1.1, None), results)
+    assert wide.covered == 1.0
+    rows = [
+        replace(one, figure=name, covered=share, truth=float(place))
+        for place, (name, share) in enumerate(
+            {
+                "impact_force_N": 0.95, "impact_contact_force_N": 0.95, "whirl_deviation_ratio": 0.97,
+                "power_loss_W": 0.93, "cage_speed_rpm": 0.95, "cage_slip": 0.1,
+            }.items()
+        )
+    ]  # fmt: skip
+    assert coverage.pooled(rows) == pytest.approx(0.95)
+    narrow = [replace(row, covered=0.8) if row.figure == "power_loss_W" else row for row in rows]
+    assert "too narrow (below 0.90): power_loss_W 0.80" in coverage.conclusion(narrow, 200)
+
+
+def test_unit_repeats_are_of_one_bearing(make_scene):
+    """Unit: rollers drawn from a spread stay those of the scene whatever the seed of a repeat."""
+    drawn = make_scene("bearing.roller_diameter_spread_um=0.5")
+    fixed = with_numerics(coverage.one_bearing(drawn), seed=77)
+    assert roller_radii(fixed) == pytest.approx(roller_radii(drawn), rel=1e-12)
+    plain = make_scene()
+    assert coverage.one_bearing(plain) is plain
+
+
+def test_command_line_coverage(command, monkeypatch):
+    """The command runs its repeats and says what they cost; repeats belong to it alone."""
+    scene = "examples/cylindrical_roller.toml"
+    short = ("numerics.turns=1", "numerics.discard_turns=1", "numerics.replicates=2", "numerics.extend=false")
+    sets = [part for item in short for part in ("--set", item)]
+    shown = command("accuracy", scene, "--coverage", "--repeats", "2", *sets, "--json")
+    assert shown.returncode == 0
+    found = json.loads(shown.stdout)
+    assert found["format"] == "rbdyn.coverage/1" and found["repeats"] == 2
+    assert {row["figure"] for row in found["rows"]} >= {"impact_force_N", "power_loss_W"}
+    assert found["mean_turns"] == pytest.approx(2.0 * (2 + 1))
+    refused = command("accuracy", scene, "--repeats", "2")
+    assert refused.returncode == 2 and "goes with --coverage only" in refused.stderr
+
+
+@pytest.mark.slow
+def test_oracle_a_slow_regime_is_seen(outer):
+    """Oracle: at loose clearances the cage changes its regime until turn 60 and later; a short run goes on by itself, and
+    its loss holds that of turns 120 to 480 of 24 replicates, which one that may not go on misses.
+    """
+    clearances = {
+        "bearing": outer.bearing.model_copy(update={"radial_clearance_mm": 0.028}),
+        "cage": outer.cage.model_copy(update={"pocket_clearance_mm": 0.35}),
+    }
+    numbers = {
+        "turns": 40.0, "discard_turns": 20.0, "impact_window_turns": 20.0, "replicates": 8, "companion": False,
+    }  # fmt: skip
+    truth_numbers = numbers | {"turns": 360.0, "discard_turns": 120.0, "replicates": 24, "seed": 99}
+
+    def run(**changes):
+        numerics = outer.numerics.model_copy(update=changes)
+        return simulate(outer.model_copy(update=clearances | {"numerics": numerics}))
+
+    truth = run(**truth_numbers, extend=False).power_loss
+    longer, short = run(**numbers, extend=True), run(**numbers, extend=False)
+    assert longer.counted_turns >= 120.0 and short.counted_turns == pytest.approx(40.0)
+    assert abs(longer.power_loss.value - truth.value) <= math.hypot(longer.power_loss.error, truth.statistical_error)
+    assert abs(short.power_loss.value - truth.value) > abs(longer.power_loss.value - truth.value)

@@ -1,0 +1,374 @@
+"""The store of runs: what it refuses, what survives a cut log and a full disk, who may run what."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from doe.running import owner
+from doe.running.failure import Failure, grouped
+from doe.running.owner import LEASE_S, this_process
+from doe.running.store import Point, Store
+from rbdyn.faults import InputError, RunError
+from rbdyn.records.kept import digest_of
+
+POINTS = [Point(f"key {number}", f"design run {number}", number, {"x": 0.5}) for number in range(1, 9)]
+
+
+def result(number: int) -> dict:
+    """A result of some size."""
+    return {"number": number, "text": f"{number} " * 400}
+
+
+@pytest.fixture
+def path(tmp_path) -> Path:
+    return tmp_path / "study.sqlite"
+
+
+def test_results_and_failures_are_kept_with_their_facts(path):
+    with Store(path, "clearance") as store:
+        assert store.get("key 1") is None
+        assert store.claim(POINTS[:2]) == {"key 1", "key 2"}
+        store.put("key 1", {"x": 1.5}, seconds=2.0)
+        store.put("key 1", {"x": 2.5})
+        store.fail("key 2", "it broke", seconds=1.0)
+        store.put("key 2", {"x": 3.5})
+    with Store(path) as store:
+        assert store.get("key 1") == {"x": 1.5}
+        assert store.outcomes(POINTS) == {
+            "key 1": {"x": 1.5},
+            "key 2": Failure("design run 2", "it broke", 2, {"x": 0.5}),
+        }
+        assert [(run.key, run.status, run.seconds) for run in store.ended()] == [
+            ("key 1", "done", 2.0),
+            ("key 2", "failed", 1.0),
+        ]
+    with sqlite3.connect(path) as connection:
+        facts = connection.execute("SELECT study, label, run, factors, pid FROM runs WHERE key = 'key 1'").fetchone()
+    assert facts == ("clearance", "design run 1", 1, '{"x": 0.5}', os.getpid())
+
+
+def foreign(path: Path, *statements: str) -> None:
+    """A database that something else made."""
+    connection = sqlite3.connect(path)
+    for statement in statements:
+        connection.execute(statement)
+    connection.commit()
+    connection.close()
+
+
+@pytest.mark.parametrize(
+    ("statements", "words"),
+    [
+        ((), "it is no database; move it away or name another folder"),
+        (("CREATE TABLE birds (name TEXT)",), "not a store of runs"),
+        (
+            ("CREATE TABLE runs (key TEXT PRIMARY KEY, result TEXT)",),
+            "a store of version 1, not 2; move it away or name another folder",
+        ),
+        (
+            (
+                "CREATE TABLE meta (name TEXT, value TEXT)",
+                "INSERT INTO meta VALUES ('format', 'doe.store'), ('version', '3')",
+            ),
+            "a store of version 3, not 2; install the newer doe that made it or name",
+        ),
+    ],
+)
+def test_what_is_no_store_of_this_version_is_refused_and_left_alone(path, statements, words):
+    if statements:
+        foreign(path, *statements)
+    else:
+        path.write_text("not a database, and long enough to be told from one " * 30)
+    before = path.read_bytes()
+    with pytest.raises(InputError, match=words) as refused:
+        Store(path)
+    assert len(refused.value.faults) == 1 and str(path) in refused.value.faults[0]
+    assert path.read_bytes() == before
+    assert os.listdir(path.parent) == [path.name]
+
+
+def test_folder_in_place_of_the_file_or_no_folder_is_told_as_such(path):
+    with pytest.raises(InputError, match=r"study\.sqlite: .*see that its folder is there"):
+        Store(path / "nowhere" / path.name)
+    path.mkdir()
+    with pytest.raises(InputError, match=r"study\.sqlite: is a folder where a file of runs belongs; move it away"):
+        Store(path)
+
+
+def test_folder_that_cannot_be_written_is_told_as_such():
+    folder = Path(tempfile.mkdtemp())
+    user, path = os.geteuid(), folder / "study.sqlite"
+    try:
+        for made in (False, True):
+            if made:
+                Store(path).close()
+            folder.chmod(0o555)
+            if user == 0:
+                os.seteuid(65534)
+            try:
+                with pytest.raises(InputError, match=r"study\.sqlite: .*that both can be written, or name") as refused:
+                    Store(path)
+            finally:
+                os.seteuid(user)
+                folder.chmod(0o755)
+            assert len(refused.value.faults) == 1 and "\n" not in str(refused.value)
+    finally:
+        shutil.rmtree(folder)
+
+
+def test_file_that_another_process_holds_is_told_as_such(path, monkeypatch):
+    monkeypatch.setattr("doe.running.database.PATIENCE_S", 0.1)
+    with Store(path) as holder, Store(path) as other:
+        holder._connection.execute("BEGIN EXCLUSIVE")
+        with pytest.raises(InputError, match=r"another process holds it; start again when that has ended$"):
+            other.put("key 1", result(1))
+        holder._connection.execute("ROLLBACK")
+
+
+def test_cut_file_is_refused(path):
+    with Store(path) as store:
+        for number in range(40):
+            store.put(f"key {number}", result(number))
+    path.write_bytes(path.read_bytes()[:-9000])
+    with pytest.raises(InputError, match=r"study\.sqlite"):
+        Store(path)
+
+
+def test_log_cut_anywhere_gives_back_whole_results_in_order(path, tmp_path):
+    """A power cut: the files as they lie there, the log shortened at will, the index of the log lost."""
+    log = path.with_name(path.name + "-wal")
+    lengths = []
+    with Store(path) as store:
+        for number in range(1, 7):
+            store.put(f"key {number}", result(number))
+            lengths.append(log.stat().st_size)
+        whole, main = log.read_bytes(), path.read_bytes()
+    for length in [*lengths, *(mark - 1 for mark in lengths), *(mark + 1000 for mark in lengths[:-1])]:
+        folder = tmp_path / str(length)
+        folder.mkdir()
+        (folder / path.name).write_bytes(main)
+        (folder / log.name).write_bytes(whole[:length])
+        reported = sum(mark <= length for mark in lengths)
+        with Store(folder / path.name) as store:
+            found = store.outcomes(POINTS)
+        assert found == {f"key {number}": result(number) for number in range(1, reported + 1)}, length
+
+
+def test_results_are_on_the_disk_when_put_returns_and_claims_need_not_be(path):
+    with Store(path) as store:
+        said: list[str] = []
+        store._connection.set_trace_callback(said.append)
+        store.claim(POINTS[:1])
+        store.put("key 1", result(1))
+        store._connection.set_trace_callback(None)
+    settings = [line.rpartition("=")[2] for line in said if line.startswith("PRAGMA synchronous")]
+    assert settings == ["NORMAL", "FULL"]
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        "result = replace(result, '1 1', '1 7')",
+        "result = NULL",
+        "digest = NULL",
+        "result = x'ff00'",
+        "result = CAST(x'7bff' AS TEXT)",
+        "result = 5",
+        f"result = '{{', digest = '{digest_of('{')}'",
+        f"result = '[]', digest = '{digest_of('[]')}'",
+        f"result = 'null', digest = '{digest_of('null')}'",
+        "status = 'failed', cause = NULL",
+    ],
+)
+def test_spoilt_result_is_told_and_not_read_but_run_again(path, spoilt, capsys):
+    with Store(path) as store:
+        store.put("key 1", result(1))
+    foreign(path, f"UPDATE runs SET {spoilt}")
+    with Store(path) as store:
+        assert store.outcomes(POINTS[:1]) == store.outcomes(POINTS[:1]) == {}
+        assert capsys.readouterr().err == f"{path}: kept results that cannot be read count as not done: design run 1\n"
+        assert store.claim(POINTS[:1]) == {"key 1"}
+        store.put("key 1", result(1))
+        assert store.get("key 1") == result(1)
+
+
+def test_spoilt_times_and_signs_of_life_stop_nobody(path):
+    with Store(path) as store, Store(path) as other:
+        store.put("key 1", result(1), seconds=2.0)
+        other.claim(POINTS[1:3])
+        times = "started = 'then', ended = CASE key WHEN 'key 1' THEN 'now' END, seconds = NULL"
+        store._connection.execute(f"UPDATE runs SET {times}")
+        assert store.get("key 1") == result(1) and store.ended() == []
+        assert [claim.since for claim in store.claims()] == [0.0, 0.0]
+        for beat in ("NULL", "'soon'"):
+            store._connection.execute(f"UPDATE owners SET beat = {beat}")
+            assert store.claims() == []
+
+
+def test_failure_dated_ahead_by_another_clock_is_tried_again(path):
+    with Store(path) as store:
+        store.claim(POINTS[:1])
+        store.fail("key 1", "it broke")
+    foreign(path, f"UPDATE runs SET ended = {time.time() + 1e5}")
+    with Store(path) as store:
+        store.forget_failures(POINTS)
+        assert store.outcomes(POINTS) == {}
+
+
+def test_full_disk_is_one_sentence_and_keeps_what_was_finished(path):
+    with Store(path) as store:
+        store.put("key 1", result(1))
+        (pages,) = store._connection.execute("PRAGMA page_count").fetchone()
+        store._connection.execute(f"PRAGMA max_page_count = {pages + 1}")
+        with pytest.raises(RunError, match=r"study\.sqlite: .*full.*make room") as refused:
+            for number in range(2, 9):
+                store.put(f"key {number}", result(number))
+        assert "\n" not in str(refused.value)
+        kept = store.outcomes(POINTS)
+        assert kept["key 1"] == result(1)
+    with Store(path) as store:
+        assert store.outcomes(POINTS) == kept
+        store.put("key 8", result(8))
+        assert store.get("key 8") == result(8)
+
+
+def test_only_one_gets_a_run_until_it_is_given_back(path):
+    with Store(path) as one, Store(path) as two:
+        assert one.claim(POINTS[:3]) == {"key 1", "key 2", "key 3"}
+        assert two.claim(POINTS[:4]) == {"key 4"}
+        assert [(claim.key, claim.pid) for claim in two.claims()] == [(f"key {n}", os.getpid()) for n in (1, 2, 3, 4)]
+        one.put("key 1", result(1))
+        one.release()
+        assert two.claim(POINTS[:3]) == {"key 2", "key 3"}
+        two.close()
+        assert one.claim(POINTS[1:4]) == {"key 2", "key 3", "key 4"}
+
+
+def claimed_by(path: Path, someone: owner.Owner, beat: float) -> set[str]:
+    """Which points a new store gets when all are claimed by ``someone``, last seen at ``beat``."""
+    with Store(path) as store:
+        store.claim(POINTS)
+        with store._transaction(durable=True) as connection:
+            connection.execute("DELETE FROM owners")
+            connection.execute(
+                "INSERT INTO owners VALUES (?, ?, ?, ?, ?, ?)",
+                (someone.token, someone.host, someone.machine, someone.pid, someone.born, beat),
+            )
+            connection.execute("UPDATE runs SET owner = ?", (someone.token,))
+    with Store(path) as store:
+        return store.claim(POINTS)
+
+
+def test_claims_of_the_dead_are_taken_over_and_those_of_the_living_are_not(path):
+    keys = {point.key for point in POINTS}
+    sleeper = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    alive = replace(this_process(), pid=sleeper.pid, born=owner._born(sleeper.pid))
+    # However long ago it was heard of: its process is there.
+    assert claimed_by(path, alive, 0.0) == set()
+    # Another process had its number before.
+    assert claimed_by(path, replace(alive, born="1"), time.time()) == keys
+    sleeper.kill()
+    os.waitid(os.P_PID, sleeper.pid, os.WEXITED | os.WNOWAIT)
+    # Killed, but not fetched by its parent: a zombie.
+    assert claimed_by(path, alive, time.time()) == keys
+    sleeper.wait()
+    assert claimed_by(path, alive, time.time()) == keys
+
+
+def test_claims_of_another_machine_last_as_long_as_the_lease(path):
+    keys = {point.key for point in POINTS}
+    elsewhere = replace(this_process(), host="elsewhere", machine="elsewhere")
+    assert claimed_by(path, elsewhere, time.time() - 0.5 * LEASE_S) == set()
+    assert claimed_by(path, elsewhere, time.time() - 1.1 * LEASE_S) == keys
+
+
+def test_claim_from_the_future_is_told_and_lasts_one_lease_from_when_it_was_first_seen(path, monkeypatch, capsys):
+    monkeypatch.setattr(owner, "LEASE_S", 0.3)
+    elsewhere = replace(this_process(), host="elsewhere", machine="elsewhere")
+    assert claimed_by(path, elsewhere, time.time() + 86400.0) == set()
+    assert re.fullmatch(
+        rf"{path}: process {os.getpid()} on elsewhere gave its last sign of life 86\d\d\d s ahead of this clock; set both "
+        r"clocks right\. Unless it gives another within 60 s, its runs are taken over\n",
+        capsys.readouterr().err,
+    )
+    with Store(path) as store:
+        time.sleep(0.2)
+        store._connection.execute("UPDATE owners SET beat = beat + 5")
+        time.sleep(0.2)
+        # Older than a lease since the first sign, but there was another.
+        assert store.claim(POINTS) == set()
+        time.sleep(0.4)
+        assert store.claim(POINTS) == {point.key for point in POINTS}
+
+
+def test_a_live_process_gives_signs_of_life(path, monkeypatch):
+    monkeypatch.setattr("doe.running.store.BEAT_S", 0.02)
+    with Store(path) as store, Store(path) as other:
+        store.claim(POINTS[:1])
+        query = "SELECT beat FROM owners"
+        (first,) = other._connection.execute(query).fetchone()
+        deadline = time.monotonic() + 10.0
+        while other._connection.execute(query).fetchone() == (first,) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert other._connection.execute(query).fetchone() > (first,)
+
+
+def test_reading_leaves_the_folder_as_it_was(path, tmp_path):
+    with Store(path) as store:
+        store.put("key 1", result(1))
+        store.claim(POINTS[1:2])
+        # As a killed process leaves it: with its log.
+        killed = tmp_path / "killed"
+        killed.mkdir()
+        for name in (path.name, f"{path.name}-wal", f"{path.name}-shm"):
+            shutil.copy(path.with_name(name), killed / name)
+    for folder in (path.parent, killed):
+        before = {file.name: file.stat().st_size for file in folder.iterdir()}
+        with Store(folder / path.name, read_only=True) as store:
+            assert store.get("key 1") == result(1)
+            with pytest.raises(InputError, match="readonly"):
+                store.put("key 2", result(2))
+        assert {file.name: file.stat().st_size for file in folder.iterdir()} == before
+
+
+def test_many_openings_at_once_make_one_store(path):
+    code = (
+        "import sys; from pathlib import Path; from doe.running.store import Point, Store\n"
+        "with Store(Path(sys.argv[1])) as store:\n"
+        "    print(len(store.claim([Point(f'k{n}', 'p') for n in range(50)])))\n"
+        "    store.put('k' + sys.argv[2], {})"
+    )
+    processes = [
+        subprocess.Popen([sys.executable, "-c", code, str(path), str(number)], stdout=subprocess.PIPE, text=True)
+        for number in range(3)
+    ]
+    assert all(process.wait(60) == 0 for process in processes)
+    with Store(path) as store:
+        assert {run.key for run in store.ended()} == {"k0", "k1", "k2"}
+
+
+def test_causes_that_differ_in_numbers_are_one_and_the_most_frequent_comes_first():
+    failures = [
+        Failure("design run 2", "seed 2 stopped at t = 1.5e-05 s: frozen", 2),
+        Failure("pick", "no oil"),
+        Failure("design run 7", "seed 7 stopped at t = 3 s: frozen", 7),
+    ]
+    assert grouped(failures) == [
+        {
+            "cause": "seed 2 stopped at t = 1.5e-05 s: frozen",
+            "runs": [2, 7],
+            "labels": ["design run 2", "design run 7"],
+        },
+        {"cause": "no oil", "runs": [], "labels": ["pick"]},
+    ]

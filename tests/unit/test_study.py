@@ -1,0 +1,274 @@
+"""The whole study on a short simulation: results, resumption, determinism, failures."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from short_studies import SHORT, rows, short_study, silent, stored
+
+from doe import clearance
+from doe.report.steps.front import front_record
+from doe.report.study.files import write
+from doe.study import run_study
+from doe.study.confirmation import Confirmed, Gain, gains
+from doe.study.finished import finished as is_finished
+from doe.study.finished import inputs_digest
+from doe.study.front import find_front
+from doe.study.reference import reference_runs
+from doe.study.runs import read_runs, run_design
+from doe.study.surfaces import fit_surfaces
+from doe.study_file import Study
+from rbdyn.faults import InputError, RunError
+from rbdyn.records.kept import run_key
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A finished study: outcome, folder, names of its files."""
+    folder = tmp_path_factory.mktemp("study")
+    study = Study.load(short_study(folder))
+    outcome = run_study(study, folder, None, lambda title: silent)
+    return outcome, folder, write(outcome, folder)["files"]
+
+
+def test_every_file_is_written(finished):
+    _, folder, files = finished
+    assert {"summary.json", "design_runs.csv", "anova.csv", "front.csv", "part_dimensions.csv"} <= set(files)
+    assert {"report.html", "report.md"} <= set(files)
+    assert {"pareto_front.png", "cage_orbit.png", "pocket_forces.png"} <= set(files)
+    assert sum(name.startswith("surface_") for name in files) == 3
+    for name in files:
+        if name.endswith(".png"):
+            colours = np.unique((255.0 * imread(folder / name)[..., :3]).astype(int).reshape(-1, 3), axis=0)
+            assert len(colours) > 50, f"{name} is nearly empty"
+        else:
+            assert (folder / name).read_text(encoding="utf-8").count("\n") > 1, name
+
+
+def test_a_finished_study_is_not_done_again(finished):
+    outcome, folder, _ = finished
+    command = [sys.executable, "-m", "doe", "study", str(outcome.study.path), "--out", str(folder)]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "finished before, nothing has changed since" in shown
+    assert f"pick: {outcome.pick.reason}" in shown
+    asked = inputs_digest(outcome.study, direct=False)
+    assert is_finished(folder, asked)["pick"] == dict(
+        zip(outcome.study.factors, outcome.pick.point.tolist(), strict=True)
+    )
+    assert is_finished(folder, inputs_digest(outcome.study, direct=True)) is None
+    (folder / "front.csv").rename(folder / "aside.csv")
+    assert is_finished(folder, asked) is None
+    (folder / "aside.csv").rename(folder / "front.csv")
+
+
+def test_summary_answers_the_question(finished):
+    outcome, folder, _ = finished
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["status"] == "ok"
+    assert summary["design"]["runs"] == 20
+    assert set(summary["pick"]) == set(outcome.study.factors)
+    for gain in summary["gains"].values():
+        assert gain["verdict"] in ("better", "worse", "within error")
+    parts = summary["chains"]["pocket"]["allocation"]
+    width, roller = parts["pocket_width"], parts["roller_diameter"]
+    pocket = summary["pick"]["pocket_clearance_mm"]
+    assert width["nominal_mm"] + width["upper_mm"] - roller["nominal_mm"] - roller["lower_mm"] == pytest.approx(
+        pocket + 0.005, abs=1e-9
+    )
+    assert width["nominal_mm"] + width["lower_mm"] - roller["nominal_mm"] - roller["upper_mm"] == pytest.approx(
+        pocket - 0.005, abs=1e-9
+    )
+
+
+def test_pick_stands_on_the_resolution_of_the_drawing(finished):
+    outcome, _, _ = finished
+    assert np.allclose(outcome.pick.point * 1000.0, np.round(outcome.pick.point * 1000.0), atol=1e-9)
+
+
+def test_centre_runs_differ_by_seed_only(finished):
+    outcome, _, _ = finished
+    centre = np.abs(outcome.runs.coded).max(axis=1) == 0.0
+    assert centre.sum() == 6
+    assert len(np.unique(outcome.runs.values[centre, 0])) == 6
+
+
+def test_stands_beside_the_published_table(finished):
+    outcome, _, _ = finished
+    theirs = reference_runs(outcome.study)
+    assert [row.response for row in outcome.beside] == outcome.study.responses
+    for row in outcome.beside:
+        column = outcome.study.responses.index(row.response)
+        ranks = [np.argsort(np.argsort(runs.values[:, column])) for runs in (outcome.runs, theirs)]
+        assert row.rank_correlation == pytest.approx(np.corrcoef(ranks)[0, 1], abs=2e-2)  # some of theirs are equal
+        assert row.verdict.startswith(row.response)
+        assert row.why
+    # Table 4 itself: its own mean impact force, and the signs of its own linear effects.
+    impact = outcome.beside[0]
+    assert impact.their_range == pytest.approx((145.6, 203.7, 278.2))
+    assert all(theirs[0] > 0.0 and theirs[1] for _, theirs in impact.effects.values())
+
+
+def test_nothing_runs_twice(finished, monkeypatch):
+    outcome, folder, _ = finished
+
+    def refuse(*arguments):
+        raise AssertionError("a stored run was simulated again")
+
+    monkeypatch.setattr("rbdyn.dynamics.simulate.simulate", refuse)
+    again = run_study(outcome.study, folder, None, lambda title: silent)
+    assert np.array_equal(again.runs.values, outcome.runs.values)
+    assert np.array_equal(again.pick.values, outcome.pick.values)
+
+
+def test_same_bits_for_any_number_of_workers(finished, tmp_path):
+    outcome, _, _ = finished
+    alone = run_design(outcome.study, tmp_path, 1, silent)
+    assert np.array_equal(alone.values, outcome.runs.values)
+
+
+def test_killed_study_loses_no_finished_run(finished, tmp_path):
+    # Long enough that the kill comes in the middle of it.
+    path = short_study(tmp_path, SHORT.replace("turns=3,", "turns=60,"))
+    store = tmp_path / "out" / "study.sqlite"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "doe", "study", str(path), "--out", str(tmp_path / "out"), "--workers", "1"],
+        stdout=subprocess.DEVNULL,
+    )
+    deadline = time.monotonic() + 120.0
+    while stored(store) < 3 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    survived = rows(store)
+    assert 3 <= len(survived) < 20
+    run_design(Study.load(path), tmp_path / "out", None, silent)
+    finished_rows = rows(store)
+    assert len(finished_rows) == 20
+    assert survived.items() <= finished_rows.items()
+
+
+@pytest.mark.slow
+def test_direct_front_killed_in_its_search_resumes_with_the_same_bits(tmp_path):
+    short = SHORT.replace("turns=3,", "turns=12,")
+    path = short_study(tmp_path, short)
+    text = path.read_text(encoding="utf-8")
+    direct = text[text.index("[direct]") : text.index("[tolerances]")]
+    brief = "[direct]\nevaluations = 60\npopulation = 8\nreplicates = 2\nturns = 13\ndiscard_turns = 1\n\n"
+    path.write_text(text.replace(direct, brief), encoding="utf-8")
+
+    def begin(out: str) -> subprocess.Popen:
+        command = [sys.executable, "-m", "doe", "study", str(path), "--direct", "--workers", "1", "--out"]
+        return subprocess.Popen([*command, str(tmp_path / out)], stdout=subprocess.DEVNULL)
+
+    assert begin("whole").wait(600) == 0
+    store = tmp_path / "out" / "study.sqlite"
+    for count in (30, 55):
+        process = begin("out")
+        deadline = time.monotonic() + 300.0
+        while stored(store) < count and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.kill()
+        process.wait()
+        survived = rows(store)
+        # In the midst of the search: after the 20 design runs, before the 60 evaluations are done.
+        assert count <= len(survived) < 80
+    assert begin("out").wait(600) == 0
+    ended = rows(store)
+    assert survived.items() <= ended.items() and ended.keys() == rows(tmp_path / "whole" / "study.sqlite").keys()
+    one, two = (json.loads((tmp_path / out / "summary.json").read_text()) for out in ("whole", "out"))
+    assert one.pop("cost") != two.pop("cost")
+    for record in (one, two):
+        del record["direct"]["seconds"], record["direct"]["comparison_seconds"]
+    assert one == two
+    for name in ("front.csv", "confirmation.csv", "design_runs.csv"):
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_failed_runs_are_grouped_by_cause_and_too_few_left_end_the_study(tmp_path):
+    study = Study.load(short_study(tmp_path, SHORT + ",step_budget_per_turn=100"))
+    with pytest.raises(RunError) as refused:
+        run_design(study, tmp_path, None, silent)
+    sentence = str(refused.value)
+    assert sentence.startswith("only 0 of 20 design runs went well, of which the response models need 11: ")
+    # One cause, told once with all its runs.
+    assert sentence.count("raise numerics.step_budget_per_turn") == 1
+    assert "design run 1, design run 2, " in sentence
+    assert stored(tmp_path / "study.sqlite") == 0
+
+
+@pytest.mark.parametrize(
+    ("replace", "words"),
+    [
+        (('key = "cage.guide_clearance_mm"', 'key = "cage.guide_clearence_mm"'), ("factor.key", "no such key")),
+        (('name = "power_loss_W"', 'name = "power_W"'), ("response.name", "choose one of")),
+        (('factor = "pocket_clearance_mm"', 'factor = "pocket"'), ("chain.factor", "no such factor")),
+        (("half_width_mm = 0.005", "half_width_mm = -0.005"), ("half_width_mm", "greater than 0")),
+        (("coefficient = -1.0", "coefficient = 0.0"), ("coefficient", "must not be zero")),
+        (("centre = 0.30", "centre = -0.30"), ("cage.pocket_clearance_mm", "greater than 0")),
+        (('file = "ccd_table4.csv"', 'file = "nowhere.csv"'), ("nowhere.csv", "no such file")),
+        (("[baseline]\n", "[baseline]\nradial = 1.0\n"), ("baseline.radial", "no such factor")),
+    ],
+)
+def test_bad_study_is_refused_before_anything_runs(tmp_path, replace, words):
+    with pytest.raises(InputError) as refused:
+        run_study(Study.load(short_study(tmp_path, SHORT, replace)), tmp_path, None, lambda title: silent)
+    assert all(word in str(refused.value) for word in words), str(refused.value)
+    assert stored(tmp_path / "study.sqlite") == 0
+
+
+def test_table_without_a_column_or_with_a_word_is_refused(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    table = tmp_path / "table.csv"
+    text = (EXAMPLES / "ccd_table4.csv").read_text(encoding="utf-8")
+    table.write_text(text.replace("power_loss_W", "loss").replace("278.2", "many"), encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        read_runs(study, table)
+    assert any("power_loss_W" in fault and "missing" in fault for fault in refused.value.faults)
+    assert any("impact_force_N in row 1" in fault for fault in refused.value.faults)
+
+
+def test_reference_of_another_design_is_refused(tmp_path):
+    study = Study.load(short_study(tmp_path, SHORT, ("centre_replicates = 6", "centre_replicates = 9")))
+    with pytest.raises(InputError, match="no run left for the design point"):
+        run_study(study, tmp_path, None, lambda title: silent)
+
+
+def test_front_on_the_published_table_improves_on_its_baseline(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    surfaces = fit_surfaces(study, read_runs(study, EXAMPLES / "ccd_table4.csv"))
+    record = front_record(study, surfaces, find_front(study, surfaces))
+    pick, baseline = record["pick"]["responses"], record["baseline"]["responses"]
+    assert all(pick[name] <= baseline[name] for name in study.responses)
+    assert all(
+        record["ideal"][name] <= min(point["responses"][name] for point in record["front"]) + 1e-9
+        for name in study.responses
+    )
+
+
+def test_gain_counts_only_beyond_its_error(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    none = np.zeros(3)
+    baseline = Confirmed(study.baseline, np.array([100.0, 1.0, 50.0]), np.array([3.0, 0.0, 0.0]), none)
+    pick = Confirmed(study.baseline, np.array([96.0, 0.9, 51.0]), np.array([4.0, 0.0, 0.0]), none)
+    found = gains(study, baseline, pick)
+    assert [gain.verdict for gain in found] == ["within error", "better", "worse"]
+    assert found[0] == Gain("impact_force_N", pytest.approx(4.0), pytest.approx(5.0))
+
+
+def test_key_follows_scene_and_version(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    one, two = clearance.design_scenes(study, np.array([study.centre, study.centre]))
+    keys = {run_key(scene.model_dump(mode="json"), version) for scene in (one, two) for version in "ab"}
+    assert len(keys) == 4
+    assert run_key(one.model_dump(mode="json"), "a") in keys

@@ -1,0 +1,228 @@
+"""A study never calls a broken limit a success: verdicts by simulation, tries, exit codes, the edge of the region."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from instant_runs import instant_result, instantly
+from short_studies import SHORT, short_study, silent
+from typer.testing import CliRunner
+
+from doe import clearance
+from doe.cli import app
+from doe.report.study.files import write
+from doe.study import run_study
+from doe.study.back_off import Conditioned, Missed
+from doe.study.confirmation import Confirmed
+from doe.study.edge import edge_of, share_at_edge
+from doe.study.goals import rounded_within
+from doe.study.limits import Limit, limits_of, sentence, verdict_of
+from doe.study_file import Study
+from rbdyn.faults import InputError
+
+IMPACT = 'name = "impact_force_N"\nmodel = "linear"\ngoal = "min"'
+
+
+def limited_study(folder, limit="upper = 35.0", more=()):
+    """The example study in no time, with a limit on an impact that nobody wants small."""
+    text = short_study(folder).read_text(encoding="utf-8")
+    text = text.replace(IMPACT, f"{IMPACT.replace('min', 'none')}\n{limit}")
+    for old, new in (
+        ('tolerance_aware = "quantile"', 'tolerance_aware = "none"'),
+        ("population = 100", "population = 24"),
+        ('name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = "min"',
+         'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = "max"'),
+        *more,
+    ):  # fmt: skip
+        assert old in text, old
+        text = text.replace(old, new)
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    return folder / "study.toml"
+
+
+def limit(value, error, bound=90.0, sense="<=", probability=1.6449 / 1.96):
+    return Limit("force", sense, bound, value, error, probability)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "sense", "verdict"),
+    [
+        (93.3, 1.4, "<=", "broken"),
+        (90.3, 1.5, "<=", "undecided"),
+        (89.0, 1.5, "<=", "undecided"),
+        # One-sided at 0.95 the error 1.0 counts 0.839.
+        (89.15, 1.0, "<=", "kept"),
+        (89.18, 1.0, "<=", "undecided"),
+        (90.9, 1.0, "<=", "undecided"),
+        (93.3, 1.4, ">=", "kept"),
+        (80.0, float("nan"), "<=", "undecided"),
+    ],
+)
+def test_verdict_is_by_value_and_error(value, error, sense, verdict):
+    assert limit(value, error, sense=sense).verdict == verdict
+
+
+def test_the_bad_is_said_first_and_the_worse_of_two_limits_counts(tmp_path):
+    study = Study.load(limited_study(tmp_path, "upper = 90.0\nlower = 80.0"))
+    none = np.full(3, np.nan)
+    point = Confirmed(study.baseline, np.array([79.0, 1.0, 1.0]), np.array([0.6, 0.1, 0.1]), none)
+    (found,) = limits_of(study, point)
+    assert (found.sense, found.bound, found.verdict) == (">=", 80.0, "broken")
+    assert point.error[0] == pytest.approx(0.6)
+    joint = Confirmed(study.baseline, point.values, np.full(3, 3.0), np.full(3, 4.0))
+    assert joint.error.tolist() == [5.0] * 3 and limits_of(study, joint)[0].verdict == "undecided"
+    text = sentence([limit(89.0, 0.1), limit(93.0, 1.0)], 0.95, 4)
+    assert text.startswith("LIMIT BROKEN") and "4 points were tried" in text
+    assert verdict_of([]) == "kept" and sentence([], 0.95, 1) == ""
+
+
+def biased(patch, excess):
+    """Let the simulator be worse in confirmation than in the design, by ``excess`` of the impact."""
+    ran = instantly(patch)
+    from rbdyn.dynamics import simulate as module
+
+    usual = module.simulate
+
+    def simulate(scene, *rest):
+        result = usual(scene, *rest)
+        if scene.numerics.seed < clearance.CONFIRMATION_SEEDS:
+            return result
+        worse = instant_result(scene).as_dict()
+        worse["impact_force_N"]["value"] += excess
+        return type(result).from_dict(worse)
+
+    patch(module, "simulate", simulate)
+    patch(clearance, "histories", lambda *rest: {})
+    patch(clearance, "draw_motion", lambda *rest: [])
+    return ran
+
+
+def test_a_pick_that_misses_is_followed_by_the_next_best_until_one_keeps_the_limit(tmp_path, monkeypatch):
+    biased(monkeypatch.setattr, 1.5)
+    wanted = [("[front]", '[front]\npick = "weights"'), ('goal = "max"', 'goal = "max"\nweight = 50.0')]
+    study = Study.load(limited_study(tmp_path, more=wanted))
+    outcome = run_study(study, tmp_path, 1, lambda title: silent)
+    assert outcome.verdict == "kept" and 1 < outcome.tried <= 4
+    assert outcome.limits[0].value < 35.0
+    assert {"try_1"} <= set(outcome.confirmed)
+    assert limits_of(study, outcome.confirmed["try_1"])[0].verdict != "kept"
+    record = write(outcome, tmp_path)
+    assert record["status"] == "ok" and record["tried"] == outcome.tried
+    told = record["confirmation"]["pick"]["limits"]["impact_force_N"]
+    assert told["verdict"] == "kept" and told["bound"] == 35.0 and {"value", "error"} <= set(told)
+
+
+def test_a_broken_limit_is_said_first_and_fails_the_study_also_when_asked_again(tmp_path, monkeypatch):
+    biased(monkeypatch.setattr, 30.0)
+    path = limited_study(tmp_path, more=[("tries = 4", "tries = 2")])
+    arguments = ["study", str(path), "--out", str(tmp_path / "out"), "-q"]
+    first, again = (CliRunner().invoke(app, arguments) for _ in range(2))
+    for shown in (first, again):
+        assert shown.exit_code == 1, shown.output
+        assert shown.stdout.startswith("LIMIT BROKEN at the pick: impact_force_N <= 35")
+        assert "2 points were tried" in shown.stdout
+    assert "finished before" in again.stdout
+    record = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
+    assert record["status"] == "broken"
+    assert record["confirmation"]["baseline"]["limits"]["impact_force_N"]["verdict"] == "broken"
+    answer = (tmp_path / "out" / "answer.txt").read_text(encoding="utf-8")
+    assert answer.startswith("LIMIT BROKEN")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "✗ broken" in page and 'class="line limit"' in page
+    assert "LIMIT BROKEN" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "broken" in (tmp_path / "out" / "confirmation.csv").read_text(encoding="utf-8")
+
+
+def test_what_was_missed_is_expected_nearby_and_forgotten_far_away():
+    missed = Missed(np.zeros((1, 2)), np.array([3.0]), np.array([0.1]), np.array([0.5]))
+    mean, deviation = Conditioned(missed)(np.array([[0.0, 0.0], [4.0, 0.0]]), np.array([0.5, 0.5]))
+    # A miss of six standard errors makes them as large as it is.
+    assert mean == pytest.approx([3.0, 0.0], abs=0.02)
+    assert deviation[0] < 0.2 and deviation[1] == pytest.approx(3.0, rel=0.1)
+    nothing = Missed(np.empty((0, 2)), *(np.empty(0) for _ in range(3)))
+    mean, deviation = Conditioned(nothing)(np.zeros((1, 2)), np.array([0.5]))
+    assert mean.tolist() == [0.0] and deviation.tolist() == [0.5]
+
+
+def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    reach = 2**0.75 * study.step
+    corner = study.centre + reach * [0.0, 1.0, 0.0]
+    assert share_at_edge(study, np.array([corner, study.centre])) == 0.5
+    from doe.response_surface import fit
+    from doe.study.runs import design_points
+
+    coded = design_points(study)
+    values = [50.0 - 2.0 * coded[:, 1] + 1e-9 * np.sin(np.arange(20)) for _ in study.responses]
+    surfaces = [
+        fit(coded, each, name=name, model="linear", centre=study.centre, step=study.step)
+        for name, each in zip(study.responses, values, strict=True)
+    ]
+    pick = Confirmed(corner, np.ones(3), np.zeros(3), np.zeros(3))
+    edge = edge_of(study, surfaces, pick, np.array([corner, study.centre]), None, None)
+    (outward,) = edge.outward
+    assert (outward.factor, outward.side, outward.unit) == ("guide_clearance_mm", "upper", "µm")
+    # Two a coded unit of 50 µm.
+    gain, error = outward.gains["impact_force_N"]
+    assert gain == pytest.approx(0.04, rel=1e-4) and error < 1e-6
+    assert "THE PICK LIES AT THE EDGE" in edge.sentence and "50 % of the front" in edge.sentence
+    inside = SimpleNamespace(point=study.centre)
+    assert not edge_of(study, surfaces, inside, study.centre[None], None, None).outward
+
+
+def test_rounding_does_not_leave_the_region(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    reach = 2**0.75 * study.step
+    for side in (-1.0, 1.0):
+        rounded = rounded_within(study, study.centre + side * reach)
+        assert (np.abs(rounded - study.centre) <= reach).all()
+        assert np.allclose(rounded * 1000.0, np.round(rounded * 1000.0))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("limit_probability = 0.95", "limit_probability = 0.4", "limit_probability"),
+        ("limit_probability = 0.95", "limit_probability = 1.0", "limit_probability"),
+        ("tries = 4", "tries = 0", "tries"),
+        ("[direct]", "[direct]\nturns = 10\ndiscard_turns = 1", "one window of the impact"),
+    ],
+)
+def test_bad_settings_are_refused(tmp_path, old, new, words):
+    path = short_study(tmp_path, SHORT.replace(",impact_window_turns=1", ""), (old, new))
+    with pytest.raises(InputError, match=words):
+        clearance.check_direct(Study.load(path))
+
+
+def test_direct_runs_are_as_long_as_design_runs_and_told_in_words(tmp_path):
+    study = Study.load(short_study(tmp_path))
+    (scene,) = clearance.direct_scenes(study, study.baseline[None], 0)
+    assert (scene.numerics.turns, scene.numerics.discard_turns, scene.numerics.replicates) == (3, 1, 3)
+    assert "3 replicates of 3 counted shaft turns (3 whole windows" in clearance.direct_run(study)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "design", ['kind = "central_composite"\nalpha = "face_centred"', 'kind = "latin_hypercube"\nruns = 20']
+)
+def test_impact_limited_to_90_newtons_of_the_bearing_itself(tmp_path, design):
+    """Guide and pocket clearance, the limit pressed upon: what surfaces alone pick simulates beyond or at 90 N."""
+    text = limited_study(tmp_path, "upper = 90.0").read_text(encoding="utf-8")
+    text = text.replace(next(line for line in text.splitlines() if line.startswith("set = ")),
+        'set = ["numerics.turns=40", "numerics.discard_turns=20", "numerics.companion=false"]')  # fmt: skip
+    first, second = (text.index("[[factor]]", place) for place in (0, text.index("[[factor]]") + 1))
+    text = text[:first] + text[second : text.index("[[chain]]")].replace("radial_clearance_mm = 0.020\n", "")
+    start, end = text.index("[design]"), text.index("[[response]]")
+    text = f"{text[:start]}[design]\n{design}\nseed = 1\n\n{text[end:]}".replace(
+        "replicates = 2\n", "replicates = 16\n"
+    )
+    (tmp_path / "study.toml").write_text(text.replace("population = 24", "population = 100"), encoding="utf-8")
+    outcome = run_study(Study.load(tmp_path / "study.toml"), tmp_path, None, lambda title: silent)
+    (found,) = outcome.limits
+    if outcome.verdict == "kept":
+        assert found.value + 0.83 * found.error < 90.0
+    else:
+        assert outcome.limits_sentence.startswith("LIMIT") and outcome.tried == 4

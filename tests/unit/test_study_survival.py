@@ -1,0 +1,295 @@
+"""What a study survives: failed points, Ctrl-C, kill -9, a full disk, another process on the same study, edits.
+
+The simulations take no time here; the same with real ones stands in ``test_study``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from instant_runs import instantly
+from short_studies import SHORT, short_study, silent, stored
+
+from doe import clearance
+from doe.running.store import Store
+from doe.study.confirmation import confirm
+from doe.study.picks import Choice
+from doe.study.reference import reference_runs
+from doe.study.runs import STORE, run_design
+from doe.study.simulations import Simulations
+from doe.study.status import study_status
+from doe.study_file import Study
+from rbdyn.faults import RunError
+from rbdyn.records.kept import digest_of
+
+CENTRES = range(15, 21)
+
+
+def seeds_run(store: Path) -> list[int]:
+    """Seeds of the finished runs."""
+    with Store(store, read_only=True) as opened:
+        keys = [run.key for run in opened.ended() if run.status == "done"]
+        return sorted(opened.get(key)["seed"] for key in keys)
+
+
+def start(study: Path, out: Path, seconds: float, workers: int, *options: str, **how) -> subprocess.Popen:
+    """The design in a process of its own, on simulations that take so long."""
+    program = Path(__file__).parents[1] / "helpers" / "instant_runs.py"
+    command = [sys.executable, str(program), str(seconds), str(study), str(out), str(workers), *options]
+    # Where the tests run in the background of a shell, Ctrl-C is switched off and that is inherited.
+    how = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler), **how}
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how)
+
+
+def wait_for(condition, seconds: float = 60.0) -> None:
+    """Until something is so."""
+    deadline = time.monotonic() + seconds
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert condition()
+
+
+def test_failed_points_are_left_out_told_and_not_tried_again_unless_asked(tmp_path, monkeypatch):
+    study = Study.load(short_study(tmp_path))
+    ran = instantly(monkeypatch.setattr, faulty=(3, 18, 19))
+    runs = run_design(study, tmp_path, 2, silent)
+    assert sorted(ran) == list(range(1, 21))
+    assert len(runs.coded) == len(runs.actual) == len(runs.values) == len(runs.errors) == 17
+    assert runs.replicates is not None and runs.replicates.shape == (17, 3)
+    assert [failure.run for failure in runs.failures] == [3, 18, 19]
+    assert runs.failures[0].factors == pytest.approx(
+        {"radial_clearance_mm": 0.015, "guide_clearance_mm": 0.2, "pocket_clearance_mm": 0.25}
+    )
+    assert runs.places == [place for place in range(20) if place + 1 not in (3, 18, 19)]
+    (note,) = runs.notes
+    assert note.startswith("3 design runs failed and are left out: design run 3, design run 18, design run 19: ")
+    assert note.count("the oil froze") == 1
+    ran.clear()
+    again = run_design(study, tmp_path, 2, silent)
+    assert ran == [] and again.failures == runs.failures and np.array_equal(again.values, runs.values)
+    thawed = instantly(monkeypatch.setattr)
+    mended = run_design(study, tmp_path, 2, silent, retry=True)
+    assert sorted(thawed) == [3, 18, 19] and not mended.failures and len(mended.coded) == 20
+
+
+def test_published_table_loses_the_rows_of_failed_runs(tmp_path, monkeypatch):
+    study = Study.load(short_study(tmp_path))
+    instantly(monkeypatch.setattr, faulty=(2, 5))
+    runs, table = run_design(study, tmp_path, 2, silent), reference_runs(study)
+    assert table is not None
+    assert np.allclose(table.only(runs.places).actual, runs.actual, atol=2e-3)
+    assert np.array_equal(table.only(runs.places).values[:3], table.values[[0, 2, 3]])
+
+
+def test_confirmation_that_fails_ends_the_study_in_a_sentence(tmp_path, monkeypatch):
+    study = Study.load(short_study(tmp_path))
+    instantly(monkeypatch.setattr, faulty=(1 + clearance.CONFIRMATION_SEEDS,))
+    with Store(tmp_path / STORE) as store:
+        simulations = Simulations(store, 2, None, False, lambda title: silent)
+        with pytest.raises(RunError, match=r"^confirmation of the baseline: .*the oil froze$"):
+            confirm(study, {"pick": Choice(study.baseline * 1.1, "why not")}, simulations)
+    with Store(tmp_path / STORE, read_only=True) as store:
+        assert [run.status for run in store.ended()] == ["failed", "failed"]
+
+
+def test_unexpected_fault_of_a_run_is_a_failure_too(tmp_path, monkeypatch):
+    study = Study.load(short_study(tmp_path))
+    instantly(monkeypatch.setattr)
+    from rbdyn.dynamics import simulate as module
+
+    instant = module.simulate
+
+    def sometimes(scene, *rest):
+        if scene.numerics.seed == 4:
+            raise ZeroDivisionError("division by zero")
+        return instant(scene, *rest)
+
+    monkeypatch.setattr(module, "simulate", sometimes)
+    runs = run_design(study, tmp_path, 1, silent)
+    assert [failure.cause for failure in runs.failures] == ["unexpected ZeroDivisionError: division by zero"]
+
+
+@pytest.mark.parametrize(
+    ("replace", "again"),
+    [
+        (("centre_replicates = 6", "centre_replicates = 9"), [21, 22, 23]),
+        (('model = "linear"', 'model = "quadratic"'), []),
+        (("population = 100", "population = 60"), []),
+        (("resolution = 0.001", "resolution = 0.002"), []),
+        # Cube and axial points move, the axial ones of the other factors and the centre do not.
+        (("centre = 0.15\nstep = 0.05", "centre = 0.15\nstep = 0.04"), [*range(1, 9), 11, 12]),
+        (("centre = 0.30\nstep = 0.05", "centre = 0.31\nstep = 0.05"), list(range(1, 21))),
+        (("numerics.turns=3", "numerics.turns=4"), list(range(1, 21))),
+    ],
+)
+def test_edited_study_runs_only_what_changed(tmp_path, monkeypatch, replace, again):
+    path = short_study(tmp_path)
+    ran = instantly(monkeypatch.setattr)
+    run_design(Study.load(path), tmp_path, 2, silent)
+    ran.clear()
+    text = path.read_text(encoding="utf-8")
+    assert replace[0] in text
+    path.write_text(text.replace(*replace), encoding="utf-8")
+    run_design(Study.load(path), tmp_path, 2, silent)
+    assert sorted(ran) == again
+
+
+def test_other_code_runs_everything_again_also_what_failed(tmp_path, monkeypatch):
+    study = Study.load(short_study(tmp_path))
+    instantly(monkeypatch.setattr, faulty=(6,))
+    assert run_design(study, tmp_path, 2, silent).failures
+    monkeypatch.setattr("rbdyn.records.kept.source_digest", lambda *roots: "edited")
+    ran = instantly(monkeypatch.setattr)
+    assert not run_design(study, tmp_path, 2, silent).failures
+    assert sorted(ran) == list(range(1, 21))
+
+
+def test_two_processes_share_a_study_and_nothing_runs_twice(tmp_path):
+    study, out = short_study(tmp_path), tmp_path / "out"
+    both = [start(study, out, 0.05, 1) for _ in range(2)]
+    answers = [process.communicate(timeout=120) for process in both]
+    assert [process.returncode for process in both] == [0, 0], answers
+    one, two = (json.loads(shown) for shown, _ in answers)
+    assert one["values"] == two["values"] and len(one["values"]) == 20
+    assert sorted(one["ran"] + two["ran"]) == list(range(1, 21))
+    with Store(out / STORE, read_only=True) as store:
+        owners = [run.owner for run in store.ended()]
+    assert len(owners) == 20 and len(set(owners)) == 2
+
+
+def test_two_doe_study_on_one_folder_both_get_runs_and_none_runs_twice(tmp_path):
+    study, out = short_study(tmp_path), tmp_path / "out"
+    both = [start(study, out, 0.1, 1, "--whole") for _ in range(2)]
+    answers = [process.communicate(timeout=200) for process in both]
+    assert [process.returncode for process in both] == [0, 0], answers
+    ran = [json.loads(said.splitlines()[-1]) for _, said in answers]
+    together = [seed for seeds in ran for seed in seeds]
+    assert all(ran) and set(range(1, 21)) < set(together)
+    # Baseline and pick are confirmed with one seed, that of no design run.
+    assert max(together.count(seed) for seed in range(1, 21)) == 1
+    with Store(out / STORE, read_only=True) as store:
+        ended = store.ended()
+    assert len(ended) == len(together) and len({run.owner for run in ended if run.seconds is not None}) >= 2
+    one, two = (json.loads(shown) for shown, _ in answers)
+    assert one["pick"] == two["pick"] and json.loads((out / "summary.json").read_text())["pick"] == one["pick"]
+    assert not list(out.glob("*.partial"))
+
+
+def spoil(store: Path, key: str, **values) -> None:
+    """Write something else into the row of a run."""
+    with sqlite3.connect(store) as connection:
+        connection.execute(
+            f"UPDATE runs SET {', '.join(f'{name} = :{name}' for name in values)} WHERE key = :key",
+            {**values, "key": key},
+        )
+
+
+def test_rows_that_are_no_results_run_again_with_one_sentence(tmp_path, monkeypatch, capsys):
+    study = Study.load(short_study(tmp_path))
+    ran = instantly(monkeypatch.setattr)
+    run_design(study, tmp_path, 1, silent)
+    with Store(tmp_path / STORE, read_only=True) as store:
+        by_seed = {store.get(run.key)["seed"]: run.key for run in store.ended()}
+        whole = store.get(by_seed[5])
+    without = {name: part for name, part in whole.items() if name != "power_loss_W"}
+    typed = {**whole, "power_loss_W": {**whole["power_loss_W"], "value": "much"}}
+    faulty: list[object] = [{}, [], None, without, typed, {**whole, "cage_slip": None}, {**whole, "loads": 3}]
+    for seed, record in enumerate(faulty, 1):
+        text = json.dumps(record)
+        spoil(tmp_path / STORE, by_seed[seed], result=text, digest=digest_of(text))
+    spoil(tmp_path / STORE, by_seed[8], result=None)
+    spoil(tmp_path / STORE, by_seed[9], result="{", digest=digest_of("{"))
+    spoil(tmp_path / STORE, by_seed[10], result=b"\xff\x00")
+    ran.clear()
+    capsys.readouterr()
+    assert study_status(study, tmp_path)["points"]["missing"] == 10
+    labels = ", ".join(f"design run {run}" for run in range(1, 11))
+    sentence = f"{tmp_path / STORE}: kept results that cannot be read count as not done: {labels}\n"
+    assert capsys.readouterr().err == sentence
+    runs = run_design(study, tmp_path, 1, silent)
+    assert sorted(ran) == list(range(1, 11)) and not runs.failures
+    assert capsys.readouterr().err == sentence
+
+
+def test_killed_process_is_taken_over_at_once_by_one_that_waits_for_it(tmp_path, monkeypatch):
+    study, out = short_study(tmp_path), tmp_path / "out"
+    slow = start(study, out, 30.0, 19)
+    wait_for(lambda: (out / STORE).exists() and study_status(Study.load(study), out)["points"]["running"] == 20)
+    ran = instantly(monkeypatch.setattr)
+    seen: list[tuple[int, int]] = []
+
+    def progress(done: int, total: int) -> None:
+        seen.append((done, total))
+        if len(seen) == 3:
+            # All points are taken: nothing to do but to wait.
+            assert ran == [] and seen == [(0, 20)] * 3
+            os.kill(slow.pid, signal.SIGKILL)
+
+    runs = run_design(Study.load(study), out, 2, progress)
+    slow.communicate()
+    assert sorted(ran) == list(range(1, 21)) and len(runs.coded) == 20
+    assert seen[-1] == (20, 20)
+
+
+def test_ctrl_c_keeps_what_was_finished_and_gives_back_the_rest(tmp_path):
+    study, out = short_study(tmp_path), tmp_path / "out"
+    process = start(study, out, 0.4, 2)
+    wait_for(lambda: stored(out / STORE) >= 3)
+    process.send_signal(signal.SIGINT)
+    shown, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert json.loads(shown) == {"status": "interrupted"}
+    assert said.strip() == f"interrupted; what was finished is kept in {out / STORE}: start again to go on"
+    status = study_status(Study.load(study), out)
+    assert status["points"]["running"] == 0 and status["status"] == "unfinished"
+    assert 3 <= status["points"]["done"] == len(seeds_run(out / STORE)) < 20
+
+
+def test_full_disk_is_one_sentence_and_the_study_goes_on_later(tmp_path):
+    study, out = short_study(tmp_path), tmp_path / "out"
+    limit = 250_000
+    full = start(study, out, 0.0, 2, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+    shown, said = full.communicate(timeout=60)
+    assert full.returncode == 1, said
+    assert re.fullmatch(
+        r"\S+study\.sqlite: cannot be written \(.*\); finished runs are kept: make room .*", said.strip()
+    )
+    assert json.loads(shown)["status"].startswith("failed: ")
+    kept = seeds_run(out / STORE)
+    assert 3 <= len(kept) < 20
+    resumed = start(study, out, 0.0, 2)
+    shown, said = resumed.communicate(timeout=120)
+    assert resumed.returncode == 0, said
+    assert len(seeds_run(out / STORE)) == 20
+    with Store(out / STORE, read_only=True) as store:
+        # The finished ones were not run again: they ended first.
+        assert sorted(store.get(run.key)["seed"] for run in store.ended()[: len(kept)]) == kept
+
+
+def test_scenes_of_the_same_laws_are_prepared_once(tmp_path, monkeypatch):
+    from rbdyn.dynamics import simulate as module
+
+    study = Study.load(short_study(tmp_path, SHORT + ",method='rk45'"))
+    prepared = []
+
+    def prepare(scene, bearing):
+        prepared.append(scene)
+        return 1.0
+
+    monkeypatch.setattr(module, "prepare", prepare)
+    monkeypatch.setattr(module, "_prepared", set())
+    scenes = clearance.design_scenes(study, np.array([study.centre, 1.1 * study.centre]))
+    one, two = (module.simulate(scene, 1) for scene in scenes)
+    assert prepared == scenes[:1]
+    assert [result.cost["compile_s"] for result in (one, two)] == [1.0, 0.0]
