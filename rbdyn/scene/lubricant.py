@@ -77,48 +77,30 @@ class Lubricant(Strict):
 
     @model_validator(mode="after")
     def _known(self) -> Lubricant:
-        given = [key for key in DATA_KEYS if getattr(self, key) is not None]
-        if self.oil in OILS or self.oil in TURBINE_OILS:
-            return or_refuse(
-                self,
-                [
-                    f"lubricant.{key} = {getattr(self, key)}: {self.oil} tells its own; leave it out, or set lubricant.oil to a "
-                    "grade or to 'data_sheet'"
-                    for key in given
-                ],
-            )
-        if self.oil == "data_sheet":
-            return or_refuse(self, self._data_sheet_faults())
-        if self.viscosities_C_mm2_s is not None:
-            said = f"lubricant.viscosities_C_mm2_s and lubricant.oil = {self.oil!r} contradict each other"
-            return or_refuse(self, [f"{said}: leave the one out or set the other to 'data_sheet'"])
-        return self
-
-    def _data_sheet_faults(self) -> list[str]:
-        found = []
-        if self.viscosity_index is not None:
-            found.append(
-                f"lubricant.viscosity_index = {self.viscosity_index:g}: two viscosities tell it; leave it out or name a grade"
-            )
-        if self.density_kg_m3 is None:
-            found.append("lubricant.density_kg_m3: missing; lubricant.oil = 'data_sheet' needs that at 15 C")
-        points = self.viscosities_C_mm2_s
-        if points is None:
-            found.append(
-                "lubricant.viscosities_C_mm2_s: missing; lubricant.oil = 'data_sheet' needs two, [[40, 32], [100, 5.4]]"
-            )
-        elif any(len(point) != 2 for point in points):
-            found.append(
-                "lubricant.viscosities_C_mm2_s: each point is [temperature in C, viscosity in mm2/s]; mend the list"
-            )
-        else:
+        """Told once: by name, by grade with base oil and index, or by a data sheet."""
+        sheet = self.oil == "data_sheet"
+        alien = {"viscosity_index"} if sheet else {"viscosities_C_mm2_s"} if self.oil.startswith(GRADE) else DATA_KEYS
+        given = {key: value for key in DATA_KEYS if (value := getattr(self, key)) is not None}
+        found = [
+            f"lubricant.{key} = {given[key]}: lubricant.oil = {self.oil!r} tells that by itself; leave it out or name another"
+            for key in given
+            if key in alien
+        ]
+        needed = ("viscosities_C_mm2_s", "density_kg_m3") if sheet else ()
+        found += [
+            f"lubricant.{key}: missing; lubricant.oil = 'data_sheet' needs it" for key in needed if key not in given
+        ]
+        points = self.viscosities_C_mm2_s or []
+        if any(len(point) != 2 for point in points):
+            found.append("lubricant.viscosities_C_mm2_s: each point is [temperature in C, viscosity in mm2/s]; mend it")
+        elif points:
             (cold, thick), (hot, thin) = sorted(points)
             if not (-60.0 <= cold < hot <= HOTTEST_C and thick > thin > 0.5):
                 found.append(
-                    f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature, from -60 to {HOTTEST_C:g} C, to no less "
-                    "than 0.5 mm2/s; mend them"
+                    f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature, from -60 to {HOTTEST_C:g} C, to "
+                    "no less than 0.5 mm2/s; mend them"
                 )
-        return found
+        return or_refuse(self, found)
 
     @model_serializer(mode="wrap")
     def _without_empty_data(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -142,23 +124,22 @@ class Lubricant(Strict):
     @property
     def estimates(self) -> tuple[str, ...]:
         """A sentence on what is estimated of the oil, where its name does not tell all."""
+        if self.oil == "MIL-L-85734":
+            return ("lubricant: MIL-L-85734 is taken as MIL-L-23699, of whose class it is",)
         if self.oil in OILS:
             return ()
-        oil, told = self.in_service, []
+        oil, told, graded = self.in_service, [], self.oil.startswith(GRADE)
+        base = "ester" if self.oil in TURBINE_OILS else self.base_oil or "mineral"
         if self.viscosity_mPas is None:
-            index = self._base().viscosity_index if self.viscosity_index is None else self.viscosity_index
-            by_index = f" and its viscosity index of {index:g} (D2270)" if self.oil.startswith(GRADE) else ""
+            index = BASE_OILS[base].viscosity_index if self.viscosity_index is None else self.viscosity_index
+            by_index = f" and its viscosity index of {index:g} (D2270)" if graded else ""
             told.append(f"{1e3 * oil.viscosity:.3g} mPa s by ASTM D341{by_index}")
         if self.pressure_coefficient_1_GPa is None:
-            told.append(
-                f"pressure coefficient {1e9 * oil.pressure_coefficient:.3g} 1/GPa by Gold, within {100.0 * GOLD_SPREAD:g} %"
-            )
-        told.append(
-            f"density {oil.density:.3g} kg/m^3"
-            + (" within 3 %" if self.oil.startswith(GRADE) and not self.density_kg_m3 else "")
-        )
+            alpha = f"{1e9 * oil.pressure_coefficient:.3g} 1/GPa"
+            told.append(f"pressure coefficient {alpha} by Gold, within {100.0 * GOLD_SPREAD:g} %")
+        if graded and self.density_kg_m3 is None:
+            told.append(f"density {oil.density:.3g} kg/m^3 within 3 %")
         told.append(f"conductivity {oil.conductivity:.2g} W/(m K) and traction by base oil")
-        base = "ester" if self.oil in TURBINE_OILS else self.base_oil or "mineral"
         return (f"lubricant: {self.oil} ({base}) is estimated at {self.temperature_C:g} C: {', '.join(told)}",)
 
     @property

@@ -162,12 +162,15 @@ def test_unit_unknown_oils(text):
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ({"oil": "MIL-L-7808", "base_oil": "PAO"}, "lubricant.base_oil = PAO: MIL-L-7808 tells its own"),
+        (
+            {"oil": "MIL-L-7808", "base_oil": "PAO"},
+            "lubricant.base_oil = PAO: lubricant.oil = 'MIL-L-7808' tells that by itself",
+        ),
         ({"oil": "Mobil Jet Oil II", "density_kg_m3": 900.0}, "lubricant.density_kg_m3 = 900.0"),
-        ({"viscosities_C_mm2_s": [[40.0, 32.0], [100.0, 5.4]]}, "contradict each other"),
+        ({"viscosities_C_mm2_s": [[40.0, 32.0], [100.0, 5.4]]}, "tells that by itself; leave it out or name another"),
         ({"oil": "data_sheet"}, "lubricant.density_kg_m3: missing"),
         ({"oil": "data_sheet"}, "lubricant.viscosities_C_mm2_s: missing"),
-        ({"oil": "data_sheet", "viscosity_index": 95.0}, "two viscosities tell it"),
+        ({"oil": "data_sheet", "viscosity_index": 95.0}, "lubricant.viscosity_index = 95.0: lubricant.oil"),
         (
             {"oil": "data_sheet", "viscosities_C_mm2_s": [[40.0, 5.0], [100.0, 32.0]], "density_kg_m3": 880.0},
             "must fall",
@@ -223,6 +226,8 @@ def test_unit_estimates_are_told_and_scenes_go_there_and_back(make_scene):
     assert all(
         word in told for word in ("ISO VG 100 (PAG)", "D341", "index of 210", "by Gold, within 25 %", "by base oil")
     )
+    (alike,) = lubricant(oil="MIL-L-85734").estimates
+    assert "is taken as MIL-L-23699" in alike
     (known,) = lubricant(viscosity_mPas=9.0, pressure_coefficient_1_GPa=15.0).estimates
     assert "D341" not in known and "Gold" not in known
 
@@ -232,7 +237,7 @@ def test_unit_oils_of_balls_are_told_too(deep_groove):
     from rbdyn import equilibrium
 
     deep_groove["lubricant"] = {"oil": "ISO VG 68", "temperature_C": 70.0}
-    (note,) = (note for note in equilibrium(BallScene.from_dict(deep_groove)).record["notes"] if "lubricant" in note)
+    (note,) = (note for note in equilibrium(BallScene.from_dict(deep_groove)).as_dict()["notes"] if "lubricant" in note)
     assert "ISO VG 68 (mineral) is estimated at 70 C" in note
 
 
