@@ -14,20 +14,19 @@ from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
 from rbdyn.dynamics.forces.state import PARTS
 from rbdyn.dynamics.integrators.arrow_matrix import arrow_matrix
 from rbdyn.dynamics.integrators.jacobian import Differences, OneRoller
-from rbdyn.dynamics.integrators.rosenbrock import STAGES, Workspace
+from rbdyn.dynamics.integrators.rosenbrock import STAGES, Rodas
 from rbdyn.dynamics.parameters.geometry import absolute_tolerance, kinematics, layout_of, shaft_speeds
 from rbdyn.scene import Scene
 
 
-def workspace(scene: Scene, bearing: RollerBearing) -> Workspace:
-    """Work space for a scene."""
+def rodas(scene: Scene, bearing: RollerBearing) -> Rodas:
+    """The method with work space for a scene."""
     layout = layout_of(scene)
     n = layout.size
-    return Workspace(
+    return Rodas(
         np.zeros((STAGES, n)),
         np.zeros((STAGES, POWERS)),
         np.zeros((2, n)),
-        np.zeros(n),
         differences(scene, bearing),
         arrow_matrix(layout),
     )
