@@ -53,16 +53,6 @@ class InnerGuide(NamedTuple):
     dry: Any
 
 
-class FilmWrench(NamedTuple):
-    """Film: force on the journal [N], moments on journal and bearing [N m], power lost [W]."""
-
-    x: float
-    y: float
-    journal_moment: float
-    bearing_moment: float
-    power: float
-
-
 class JournalWrench(NamedTuple):
     """Force on the journal [N], moments on journal and bearing [N m], dry load [N], powers lost [W]."""
 
@@ -96,7 +86,7 @@ class LandForces(NamedTuple):
 
 @law
 def film_wrench(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
-    """``FilmWrench`` at an offset of the journal.
+    """``JournalWrench`` of the film alone.
 
     ``ex, ey, e``: direction and size [m] of the journal's offset; ``evx, evy``: its velocity [m/s].
     """
@@ -104,7 +94,7 @@ def film_wrench(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
 
 @film_wrench.body(NoFilm)
 def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
-    return FilmWrench(0.0, 0.0, 0.0, 0.0, 0.0)
+    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @film_wrench.body(ShortJournalFilm)
@@ -120,7 +110,7 @@ def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
     journal_moment = -shear - 0.5 * e * across
     bearing_moment = shear - 0.5 * e * across
     power = -(fx * evx + fy * evy + journal_moment * journal_speed + bearing_moment * bearing_speed)
-    return FilmWrench(fx, fy, journal_moment, bearing_moment, power)
+    return JournalWrench(fx, fy, journal_moment, bearing_moment, 0.0, power, 0.0, 0.0)
 
 
 @law
@@ -170,7 +160,7 @@ def journal_wrench(guide, dx, dy, dvx, dvy, journal_speed, bearing_speed):
         film.journal_moment + dry.journal_moment,
         film.bearing_moment + dry.bearing_moment,
         dry.load,
-        film.power,
+        film.film,
         dry.friction,
         dry.damping,
     )

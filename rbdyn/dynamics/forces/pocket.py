@@ -68,16 +68,6 @@ class PocketWrench(NamedTuple):
     on_wall: float
 
 
-class WallFilm(NamedTuple):
-    """Film of one wall on a roller: force along and across the mid-line [N], moments [N m], power lost [W]."""
-
-    along: float
-    across: float
-    roller_moment: float
-    cage_moment: float
-    power: float
-
-
 @kernel
 def clearance_of(pocket, radius):
     """Half the clearance that a roller of ``radius`` has in a pocket or between lips [m]."""
@@ -166,7 +156,7 @@ def dry_walls(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed)
 
 @kernel
 def film_on_wall(film, wall, half_clearance, radius, offset, height, across, along, roller_spin, cage_speed):
-    """``WallFilm`` of one wall (+1 front, -1 rear).
+    """``PocketWrench`` by the film of one wall (+1 front, -1 rear), x along and y across the mid-line.
 
     ``across, along``: velocity of the roller's centre less that of the cage, in the directions of offset and height.
     """
@@ -182,7 +172,7 @@ def film_on_wall(film, wall, half_clearance, radius, offset, height, across, alo
     normal = -wall * push
     # The pressure on the wall stands off the contact, so that the film as a whole has no moment.
     cage_moment = -height * normal + offset * tangential + lever * shear
-    return WallFilm(tangential, normal, -lever * shear, cage_moment, power)
+    return PocketWrench(tangential, normal, -lever * shear, cage_moment, 0.0, 0.0, 0.0, power, -normal)
 
 
 @pocket_contact.body(LubricatedPocket)
@@ -193,8 +183,8 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
     play = clearance_of(pocket, radius)
     front = film_on_wall(pocket.film, 1.0, play, radius, offset, height, across, along, roller_spin, cage_speed)
     rear = film_on_wall(pocket.film, -1.0, play, radius, offset, height, across, along, roller_spin, cage_speed)
-    tangential, normal = front.along + rear.along, front.across + rear.across
-    on_front, on_rear = max(dry.on_wall, 0.0) - front.across, max(-dry.on_wall, 0.0) + rear.across
+    tangential, normal = front.x + rear.x, front.y + rear.y
+    on_front, on_rear = max(dry.on_wall, 0.0) + front.on_wall, max(-dry.on_wall, 0.0) - rear.on_wall
     return PocketWrench(
         dry.x + (tangential * ex - normal * ey),
         dry.y + (tangential * ey + normal * ex),
@@ -203,7 +193,7 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
         dry.load,
         dry.friction,
         dry.damping,
-        front.power + rear.power,
+        front.film + rear.film,
         on_front if on_front >= on_rear else -on_rear,
     )
 

@@ -29,39 +29,18 @@ class Component(NamedTuple):
         return self.unit.endswith("/s")
 
 
+def _body(body: str, *rows: tuple[str, ...]) -> tuple[Component, ...]:
+    return tuple(Component(body, *row) for row in rows)
+
+
+PLACE, VELOCITY = (("x", "m", "vx"), ("y", "m", "vy")), (("vx", "m/s"), ("vy", "m/s"))
 # Each of a roller's stands Z times, for one roller after the other.
-ROLLER = (
-    Component("roller", "x", "m", "vx"),
-    Component("roller", "y", "m", "vy"),
-    Component("roller", "vx", "m/s"),
-    Component("roller", "vy", "m/s"),
-    Component("roller", "spin", "rad/s"),
-)
-BODIES = (
-    Component("cage", "x", "m", "vx"),
-    Component("cage", "y", "m", "vy"),
-    Component("cage", "angle", "rad", "speed"),
-    Component("cage", "vx", "m/s"),
-    Component("cage", "vy", "m/s"),
-    Component("cage", "speed", "rad/s"),
-    Component("inner ring", "x", "m", "vx"),
-    Component("inner ring", "y", "m", "vy"),
-    Component("inner ring", "vx", "m/s"),
-    Component("inner ring", "vy", "m/s"),
-)
-# With an outer ring on a support.
-SUPPORT = (
-    Component("outer ring", "x", "m", "vx"),
-    Component("outer ring", "y", "m", "vy"),
-    Component("outer ring", "vx", "m/s"),
-    Component("outer ring", "vy", "m/s"),
-)
-# Where something depends on time or on a ring's angle.
-CLOCK = (
-    Component("clock", "time", "s"),
-    Component("clock", "inner ring angle", "rad"),
-    Component("clock", "outer ring angle", "rad"),
-)
+ROLLER = _body("roller", *PLACE, *VELOCITY, ("spin", "rad/s"))
+CAGE = _body("cage", *PLACE, ("angle", "rad", "speed"), *VELOCITY, ("speed", "rad/s"))
+BODIES = (*CAGE, *_body("inner ring", *PLACE, *VELOCITY))
+# With an outer ring on a support; where something depends on time or on a ring's angle.
+SUPPORT = _body("outer ring", *PLACE, *VELOCITY)
+CLOCK = _body("clock", ("time", "s"), ("inner ring angle", "rad"), ("outer ring angle", "rad"))
 PARTS = len(ROLLER)
 # Places within BODIES, SUPPORT and CLOCK.
 CAGE_X, CAGE_Y, CAGE_ANGLE, CAGE_VX, CAGE_VY, CAGE_SPEED, RING_X, RING_Y, RING_VX, RING_VY = range(len(BODIES))
