@@ -123,7 +123,7 @@ class Recording:
         """Cage angle, kinematic cage angle [rad] and mechanical energy [J] as they stand."""
         run = self.run
         return (
-            float(run.carry.y[run.layout.body + CAGE_ANGLE]),
+            float(run.carry.y[run.layout.first_body + CAGE_ANGLE]),
             kinematic_cage_angle(run.scene, self._begin, run.clock_angles()),
             sum(mechanical_energy(run.bearing, run.carry.y)),
         )

@@ -28,7 +28,7 @@ from rbdyn.dynamics.integrators.booking import book_whirl
 def velocity_of(layout: Layout) -> NDArray[np.int64]:
     """For each state component the index of its velocity; -1 for what is not a position."""
     z, components = layout.rollers, layout.components
-    owners = [(part.body, place % z if place < layout.body else 0) for place, part in enumerate(components)]
+    owners = [(part.body, place % z if place < layout.first_body else 0) for place, part in enumerate(components)]
     places = {(owner, part.name): place for place, (owner, part) in enumerate(zip(owners, components, strict=True))}
     return np.array([places.get((owner, part.speed), -1) for owner, part in zip(owners, components, strict=True)])
 

@@ -57,7 +57,7 @@ class Layout(NamedTuple):
     clock: int | None
 
     @property
-    def body(self) -> int:
+    def first_body(self) -> int:
         """Where the bodies begin, behind the rollers."""
         return PARTS * self.rollers
 

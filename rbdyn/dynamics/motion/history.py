@@ -123,7 +123,7 @@ def history(
     seen = np.empty((OBSERVED, len(states), z))
     land = np.empty(len(states))
     observe(bearing, states, seen, land)
-    body, support = run.layout.body, run.layout.support
+    body, support = run.layout.first_body, run.layout.support
     x, y = states[:, :z], states[:, z : 2 * z]
     still = np.zeros(len(states))
     return History(
