@@ -185,12 +185,19 @@ def _rough_power(x, exponent):
 
 
 @kernel
-def _root_from(s, guess, n):
-    """y^(1/n) from an estimate x of y^(-1/n) and s = y x^(n-1).
+def _fourth_power(x):
+    square = x * x
+    return square * square
 
-    Exactly it is s (s x)^(-(n-1)/n); four terms of the binomial series in 1 - s x < 6e-4 leave 1e-17, and the rounding
-    errors of s are cut by n.
+
+@kernel
+def _root_from(x, guess, half, n):
+    """x^(1/n) from an estimate g of x^(-1/n) and ``half`` = g^(n/2 - 1).
+
+    With s = x g^(n-1) it is s (s g)^(-(n-1)/n) exactly; four terms of the binomial series in 1 - s g < 6e-4 leave 1e-17,
+    and the rounding errors of s are cut by n.
     """
+    s = x * half * half * guess
     share = (n - 1) / n
     r = fma(-s, guess, 1.0)
     inner = fma((share + 1.0) / 2.0 * r, fma((share + 2.0) / 3.0 * r, fma((share + 3.0) / 4.0, r, 1.0), 1.0), 1.0)
@@ -205,9 +212,7 @@ def tenth_root(x: float) -> float:
 @compiled_as(tenth_root)
 def _(x):
     guess = _rough_power(x, -1.0 / 10.0)
-    guess2 = guess * guess
-    guess4 = guess2 * guess2
-    return _root_from(x * guess4 * guess4 * guess, guess, 10)
+    return _root_from(x, guess, _fourth_power(guess), 10)
 
 
 def eighteenth_root(x: float) -> float:
@@ -218,10 +223,7 @@ def eighteenth_root(x: float) -> float:
 @compiled_as(eighteenth_root)
 def _(x):
     guess = _rough_power(x, -1.0 / 18.0)
-    guess2 = guess * guess
-    guess4 = guess2 * guess2
-    guess8 = guess4 * guess4
-    return _root_from(x * guess8 * guess8 * guess, guess, 18)
+    return _root_from(x, guess, _fourth_power(guess * guess), 18)
 
 
 PIO2_1, PIO2_2, PIO2_3 = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21

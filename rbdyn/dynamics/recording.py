@@ -15,6 +15,7 @@ from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE
+from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, REJECTED
 from rbdyn.dynamics.parameters.geometry import raceway_radii, scales
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.statistics.metrics import Replicate
@@ -113,9 +114,9 @@ class Recording:
             kinematic_angle=np.diff(rolling),
             energy=energy,
             energy_scale=scale.load * scale.length,
-            accepted_steps=int(run.carry.counts[0]),
-            rejected_steps=int(run.carry.counts[1]),
-            derivatives=int(run.carry.counts[2]),
+            accepted_steps=int(run.carry.counts[ACCEPTED]),
+            rejected_steps=int(run.carry.counts[REJECTED]),
+            derivatives=int(run.carry.counts[DERIVATIVES]),
             cpu_s=self._cpu_s,
             method=run.method,
             stiffness=run.carry.stiffness.copy(),
@@ -125,7 +126,7 @@ class Recording:
         """Cage angle, kinematic cage angle [rad] and mechanical energy [J] as they stand."""
         run = self.run
         return (
-            float(run.carry.y[5 * run.bearing.rollers + CAGE_ANGLE]),
+            float(run.carry.y[run.layout.first_body + CAGE_ANGLE]),
             kinematic_cage_angle(run.scene, self._begin, run.clock_angles()),
             sum(mechanical_energy(run.bearing, run.carry.y)),
         )

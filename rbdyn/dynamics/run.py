@@ -12,19 +12,12 @@ from numpy.typing import NDArray
 
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.energy import mechanical_energy
-from rbdyn.dynamics.forces.equations import LOADS, POWERS, RollerBearing
-from rbdyn.dynamics.forces.race_lanes import scratch
+from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import INNER_ANGLE, OUTER_ANGLE, name
-from rbdyn.dynamics.integrators.method import EXPLICIT, advance_by, cheaper_method, explicit_method, pair_of
-from rbdyn.dynamics.integrators.runge_kutta import (
-    FINISHED,
-    NOT_FINITE,
-    STEP_BUDGET,
-    STEP_UNDERFLOW,
-    Carry,
-    Control,
-    Tally,
-)
+from rbdyn.dynamics.integrators import records as at
+from rbdyn.dynamics.integrators.advance import advance
+from rbdyn.dynamics.integrators.method import EXPLICIT, cheaper_method, explicit_method, method_of
+from rbdyn.dynamics.integrators.records import Control, Status, carry_from, empty_tally
 from rbdyn.dynamics.parameters.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
 from rbdyn.dynamics.parameters.start import start_state
 from rbdyn.faults import RunError
@@ -34,7 +27,6 @@ from rbdyn.scene import Scene
 STEPS_AT_ONCE = 10_000
 LARGEST_STEP_TURNS = 0.02
 SMALLEST_STEP_TURNS = 1e-12
-PI_START_ERROR = 1e-4
 
 
 class Run:
@@ -48,21 +40,9 @@ class Run:
         y = start_state(scene, bearing, np.random.default_rng(seeds))
         numerics = scene.numerics
         explicit = explicit_method(numerics.method, numerics.rtol)
-        n = y.size
         first_step = 1e-3 * scales(scene).length / scales(scene).speed
-        self.carry = Carry(
-            y=y,
-            k=np.zeros((7, n)),
-            stage=np.zeros(n),
-            power=np.zeros((7, POWERS)),
-            loads=np.zeros((7, LOADS)),
-            scratch=scratch(bearing.rollers),
-            clock=np.array([0.0, first_step, PI_START_ERROR, 0.0, 0.0]),
-            counts=np.zeros(4, dtype=np.int64),
-            stiffness=np.zeros(3),
-            pair=pair_of(explicit),
-        )
-        self.tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
+        self.carry = carry_from(y, bearing.rollers, first_step, method_of(explicit, scene, bearing))
+        self.tally = empty_tally()
         self.sample_step = scene.turn_s / numerics.samples_per_turn
         self.method: str = numerics.method
         control_by = cache(self._control_by)
@@ -72,8 +52,9 @@ class Run:
             )
             # The implicit method does not see what it overcomes.
             self.carry.stiffness[:] = stiffness if self.method == "rosenbrock" else 0.0
+        if self.method == "rosenbrock":
+            self.carry = self.carry._replace(method=method_of(self.method, scene, bearing))
         self.control = control_by(self.method)
-        self.advance = advance_by(self.method, scene, bearing)
 
     def _control_by(self, method: str) -> Control:
         numerics = self.scene.numerics
@@ -92,49 +73,44 @@ class Run:
 
     def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""
-        counts, budget = self.carry.counts, self.control.step_budget
+        budget, end = self.control.step_budget, turns * self.scene.turn_s
         while True:
             self.stop.check()
-            short = self.control._replace(step_budget=min(int(counts[:2].sum()) + STEPS_AT_ONCE, budget))
-            status = self.advance(
-                self.bearing, short, self.carry, self.tally, turns * self.scene.turn_s, self.sample_step
-            )
-            if status == FINISHED:
+            short = self.control._replace(step_budget=min(self.steps + STEPS_AT_ONCE, budget))
+            status = list(Status)[advance(self.bearing, short, self.carry, self.tally, end, self.sample_step)]
+            if status is Status.FINISHED:
                 return
-            if status != STEP_BUDGET or counts[:2].sum() >= budget:
+            if status is not Status.STEP_BUDGET or self.steps >= budget:
                 raise RunError(self._why(status))
+
+    @property
+    def steps(self) -> int:
+        """Steps made, the refused ones too."""
+        return int(self.carry.counts[at.ACCEPTED] + self.carry.counts[at.REJECTED])
 
     def forget(self) -> None:
         """Start counting here: empty the tally and sample from now on."""
         for kept in self.tally:
             kept[:] = 0.0
-        self.carry.clock[3] = self.carry.clock[0]
+        self.carry.clock[at.SAMPLE] = self.carry.clock[at.NOW]
 
     def clock_angles(self) -> NDArray[np.float64]:
         """Angles of inner and outer ring [rad] since the start."""
         clock = self.layout.clock
         if clock is None:
-            return self.carry.clock[0] * np.array(shaft_speeds(self.scene))
+            return self.carry.clock[at.NOW] * np.array(shaft_speeds(self.scene))
         return self.carry.y[clock + INNER_ANGLE : clock + OUTER_ANGLE + 1].copy()
 
-    def _why(self, status: int) -> str:
-        time_s = self.carry.clock[0]
-        where = (
-            f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s, "
-            f"shaft turn {time_s / self.scene.turn_s:.4g}"
-        )
-        component = name(int(self.carry.counts[3]), self.layout)
-        if status == STEP_UNDERFLOW:
-            return (
-                f"{where}: the step fell below {self.control.smallest_step:.2g} s because of {component}; "
-                "loosen numerics.rtol or soften the law that acts on it (damping, friction blend, film floor)"
-            )
-        if status == NOT_FINITE:
-            return f"{where}: {component} is not finite at any step size; check the laws that act on it"
+    def _why(self, status: Status) -> str:
+        time_s = self.carry.clock[at.NOW]
+        message, remedy = status.value
+        component, step = name(int(self.carry.counts[at.WORST]), self.layout), self.carry.clock[at.STEP]
+        message = message.format(component=component, step=step, **self.control._asdict())
+        explicit = status is Status.STEP_BUDGET and self.scene.numerics.method in EXPLICIT
         return (
-            f"{where}: step budget of {self.control.step_budget} used up (last step {self.carry.clock[1]:.2g} s); "
-            f"{'take numerics.method = auto, ' if self.scene.numerics.method in EXPLICIT else ''}raise "
-            "numerics.step_budget_per_turn, loosen numerics.rtol, or soften the stiffest law"
+            f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s, "
+            f"shaft turn {time_s / self.scene.turn_s:.4g}: {message}; "
+            f"{'take numerics.method = auto, ' if explicit else ''}{remedy}"
         )
 
 

@@ -337,7 +337,7 @@ def test_literature_petrov():
     from rbdyn.dynamics.forces.guide_land import film_wrench
 
     land = film.short_journal_film(2.87e-3, 24.7e-3, 3e-3, 2, 75e-6, 3e-6, 0.5)
-    fx, fy, on_journal, on_bearing, power = film_wrench(land, 1.0, 0.0, 0.0, 0.0, 0.0, 996.6, 100.0)
+    fx, fy, on_journal, on_bearing, _, power, *_ = film_wrench(land, 1.0, 0.0, 0.0, 0.0, 0.0, 996.6, 100.0)
     petrov = 0.5 * 2 * 2.0 * math.pi * 2.87e-3 * 24.7e-3**3 * 3e-3 * (996.6 - 100.0) / 75e-6
     assert (fx, fy) == (0.0, 0.0)
     assert -on_journal == pytest.approx(petrov, rel=1e-13)

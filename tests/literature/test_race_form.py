@@ -102,10 +102,10 @@ def test_oracle_force_is_virtual_work(side, contact):
 
         expected = [-slope((1.0, 0.0), 0.0, 1e-8), -slope((0.0, 1.0), 0.0, 1e-8), -slope((0.0, 0.0), 1.0, 1e-5)]
         found = compiled_contact(race, side, ROLLER, *place, 0.0, 0.0, 0.0, 0.0, math.cos(turned), math.sin(turned))
-        assert found[4] > 10.0
+        assert found.load > 10.0
         # Round-off of millijoules over the steps.
         assert found[:2] == pytest.approx(expected[:2], rel=1e-7, abs=1e-6)
-        assert found[2] == 0.0 and found[3] == pytest.approx(expected[2], rel=1e-5, abs=1e-8)
+        assert found.roller_moment == 0.0 and found.ring_moment == pytest.approx(expected[2], rel=1e-5, abs=1e-8)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -19,9 +19,8 @@ from rbdyn.accuracy.rollers.methods import METHODS, OURS, RUNGE_KUTTA_4, SCIPY_R
 from rbdyn.accuracy.rollers.right_hand_side import BudgetSpent, RightHandSide
 from rbdyn.accuracy.rollers.trajectory import Error, Reference, difference, end_of, reference, settled
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.equations import LOADS, POWERS
 from rbdyn.dynamics.forces.race_lanes import scratch
-from rbdyn.dynamics.integrators.runge_kutta import Tally
+from rbdyn.dynamics.integrators.records import empty_tally
 from rbdyn.dynamics.parameters.geometry import layout_of
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
@@ -131,7 +130,7 @@ def test_unit_failures_stay_in_the_table(smooth, smooth_end, stretches, known):
 def test_unit_fixed_step_stops_where_it_ceases_to_be_finite(stretches):
     """Unit: the steps done are returned; a state of NaN does none."""
     y = np.full_like(stretches[0].start, np.nan)
-    tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
+    tally = empty_tally()
     assert runge_kutta_4(stretches[0].bearing, y, 1e-6, 5, scratch(10), tally) == 0
     assert steps_of(1.0, 0.3) == 4 and steps_of(1.0, 0.25) == 4 and steps_of(1.0, 5.0) == 1
 

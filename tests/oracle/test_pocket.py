@@ -16,10 +16,10 @@ from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping
 from rbdyn.contact.hertz_line import LineContact
 from rbdyn.contact.pocket_film import film_shape, pocket_film, wall_film
 from rbdyn.contact.traction import CoulombTraction, NoTraction
-from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
+from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, Pocket, pocket_contact, pocket_energy
 from rbdyn.dynamics.integrators.booking import book_peaks, book_point
-from rbdyn.dynamics.integrators.runge_kutta import Tally
+from rbdyn.dynamics.integrators.records import empty_tally
 
 VISCOSITY, RADIUS, LENGTH, FLOOR = 2.87e-3, 4.5e-3, 5e-3, 0.8e-6
 FILM = pocket_film(VISCOSITY, RADIUS, LENGTH, FLOOR, 1.0)
@@ -229,12 +229,12 @@ def test_unit_film_hands_over_to_contact(side):
     """Unit: at the floor the film is as thick as it gets thin and contact begins; beyond, contact grows from nil."""
     for gap, closed in ((FLOOR + 1e-9, False), (FLOOR - 1e-9, True)):
         _, found = wrench(WET, (0.0, side * (HALF - gap), 0.0, 0.0, 0.0, 0.0, 0.0))
-        assert (found[4] > 0.0) == closed
-        assert found[4] < CONTACT.stiffness * 1e-9 ** (10.0 / 9.0) * (1.0 + 1e-6)
+        assert (found.load > 0.0) == closed
+        assert found.load < CONTACT.stiffness * 1e-9 ** (10.0 / 9.0) * (1.0 + 1e-6)
     _, dry = wrench(DRY, (0.0, side * (HALF + 2e-6), 0.0, 0.0, 0.0, 0.0, 0.0))
     _, wet = wrench(WET, (0.0, side * (HALF + 2e-6 - FLOOR), 0.0, 0.0, 0.0, 0.0, 0.0))
-    assert wet[4] == pytest.approx(dry[4], rel=1e-9)
-    assert (dry[8], wet[8]) == pytest.approx((side * dry[4], side * wet[4]), rel=1e-12)
+    assert wet.load == pytest.approx(dry.load, rel=1e-9)
+    assert (dry.on_wall, wet.on_wall) == pytest.approx((side * dry.load, side * wet.load), rel=1e-12)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -247,18 +247,18 @@ def test_unit_force_on_the_wall(side):
         _, found = wrench(WET, (0.0, side * (HALF - gap), 0.0, side * rate, 0.0, spin, 0.0))
         near = wall_film(FILM, gap, rate, -spin * RADIUS, 0.0)[0]
         far = wall_film(FILM, 2.0 * HALF - gap, -rate, spin * RADIUS, 0.0)[0]
-        assert found[8] == pytest.approx(side * (near + found[4]), rel=1e-6)
+        assert found.on_wall == pytest.approx(side * (near + found.load), rel=1e-6)
         # Along the x axis the pocket's normal is y.
-        assert found[1] == pytest.approx(-side * (near + found[4] - far), rel=1e-6)
+        assert found.y == pytest.approx(-side * (near + found.load - far), rel=1e-6)
         _, parting = wrench(WET, (0.0, side * (HALF - gap), 0.0, -side * 60.0, 0.0, spin, 0.0))
-        assert side * parting[8] < 0.0 or gap < FLOOR
+        assert side * parting.on_wall < 0.0 or gap < FLOOR
     _, found = wrench(LIPPED, (0.0, side * 1e-5, 40e-6, 0.0, 0.0, 0.0, 0.0))
-    assert found[8] == side * found[4] != 0.0
+    assert found.on_wall == side * found.load != 0.0
 
 
 def test_unit_both_peaks_are_booked():
     """Unit: contact and whole force keep each its own peak and time, at the vertex of the parabola through three points."""
-    tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
+    tally = empty_tally()
     points, values = np.linspace(0.0, 1.0, 10), np.empty((2, 10))
     for point, theta in enumerate(points):
         loads = np.zeros((3, LOADS))
@@ -282,10 +282,7 @@ def test_unit_lips_hold_radially():
     for height in (33e-6, -33e-6):
         _, found = wrench(lipped, (0.3, 0.0, height, 0.0, 0.0, 0.0, 0.0))
         expected = -math.copysign(CONTACT.stiffness * 3e-6 ** (10.0 / 9.0), height)
-        along = (
-            found[0] * math.cos(0.3) + found[1] * math.sin(0.3),
-            found[1] * math.cos(0.3) - found[0] * math.sin(0.3),
-        )
+        along = (found[0] * math.cos(0.3) + found.y * math.sin(0.3), found.y * math.cos(0.3) - found[0] * math.sin(0.3))
         assert along == pytest.approx((expected, 0.0), rel=1e-9, abs=1e-9)
 
 

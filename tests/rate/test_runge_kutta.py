@@ -13,11 +13,15 @@ from rbdyn.dynamics.ensemble import CancelledError, Stop
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import POWERS, SHAFT
 from rbdyn.dynamics.integrators import dormand_prince as dp
-from rbdyn.dynamics.integrators import runge_kutta as rk
+from rbdyn.dynamics.integrators import records as at
+from rbdyn.dynamics.integrators.advance import advance, refine_peak
+from rbdyn.dynamics.integrators.method_laws import interpolate
 from rbdyn.dynamics.parameters.geometry import scales
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
 from rbdyn.faults import RunError
+
+PAIR = dp.DormandPrince()
 
 
 def run_of(scene, rtol, replicate=0):
@@ -37,9 +41,9 @@ def fixed_step(scene, step, duration):
     """State after ``duration`` in steps of exactly ``step``: no error is ever too large."""
     run = vibrating(scene)
     control = run.control._replace(inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step)
-    run.carry.clock[1] = step
-    assert rk.advance(run.bearing, control, run.carry, run.tally, duration, 1.0) == rk.FINISHED
-    assert run.carry.counts[0] == pytest.approx(duration / step, abs=1.1)
+    run.carry.clock[at.STEP] = step
+    assert advance(run.bearing, control, run.carry, run.tally, duration, 1.0) == at.FINISHED
+    assert run.carry.counts[at.ACCEPTED] == pytest.approx(duration / step, abs=1.1)
     return run.carry.y
 
 
@@ -84,7 +88,7 @@ def test_rate_dense_output(conservative, evaluate):
         for h in steps:
             k, _ = one_step(bearing, y, h, evaluate)
             step = SimpleNamespace(k=k, y=y)
-            inside = np.array([rk.interpolate.py_func(step.y, step.k, h, theta, i) for i in range(y.size)])
+            inside = np.array([interpolate(PAIR, step.y, None, step.k, h, theta, i) for i in range(y.size)])
             exact = y
             for _ in range(16):
                 exact = one_step(bearing, exact, theta * h / 16.0, evaluate)[1]
@@ -99,7 +103,7 @@ def test_unit_dense_output_meets_the_ends():
     end = step.y + h * dp.A[6] @ step.k[:6]
     # Slopes at the ends are k_1 and k_7 whatever the stages between.
     for i in range(3):
-        at = [rk.interpolate.py_func(step.y, step.k, h, theta, i) for theta in (0.0, 1.0, 1e-6, 1.0 - 1e-6)]
+        at = [interpolate(PAIR, step.y, None, step.k, h, theta, i) for theta in (0.0, 1.0, 1e-6, 1.0 - 1e-6)]
         assert at[:2] == pytest.approx([step.y[i], end[i]], abs=1e-14)
         slopes = [(at[2] - at[0]) / (1e-6 * h), (at[1] - at[3]) / (1e-6 * h)]
         assert slopes == pytest.approx([step.k[0, i], step.k[6, i]], abs=1e-3)
@@ -211,8 +215,8 @@ def test_unit_chunks_change_nothing(outer):
     whole.to(0.5)
     for end in np.linspace(0.05, 0.5, 10):
         parts.to(float(end))
-    assert parts.carry.clock[0] == whole.carry.clock[0] == 0.5 * outer.turn_s
-    assert parts.tally.whirl[0] == whole.tally.whirl[0] == 257  # 512 a turn, both ends counted
+    assert parts.carry.clock[at.NOW] == whole.carry.clock[at.NOW] == 0.5 * outer.turn_s
+    assert parts.tally.whirl[at.SAMPLES] == whole.tally.whirl[at.SAMPLES] == 257  # 512 a turn, both ends counted
     scale = scales(outer)
     # Ten extra step ends at rtol 1e-8, over half a turn in which differences grow about tenfold.
     assert parts.tally.work == pytest.approx(whole.tally.work, rel=1e-5, abs=1e-5 * scale.load * scale.length)
@@ -230,7 +234,7 @@ def test_unit_peak_is_never_below_a_step_end(outer):
         assert run.tally.largest[0] >= seen
         assert (run.tally.largest >= run.carry.loads[0]).all()
     assert seen > 0.0
-    assert 0.0 < run.tally.largest_time[0] <= run.carry.clock[0]
+    assert 0.0 < run.tally.largest_time[0] <= run.carry.clock[at.NOW]
 
 
 def test_oracle_peak_is_the_true_peak(outer):
@@ -266,10 +270,10 @@ def test_oracle_peak_inside_one_step(conservative, evaluate):
         forces = []
         for theta in thetas:
             inside = y.copy()
-            inside[10] = rk.interpolate.py_func(carry.y, carry.k, h, theta, 10)
+            inside[10] = interpolate(PAIR, carry.y, None, carry.k, h, theta, 10)
             forces.append(evaluate(run.bearing, inside).loads[0])
         carry.loads[:] = run.tally.largest[:] = 0.0
-        rk.refine_peak(run.bearing, carry, h, run.tally)
+        refine_peak(run.bearing, carry, h, run.tally)
         assert run.tally.largest[0] == pytest.approx(max(forces), rel=1e-3)
         assert run.tally.largest_time[0] == pytest.approx(thetas[np.argmax(forces)] * h, abs=0.01 * h)
 
@@ -286,19 +290,19 @@ def test_unit_overflowing_trial_step_is_rejected(outer):
     """Unit: a trial step into infinity is shrunk, never accepted; the budget then ends the run with a sentence."""
     run = run_of(outer, 1e-4)
     run.control = run.control._replace(step_budget=1000)
-    run.carry.clock[1] = 1e200
-    status = rk.advance(run.bearing, run.control, run.carry, run.tally, 1e201, 1.0)
-    assert status == rk.STEP_BUDGET
-    assert run.carry.counts[1] > 280  # 1e200 s to 1e-6 s by fifths
+    run.carry.clock[at.STEP] = 1e200
+    status = advance(run.bearing, run.control, run.carry, run.tally, 1e201, 1.0)
+    assert status == at.STEP_BUDGET
+    assert run.carry.counts[at.REJECTED] > 280  # 1e200 s to 1e-6 s by fifths
     assert np.isfinite(run.carry.y).all()
-    assert run.carry.counts[0] + run.carry.counts[1] == 1000
+    assert run.steps == 1000
 
 
 def test_unit_step_underflow_names_component_and_mend(outer):
     """Unit: a step that may not shrink ends the run; the sentence names place, component and remedy."""
     run = run_of(outer, 1e-4)
     run.control = run.control._replace(smallest_step=1e-4)
-    run.carry.clock[1] = 1e-3
+    run.carry.clock[at.STEP] = 1e-3
     with pytest.raises(RunError, match=r"the step fell below 0.0001 s because of .*(roller|cage|ring).*numerics\.rtol"):
         run.to(1.0)
 

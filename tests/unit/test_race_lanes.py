@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from rbdyn.compiled.kernel import alike, either
+from rbdyn.compiled.kernel import alike, either, kernel
 from rbdyn.contact.hertz_line import LineContact, sliced
 from rbdyn.dynamics.forces.pocket import NoPocket, pocket_contact, pocket_gap
 from rbdyn.dynamics.forces.race_form import RoundRace
@@ -70,3 +70,19 @@ def test_invariant_nothing_acts_across_a_gap(make_scene, assignments):
         acted += gap <= 0.0
     assert 100 < acted < 1900
     assert compiled_pocket(NoPocket(), 4.5e-3, 1.0, 0.0, 0.02, 0.0)[0] > 0.0
+
+
+@kernel
+def thrice(x):
+    return 3.0 * x
+
+
+@njit
+def calls_thrice(x):
+    return thrice(x)
+
+
+def test_unit_kernels_answer_compiled_code_and_python():
+    """Unit: a kernel compiled without wrappers serves compiled code, its twin serves Python, and both give the same."""
+    assert calls_thrice(0.1) == thrice(0.1) == thrice.py_func(0.1)
+    assert not thrice.twin.targetoptions["no_cpython_wrapper"] and thrice.targetoptions["no_cpython_wrapper"]

@@ -25,6 +25,7 @@ from rbdyn.dynamics.forces.gravity import Gravity, NoGravity, height_energy
 from rbdyn.dynamics.forces.ring_motion import HeldRing, support_energy, support_motion
 from rbdyn.dynamics.forces.schedule import Constant, Ramps, SmoothRamps, Steps, value_at
 from rbdyn.dynamics.forces.support import SupportedRing
+from rbdyn.dynamics.integrators.records import NOW
 from rbdyn.dynamics.parameters.geometry import layout_of
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
@@ -115,7 +116,7 @@ def test_oracle_angle_is_the_integral_of_speed(everything):
     run.to(2.0)
     clock = layout_of(everything).clock
     time, inner, outer = run.carry.y[clock:]
-    assert time == pytest.approx(run.carry.clock[0], rel=1e-12) and time == pytest.approx(2.0 * everything.turn_s)
+    assert time == pytest.approx(run.carry.clock[NOW], rel=1e-12) and time == pytest.approx(2.0 * everything.turn_s)
     speed = run.bearing.drive.inner_speed
     expected, _ = quad(lambda t: value_at(speed, t), 0.0, time, points=[2e-3], epsrel=1e-12)
     # The clock does not limit the steps, which are short against its ramps of milliseconds.

@@ -24,25 +24,13 @@ from rbdyn.dynamics.forces.equations import LOADS, POWERS, derivative, derivativ
 from rbdyn.dynamics.forces.state import Layout
 from rbdyn.dynamics.integrators.booking import book_whirl
 
-BODY_PAIRS = (
-    (state.CAGE_X, state.CAGE_VX),
-    (state.CAGE_Y, state.CAGE_VY),
-    (state.CAGE_ANGLE, state.CAGE_SPEED),
-    (state.RING_X, state.RING_VX),
-    (state.RING_Y, state.RING_VY),
-)
-
 
 def velocity_of(layout: Layout) -> NDArray[np.int64]:
     """For each state component the index of its velocity; -1 for what is not a position."""
-    pairs = np.full(layout.size, -1)
-    z = layout.rollers
-    pairs[: 2 * z] = np.arange(2 * z, 4 * z)
-    for position, velocity in BODY_PAIRS:
-        pairs[5 * z + position] = 5 * z + velocity
-    if layout.support is not None:
-        pairs[layout.support : layout.support + 2] = layout.support + 2, layout.support + 3
-    return pairs
+    z, components = layout.rollers, layout.components
+    owners = [(part.body, place % z if place < layout.first_body else 0) for place, part in enumerate(components)]
+    places = {(owner, part.name): place for place, (owner, part) in enumerate(zip(owners, components, strict=True))}
+    return np.array([places.get((owner, part.speed), -1) for owner, part in zip(owners, components, strict=True)])
 
 
 @kernel
@@ -77,7 +65,7 @@ def runge_kutta_4(bearing, y, step, steps, scratch, tally):
             for i in range(n):
                 stage[i] = y[i] + reach * k[max(s - 1, 0), i]
             derivative(bearing, stage, s, k, power, loads, scratch)
-        book(tally, y, 5 * bearing.rollers, loads)
+        book(tally, y, state.PARTS * bearing.rollers, loads)
         for i in range(n):
             y[i] += step / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
         for p in range(POWERS):
@@ -114,7 +102,7 @@ def velocity_verlet(bearing, velocity_of, y, step, steps, scratch, tally):
             power[0, p] = power[1, p]
         for force in range(LOADS):
             loads[0, force] = loads[1, force]
-        book(tally, y, 5 * bearing.rollers, loads)
+        book(tally, y, state.PARTS * bearing.rollers, loads)
         if not all_finite(y):
             return done
     return steps

@@ -30,10 +30,10 @@ class Footprint:
 
 def footprint(scene: Scene, bearing: RollerBearing) -> Footprint:
     """Sizes for a scene whose bearing has been run. Raises KeyError where nothing was compiled for its laws."""
-    from rbdyn.dynamics.integrators.method import explicit_method, pair_of
+    from rbdyn.dynamics.integrators.method import explicit_method, method_of
     from rbdyn.dynamics.parameters.geometry import layout_of
 
-    pair = pair_of(explicit_method(scene.numerics.method, scene.numerics.rtol))
+    pair = method_of(explicit_method(scene.numerics.method, scene.numerics.rtol), scene, bearing)
     return Footprint(layout_of(scene).size, parameter_bytes(bearing), instructions(bearing, pair))
 
 
@@ -58,7 +58,7 @@ def instructions(bearing: RollerBearing, pair: Any) -> int:
     """
     import numba
 
-    from rbdyn.dynamics.integrators.runge_kutta import advance
+    from rbdyn.dynamics.integrators.advance import advance
 
     kind, of_pair = numba.typeof(bearing), numba.typeof(pair)
     for signature, compiled in advance.overloads.items():

@@ -19,6 +19,7 @@ from rbdyn.accuracy.rollers.right_hand_side import BudgetSpent, RightHandSide
 from rbdyn.accuracy.rollers.stretch import Stretch
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing
+from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, NOW
 from rbdyn.dynamics.parameters.geometry import scales
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.faults import RunError
@@ -73,7 +74,7 @@ def _over(stretch: Stretch, run: Run) -> Callable[[], Arrived]:
 
     def go() -> Arrived:
         run.to(stretch.turns)
-        return Arrived(run.carry.y, int(run.carry.counts[2]))
+        return Arrived(run.carry.y, int(run.carry.counts[DERIVATIVES]))
 
     return go
 
@@ -94,17 +95,17 @@ class FixedStepRun(Run):
     def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError where the state explodes."""
         carry, turn_s = self.carry, self.scene.turn_s
-        duration = turns * turn_s - carry.clock[0]
+        duration = turns * turn_s - carry.clock[NOW]
         if duration <= 0.0:
             return
         steps = steps_of(duration, self.step)
         rest = (carry.y, duration / steps, steps, carry.scratch, self.tally)
         done = velocity_verlet(self.bearing, self.pairs, *rest) if self.verlet else runge_kutta_4(self.bearing, *rest)
-        carry.clock[0] += duration * done / steps
-        carry.counts[0] += done
-        carry.counts[2] += done if self.verlet else 4 * done
+        carry.clock[NOW] += duration * done / steps
+        carry.counts[ACCEPTED] += done
+        carry.counts[DERIVATIVES] += done if self.verlet else 4 * done
         if done < steps:
-            raise RunError(f"not finite after {carry.clock[0] / turn_s:.2g} turns")
+            raise RunError(f"not finite after {carry.clock[NOW] / turn_s:.2g} turns")
 
 
 def by_fixed_step(verlet: bool) -> Callable[..., Callable[[], Arrived]]:

@@ -17,7 +17,6 @@ from rbdyn.accuracy.report import Table
 from rbdyn.accuracy.rollers.methods import DOP853, OURS, Method
 from rbdyn.accuracy.rollers.stretch import Stretch
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.state import CAGE_X, CAGE_Y, RING_X, RING_Y
 from rbdyn.dynamics.parameters.geometry import absolute_tolerance, layout_of
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
@@ -77,11 +76,7 @@ def settled(scene: Scene, turns: float = DEFAULT_TURNS, starts: int = STARTS) ->
 
 def positions(scene: Scene) -> NDArray[np.int64]:
     """Indices of the positions of rollers, cage and rings [m] in the state."""
-    state = layout_of(scene)
-    z = state.rollers
-    bodies = [5 * z + place for place in (CAGE_X, CAGE_Y, RING_X, RING_Y)]
-    support = [state.support, state.support + 1] if state.support is not None else []
-    return np.array([*range(2 * z), *bodies, *support])
+    return np.flatnonzero([part.unit == "m" for part in layout_of(scene).components])
 
 
 def difference(stretch: Stretch, a: Array, b: Array) -> Error:

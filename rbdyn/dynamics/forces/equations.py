@@ -40,12 +40,12 @@ LOSSES = (
     "roller_drag",
     "support_damping",
 )
-SHAFT = len(LOSSES)
-LOAD = SHAFT + 1
-POWERS = SHAFT + 2
+(
+    OUTER_TRACTION, INNER_TRACTION, ROLLING, RACE_DAMPING, POCKET_FRICTION, POCKET_DAMPING, POCKET_FILM,
+    LAND_FILM, LAND_FRICTION, LAND_DAMPING, DRAG, SUPPORT_DAMPING, SHAFT, LOAD, POWERS,
+) = range(len(LOSSES) + 3)  # fmt: skip
 # Extremes, in the order of the load vector. On a pocket wall: contact and film together, and contact alone.
-POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD = range(5)
-LOADS = 5
+POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD, LOADS = range(6)
 
 
 class RollerBearing(NamedTuple):
@@ -115,7 +115,7 @@ def inner_motion(y, body, acting):
 @kernel
 def motions(bearing, y):
     """What acts on the bearing in a state, and the motions of cage, inner and outer ring."""
-    body = 5 * roller_count(bearing)
+    body = state.PARTS * roller_count(bearing)
     acting = action(bearing.drive, y)
     outer = outer_motion(bearing.outer_ring, y, acting.outer_speed, acting.outer_cos, acting.outer_sin)
     return acting, cage_motion(y, body), inner_motion(y, body, acting), outer
@@ -166,17 +166,17 @@ def pocket_forces(bearing, cage, y, row, dy, scratch):
         if scratch.gap[j] > 0.0:
             continue
         wall = roller_pocket(bearing, y, cage, j)
-        dy[row, 2 * z + j] += wall[0]
-        dy[row, 3 * z + j] += wall[1]
-        dy[row, 4 * z + j] += wall[2]
-        fx -= wall[0]
-        fy -= wall[1]
-        moment += wall[3]
-        load = max(load, abs(wall[8]))
-        contact_load = max(contact_load, wall[4])
-        friction += wall[5]
-        damping += wall[6]
-        film += wall[7]
+        dy[row, 2 * z + j] += wall.x
+        dy[row, 3 * z + j] += wall.y
+        dy[row, 4 * z + j] += wall.roller_moment
+        fx -= wall.x
+        fy -= wall.y
+        moment += wall.cage_moment
+        load = max(load, abs(wall.on_wall))
+        contact_load = max(contact_load, wall.load)
+        friction += wall.friction
+        damping += wall.damping
+        film += wall.film
     return OnCage(fx, fy, moment, friction, damping, film, load, contact_load)
 
 
@@ -195,7 +195,7 @@ def accelerate_rollers(bearing, row, dy):
 @kernel
 def accelerate_cage(bearing, cage, pockets, land, row, dy):
     """Rates of the cage's coordinates into row ``row`` of ``dy``."""
-    body = 5 * roller_count(bearing)
+    body = state.PARTS * roller_count(bearing)
     fx, fy, moment = pockets.x + land.cage_x, pockets.y + land.cage_y, pockets.moment + land.cage_moment
     ax, ay, spin_up = cage_acceleration(bearing.cage, fx, fy, moment, cage.cos, cage.sin, cage.speed)
     dy[row, body + state.CAGE_X] = cage.vx
@@ -210,7 +210,7 @@ def accelerate_cage(bearing, cage, pockets, land, row, dy):
 @kernel
 def accelerate_inner_ring(bearing, inner, fx, fy, row, dy):
     """Rates of the inner ring's coordinates under a force [N] into row ``row`` of ``dy``."""
-    body = 5 * roller_count(bearing)
+    body = state.PARTS * roller_count(bearing)
     dy[row, body + state.RING_X] = inner.vx
     dy[row, body + state.RING_Y] = inner.vy
     dy[row, body + state.RING_VX] = fx / bearing.inner_ring_mass
@@ -235,28 +235,28 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
     accelerate_rollers(bearing, row, dy)
     accelerate_cage(bearing, cage, pockets, land, row, dy)
-    ring_fx, ring_fy = on_inner[0] + land.inner_x + acting.load_x, on_inner[1] + land.inner_y + acting.load_y
+    ring_fx, ring_fy = on_inner.x + land.inner_x + acting.load_x, on_inner.y + land.inner_y + acting.load_y
     accelerate_inner_ring(bearing, inner, ring_fx, ring_fy, row, dy)
-    support_fx, support_fy = on_outer[0] + land.outer_x, on_outer[1] + land.outer_y
+    support_fx, support_fy = on_outer.x + land.outer_x, on_outer.y + land.outer_y
     support_loss = support_motion(bearing.outer_ring, bearing.gravity, support_fx, support_fy, y, row, dy)
-    power[row, 0] = on_outer[4]
-    power[row, 1] = on_inner[4]
-    power[row, 2] = on_outer[5] + on_inner[5]
-    power[row, 3] = on_outer[6] + on_inner[6]
-    power[row, 4] = pockets.friction
-    power[row, 5] = pockets.damping
-    power[row, 6] = pockets.film
-    power[row, 7] = land.film
-    power[row, 8] = land.friction
-    power[row, 9] = land.damping
-    power[row, 10] = drag_loss
-    power[row, 11] = support_loss
-    inner_moment, outer_moment = on_inner[2] + land.inner_moment, on_outer[2] + land.outer_moment
+    power[row, OUTER_TRACTION] = on_outer.traction
+    power[row, INNER_TRACTION] = on_inner.traction
+    power[row, ROLLING] = on_outer.rolling + on_inner.rolling
+    power[row, RACE_DAMPING] = on_outer.damping + on_inner.damping
+    power[row, POCKET_FRICTION] = pockets.friction
+    power[row, POCKET_DAMPING] = pockets.damping
+    power[row, POCKET_FILM] = pockets.film
+    power[row, LAND_FILM] = land.film
+    power[row, LAND_FRICTION] = land.friction
+    power[row, LAND_DAMPING] = land.damping
+    power[row, DRAG] = drag_loss
+    power[row, SUPPORT_DAMPING] = support_loss
+    inner_moment, outer_moment = on_inner.moment + land.inner_moment, on_outer.moment + land.outer_moment
     power[row, SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
     power[row, LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
     loads[row, POCKET_LOAD] = pockets.load
-    loads[row, OUTER_LOAD] = on_outer[3]
-    loads[row, INNER_LOAD] = on_inner[3]
+    loads[row, OUTER_LOAD] = on_outer.load
+    loads[row, INNER_LOAD] = on_inner.load
     loads[row, LAND_LOAD] = land.load
     loads[row, POCKET_CONTACT_LOAD] = pockets.contact_load
 

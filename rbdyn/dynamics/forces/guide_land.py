@@ -53,76 +53,17 @@ class InnerGuide(NamedTuple):
     dry: Any
 
 
-@law
-def film_wrench(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
-    """Film force x, y on the journal [N], moments on journal and bearing [N m], power lost [W].
+class JournalWrench(NamedTuple):
+    """Force on the journal [N], moments on journal and bearing [N m], dry load [N], powers lost [W]."""
 
-    ``ex, ey, e``: direction and size [m] of the journal's offset; ``evx, evy``: its velocity [m/s].
-    """
-
-
-@film_wrench.body(NoFilm)
-def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
-    return 0.0, 0.0, 0.0, 0.0, 0.0
-
-
-@film_wrench.body(ShortJournalFilm)
-def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
-    per_clearance = 1.0 / film.clearance
-    eccentricity = min(e * per_clearance, film.largest_eccentricity)
-    radial_rate = (evx * ex + evy * ey) * per_clearance
-    whirl_rate = 2.0 * (evy * ex - evx * ey) * per_clearance
-    wedge_rate = eccentricity * (journal_speed + bearing_speed) - whirl_rate
-    radial, across = journal_film_force(film.force_scale, eccentricity, radial_rate, wedge_rate)
-    shear = film.shear_scale * (journal_speed - bearing_speed) / math.sqrt(1.0 - eccentricity * eccentricity)
-    fx, fy = radial * ex - across * ey, radial * ey + across * ex
-    journal_moment = -shear - 0.5 * e * across
-    bearing_moment = shear - 0.5 * e * across
-    power = -(fx * evx + fy * evy + journal_moment * journal_speed + bearing_moment * bearing_speed)
-    return fx, fy, journal_moment, bearing_moment, power
-
-
-@law
-def dry_wrench(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
-    """Contact force x, y on the journal, moments on journal and bearing, load, powers in friction and damping."""
-
-
-@dry_wrench.body(NoContact)
-def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
-    return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-
-
-@dry_wrench.body(DryContact)
-def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
-    approach = e - dry.play
-    if approach <= 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    approach_rate = evx * ex + evy * ey
-    elastic, stiffness = whole_load(dry.contact, approach)
-    root = root_stiffness(dry.contact, stiffness, approach)
-    load = damped_load(dry.damping, elastic, root, approach, approach_rate)
-    slip = bearing_speed * (e + radius) - journal_speed * radius - (evy * ex - evx * ey)
-    friction = traction(dry.friction, slip, load) * load
-    return (
-        -load * ex - friction * ey,
-        -load * ey + friction * ex,
-        radius * friction,
-        -(radius + e) * friction,
-        load,
-        friction * slip,
-        (load - elastic) * approach_rate,
-    )
-
-
-@kernel
-def journal_wrench(guide, dx, dy, dvx, dvy, journal_speed, bearing_speed):
-    """Film and dry contact together: force on the journal, two moments, dry load, three powers (film, friction, damping)."""
-    e = math.sqrt(dx * dx + dy * dy)
-    inverse = 1.0 / e if e > 0.0 else 0.0
-    ex, ey = (dx * inverse, dy * inverse) if e > 0.0 else (1.0, 0.0)
-    film = film_wrench(guide.film, ex, ey, e, dvx, dvy, journal_speed, bearing_speed)
-    dry = dry_wrench(guide.dry, guide.radius, ex, ey, e, dvx, dvy, journal_speed, bearing_speed)
-    return (film[0] + dry[0], film[1] + dry[1], film[2] + dry[2], film[3] + dry[3], dry[4], film[4], dry[5], dry[6])
+    x: float
+    y: float
+    journal_moment: float
+    bearing_moment: float
+    load: float
+    film: float
+    friction: float
+    damping: float
 
 
 class LandForces(NamedTuple):
@@ -144,6 +85,88 @@ class LandForces(NamedTuple):
 
 
 @law
+def film_wrench(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    """``JournalWrench`` of the film alone.
+
+    ``ex, ey, e``: direction and size [m] of the journal's offset; ``evx, evy``: its velocity [m/s].
+    """
+
+
+@film_wrench.body(NoFilm)
+def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@film_wrench.body(ShortJournalFilm)
+def _(film, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    per_clearance = 1.0 / film.clearance
+    eccentricity = min(e * per_clearance, film.largest_eccentricity)
+    radial_rate = (evx * ex + evy * ey) * per_clearance
+    whirl_rate = 2.0 * (evy * ex - evx * ey) * per_clearance
+    wedge_rate = eccentricity * (journal_speed + bearing_speed) - whirl_rate
+    radial, across = journal_film_force(film.force_scale, eccentricity, radial_rate, wedge_rate)
+    shear = film.shear_scale * (journal_speed - bearing_speed) / math.sqrt(1.0 - eccentricity * eccentricity)
+    fx, fy = radial * ex - across * ey, radial * ey + across * ex
+    journal_moment = -shear - 0.5 * e * across
+    bearing_moment = shear - 0.5 * e * across
+    power = -(fx * evx + fy * evy + journal_moment * journal_speed + bearing_moment * bearing_speed)
+    return JournalWrench(fx, fy, journal_moment, bearing_moment, 0.0, power, 0.0, 0.0)
+
+
+@law
+def dry_wrench(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    """``JournalWrench`` of the contact, without a film."""
+
+
+@dry_wrench.body(NoContact)
+def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dry_wrench.body(DryContact)
+def _(dry, radius, ex, ey, e, evx, evy, journal_speed, bearing_speed):
+    approach = e - dry.play
+    if approach <= 0.0:
+        return JournalWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    approach_rate = evx * ex + evy * ey
+    elastic, stiffness = whole_load(dry.contact, approach)
+    root = root_stiffness(dry.contact, stiffness, approach)
+    load = damped_load(dry.damping, elastic, root, approach, approach_rate)
+    slip = bearing_speed * (e + radius) - journal_speed * radius - (evy * ex - evx * ey)
+    friction = traction(dry.friction, slip, load) * load
+    return JournalWrench(
+        -load * ex - friction * ey,
+        -load * ey + friction * ex,
+        radius * friction,
+        -(radius + e) * friction,
+        load,
+        0.0,
+        friction * slip,
+        (load - elastic) * approach_rate,
+    )
+
+
+@kernel
+def journal_wrench(guide, dx, dy, dvx, dvy, journal_speed, bearing_speed):
+    """``JournalWrench`` of film and dry contact together."""
+    e = math.sqrt(dx * dx + dy * dy)
+    inverse = 1.0 / e if e > 0.0 else 0.0
+    ex, ey = (dx * inverse, dy * inverse) if e > 0.0 else (1.0, 0.0)
+    film = film_wrench(guide.film, ex, ey, e, dvx, dvy, journal_speed, bearing_speed)
+    dry = dry_wrench(guide.dry, guide.radius, ex, ey, e, dvx, dvy, journal_speed, bearing_speed)
+    return JournalWrench(
+        film.x + dry.x,
+        film.y + dry.y,
+        film.journal_moment + dry.journal_moment,
+        film.bearing_moment + dry.bearing_moment,
+        dry.load,
+        film.film,
+        dry.friction,
+        dry.damping,
+    )
+
+
+@law
 def guide_forces(guide, cage, inner, outer):
     """Land forces, from the motions (``RingMotion``) of cage, inner and outer ring."""
 
@@ -156,19 +179,21 @@ def _(guide, cage, inner, outer):
 @guide_forces.body(OuterGuide)
 def _(guide, cage, inner, outer):
     dx, dy, dvx, dvy = cage.x - outer.x, cage.y - outer.y, cage.vx - outer.vx, cage.vy - outer.vy
-    fx, fy, moment, ring_moment, load, film, friction, damping = journal_wrench(
-        guide, dx, dy, dvx, dvy, cage.speed, outer.speed
-    )
-    return LandForces(fx, fy, moment, 0.0, 0.0, 0.0, -fx, -fy, ring_moment, load, film, friction, damping)
+    on = journal_wrench(guide, dx, dy, dvx, dvy, cage.speed, outer.speed)
+    return LandForces(
+        on.x, on.y, on.journal_moment, 0.0, 0.0, 0.0, -on.x, -on.y, on.bearing_moment,
+        on.load, on.film, on.friction, on.damping,
+    )  # fmt: skip
 
 
 @guide_forces.body(InnerGuide)
 def _(guide, cage, inner, outer):
     dx, dy, dvx, dvy = inner.x - cage.x, inner.y - cage.y, inner.vx - cage.vx, inner.vy - cage.vy
-    fx, fy, ring_moment, moment, load, film, friction, damping = journal_wrench(
-        guide, dx, dy, dvx, dvy, inner.speed, cage.speed
-    )
-    return LandForces(-fx, -fy, moment, fx, fy, ring_moment, 0.0, 0.0, 0.0, load, film, friction, damping)
+    on = journal_wrench(guide, dx, dy, dvx, dvy, inner.speed, cage.speed)
+    return LandForces(
+        -on.x, -on.y, on.bearing_moment, on.x, on.y, on.journal_moment, 0.0, 0.0, 0.0,
+        on.load, on.film, on.friction, on.damping,
+    )  # fmt: skip
 
 
 @law

@@ -44,10 +44,10 @@ def observe(bearing, states, rollers, land):
             on_outer = race_observed(bearing.outer, 1.0, bearing, y, j, outer)
             on_inner = race_observed(bearing.inner, -1.0, bearing, y, j, inner)
             wall = roller_pocket(bearing, y, cage, j)
-            rollers[OUTER_LOAD, i, j] = on_outer[4]
-            rollers[INNER_LOAD, i, j] = on_inner[4]
-            rollers[POCKET_LOAD, i, j] = wall[8]
-            rollers[OUTER_SLIP, i, j] = on_outer[8]
-            rollers[INNER_SLIP, i, j] = on_inner[8]
-            rollers[OUTER_HEAT, i, j] = on_outer[5] + on_outer[6]
-            rollers[INNER_HEAT, i, j] = on_inner[5] + on_inner[6]
+            rollers[OUTER_LOAD, i, j] = on_outer.load
+            rollers[INNER_LOAD, i, j] = on_inner.load
+            rollers[POCKET_LOAD, i, j] = wall.on_wall
+            rollers[OUTER_SLIP, i, j] = on_outer.slip
+            rollers[INNER_SLIP, i, j] = on_inner.slip
+            rollers[OUTER_HEAT, i, j] = on_outer.traction + on_outer.rolling
+            rollers[INNER_HEAT, i, j] = on_inner.traction + on_inner.rolling

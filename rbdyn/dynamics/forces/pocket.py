@@ -50,6 +50,24 @@ class LippedPocket(NamedTuple):
     friction: Any
 
 
+class PocketWrench(NamedTuple):
+    """What a pocket does to its roller: force [N]; moments on the roller and on the cage about its centre [N m].
+
+    Then the contact load [N], the powers lost [W], and the force on the more loaded wall by contact and film together,
+    negative on the rear one [N]. The force on the cage is the opposite.
+    """
+
+    x: float
+    y: float
+    roller_moment: float
+    cage_moment: float
+    load: float
+    friction: float
+    damping: float
+    film: float
+    on_wall: float
+
+
 @kernel
 def clearance_of(pocket, radius):
     """Half the clearance that a roller of ``radius`` has in a pocket or between lips [m]."""
@@ -87,19 +105,16 @@ def _(pocket, radius, offset, height):
 
 @law
 def pocket_contact(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
-    """Wrench of a pocket on its roller.
+    """``PocketWrench`` of a pocket on its roller: Chen et al. 2022, eq 16, for the front and the rear wall alike.
 
     ``ex, ey``: unit vector of the pocket's mid-line, outward; ``dx ... dvy``: centre of the roller less that of the
-    cage, position [m] and velocity [m/s]; spins [rad/s]. Returns (force x, force y, moment on the roller, moment on
-    the cage about its centre, contact load, powers lost in friction, in damping and in the film, force on the more
-    loaded wall by contact and film together, negative on the rear one). The force on the cage is the opposite. Chen et
-    al. 2022, eq 16, for the front and the rear wall alike.
+    cage, position [m] and velocity [m/s]; spins [rad/s].
     """
 
 
 @pocket_contact.body(NoPocket)
 def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
-    return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return PocketWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @pocket_contact.body(Pocket)
@@ -113,7 +128,7 @@ def dry_walls(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed)
     offset = dy * ex - dx * ey
     approach = abs(offset) - clearance_of(pocket, radius)
     if approach <= 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        return PocketWrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     wall = math.copysign(1.0, offset)
     height = dx * ex + dy * ey
     approach_rate = wall * (dvy * ex - dvx * ey - cage_speed * height)
@@ -126,7 +141,7 @@ def dry_walls(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed)
     slip = -cage_speed * (offset + lever) - roller_surface
     friction = traction(pocket.friction, slip, load) * load
     normal = -wall * load
-    return (
+    return PocketWrench(
         friction * ex - normal * ey,
         friction * ey + normal * ex,
         -lever * friction,
@@ -141,7 +156,7 @@ def dry_walls(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed)
 
 @kernel
 def film_on_wall(film, wall, half_clearance, radius, offset, height, across, along, roller_spin, cage_speed):
-    """Film of one wall (+1 front, -1 rear): force along and across the mid-line, moments on roller and cage, power.
+    """``PocketWrench`` by the film of one wall (+1 front, -1 rear), x along and y across the mid-line.
 
     ``across, along``: velocity of the roller's centre less that of the cage, in the directions of offset and height.
     """
@@ -156,7 +171,8 @@ def film_on_wall(film, wall, half_clearance, radius, offset, height, across, alo
     )
     normal = -wall * push
     # The pressure on the wall stands off the contact, so that the film as a whole has no moment.
-    return tangential, normal, -lever * shear, -height * normal + offset * tangential + lever * shear, power
+    cage_moment = -height * normal + offset * tangential + lever * shear
+    return PocketWrench(tangential, normal, -lever * shear, cage_moment, 0.0, 0.0, 0.0, power, -normal)
 
 
 @pocket_contact.body(LubricatedPocket)
@@ -167,19 +183,17 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
     play = clearance_of(pocket, radius)
     front = film_on_wall(pocket.film, 1.0, play, radius, offset, height, across, along, roller_spin, cage_speed)
     rear = film_on_wall(pocket.film, -1.0, play, radius, offset, height, across, along, roller_spin, cage_speed)
-    tangential, normal = front[0] + rear[0], front[1] + rear[1]
-    fx, fy = tangential * ex - normal * ey, tangential * ey + normal * ex
-    moment, cage_moment = front[2] + rear[2], front[3] + rear[3]
-    on_front, on_rear = max(dry[8], 0.0) - front[1], max(-dry[8], 0.0) + rear[1]
-    return (
-        dry[0] + fx,
-        dry[1] + fy,
-        dry[2] + moment,
-        dry[3] + cage_moment,
-        dry[4],
-        dry[5],
-        dry[6],
-        front[4] + rear[4],
+    tangential, normal = front.x + rear.x, front.y + rear.y
+    on_front, on_rear = max(dry.on_wall, 0.0) + front.on_wall, max(-dry.on_wall, 0.0) - rear.on_wall
+    return PocketWrench(
+        dry.x + (tangential * ex - normal * ey),
+        dry.y + (tangential * ey + normal * ex),
+        dry.roller_moment + (front.roller_moment + rear.roller_moment),
+        dry.cage_moment + (front.cage_moment + rear.cage_moment),
+        dry.load,
+        dry.friction,
+        dry.damping,
+        front.film + rear.film,
         on_front if on_front >= on_rear else -on_rear,
     )
 
@@ -201,16 +215,16 @@ def _(pocket, radius, ex, ey, dx, dy, dvx, dvy, roller_spin, cage_speed):
     slip = cage_speed * (height + lever) - roller_surface
     friction = traction(pocket.friction, slip, load) * load
     along, across = -lip * load, friction
-    return (
-        walls[0] + along * ex - across * ey,
-        walls[1] + along * ey + across * ex,
-        walls[2] + lever * friction,
-        walls[3] + offset * along - (height + lever) * across,
-        max(walls[4], load),
-        walls[5] + friction * slip,
-        walls[6] + (load - elastic) * approach_rate,
-        walls[7],
-        walls[8] if abs(walls[8]) >= load else math.copysign(load, offset),
+    return PocketWrench(
+        walls.x + along * ex - across * ey,
+        walls.y + along * ey + across * ex,
+        walls.roller_moment + lever * friction,
+        walls.cage_moment + offset * along - (height + lever) * across,
+        max(walls.load, load),
+        walls.friction + friction * slip,
+        walls.damping + (load - elastic) * approach_rate,
+        walls.film,
+        walls.on_wall if abs(walls.on_wall) >= load else math.copysign(load, offset),
     )
 
 

@@ -29,18 +29,33 @@ from rbdyn.contact.traction import (
 )
 from rbdyn.dynamics.forces.race_form import RoundRace, WavyRace
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers, race_contact, roller_radius
+from rbdyn.dynamics.forces.state import PARTS
 
 # Contacts are worked through in blocks of LANES, VECTOR at a time; each quantity is a row of a block. Rollers that are
 # picked out bring their coordinates, their radii and, as the last row, the side of the race: +1 outer, -1 inner.
-LANES, COORDINATES, OUTPUTS = 16, 5, 8
-RADII = COORDINATES * LANES
+LANES, OUTPUTS = 16, 8
+RADII = PARTS * LANES
 SIDES = RADII + LANES
+# Where the rows of what is found of a contact begin: the fields of ``RaceWrench`` but for the slip.
+FORCE_X, FORCE_Y, ROLLER_MOMENT, RING_MOMENT, LOAD, TRACTION, ROLLING, DAMPING = range(0, OUTPUTS * LANES, LANES)
+
+
+class OnRing(NamedTuple):
+    """What the rollers do to a ring: force [N] and moment [N m]; largest load [N]; powers lost [W]."""
+
+    x: float
+    y: float
+    moment: float
+    load: float
+    traction: float
+    rolling: float
+    damping: float
 
 
 class Scratch(NamedTuple):
     """Work space of one thread."""
 
-    packed: NDArray[np.float64]  # ((COORDINATES + 2) * LANES,)
+    packed: NDArray[np.float64]  # ((PARTS + 2) * LANES,)
     lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
     gap: NDArray[np.float64]  # (rollers,) way that each has left in its pocket [m]
@@ -49,7 +64,7 @@ class Scratch(NamedTuple):
 def scratch(rollers: int) -> Scratch:
     """Work space for the contacts of so many rollers."""
     return Scratch(
-        np.ones((COORDINATES + 2) * LANES), np.empty(OUTPUTS * LANES), np.zeros(LANES, np.int64), np.empty(rollers)
+        np.ones((PARTS + 2) * LANES), np.empty(OUTPUTS * LANES), np.zeros(LANES, np.int64), np.empty(rollers)
     )
 
 
@@ -126,16 +141,16 @@ def lanes_to_fill(race, count):
 
 
 @kernel
-def keep_lane(lanes, i, out):
-    """Write what ``race_contact`` found to lane ``i``."""
-    lanes[i] = out[0]
-    lanes[LANES + i] = out[1]
-    lanes[2 * LANES + i] = out[2]
-    lanes[3 * LANES + i] = out[3]
-    lanes[4 * LANES + i] = out[4]
-    lanes[5 * LANES + i] = out[5]
-    lanes[6 * LANES + i] = out[6]
-    lanes[7 * LANES + i] = out[7]
+def keep_lane(lanes, i, wrench):
+    """Write a ``RaceWrench`` to lane ``i``."""
+    lanes[FORCE_X + i] = wrench.x
+    lanes[FORCE_Y + i] = wrench.y
+    lanes[ROLLER_MOMENT + i] = wrench.roller_moment
+    lanes[RING_MOMENT + i] = wrench.ring_moment
+    lanes[LOAD + i] = wrench.load
+    lanes[TRACTION + i] = wrench.traction
+    lanes[ROLLING + i] = wrench.rolling
+    lanes[DAMPING + i] = wrench.damping
 
 
 @kernel
@@ -182,7 +197,7 @@ def picked_block(outer, inner, sizes, outer_ring, inner_ring, packed, lanes, cou
 @kernel
 def pack(sizes, rollers, y, j, side, scratch, lane):
     """Copy the state of roller ``j`` to a lane."""
-    for row in range(COORDINATES):
+    for row in range(PARTS):
         scratch.packed[row * LANES + lane] = y[row * rollers + j]
     scratch.packed[RADII + lane] = roller_radius(sizes, j)
     scratch.packed[SIDES + lane] = side
@@ -192,18 +207,18 @@ def pack(sizes, rollers, y, j, side, scratch, lane):
 @kernel
 def add_block(lanes, i, j, rollers, row, dy, sums):
     """Add contact ``i`` of a block to roller ``j`` and to the sums of its race."""
-    force_x, force_y = lanes[i], lanes[LANES + i]
+    force_x, force_y = lanes[FORCE_X + i], lanes[FORCE_Y + i]
     dy[row, 2 * rollers + j] += force_x
     dy[row, 3 * rollers + j] += force_y
-    dy[row, 4 * rollers + j] += lanes[2 * LANES + i]
-    return (
-        sums[0] - force_x,
-        sums[1] - force_y,
-        sums[2] + lanes[3 * LANES + i],
-        max(sums[3], lanes[4 * LANES + i]),
-        sums[4] + lanes[5 * LANES + i],
-        sums[5] + lanes[6 * LANES + i],
-        sums[6] + lanes[7 * LANES + i],
+    dy[row, 4 * rollers + j] += lanes[ROLLER_MOMENT + i]
+    return OnRing(
+        sums.x - force_x,
+        sums.y - force_y,
+        sums.moment + lanes[RING_MOMENT + i],
+        max(sums.load, lanes[LOAD + i]),
+        sums.traction + lanes[TRACTION + i],
+        sums.rolling + lanes[ROLLING + i],
+        sums.damping + lanes[DAMPING + i],
     )
 
 
@@ -211,13 +226,11 @@ def add_block(lanes, i, j, rollers, row, dy, sums):
 def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy, scratch):
     """All contacts of both races: adds forces and moments on the rollers to row ``row`` of ``dy``.
 
-    Returns, for the outer and for the inner race, (force x, force y, moment on the ring, largest load, powers lost in
-    traction, rolling and damping). Nearly every roller touches the outer race; only those of the load zone touch the
-    inner one and are picked out first.
+    Returns ``OnRing`` of the outer and of the inner ring. Nearly every roller touches the outer race; only those of the
+    load zone touch the inner one and are picked out first.
     """
     lanes, index = scratch.lanes, scratch.roller
-    on_outer = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    on_inner = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    on_outer = on_inner = OnRing(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     in_order = rollers // VECTOR * VECTOR if share_vectors(outer, inner) else rollers
     start = 0
     while start < in_order:

@@ -67,14 +67,29 @@ def _(sizes, number):
     return sizes.radii[number]
 
 
+class RaceWrench(NamedTuple):
+    """What a race does to a roller: force [N]; moments on the roller and on the ring about its centre [N m].
+
+    Then the load [N], the powers lost [W] and the slip [m/s]. The force on the ring is the opposite.
+    """
+
+    x: float
+    y: float
+    roller_moment: float
+    ring_moment: float
+    load: float
+    traction: float
+    rolling: float
+    damping: float
+    slip: float
+
+
 @kernel
 def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin):
-    """Wrench of one race on one roller; zero, but for round-off, where they do not touch.
+    """``RaceWrench`` of one race on one roller; zero, but for round-off, where they do not touch.
 
     ``dx, dy, dvx, dvy``: position [m] and velocity [m/s] of the roller's centre less those of the ring's centre;
-    spins [rad/s]; ``ring_cos, ring_sin``: direction of the ring's mark. Returns (force x, force y, moment on the
-    roller, moment on the ring about its centre, load, powers lost in traction, in rolling and in damping, slip) in
-    N, N m, W and m/s. The force on the ring is the opposite.
+    spins [rad/s]; ``ring_cos, ring_sin``: direction of the ring's mark.
 
     Load: Chen et al. 2022, eq 5-6; slip at the point that halves the approach: eq 7-10; rolling resistance with
     the pressure offset 2 F_R R_x/R_b: Biboulet and Houpert 2010. On a wavy race the load points along the gradient of
@@ -110,7 +125,7 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
     normal = -side * load
     along = traction_force + rolling * (ring_lever + roller_lever) * inverse
     along -= sloped(race.form, slope, normal * inverse) + around(race.contact, lean, load * inverse)
-    return (
+    return RaceWrench(
         normal * nx - along * ny,
         normal * ny + along * nx,
         roller_lever * (traction_force - rolling),

@@ -1,36 +1,51 @@
-"""Layout of the state vector: 5 Z + 10 numbers, each kind of roller coordinate contiguous, then what a scene adds.
+"""The state vector: one table of its components, from which layout, names, tolerances and the Jacobian's pattern follow.
 
-[0, Z)     roller x [m]            5Z + 0, 1   cage x, y [m]
-[Z, 2Z)    roller y [m]            5Z + 2      cage angle [rad]
-[2Z, 3Z)   roller vx [m/s]         5Z + 3, 4   cage vx, vy [m/s]
-[3Z, 4Z)   roller vy [m/s]         5Z + 5      cage speed [rad/s]
-[4Z, 5Z)   roller spin [rad/s]     5Z + 6 ... 9  inner ring x, y [m], vx, vy [m/s]
-
-An outer ring on a support adds its x, y [m], vx, vy [m/s]; a scene that depends on time or on a ring's angle adds
-time [s], inner ring angle and outer ring angle [rad].
+Each coordinate of the rollers stands contiguous, roller after roller; then come cage and inner ring, then what a scene adds.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
-ROLLER_PARTS = ("x", "y", "vx", "vy", "spin")
-BODY_PARTS = (
-    ("cage", "x"),
-    ("cage", "y"),
-    ("cage", "angle"),
-    ("cage", "vx"),
-    ("cage", "vy"),
-    ("cage", "speed"),
-    ("inner ring", "x"),
-    ("inner ring", "y"),
-    ("inner ring", "vx"),
-    ("inner ring", "vy"),
-)
-SUPPORT_PARTS = (("outer ring", "x"), ("outer ring", "y"), ("outer ring", "vx"), ("outer ring", "vy"))
-CLOCK_PARTS = (("time", ""), ("inner ring", "angle"), ("outer ring", "angle"))
-CAGE_X, CAGE_Y, CAGE_ANGLE, CAGE_VX, CAGE_VY, CAGE_SPEED, RING_X, RING_Y, RING_VX, RING_VY = range(10)
-TIME, INNER_ANGLE, OUTER_ANGLE = range(3)
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Component(NamedTuple):
+    """A coordinate or a speed: body, name, unit; and the name of the speed at which it changes, where the state has that.
+
+    Body and unit together choose the size by which its error is measured.
+    """
+
+    body: str
+    name: str
+    unit: str
+    speed: str = ""
+
+    @property
+    def pushed(self) -> bool:
+        """Whether forces change it, those of the rollers among them."""
+        return self.unit.endswith("/s")
+
+
+def _body(body: str, *rows: tuple[str, ...]) -> tuple[Component, ...]:
+    return tuple(Component(body, *row) for row in rows)
+
+
+PLACE, VELOCITY = (("x", "m", "vx"), ("y", "m", "vy")), (("vx", "m/s"), ("vy", "m/s"))
+# Each of a roller's stands Z times, for one roller after the other.
+ROLLER = _body("roller", *PLACE, *VELOCITY, ("spin", "rad/s"))
+CAGE = _body("cage", *PLACE, ("angle", "rad", "speed"), *VELOCITY, ("speed", "rad/s"))
+BODIES = (*CAGE, *_body("inner ring", *PLACE, *VELOCITY))
+# With an outer ring on a support; where something depends on time or on a ring's angle.
+SUPPORT = _body("outer ring", *PLACE, *VELOCITY)
+CLOCK = _body("clock", ("time", "s"), ("inner ring angle", "rad"), ("outer ring angle", "rad"))
+PARTS = len(ROLLER)
+# Places within BODIES, SUPPORT and CLOCK.
+CAGE_X, CAGE_Y, CAGE_ANGLE, CAGE_VX, CAGE_VY, CAGE_SPEED, RING_X, RING_Y, RING_VX, RING_VY = range(len(BODIES))
+SUPPORT_X, SUPPORT_Y, SUPPORT_VX, SUPPORT_VY = range(len(SUPPORT))
+TIME, INNER_ANGLE, OUTER_ANGLE = range(len(CLOCK))
 
 
 class Layout(NamedTuple):
@@ -41,19 +56,39 @@ class Layout(NamedTuple):
     support: int | None
     clock: int | None
 
+    @property
+    def first_body(self) -> int:
+        """Where the bodies begin, behind the rollers."""
+        return PARTS * self.rollers
+
+    @property
+    def bodies(self) -> tuple[Component, ...]:
+        """Components behind those of the rollers."""
+        supported, clocked = self.support is not None, self.clock is not None
+        return (*BODIES, *(SUPPORT if supported else ()), *(CLOCK if clocked else ()))
+
+    @property
+    def components(self) -> tuple[Component, ...]:
+        """What each number of the state is."""
+        return (*(part for part in ROLLER for _ in range(self.rollers)), *self.bodies)
+
+    def each(self, value: Callable[[Component], float]) -> NDArray[np.float64]:
+        """``value`` of every component, in the order of the state."""
+        return np.array([value(part) for part in self.components])
+
 
 def layout(rollers: int, supported: bool, clocked: bool) -> Layout:
     """Layout for a number of rollers, with an outer ring on a support or not, with a clock or not."""
-    size = 5 * rollers + len(BODY_PARTS)
+    size = PARTS * rollers + len(BODIES)
     support = size if supported else None
-    size += len(SUPPORT_PARTS) * supported
+    size += len(SUPPORT) * supported
     clock = size if clocked else None
-    return Layout(rollers, size + len(CLOCK_PARTS) * clocked, support, clock)
+    return Layout(rollers, size + len(CLOCK) * clocked, support, clock)
 
 
 def name(index: int, layout: Layout) -> str:
     """What a state component is, in words: 'roller 3 spin', 'cage vx'. Rollers count from 1."""
-    if index < 5 * layout.rollers:
-        return f"roller {index % layout.rollers + 1} {ROLLER_PARTS[index // layout.rollers]}"
-    parts = [*BODY_PARTS, *(SUPPORT_PARTS if layout.support else ()), *(CLOCK_PARTS if layout.clock else ())]
-    return " ".join(parts[index - 5 * layout.rollers]).strip()
+    part = layout.components[index]
+    if part in ROLLER:
+        return f"roller {index % layout.rollers + 1} {part.name}"
+    return part.name if part in CLOCK else f"{part.body} {part.name}"

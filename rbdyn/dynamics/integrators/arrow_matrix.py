@@ -16,9 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import routine
-from rbdyn.dynamics.forces.state import CAGE_SPEED, CAGE_VX, CAGE_VY, RING_VX, RING_VY, Layout
-
-PARTS = 5  # coordinates of a roller
+from rbdyn.dynamics.forces.state import PARTS, Layout
 
 
 class ArrowMatrix(NamedTuple):
@@ -34,10 +32,8 @@ class ArrowMatrix(NamedTuple):
 
 def arrow_matrix(layout: Layout) -> ArrowMatrix:
     """An empty matrix for a state of this layout: rollers push the velocities of cage and rings, nothing else."""
-    z, m = layout.rollers, layout.size - PARTS * layout.rollers
-    pushed = [CAGE_VX, CAGE_VY, CAGE_SPEED, RING_VX, RING_VY]
-    if layout.support is not None:
-        pushed += [layout.support - PARTS * z + 2, layout.support - PARTS * z + 3]
+    z, m = layout.rollers, len(layout.bodies)
+    pushed = [place for place, part in enumerate(layout.bodies) if part.pushed]
     return ArrowMatrix(
         own=np.zeros((PARTS, PARTS, z)),
         right=np.zeros((PARTS, z, m)),

@@ -6,6 +6,7 @@ import math
 
 from rbdyn.compiled.kernel import kernel, routine
 from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD
+from rbdyn.dynamics.integrators.records import SAMPLES, SPEEDS, SQUARES
 
 PEAK_POINTS = 8  # interior points at which a step that holds a new largest pocket load is looked at
 
@@ -14,9 +15,9 @@ PEAK_POINTS = 8  # interior points at which a step that holds a new largest pock
 def book_whirl(whirl, vx, vy):
     """Take a sample of the velocity of the cage's centre [m/s]."""
     square = vx * vx + vy * vy
-    whirl[0] += 1.0
-    whirl[1] += math.sqrt(square)
-    whirl[2] += square
+    whirl[SAMPLES] += 1.0
+    whirl[SPEEDS] += math.sqrt(square)
+    whirl[SQUARES] += square
 
 
 @kernel

@@ -16,11 +16,9 @@ from rbdyn.dynamics.integrators.embedded_pair import (
     quartic_rate,
     rate_error,
     stage_state,
-    stage_time,
-    stage_weight,
+    tableau,
 )
 
-# Row s holds the weights of stages 1 ... s in the state at which stage s + 1 is evaluated; the last is the new state.
 A = np.array(
     [
         [0, 0, 0, 0, 0, 0],
@@ -40,7 +38,7 @@ D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29
 
 
 class DormandPrince(NamedTuple):
-    """The pair of order 5(4), six right-hand sides a step; fields as in ``embedded_pair``."""
+    """The pair of order 5(4), six right-hand sides a step; fields as in ``method_laws``."""
 
     last: int = 6
     free: int = 1  # b_2 = e_2 = d_2 = 0
@@ -51,14 +49,9 @@ class DormandPrince(NamedTuple):
     limit: float = 2.0
 
 
-@stage_weight.body(DormandPrince)
-def _(pair, s, j):
-    return A[s, j]
-
-
-@stage_time.body(DormandPrince)
-def _(pair, s):
-    return C[s]
+@tableau.body(DormandPrince)
+def _(pair):
+    return A, C
 
 
 @mean_rate.body(DormandPrince)

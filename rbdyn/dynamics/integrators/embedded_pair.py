@@ -1,9 +1,6 @@
-"""What the loop of ``runge_kutta`` asks of an embedded pair. Each is a law, so that stages and weights are compiled in.
+"""What ``runge_kutta`` asks of an embedded pair. Each is a law, so that stages and weights are compiled in.
 
-A pair is a NamedTuple of numbers: ``last``, the row of ``Carry.k`` at the end of the step, which is the first of the next
-one; ``free``, a row in which nothing is kept once the step is taken; the ``exponent`` of the error of this step and ``beta`` of
-the one before in the control of the step, ``rejected`` that of the error of a step that is refused; and h |eigenvalue|
-from which stability is said to hold a step, ``limit``.
+A pair is a method as in ``method_laws``, and has h |eigenvalue| from which stability is said to hold a step, ``limit``.
 """
 
 from __future__ import annotations
@@ -13,13 +10,10 @@ from rbdyn.compiled.kernel import kernel, law
 
 
 @law
-def stage_weight(pair, s, j):
-    """Weight of row ``j`` in the state at which row ``s`` is evaluated."""
-
-
-@law
-def stage_time(pair, s):
-    """Time of row ``s`` since the start of the step, over its size."""
+def tableau(pair):
+    """Weights: row s holds those of the rows before it in the state at which row s is evaluated, the last ones make the
+    new state. Nodes: time of each row since the start of the step, over its size.
+    """
 
 
 @law

@@ -11,22 +11,22 @@ from rbdyn.compiled.kernel import VECTOR
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, RollerBearing
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
-from rbdyn.dynamics.integrators.arrow_matrix import PARTS, arrow_matrix
+from rbdyn.dynamics.forces.state import PARTS
+from rbdyn.dynamics.integrators.arrow_matrix import arrow_matrix
 from rbdyn.dynamics.integrators.jacobian import Differences, OneRoller
-from rbdyn.dynamics.integrators.rosenbrock import STAGES, Workspace
+from rbdyn.dynamics.integrators.rosenbrock import STAGES, Rodas
 from rbdyn.dynamics.parameters.geometry import absolute_tolerance, kinematics, layout_of, shaft_speeds
 from rbdyn.scene import Scene
 
 
-def workspace(scene: Scene, bearing: RollerBearing) -> Workspace:
-    """Work space for a scene."""
+def rodas(scene: Scene, bearing: RollerBearing) -> Rodas:
+    """The method with work space for a scene."""
     layout = layout_of(scene)
     n = layout.size
-    return Workspace(
+    return Rodas(
         np.zeros((STAGES, n)),
         np.zeros((STAGES, POWERS)),
         np.zeros((2, n)),
-        np.zeros(n),
         differences(scene, bearing),
         arrow_matrix(layout),
     )
@@ -46,12 +46,9 @@ def increments(scene: Scene, bearing: RollerBearing) -> NDArray[np.float64]:
     layout, motion = layout_of(scene), kinematics(scene)
     length = 0.5e-3 * scene.bearing.pitch_diameter_mm
     turning = max(abs(speed) for speed in shaft_speeds(scene))
-    speed = length * turning
+    sizes = {"m": length, "rad": 1.0, "m/s": length * turning, "rad/s": turning, "s": scene.turn_s}
     spin = max(abs(motion.roller_spin), turning)
-    bodies = [length, length, 1.0, speed, speed, turning, length, length, speed, speed]
-    bodies += [length, length, speed, speed] if layout.support is not None else []
-    clock = [scene.turn_s, 1.0, 1.0] if layout.clock is not None else []
-    size = np.concatenate((np.repeat([length, length, speed, speed, spin], layout.rollers), bodies, clock))
+    size = layout.each(lambda part: spin if (part.body, part.unit) == ("roller", "rad/s") else sizes[part.unit])
     scale = np.minimum(absolute_tolerance(scene, bearing, 1.0, "rosenbrock"), size)
     return np.sqrt(np.finfo(float).eps * size * scale)
 

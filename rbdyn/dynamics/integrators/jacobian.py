@@ -16,7 +16,8 @@ from rbdyn.compiled.kernel import kernel, law, routine
 from rbdyn.dynamics.forces.equations import POWERS, RollerBearing, derivative_once
 from rbdyn.dynamics.forces.race_lanes import Scratch
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
-from rbdyn.dynamics.integrators.arrow_matrix import PARTS, ArrowMatrix
+from rbdyn.dynamics.forces.state import PARTS
+from rbdyn.dynamics.integrators.arrow_matrix import ArrowMatrix
 
 
 class OneRoller(NamedTuple):

@@ -18,8 +18,7 @@ from rbdyn.dynamics.integrators.embedded_pair import (
     quartic_rate,
     rate_error,
     stage_state,
-    stage_time,
-    stage_weight,
+    tableau,
 )
 
 A = np.array([[0, 0, 0, 0], [1 / 3, 0, 0, 0], [-1 / 3, 1, 0, 0], [1, -1, 1, 0], [1 / 8, 3 / 8, 3 / 8, 1 / 8]])
@@ -41,14 +40,9 @@ class Kutta(NamedTuple):
     limit: float = 2.3
 
 
-@stage_weight.body(Kutta)
-def _(pair, s, j):
-    return A[s, j]
-
-
-@stage_time.body(Kutta)
-def _(pair, s):
-    return C[s]
+@tableau.body(Kutta)
+def _(pair):
+    return A, C
 
 
 @stage_state.body(Kutta)

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.integrators.runge_kutta import DORMAND_PRINCE, FINISHED, STEP_BUDGET, Carry, Control, Tally, advance
+from rbdyn.dynamics.integrators import records as at
+from rbdyn.dynamics.integrators.advance import advance
+from rbdyn.dynamics.integrators.records import FINISHED, STEP_BUDGET, Carry, Control, Tally
+from rbdyn.dynamics.integrators.runge_kutta import DormandPrince, Kutta
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
-
-# Arguments: bearing, control, carry, tally, end [s], time between samples [s]. Returns a status of ``runge_kutta``.
-Advance = Callable[[RollerBearing, Control, Carry, Tally, float, float], int]
 
 EXPLICIT = ("rk45", "rk43")
 # From this tolerance on the third-order error estimate of Kutta's pair asks for fewer right-hand sides than the fifth order
@@ -46,26 +46,13 @@ def explicit_method(method: str, rtol: float) -> str:
     return "rk43" if rtol >= KUTTA_FROM else "rk45"
 
 
-def pair_of(method: str) -> Any:
-    """The pair of an explicit method."""
-    if method == "rk43":
-        from rbdyn.dynamics.integrators.kutta_pair import Kutta
+def method_of(name: str, scene: Scene, bearing: RollerBearing) -> Any:
+    """The method "rk45", "rk43" or "rosenbrock" for this bearing."""
+    if name == "rosenbrock":
+        from rbdyn.dynamics.integrators.implicit import rodas
 
-        return Kutta()
-    return DORMAND_PRINCE
-
-
-def advance_by(method: str, scene: Scene, bearing: RollerBearing) -> Advance:
-    """``advance`` of "rk45", "rk43" or "rosenbrock" for this bearing."""
-    if method == "rosenbrock":
-        from rbdyn.dynamics.integrators.implicit import workspace
-        from rbdyn.dynamics.integrators.rosenbrock import advance_implicit
-
-        work = workspace(scene, bearing)
-        return lambda one, control, carry, tally, t_end, sample_step: advance_implicit(
-            one, control, carry, tally, work, t_end, sample_step
-        )
-    return advance
+        return rodas(scene, bearing)
+    return Kutta() if name == "rk43" else DormandPrince()
 
 
 def cheaper_method(
@@ -84,27 +71,28 @@ def cheaper_method(
     """
     trial_s = TRIAL_TURNS * scene.turn_s
     short = control_by(pair)._replace(step_budget=TRIAL_STEPS)
-    explicit = advance_by(pair, scene, bearing)
     run, book = _copy(carry), Tally(*(kept.copy() for kept in tally))
-    status = explicit(bearing, short, run, book, trial_s, sample_step)
+    status = advance(bearing, short, run, book, trial_s, sample_step)
     start = _copy(run)
-    start.counts[:] = run.counts[:] = [0, 0, run.counts[2], 0]
+    derivatives = int(run.counts[at.DERIVATIVES])
+    for counts in (start.counts, run.counts):
+        counts[:] = 0
+        counts[at.DERIVATIVES] = derivatives
     run.stiffness[:] = 0.0
     if status in (FINISHED, STEP_BUDGET):
-        status = explicit(bearing, short, run, book, run.clock[0] + trial_s, sample_step)
+        status = advance(bearing, short, run, book, run.clock[at.NOW] + trial_s, sample_step)
     if status not in (FINISHED, STEP_BUDGET):
         return "rosenbrock", run.stiffness
-    turns = (run.clock[0] - start.clock[0]) / scene.turn_s
-    steps = run.counts[0] + run.counts[1]
+    turns = (run.clock[at.NOW] - start.clock[at.NOW]) / scene.turn_s
+    steps = run.counts[at.ACCEPTED] + run.counts[at.REJECTED]
     if held_by_stability(run.stiffness) < STIFF_SHARE or steps < FEWEST_STEPS_PER_TURN * turns:
         return pair, run.stiffness
-    derivatives = int(start.counts[2])
-    implicit = advance_by("rosenbrock", scene, bearing)
+    start = start._replace(method=method_of("rosenbrock", scene, bearing))
     short = control_by("rosenbrock")._replace(step_budget=TRIAL_STEPS)
-    if implicit(bearing, short, start, book, run.clock[0], sample_step) != FINISHED:
+    if advance(bearing, short, start, book, run.clock[at.NOW], sample_step) != FINISHED:
         return pair, run.stiffness
-    cost = IMPLICIT_OVERHEAD * (start.counts[2] - derivatives)
-    return "rosenbrock" if cost < run.counts[2] - derivatives else pair, run.stiffness
+    cost = IMPLICIT_OVERHEAD * (start.counts[at.DERIVATIVES] - derivatives)
+    return "rosenbrock" if cost < run.counts[at.DERIVATIVES] - derivatives else pair, run.stiffness
 
 
 def _copy(carry: Carry) -> Carry:
@@ -115,12 +103,12 @@ def _copy(carry: Carry) -> Carry:
 
 def held_by_stability(stiffness: Sequence[float] | np.ndarray) -> float:
     """Share of the explicit steps looked at that stability held, not accuracy."""
-    return float(stiffness[1] / stiffness[0]) if stiffness[0] > 0.0 else 0.0
+    return float(stiffness[at.HELD] / stiffness[at.LOOKED_AT]) if stiffness[at.LOOKED_AT] > 0.0 else 0.0
 
 
 def largest_eigenvalue(stiffness: Sequence[float] | np.ndarray) -> float:
     """Mean |eigenvalue| [1/s] of the motion that held them; zero where none did."""
-    return float(stiffness[2] / stiffness[1]) if stiffness[1] > 0.0 else 0.0
+    return float(stiffness[at.EIGENVALUES] / stiffness[at.HELD]) if stiffness[at.HELD] > 0.0 else 0.0
 
 
 def stiffness_cost(runs: Sequence[Replicate]) -> dict[str, float]:

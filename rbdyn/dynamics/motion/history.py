@@ -123,7 +123,7 @@ def history(
     seen = np.empty((OBSERVED, len(states), z))
     land = np.empty(len(states))
     observe(bearing, states, seen, land)
-    body, support = 5 * z, run.layout.support
+    body, support = run.layout.first_body, run.layout.support
     x, y = states[:, :z], states[:, z : 2 * z]
     still = np.zeros(len(states))
     return History(
@@ -135,7 +135,7 @@ def history(
         outer_y=still if support is None else states[:, support + 1],
         roller_x=x,
         roller_y=y,
-        roller_spin=states[:, 4 * z : 5 * z],
+        roller_spin=states[:, 4 * z : body],
         azimuth=np.unwrap(np.arctan2(y, x), axis=0),
         **dict(zip(SEEN, seen, strict=True)),
         land_load=land,

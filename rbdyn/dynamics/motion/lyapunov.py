@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.integrators.records import DERIVATIVES
 from rbdyn.dynamics.parameters.geometry import absolute_tolerance
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run, with_numerics
@@ -80,18 +81,19 @@ def lyapunov_exponent(
     draw = np.random.default_rng(np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate, 1)))
     apart = np.where(weight > 0.0, draw.standard_normal(weight.size), 0.0)
     apart[weight > 0.0] /= weight[weight > 0.0]
-    derivatives = int(leader.carry.counts[2])
+    derivatives = int(leader.carry.counts[DERIVATIVES])
     intervals = round((turns + ALIGN_TURNS) / RENORMALISE_TURNS)
     growth = np.empty(intervals)
     for index in range(intervals):
         # Back to the size of the separation, in the direction in which the runs parted.
         apart *= separation / _norm(apart, weight)
         follower.carry.y[:] = leader.carry.y + apart
-        leader.carry.counts[2] = follower.carry.counts[2] = 0  # the first stage is that of the new state
+        # The first stage is that of the new state.
+        leader.carry.counts[DERIVATIVES] = follower.carry.counts[DERIVATIVES] = 0
         until = begin + (index + 1) * RENORMALISE_TURNS
         for run in (leader, follower):
             run.to(until)
-            derivatives += int(run.carry.counts[2])
+            derivatives += int(run.carry.counts[DERIVATIVES])
         apart = np.where(weight > 0.0, follower.carry.y - leader.carry.y, 0.0)
         growth[index] = math.log(_norm(apart, weight) / separation)
     counted = growth[round(ALIGN_TURNS / RENORMALISE_TURNS) :] / (RENORMALISE_TURNS * scene.turn_s)

@@ -168,9 +168,13 @@ def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method
     length = scale.length * speed / scale.speed
     slip = min(speed, slip_scale(bearing, 5.0 * scale.load))
     roller, cage = 0.5e-3 * scene.bearing.roller_diameter_mm, 0.5e-3 * scene.bearing.pitch_diameter_mm
-    rollers = np.repeat([length, length, speed, speed, slip / roller], state.rollers)
-    positions, speeds, own = [length, length], [speed, speed], CAGE_SHARES[method] * speed
-    bodies = [*positions, length / cage, own, own, own / cage, *positions, *speeds]
-    bodies += [*positions, *speeds] if state.support is not None else []
-    clock = [math.inf] * 3 if state.clock is not None else []
-    return rtol * np.concatenate((rollers, np.array(bodies + clock)))
+    sizes = {"m": length, "m/s": speed}
+    own = CAGE_SHARES[method] * speed
+    sizes_of = {
+        "roller": sizes | {"rad/s": slip / roller},
+        "cage": {"m": length, "rad": length / cage, "m/s": own, "rad/s": own / cage},
+        "inner ring": sizes,
+        "outer ring": sizes,
+        "clock": {"s": math.inf, "rad": math.inf},
+    }
+    return rtol * state.each(lambda part: sizes_of[part.body][part.unit])

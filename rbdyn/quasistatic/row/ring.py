@@ -38,42 +38,27 @@ def measure(row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> No
 
 
 @kernel
-def astray(convex: bool, ra: float, rr: float, fa: float, fr: float) -> bool:
+def astray(convex: bool, forces: Any) -> bool:
     """Whether a ball is so far from balance that it is better settled by itself: Newton's step would tell nothing."""
+    (ra, rr), (fa, fr, _) = forces[0], forces[1]
     lacking, held = max(abs(ra), abs(rr)), max(abs(fa), abs(fr))
     return lacking > 0.3 * held if convex else held == 0.0
 
 
 @kernel
-def balanced_forces(
-    control: Any, strength: float, mixed: bool, row: Any, j: int, a_axial: float, a_radial: float, balls: Any, work: Any
-) -> Any:
-    """``ball_forces`` of ball j, which is settled first where it has just come into contact or lies astray."""
-    if work[j, LOADED] == 0.0:
-        settle(row, j, a_axial, a_radial, SETTLED, balls)
-        measure(row, j, a_axial, a_radial, balls)
-        work[j, LOADED] = 1.0
-    elif not mixed:
-        measure(row, j, a_axial, a_radial, balls)
-    for attempt in range(2):
-        forces = ball_forces(
-            control, strength, row, a_axial, a_radial, balls[j, AXIAL], balls[j, RADIAL], balls[j, INNER_DEPTH],
-            balls[j, OUTER_DEPTH],
-        )  # fmt: skip
-        (ra, rr), (fa, fr, _) = forces[0], forces[1]
-        if attempt == 1 or not astray(strength == 0.0, ra, rr, fa, fr):
-            break
-        settle(row, j, a_axial, a_radial, SETTLED, balls)
-        measure(row, j, a_axial, a_radial, balls)
-    return forces
+def forces_on(control: Any, strength: float, row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> Any:
+    """``ball_forces`` of ball j where it stands."""
+    return ball_forces(
+        control, strength, row, a_axial, a_radial, balls[j, AXIAL], balls[j, RADIAL], balls[j, INNER_DEPTH],
+        balls[j, OUTER_DEPTH],
+    )  # fmt: skip
 
 
 @kernel
-def add_up(row: Any, j: int, forces: Any, balls: Any, sums: Any) -> None:
+def add_up(row: Any, j: int, forces: Any, springs: Any, balls: Any, sums: Any) -> None:
     """Add energy, residual and ring forces of ball j to ``sums``."""
     (ra, rr), (fa, fr, fm), _, _, _, _, pull, _ = forces
-    qi, _ = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
-    qo, _ = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+    (qi, _), (qo, _) = springs
     sums[ENERGY] += 0.4 * (qi * balls[j, INNER_DEPTH] + qo * balls[j, OUTER_DEPTH])
     sums[ENERGY] -= row.centrifugal_force * (balls[j, RADIAL] - row.outer_reach[j])
     sums[UNBALANCE] += ra * ra + rr * rr
@@ -96,7 +81,9 @@ def ahead(force: float, by_a: Any, by_x: Any, gaps: Any) -> float:
 
 
 @kernel
-def close_gaps(row: Any, j: int, a_axial: float, a_radial: float, forces: Any, balls: Any, work: Any, sums: Any) -> Any:
+def close_gaps(
+    row: Any, j: int, a_axial: float, a_radial: float, forces: Any, springs: Any, balls: Any, work: Any, sums: Any
+) -> Any:
     """Residual and ring forces with what the places of ball j tell beyond its depths, which goes into the step only."""
     (ra, rr), (fa, fr, fm), by_a, by_x, ring_a, ring_x, _, _ = forces
     x, y = balls[j, AXIAL], balls[j, RADIAL]
@@ -104,8 +91,7 @@ def close_gaps(row: Any, j: int, a_axial: float, a_radial: float, forces: Any, b
     one_o, so, co = line(x, y)
     gap_i = 1.0 / one_i - row.inner_reach[j] - balls[j, INNER_DEPTH]
     gap_o = 1.0 / one_o - row.outer_reach[j] - balls[j, OUTER_DEPTH]
-    _, ki = spring(balls[j, INNER_DEPTH], row.inner_stiffness)
-    _, ko = spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+    (_, ki), (_, ko) = springs
     slip = max(abs(gap_i) * ki, abs(gap_o) * ko)
     sums[WORST] = max(sums[WORST], slip)
     sums[UNBALANCE] += slip * slip
@@ -200,11 +186,22 @@ def assemble(task: Any, strength: float, mixed: bool, at: Any) -> None:
             # By its place: at rest on the outer race.
             sums[ENERGY] += row.rest_energy
             continue
-        forces = balanced_forces(control, strength, mixed, row, j, a_axial, a_radial, balls, work)
-        add_up(row, j, forces, balls, sums)
+        if work[j, LOADED] == 0.0:
+            settle(row, j, a_axial, a_radial, SETTLED, balls)
+            work[j, LOADED] = 1.0
+            measure(row, j, a_axial, a_radial, balls)
+        elif not mixed:
+            measure(row, j, a_axial, a_radial, balls)
+        forces = forces_on(control, strength, row, j, a_axial, a_radial, balls)
+        if astray(strength == 0.0, forces):
+            settle(row, j, a_axial, a_radial, SETTLED, balls)
+            measure(row, j, a_axial, a_radial, balls)
+            forces = forces_on(control, strength, row, j, a_axial, a_radial, balls)
+        springs = spring(balls[j, INNER_DEPTH], row.inner_stiffness), spring(balls[j, OUTER_DEPTH], row.outer_stiffness)
+        add_up(row, j, forces, springs, balls, sums)
         residual, ring, by_x = forces[0], forces[1], forces[3]
         if mixed:
-            residual, ring = close_gaps(row, j, a_axial, a_radial, forces, balls, work, sums)
+            residual, ring = close_gaps(row, j, a_axial, a_radial, forces, springs, balls, work, sums)
         determinant = by_x[0] * by_x[3] - by_x[1] * by_x[2]
         if determinant == 0.0:
             # Squeezed by less than the spacing of numbers: as good as lifted.

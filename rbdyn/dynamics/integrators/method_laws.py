@@ -1,0 +1,60 @@
+"""What the loop of ``advance`` asks of a method. Each is a law, so that stages and weights are compiled in.
+
+A method is a NamedTuple: ``last``, the row of ``Carry.k`` at the end of the step, which is the first of the next one;
+``free``, a row in which nothing is kept once the step is taken; the ``exponent`` of the error of this step and ``beta`` of
+the one before in the control of the step, ``rejected`` that of the error of a step that is refused.
+"""
+
+from __future__ import annotations
+
+from rbdyn.compiled.kernel import law
+
+
+@law
+def begin(method, bearing, y, k, power, loads, scratch, clock, counts):
+    """Right-hand side of the state, where it is not carried along. Returns its first component that is not finite, else -1."""
+
+
+@law
+def trial_step(method, refused, bearing, y, k, stage, power, loads, scratch, clock, counts, h):
+    """Stages of a step of ``h`` [s] from ``y``; the end state is left in ``stage``. ``refused``: the last trial from here was."""
+
+
+@law
+def error_norm(method, k, h, inverse_tolerance):
+    """Norm of the embedded error over the tolerances: a sum of squares, so that any NaN comes through."""
+
+
+@law
+def step_error(method, k, h, i):
+    """Embedded error of component ``i``."""
+
+
+@law
+def look_at_stiffness(method, k, stiffness, h, inverse_tolerance):
+    """Book whether stability, not accuracy, holds an accepted step."""
+
+
+@law
+def end_step(method, bearing, stage, k, power, loads, scratch, counts):
+    """Fill row ``last``, which belongs to the end of an accepted step, and what its dense output needs."""
+
+
+@law
+def interpolate(method, y, end, k, h, theta, i):
+    """Component ``i`` at the fraction ``theta`` of the step from ``y`` to ``end``."""
+
+
+@law
+def work_done(method, power, h, p):
+    """Integral of power ``p`` over the step [J]."""
+
+
+@law
+def to_fixed_axes_at(method, clock, time, z, y):
+    """Turn an interpolated state at a time [s] since the start of the step into the fixed axes."""
+
+
+@law
+def next_frame(method, clock, h, z, y, k):
+    """From the frame of a step of ``h`` [s] to that of the next one, whose start ``y`` and row 0 are."""
