@@ -22,8 +22,8 @@ from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import LOADS, POWERS
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.integrators.runge_kutta import Tally
-from rbdyn.dynamics.parameters.geometry import layout_of
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.dynamics.run import Run
 from rbdyn.faults import InputError, RunError
 

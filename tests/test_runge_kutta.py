@@ -14,8 +14,8 @@ from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import POWERS, SHAFT
 from rbdyn.dynamics.integrators import dormand_prince as dp
 from rbdyn.dynamics.integrators import runge_kutta as rk
-from rbdyn.dynamics.parameters.geometry import scales
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.run import Run
 from rbdyn.faults import RunError
 

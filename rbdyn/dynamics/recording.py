@@ -15,7 +15,7 @@ from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE
-from rbdyn.dynamics.parameters.geometry import raceway_radii, scales
+from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
@@ -162,6 +162,6 @@ def run_series(
 
 def kinematic_cage_angle(scene: Scene, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
     """Angle [rad] that an epicyclic cage turns while inner and outer ring turn from ``before`` to ``after``."""
-    outer, inner = raceway_radii(scene)
+    outer, inner = scene.geometry.raceways
     turned = after - before
     return float((turned[0] * inner + turned[1] * outer) / (inner + outer))

@@ -25,7 +25,7 @@ from rbdyn.dynamics.integrators.runge_kutta import (
     Control,
     Tally,
 )
-from rbdyn.dynamics.parameters.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
+from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of, scales
 from rbdyn.dynamics.parameters.start import start_state
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
@@ -114,7 +114,7 @@ class Run:
         """Angles of inner and outer ring [rad] since the start."""
         clock = self.layout.clock
         if clock is None:
-            return self.carry.clock[0] * np.array(shaft_speeds(self.scene))
+            return self.carry.clock[0] * np.array(self.scene.operation.speeds)
         return self.carry.y[clock + INNER_ANGLE : clock + OUTER_ANGLE + 1].copy()
 
     def _why(self, status: int) -> str:

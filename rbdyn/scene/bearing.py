@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import LIGHTEST_RING_KG, Fraction, NotVanishing, Positive, or_refuse
+from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive, or_refuse
 
 # Keys that belong to one roller profile each.
 PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "table": "profile_table_mm_um"}
@@ -21,6 +21,7 @@ class Harmonic(Strict):
     order: Annotated[int, Field(ge=1, le=2000)]
     amplitude_um: Annotated[float, Field(ge=-500.0, le=500.0)]
     phase_deg: float = 0.0
+    amplitude, phase = SI("um"), SI("deg")
 
 
 class Bearing(Strict):
@@ -62,6 +63,21 @@ class Bearing(Strict):
     # alone (0.04 kg in the bearing of Chen et al. 2022) and the part of the rotor's mass that this bearing carries. With
     # 0.3, 1 and 3 kg that bearing has impacts of 91, 86 and 93 N and a whirl of 0.51, 0.41 and 0.55.
     inner_ring_mass_kg: Annotated[float, Field(ge=LIGHTEST_RING_KG, le=1e5)] = 1.0
+
+    roller_diameter, pitch_diameter, radial_clearance = SI("mm"), SI("mm"), SI("mm")
+    roller_length, effective_length, crown_radius = SI("mm"), SI("mm"), OptionalSI("mm")
+    tilt, tilt_direction = SI("mrad"), SI("deg")
+
+    @property
+    def diameter_ratio(self) -> float:
+        """Roller over pitch diameter."""
+        return self.roller_diameter_mm / self.pitch_diameter_mm
+
+    @property
+    def profile_table(self) -> list[tuple[float, float]] | None:
+        """Points of the profile: distance from the middle, drop [m]."""
+        points = self.profile_table_mm_um
+        return None if points is None else [(x * 1e-3, drop * 1e-6) for x, drop in points]
 
     @property
     def raceway_diameters_mm(self) -> tuple[float, float]:
@@ -180,6 +196,10 @@ class Cage(Strict):
     pocket_radial_clearance_mm: Positive | None = None
     lands: Annotated[int, Field(ge=1, le=4)] = 2
     land_width_mm: Positive = 3.0
+
+    guide_clearance, pocket_clearance, lip_clearance = SI("mm"), SI("mm"), OptionalSI("mm")
+    pocket_contact_length, land_width = OptionalSI("mm"), SI("mm")
+    mass, inertia, imbalance = SI("g"), OptionalSI("kg_mm2"), SI("um")
 
     @model_validator(mode="after")
     def _sensible(self) -> Cage:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import Fraction, NonNegative, NotVanishing, Positive, or_refuse
+from rbdyn.fields import SI, Fraction, NonNegative, NotVanishing, Positive, or_refuse
 from rbdyn.properties.lubricants import Oil, oil_at
 
 RheologyOil = Literal["MIL-L-7808", "MIL-L-23699", "MIL-L-27502", "Santotrac 30", "Santotrac 50", "Mobil DTE SAE30"]
@@ -48,6 +48,7 @@ class Lubricant(Strict):
     # Where the oil begins ahead of the edge of a contact, in its half-widths; flooded where left out. ADORE-style inputs
     # have 10, which leaves the film whole and takes 5 to 19 % of the rolling resistance.
     inlet_distance: Positive | None = None
+    roller_roughness, race_roughness = SI("um"), SI("um")
 
     @property
     def in_service(self) -> Oil:
@@ -94,6 +95,7 @@ class Traction(Strict):
     coulomb: NonNegative = 0.1
     # Slip over which friction changes sign, where it would otherwise jump.
     blend_speed_m_s: Positive = 0.02
+    eyring_stress = SI("MPa")
 
     @model_validator(mode="after")
     def _consistent(self) -> Traction:

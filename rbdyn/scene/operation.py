@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import LIGHTEST_RING_KG, NonNegative, Positive, or_refuse
+from rbdyn.fields import LIGHTEST_RING_KG, SI, NonNegative, Positive, or_refuse
 
 Speed = Annotated[float, Field(ge=-1e6, le=1e6)]
 Load = Annotated[float, Field(ge=0.0, le=1e7)]
@@ -27,6 +27,11 @@ class Schedule(Strict):
     inner_speed_rpm: list[Speed] | None = None
     radial_load_N: list[Load] | None = None  # noqa: N815
     shape: Literal["linear", "smooth", "step"] = "smooth"
+
+    @property
+    def inner_speed(self) -> list[float] | None:
+        """Inner speeds [rad/s]."""
+        return self.inner_speed_rpm and [math.pi / 30.0 * speed for speed in self.inner_speed_rpm]
 
     @model_validator(mode="after")
     def _matches(self) -> Schedule:
@@ -63,6 +68,7 @@ class Operation(Strict):
     gravity_m_s2: NonNegative = 0.0
     gravity_direction_deg: float = 0.0
     schedule: Schedule | None = None
+    unbalance, gravity_direction = SI("g_mm"), SI("deg")
 
     @model_validator(mode="after")
     def _turns(self) -> Operation:
@@ -74,12 +80,22 @@ class Operation(Strict):
         return self
 
     @property
+    def speeds(self) -> tuple[float, float]:
+        """Nominal speeds of inner and outer ring [rad/s]."""
+        return self.inner_speed_rpm * math.pi / 30.0, self.outer_speed_rpm * math.pi / 30.0
+
+    @property
+    def fastest_inner_speed(self) -> float:
+        """Largest inner speed of the schedule, or the nominal one, either way round [rad/s]."""
+        speeds = (self.schedule.inner_speed_rpm if self.schedule else None) or [self.inner_speed_rpm]
+        return max(abs(speed) for speed in speeds) * math.pi / 30.0
+
+    @property
     def largest_load_N(self) -> float:  # noqa: N802
         """Largest load along x at any time, with the rotating load in line [N]."""
         scheduled = (self.schedule.radial_load_N if self.schedule else None) or [self.radial_load_N]
-        speeds = (self.schedule.inner_speed_rpm if self.schedule else None) or [self.inner_speed_rpm]
-        fastest = max(abs(speed) for speed in speeds) * math.pi / 30.0
-        return max(scheduled) + self.rotating_load_N + self.unbalance_g_mm * 1e-6 * fastest**2
+        fastest = self.fastest_inner_speed
+        return max(scheduled) + self.rotating_load_N + self.unbalance * fastest**2
 
     @property
     def turn_s(self) -> float:

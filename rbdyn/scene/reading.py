@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from copy import deepcopy
+from functools import wraps
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar, cast
 
 from rbdyn.faults import Strict, read_toml, set_key, validated
 
@@ -26,7 +27,32 @@ class SceneFile(Strict):
             set_key(data, override)
         return validated(cls._of_kind(data), data, source)
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy, of whose changes nothing is left that the original worked out of itself."""
+        copied = super().model_copy(update=update, deep=deep)
+        for name in copied.__dict__.keys() - type(self).model_fields:
+            del copied.__dict__[name]
+        return copied
+
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:
         """The class that reads a scene of this kind."""
         return cls
+
+
+S = TypeVar("S", bound=SceneFile)
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def once(make: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[S, P], T]:
+    """``make`` worked out once a scene and kept with it, which never changes; its other arguments must follow from the scene."""
+    name = f"{make.__module__}.{make.__qualname__}"
+
+    @wraps(make)
+    def kept(scene: S, *args: P.args, **more: P.kwargs) -> T:
+        if name not in scene.__dict__:
+            scene.__dict__[name] = make(scene, *args, **more)
+        return cast(T, scene.__dict__[name])
+
+    return kept

@@ -14,7 +14,7 @@ from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
 from rbdyn.dynamics.integrators.arrow_matrix import PARTS, arrow_matrix
 from rbdyn.dynamics.integrators.jacobian import Differences, OneRoller
 from rbdyn.dynamics.integrators.rosenbrock import STAGES, Workspace
-from rbdyn.dynamics.parameters.geometry import absolute_tolerance, kinematics, layout_of, shaft_speeds
+from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
 from rbdyn.scene import Scene
 
 
@@ -43,11 +43,10 @@ def increments(scene: Scene, bearing: RollerBearing) -> NDArray[np.float64]:
     """Increment of each state component: the geometric mean of its round-off and of the scale on which laws change,
     so that round-off and truncation of a difference quotient are alike.
     """
-    layout, motion = layout_of(scene), kinematics(scene)
-    length = 0.5e-3 * scene.bearing.pitch_diameter_mm
-    turning = max(abs(speed) for speed in shaft_speeds(scene))
+    layout, length = layout_of(scene), scene.geometry.pitch_radius
+    turning = max(abs(speed) for speed in scene.operation.speeds)
     speed = length * turning
-    spin = max(abs(motion.roller_spin), turning)
+    spin = max(abs(scene.geometry.motion.roller_spin), turning)
     bodies = [length, length, 1.0, speed, speed, turning, length, length, speed, speed]
     bodies += [length, length, speed, speed] if layout.support is not None else []
     clock = [scene.turn_s, 1.0, 1.0] if layout.clock is not None else []

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.parameters.geometry import absolute_tolerance
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import absolute_tolerance
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.scene import Scene
