@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,10 @@ PI_START_ERROR = 1e-4
 
 
 class Run:
-    """One replicate under way: parameters, integrator memory and where it stands."""
+    """One replicate under way: parameters, integrator memory and where it stands.
+
+    ``method``: "auto" until its first step, where the scene leaves it open.
+    """
 
     def __init__(self, scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> None:
         self.scene, self.bearing, self.replicate, self.stop = scene, bearing, replicate, stop
@@ -47,7 +49,8 @@ class Run:
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
         y = start_state(scene, bearing, np.random.default_rng(seeds))
         numerics = scene.numerics
-        explicit = explicit_method(numerics.method, numerics.rtol)
+        self.method: str = numerics.method
+        self.explicit = explicit_method(numerics.method, numerics.rtol)
         n = y.size
         first_step = 1e-3 * scales(scene).length / scales(scene).speed
         self.carry = Carry(
@@ -60,20 +63,26 @@ class Run:
             clock=np.array([0.0, first_step, PI_START_ERROR, 0.0, 0.0]),
             counts=np.zeros(4, dtype=np.int64),
             stiffness=np.zeros(3),
-            pair=pair_of(explicit),
+            pair=pair_of(self.explicit),
         )
         self.tally = Tally(np.zeros(POWERS), np.zeros(LOADS), np.zeros(LOADS), np.zeros(3))
         self.sample_step = scene.turn_s / numerics.samples_per_turn
-        self.method: str = numerics.method
-        control_by = cache(self._control_by)
-        if self.method == "auto":
-            self.method, stiffness = cheaper_method(
-                scene, bearing, explicit, control_by, self.carry, self.tally, self.sample_step
-            )
+        allotted = self.explicit if self.method == "auto" else self.method
+        self.control = self._control_by(allotted)
+        self.advance = advance_by(allotted, scene, bearing)
+
+    def choose_method(self) -> None:
+        """Settle "auto" by a trial from where the run stands, which is left as it is."""
+        if self.method != "auto":
+            return
+        self.method, stiffness = cheaper_method(
+            self.scene, self.bearing, self.explicit, self._control_by, self.carry, self.tally, self.sample_step
+        )
+        if self.method == "rosenbrock":
             # The implicit method does not see what it overcomes.
-            self.carry.stiffness[:] = stiffness if self.method == "rosenbrock" else 0.0
-        self.control = control_by(self.method)
-        self.advance = advance_by(self.method, scene, bearing)
+            self.carry.stiffness[:] = stiffness
+            self.control = self._control_by(self.method)._replace(step_budget=self.control.step_budget)
+            self.advance = advance_by(self.method, self.scene, self.bearing)
 
     def _control_by(self, method: str) -> Control:
         numerics = self.scene.numerics
@@ -92,6 +101,7 @@ class Run:
 
     def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""
+        self.choose_method()
         counts, budget = self.carry.counts, self.control.step_budget
         while True:
             self.stop.check()

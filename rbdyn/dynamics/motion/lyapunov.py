@@ -94,6 +94,7 @@ def lyapunov_exponent(
     leader = Run(scene, bearing, replicate, rtol, stop)
     follower = Run(scene, bearing, replicate, rtol, stop)
     begin = scene.numerics.warm_up_turns
+    follower.choose_method()
     leader.to(begin)
     follower.carry.clock[:] = leader.carry.clock
     # The clock of a scene that depends on time has no scale, and is not moved apart.
