@@ -25,8 +25,9 @@ NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST)]
 
 
 N = TypeVar("N", float, float | None)
+RPM = math.pi / 30.0  # [rad/s]
 TO_SI = {"mm": 1e-3, "um": 1e-6, "g": 1e-3, "g_mm": 1e-6, "kg_mm2": 1e-6, "MPa": 1e6, "mrad": 1e-3}
-TO_SI |= {"deg": math.pi / 180.0, "rpm": math.pi / 30.0}
+TO_SI |= {"deg": math.pi / 180.0, "rpm": RPM}
 
 
 class InSI(Generic[N]):

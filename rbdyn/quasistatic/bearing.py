@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rbdyn.fields import RPM
 from rbdyn.mounting.ball_rings import growth_record, row_change
 from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of, load_record, middle_record
@@ -15,7 +16,7 @@ from rbdyn.quasistatic.remarks import Rating, overloads, remarks, sentences, tip
 from rbdyn.quasistatic.result import FORMAT, BallResult, ball_records, displacement_record, stiffness_record
 from rbdyn.quasistatic.roots import other_roots
 from rbdyn.quasistatic.row.equilibrium import Solution
-from rbdyn.quasistatic.row.model import RPM, RowModel, given_of, load_of, row_of
+from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.row_report import film_record, row_record
 from rbdyn.quasistatic.solvers import SOLVERS
 from rbdyn.result import versions

@@ -207,9 +207,9 @@ def _case(scene: SingleRowScene, capacities: Capacities) -> Case:
 
 def clearance_of(drawing: BallRow) -> float:
     """Diametral clearance of a row [m], given or from its contact angle: 2 B (1 - cos alpha_0)."""
-    if drawing.radial_clearance_mm is not None:
-        return 1e-3 * drawing.radial_clearance_mm
-    return 2e-3 * drawing.groove_centre_distance_mm * (1.0 - math.cos(drawing.contact_angle))
+    if drawing.radial_clearance is not None:
+        return drawing.radial_clearance
+    return 2.0 * drawing.groove_centre_distance * (1.0 - math.cos(drawing.contact_angle))
 
 
 def worn(scene: SingleRowScene, wear: float) -> SingleRowScene:

@@ -82,7 +82,7 @@ def needed_friction(balls: Vector, ratings: Sequence[Rating]) -> Vector:
     if not isinstance(controls[0], FixedShare | FrictionShare):
         return np.zeros(len(ratings))
     share = np.array([[control[0]] for control in controls])
-    diameter = np.array([[rating.drawing.ball_diameter_mm * 1e-3] for rating in ratings])
+    diameter = np.array([[rating.drawing.ball_diameter] for rating in ratings])
     with np.errstate(divide="ignore", invalid="ignore"):
         if isinstance(controls[0], FrictionShare):
             ratio = np.array(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import NonNegative, NotVanishing, or_refuse
+from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI, or_refuse
 from rbdyn.scene.bearing import Harmonic
 
 Order = Annotated[int, Field(ge=1, le=2000)]
@@ -25,6 +27,7 @@ class RandomWaviness(Strict):
     highest_order: Order
     height_um: Annotated[float, Field(gt=0.0, le=500.0), NotVanishing]
     decay: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
+    height = SI("um")
 
 
 class BallHarmonic(Strict):
@@ -36,6 +39,7 @@ class BallHarmonic(Strict):
     phase_deg: float | None = None
     # Numbers of the balls that have it, from 1; every ball where left out.
     balls: list[Annotated[int, Field(ge=1)]] | None = None
+    amplitude, phase = SI("um"), OptionalSI("deg")
 
 
 class FormErrors(Strict):
@@ -88,6 +92,11 @@ class FormErrors(Strict):
                 f"wave; take at least {2 * highest + 1}"
             )
         return or_refuse(self, faults)
+
+    def ball_diameter_errors(self, normal: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Each ball's diameter less the nominal one [m], as given or with the spread of standard ``normal`` numbers."""
+        given, spread = self.ball_diameter_errors_um, self.ball_diameter_spread_um
+        return 1e-6 * (spread * normal if given is None else np.array(given))
 
     @property
     def highest_order(self) -> int:

@@ -34,7 +34,6 @@ class Geometry:
 
     clearance: float
     raceways: tuple[float, float]
-    pitch_radius: float
     roller_radius: float
     roller_radii: NDArray[np.float64] | None
     roller_mass: float
@@ -76,7 +75,6 @@ def geometry_of(scene: Scene) -> Geometry:
     return Geometry(
         clearance=1e-3 * scene.mounted_clearance_mm,
         raceways=raceways,
-        pitch_radius=0.5e-3 * pitch,
         roller_radius=0.5e-3 * roller,
         roller_radii=_roller_radii(scene),
         roller_mass=mass,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from copy import deepcopy
 from functools import wraps
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, Self, TypeVar, cast
+from typing import Any, ParamSpec, Self, TypeVar, cast
 
 from rbdyn.faults import Strict, read_toml, set_key, validated
 
@@ -40,19 +40,19 @@ class SceneFile(Strict):
         return cls
 
 
-S = TypeVar("S", bound=SceneFile)
 P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def once(make: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[S, P], T]:
+def once(make: Callable[P, T]) -> Callable[P, T]:
     """``make`` worked out once a scene and kept with it, which never changes; its other arguments must follow from the scene."""
     name = f"{make.__module__}.{make.__qualname__}"
 
     @wraps(make)
-    def kept(scene: S, *args: P.args, **more: P.kwargs) -> T:
-        if name not in scene.__dict__:
-            scene.__dict__[name] = make(scene, *args, **more)
-        return cast(T, scene.__dict__[name])
+    def kept(*args: P.args, **more: P.kwargs) -> T:
+        found = args[0].__dict__
+        if name not in found:
+            found[name] = make(*args, **more)
+        return cast(T, found[name])
 
     return kept

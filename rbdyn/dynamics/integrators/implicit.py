@@ -43,7 +43,7 @@ def increments(scene: Scene, bearing: RollerBearing) -> NDArray[np.float64]:
     """Increment of each state component: the geometric mean of its round-off and of the scale on which laws change,
     so that round-off and truncation of a difference quotient are alike.
     """
-    layout, length = layout_of(scene), scene.geometry.pitch_radius
+    layout, length = layout_of(scene), 0.5 * scene.bearing.pitch_diameter
     turning = max(abs(speed) for speed in scene.operation.speeds)
     speed = length * turning
     spin = max(abs(scene.geometry.motion.roller_spin), turning)

@@ -26,7 +26,7 @@ from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, NoPocke
 from rbdyn.dynamics.forces.race_form import RoundRace, largest_rise, wavy_race
 from rbdyn.dynamics.forces.races import EqualRollers, Race, unequal_rollers
 from rbdyn.dynamics.forces.ring_motion import HeldRing
-from rbdyn.dynamics.parameters.race_traction import race_traction
+from rbdyn.dynamics.parameters.race_traction import race_traction, rolling_contacts
 from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.properties.lubricants import Oil
 from rbdyn.properties.materials import equivalent_modulus
@@ -76,6 +76,7 @@ def _race(scene: Scene, oil: Oil, which: str) -> Race:
     radius, reduced, radii = geometry.raceways[place], geometry.reduced_radii[place], geometry.roller_radii
     form = _form(getattr(scene.bearing, f"{which}_waviness"))
     largest_roller = geometry.roller_radius if radii is None else float(radii.max())
+    largest_load = TRACTION_RANGE * max(scene.operation.largest_load_N, 1.0)
     # A tilt may close the ends of a contact whose middle is open.
     end_rise = 0.5 * scene.bearing.effective_length * abs(scene.bearing.tilt)
     return Race(
@@ -84,15 +85,7 @@ def _race(scene: Scene, oil: Oil, which: str) -> Race:
         form=form,
         contact=race_contact_law(scene, which),
         damping=_race_damping(scene),
-        traction=race_traction(
-            scene,
-            reduced,
-            abs(geometry.motion.entrainment),
-            oil,
-            _modulus(scene, "roller", "rings"),
-            scene.bearing.effective_length,
-            TRACTION_RANGE * max(scene.operation.largest_load_N, 1.0),
-        ),
+        traction=race_traction(scene, rolling_contacts(scene)[which], oil, largest_load),
         rolling=rolling_law(scene, oil, reduced),
     )
 

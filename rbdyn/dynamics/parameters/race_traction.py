@@ -43,27 +43,18 @@ LARGEST_PRESSURE = 4e9
 LARGEST_ERROR = 0.01
 
 
-def race_traction(
-    scene: Scene,
-    reduced_radius: float,
-    entrainment_speed: float,
-    oil: Oil,
-    equivalent_modulus: float,
-    length: float,
-    largest_load: float,
-) -> Any:
-    """Traction law of a race whose contacts have this reduced radius and length [m] and roll at this speed [m/s].
+def race_traction(scene: Scene, contact: RollingContact, oil: Oil, largest_load: float) -> Any:
+    """Traction law of a race by one of its contacts.
 
     ``oil`` is the scene's, at its temperature; a table covers loads up to ``largest_load`` [N]. The film is that of
-    pure rolling at the entrainment speed given. Raises InputError where a model needs a film and nothing rolls.
+    pure rolling. Raises InputError where a model needs a film and nothing rolls.
     """
     table = scene.traction
     if table.model not in RHEOLOGIES and table.friction == "film":
         return _load_independent(scene)
-    if not entrainment_speed > 0.0:
+    if not contact.entrainment_speed > 0.0:
         key = f"model = '{table.model}'" if table.model in RHEOLOGIES else "friction = 'mixed'"
         raise InputError([f"traction.{key}: needs a film, but the races do not roll; choose another"])
-    contact = RollingContact(reduced_radius, length, equivalent_modulus, entrainment_speed)
     law = _surface(scene, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)
     return _mixed(scene, law, contact, oil) if table.friction == "mixed" else law
 

@@ -99,7 +99,7 @@ def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method
     speed = min(scale.speed, SPEED_SHARES[method] * fastest_surface(scene))
     length = scale.length * speed / scale.speed
     slip = min(speed, typical_slip(scene, bearing))
-    roller, cage = scene.geometry.roller_radius, scene.geometry.pitch_radius
+    roller, cage = scene.geometry.roller_radius, 0.5 * scene.bearing.pitch_diameter
     rollers = np.repeat([length, length, speed, speed, slip / roller], state.rollers)
     positions, speeds, own = [length, length], [speed, speed], CAGE_SHARES[method] * speed
     bodies = [*positions, length / cage, own, own, own / cage, *positions, *speeds]

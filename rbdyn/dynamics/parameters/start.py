@@ -29,7 +29,7 @@ def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Gener
     acting = action(bearing.drive, y)
     motion = scene.geometry.rolling(acting.inner_speed, acting.outer_speed)
     pocket = scene.cage.pocket_clearance
-    offsets = generator.uniform(-0.2, 0.2, z) * pocket / scene.geometry.pitch_radius
+    offsets = generator.uniform(-0.2, 0.2, z) * pocket / (0.5 * scene.bearing.pitch_diameter)
     direction, cage_angle = generator.uniform(0.0, 2.0 * np.pi, 2)
     angles = cage_angle + 2.0 * np.pi * np.arange(z) / z + offsets
     offset = 0.1 * min(0.5 * scene.cage.guide_clearance, 0.5 * pocket)
