@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from rbdyn.fields import RPM
 from rbdyn.mounting.ball_rings import growth_record, row_change
 from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of, load_record, middle_record
@@ -64,9 +63,7 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | None = None) -> Ba
 
 def row_rating(scene: SingleRowScene, model: RowModel) -> Rating:
     """What pressure, life and remarks need of a single row."""
-    operation = scene.operation
-    speeds = operation.inner_speed_rpm, operation.outer_speed_rpm
-    return Rating(scene.bearing, model, reference_capacities(scene.bearing), speeds)
+    return Rating(scene.bearing, model, reference_capacities(scene.bearing), scene.operation.speeds)
 
 
 def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[dict[str, Any]] | None:
@@ -88,10 +85,10 @@ def _double_decker(scene: DoubleDeckerScene, start: BallResult | None) -> BallRe
         return BallResult({**head, **tail})
     rows = solution.inner, solution.outer
     rings = {"inner": ("inner_ring", "middle_ring"), "outer": ("middle_ring", "outer_ring")}
-    operation, below, above, middle = scene.operation, scene.bearing.inner, scene.bearing.outer, model.split.speed / RPM
+    operation, below, above, middle = scene.operation, scene.bearing.inner, scene.bearing.outer, model.split.speed
     ratings = (
-        Rating(below, model.inner, reference_capacities(below), (operation.inner_speed_rpm, middle)),
-        Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed_rpm)),
+        Rating(below, model.inner, reference_capacities(below), (operation.inner_speed, middle)),
+        Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed)),
     )
     layers: dict[str, Any] = {}
     notes: list[str] = []

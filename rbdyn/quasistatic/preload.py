@@ -200,8 +200,7 @@ def over_wear(scene: SingleRowScene, wears: Sequence[float], capacities: Capacit
 
 
 def _case(scene: SingleRowScene, capacities: Capacities) -> Case:
-    speeds = scene.operation.inner_speed_rpm, scene.operation.outer_speed_rpm
-    rating = Rating(scene.bearing, row_of(scene), capacities(scene.bearing), speeds)
+    rating = Rating(scene.bearing, row_of(scene), capacities(scene.bearing), scene.operation.speeds)
     return Case(rating, load_of(scene), given_of(scene))
 
 

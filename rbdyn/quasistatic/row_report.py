@@ -10,7 +10,6 @@ import numpy as np
 from rbdyn.contact import point_film
 from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
-from rbdyn.fields import RPM
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.fatigue import solution_life, turning_rings
 from rbdyn.quasistatic.remarks import Rating, needed_friction
@@ -62,9 +61,8 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
         return {}
     lubricant, drawing, model = scene.lubricant, rating.drawing, rating.model
     ball, inner, outer = (scene.material(part) for part in ("ball", *rings))
-    speeds = [speed * RPM for speed in rating.speeds]
     gamma = drawing.gamma
-    entrainment = point_film.entrainment_speed(drawing.pitch_diameter, gamma, *speeds)
+    entrainment = point_film.entrainment_speed(drawing.pitch_diameter, gamma, *rating.speeds)
     oil, found = lubricant.in_service, {}
     for race, contact, ring, side, loads in (
         ("inner", model.inner_contact, inner, gamma, solution.inner_load),
@@ -91,7 +89,7 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
 def life_record(rating: Rating, solution: Solution) -> dict[str, Any]:
     """Reference life by ISO/TS 16281; None where nothing is loaded, in hours also where nothing turns."""
     life = solution_life(solution, rating.capacities, turning_rings(*rating.speeds))
-    hours = life.hours(*(speed * RPM for speed in rating.speeds))
+    hours = life.hours(*rating.speeds)
     return {
         "L10_Mrev": life.million_turns if math.isfinite(life.million_turns) else None,
         "L10_h": hours if math.isfinite(hours) else None,

@@ -23,9 +23,9 @@ def rating_life(scene: Scene, azimuth: Array, inner_load: Array, outer_load: Arr
     ends would need a half-space solution. Rings that turn see the mean over all rollers, a ring at rest each place.
     """
     drawing = scene.bearing
-    diameter, pitch = drawing.roller_diameter, drawing.pitch_diameter
+    diameter = drawing.roller_diameter
     capacity = drawing.dynamic_capacity_N or dynamic_capacity(
-        drawing.rollers, diameter, drawing.effective_length, pitch
+        drawing.rollers, diameter, drawing.effective_length, drawing.pitch_diameter
     )
     nx, ny = np.cos(azimuth), np.sin(azimuth)
     inner, outer = (
@@ -38,7 +38,7 @@ def rating_life(scene: Scene, azimuth: Array, inner_load: Array, outer_load: Arr
         inner,
         outer,
         capacity=capacity,
-        gamma=diameter / pitch,
+        gamma=drawing.diameter_ratio,
         turning=turning,
         angle=np.mod(azimuth, 2.0 * math.pi),
         edges=drawing.roller_profile != "cylinder",

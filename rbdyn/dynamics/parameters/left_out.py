@@ -166,7 +166,7 @@ def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
 def heat_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
     """A note where a power loss [W] is more than any oil carries off: the model leaves out what it would warm."""
     drawing, oil = scene.bearing, scene.lubricant
-    heat = power_loss / (2.0 * math.pi * drawing.pitch_diameter_mm * drawing.roller_length_mm * 1e-6)
+    heat = power_loss / (2.0 * math.pi * drawing.pitch_diameter * drawing.roller_length)
     if heat <= TOO_HOT * JET_COOLED:
         return ()
     return (

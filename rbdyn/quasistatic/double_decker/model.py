@@ -62,7 +62,7 @@ def double_decker_of(scene: DoubleDeckerScene) -> DoubleDeckerModel:
     # Planes of groove centres, from the ball plane of the outer row.
     plane_0 = offset + (below.inner_groove_factor - 0.5) * diameter * math.sin(below.contact_angle)
     plane_1 = offset - back * math.sin(below.contact_angle)
-    plane_2 = (above.inner_groove_factor - 0.5) * 1e-3 * above.ball_diameter_mm * math.sin(above.contact_angle)
+    plane_2 = (above.inner_groove_factor - 0.5) * above.ball_diameter * math.sin(above.contact_angle)
     stack = Stack(
         inner=Layer(inner.row, inner.control),
         outer=Layer(outer.row, outer.control),

@@ -75,8 +75,7 @@ def single_row(scene: BallScene) -> SingleRowScene:
 
 def turning_of(scene: SingleRowScene) -> Turning:
     """Turns of the parts while the inner ring makes one against the outer; the outer ring stands where neither turns."""
-    operation, bearing = scene.operation, scene.bearing
-    inner, outer = operation.inner_speed_rpm, operation.outer_speed_rpm
+    bearing, (inner, outer) = scene.bearing, scene.operation.speeds
     against = inner - outer
     return rolling(
         bearing.ball_diameter, bearing.pitch_diameter, bearing.contact_angle, outer / against if against != 0.0 else 0.0
