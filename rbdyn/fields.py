@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, TypeVar, cast
 
 from pydantic import AfterValidator, Field
 
@@ -24,14 +24,14 @@ Positive = Annotated[float, Field(gt=0.0, le=LARGEST), NotVanishing]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST)]
 
 
-N = TypeVar("N", float, float | None)
+N = TypeVar("N")
 RPM = math.pi / 30.0  # [rad/s]
 TO_SI = {"mm": 1e-3, "um": 1e-6, "g": 1e-3, "g_mm": 1e-6, "kg_mm2": 1e-6, "MPa": 1e6, "mrad": 1e-3}
 TO_SI |= {"deg": math.pi / 180.0, "rpm": RPM}
 
 
 class InSI(Generic[N]):
-    """SI value of a key that carries its unit: ``width = SI("mm")`` is ``width_mm`` in metres."""
+    """SI value of a key that carries its unit: ``width = SI("mm")`` is ``width_mm`` in metres; None and lists as they are."""
 
     def __init__(self, unit: str) -> None:
         self.unit = unit
@@ -40,9 +40,10 @@ class InSI(Generic[N]):
         self.key = f"{name}_{self.unit}"
 
     def __get__(self, table: Any, owner: type) -> N:
-        value: Any = getattr(table, self.key)
-        converted: Any = None if value is None else value * TO_SI[self.unit]
-        return converted
+        def converted(value: Any) -> Any:
+            return [converted(v) for v in value] if isinstance(value, list) else value and value * TO_SI[self.unit]
+
+        return cast(N, converted(getattr(table, self.key)))
 
 
 SI, OptionalSI = InSI[float], InSI[float | None]

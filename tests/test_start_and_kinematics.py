@@ -6,17 +6,25 @@ import math
 
 import numpy as np
 import pytest
+from conftest import ROOT
 from numpy_twin import race_overlap
 from numpy_twin_laws import race_load, raceways, roller_errors
 from scipy.optimize import brentq
 
 from rbdyn.contact.hertz_line import LineContactOnBar
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.guide_land import InnerGuide, NoFilm, NoGuide, OuterGuide
+from rbdyn.dynamics.parameters import scales as scale_module
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.race_report import race_report
 from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.parameters.start import start_state, static_share
+from rbdyn.dynamics.run import Run
+from rbdyn.mounting import fits
+from rbdyn.scene import Scene
+from rbdyn.scene.bearing import Bearing
 
 
 def test_literature_speeds_at_the_papers_point(outer):
@@ -198,3 +206,40 @@ def test_unit_scales(outer):
     assert bearing.inner.contact.stiffness * scale.length ** (10.0 / 9.0) == pytest.approx(scale.load, rel=1e-12)
     stiffness = 10.0 / 9.0 * scale.load / scale.length
     assert scale.speed == pytest.approx(scale.length * math.sqrt(stiffness / bearing.roller_mass), rel=1e-12)
+
+
+def test_invariant_what_a_scene_fixes_is_worked_out_once(monkeypatch):
+    """Invariant: mounting and slip scale once a scene, not once a replicate; a changed copy works out its own."""
+    calls = []
+    for module, name in ((fits, "operating_clearance"), (scale_module, "slip_scale")):
+        real = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *given, name=name, real=real: [calls.append(name), real(*given)][1])
+    scene = Scene.load(ROOT / "examples" / "all_options.toml")
+    bearing = roller_bearing(scene)
+    for replicate in range(3):
+        run = Run(scene, bearing, replicate, 1e-2, Stop())
+        assert not run.carry.counts.any() and run.carry.clock[0] == 0.0, "a run that is made has not begun"
+    race_report(scene, 100.0, 100.0)
+    assert sorted(calls) == ["operating_clearance", "slip_scale"]
+    tighter = scene.bearing.model_copy(update={"radial_clearance_mm": scene.bearing.radial_clearance_mm - 0.01})
+    copied = scene.model_copy(update={"bearing": tighter})
+    assert scene.geometry.clearance - copied.geometry.clearance == pytest.approx(1e-5, rel=1e-9)
+    assert scene == Scene.load(ROOT / "examples" / "all_options.toml") != copied, (
+        "what was worked out is no part of a scene"
+    )
+
+
+def test_unit_keys_in_si():
+    """Unit: a key without its unit is its SI value."""
+    scene = Scene.load(ROOT / "examples" / "all_options.toml")
+    bearing, operation = scene.bearing, scene.operation
+    assert bearing.roller_diameter == pytest.approx(bearing.roller_diameter_mm / 1e3, rel=1e-15)
+    assert bearing.tilt_direction == math.radians(bearing.tilt_direction_deg)
+    assert bearing.outer_waviness[0].amplitude == pytest.approx(bearing.outer_waviness[0].amplitude_um / 1e6, rel=1e-15)
+    assert operation.schedule.inner_speed == pytest.approx(
+        np.array(operation.schedule.inner_speed_rpm) * math.pi / 30.0
+    )
+    assert operation.unbalance == pytest.approx(operation.unbalance_g_mm / 1e6, rel=1e-15)
+    assert (
+        Bearing(**{**bearing.model_dump(), "roller_profile": "cylinder", "crown_radius_mm": None}).crown_radius is None
+    )

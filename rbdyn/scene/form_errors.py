@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
 from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI, or_refuse
 from rbdyn.scene.bearing import Harmonic
+
+if TYPE_CHECKING:
+    from numpy import float64
+    from numpy.typing import NDArray
 
 Order = Annotated[int, Field(ge=1, le=2000)]
 # Beyond this share of the ball it is no form error but a slip of the unit.
@@ -93,8 +95,10 @@ class FormErrors(Strict):
             )
         return or_refuse(self, faults)
 
-    def ball_diameter_errors(self, normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ball_diameter_errors(self, normal: NDArray[float64]) -> NDArray[float64]:
         """Each ball's diameter less the nominal one [m], as given or with the spread of standard ``normal`` numbers."""
+        import numpy as np
+
         given, spread = self.ball_diameter_errors_um, self.ball_diameter_spread_um
         return 1e-6 * (spread * normal if given is None else np.array(given))
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import LIGHTEST_RING_KG, SI, NonNegative, Positive, or_refuse
+from rbdyn.fields import LIGHTEST_RING_KG, SI, InSI, NonNegative, Positive, or_refuse
 
 Speed = Annotated[float, Field(ge=-1e6, le=1e6)]
 Load = Annotated[float, Field(ge=0.0, le=1e7)]
@@ -27,11 +27,7 @@ class Schedule(Strict):
     inner_speed_rpm: list[Speed] | None = None
     radial_load_N: list[Load] | None = None  # noqa: N815
     shape: Literal["linear", "smooth", "step"] = "smooth"
-
-    @property
-    def inner_speed(self) -> list[float] | None:
-        """Inner speeds [rad/s]."""
-        return self.inner_speed_rpm and [math.pi / 30.0 * speed for speed in self.inner_speed_rpm]
+    inner_speed = InSI[list[float] | None]("rpm")
 
     @model_validator(mode="after")
     def _matches(self) -> Schedule:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from copy import deepcopy
-from functools import wraps
 from pathlib import Path
-from typing import Any, ParamSpec, Self, TypeVar, cast
+from typing import Any, Self, TypeVar, cast
 
 from rbdyn.faults import Strict, read_toml, set_key, validated
+
+T = TypeVar("T")
 
 
 class SceneFile(Strict):
@@ -34,25 +35,13 @@ class SceneFile(Strict):
             del copied.__dict__[name]
         return copied
 
+    def once(self, name: str, make: Callable[[], T]) -> T:
+        """What ``make`` gives, worked out once a scene and kept with it under a name: a scene never changes."""
+        if name not in self.__dict__:
+            self.__dict__[name] = make()
+        return cast(T, self.__dict__[name])
+
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:
         """The class that reads a scene of this kind."""
         return cls
-
-
-P = ParamSpec("P")
-T = TypeVar("T")
-
-
-def once(make: Callable[P, T]) -> Callable[P, T]:
-    """``make`` worked out once a scene and kept with it, which never changes; its other arguments must follow from the scene."""
-    name = f"{make.__module__}.{make.__qualname__}"
-
-    @wraps(make)
-    def kept(*args: P.args, **more: P.kwargs) -> T:
-        found = args[0].__dict__
-        if name not in found:
-            found[name] = make(*args, **more)
-        return cast(T, found[name])
-
-    return kept

@@ -14,7 +14,6 @@ from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import Layout, layout
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
-from rbdyn.scene.reading import once
 
 # Largest contact speed by which errors are measured, as a share of that of the faster race. Held at its limit of
 # stability, the explicit method leaves the whole tolerance in every contact in every step, and contacts lose it: in a
@@ -43,13 +42,11 @@ def needs_clock(scene: Scene) -> bool:
     return bool(operation.schedule or operation.rotating_load_N > 0.0 or operation.unbalance > 0.0 or turning_form)
 
 
-@once
 def layout_of(scene: Scene) -> Layout:
     """Layout of the state vector."""
-    return layout(scene.bearing.rollers, scene.support is not None, needs_clock(scene))
+    return scene.once("layout", lambda: layout(scene.bearing.rollers, scene.support is not None, needs_clock(scene)))
 
 
-@once
 def scales(scene: Scene) -> Scales:
     """Size of a race contact: the mean load share, or the centrifugal force, or the roller's weight."""
     geometry, mass = scene.geometry, scene.geometry.roller_mass
@@ -81,12 +78,6 @@ def slip_scale(bearing: RollerBearing, load: float) -> float:
     return scale
 
 
-@once
-def typical_slip(scene: Scene, bearing: RollerBearing) -> float:
-    """The slip scale of the most loaded roller (Stribeck)."""
-    return slip_scale(bearing, 5.0 * scales(scene).load)
-
-
 def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method: str = "rk45") -> NDArray[np.float64]:
     """Tolerance of each state component: ``rtol`` of the approach or contact speed that the component can make.
 
@@ -98,7 +89,7 @@ def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method
     scale, state = scales(scene), layout_of(scene)
     speed = min(scale.speed, SPEED_SHARES[method] * fastest_surface(scene))
     length = scale.length * speed / scale.speed
-    slip = min(speed, typical_slip(scene, bearing))
+    slip = min(speed, scene.once("slip_scale", lambda: slip_scale(bearing, 5.0 * scale.load)))
     roller, cage = scene.geometry.roller_radius, 0.5 * scene.bearing.pitch_diameter
     rollers = np.repeat([length, length, speed, speed, slip / roller], state.rollers)
     positions, speeds, own = [length, length], [speed, speed], CAGE_SHARES[method] * speed
