@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from rbdyn.fields import InSI
+
 Model = TypeVar("Model", bound=BaseModel)
 
 # Faults told at once, and characters of a sentence and of a name within one: a screen of them can be read.
@@ -67,7 +69,7 @@ class RunError(Exception):
 class Strict(BaseModel):
     """Base of all input tables: frozen, no unknown keys, no silent conversions, no NaN or infinity."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, ignored_types=(InSI,))
 
 
 def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:

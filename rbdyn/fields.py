@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import math
+from typing import Annotated, Any, Generic, TypeVar, cast
 
 from pydantic import AfterValidator, Field
 
@@ -21,6 +22,31 @@ LIGHTEST_RING_KG = 1e-6
 NotVanishing = AfterValidator(_not_vanishing)
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST), NotVanishing]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST)]
+
+
+N = TypeVar("N")
+RPM = math.pi / 30.0  # [rad/s]
+TO_SI = {"mm": 1e-3, "um": 1e-6, "g": 1e-3, "g_mm": 1e-6, "kg_mm2": 1e-6, "MPa": 1e6, "mrad": 1e-3}
+TO_SI |= {"deg": math.pi / 180.0, "rpm": RPM}
+
+
+class InSI(Generic[N]):
+    """SI value of a key that carries its unit: ``width = SI("mm")`` is ``width_mm`` in metres; None and lists as they are."""
+
+    def __init__(self, unit: str) -> None:
+        self.unit = unit
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.key = f"{name}_{self.unit}"
+
+    def __get__(self, table: Any, owner: type) -> N:
+        def converted(value: Any) -> Any:
+            return [converted(v) for v in value] if isinstance(value, list) else value and value * TO_SI[self.unit]
+
+        return cast(N, converted(getattr(table, self.key)))
+
+
+SI, OptionalSI = InSI[float], InSI[float | None]
 
 
 def or_refuse(table: Any, faults: list[str]) -> Any:

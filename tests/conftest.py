@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rbdyn.compiled.kernel import entry
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, derivative
 from rbdyn.dynamics.forces.race_lanes import scratch
-from rbdyn.dynamics.parameters.geometry import kinematics, layout_of, raceway_radii, roller_radii
+from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.faults import read_toml
 from rbdyn.scene import Scene
 
@@ -125,10 +125,10 @@ def state_near_contact(scene: Scene, seed: int) -> NDArray[np.float64]:
     """A seeded state in which races, pocket walls and land are partly open, partly closed, and all slide."""
     draw = np.random.default_rng(seed)
     z, parts = scene.bearing.rollers, layout_of(scene)
-    outer, _ = raceway_radii(scene)
-    motion = kinematics(scene)
+    outer, _ = scene.geometry.raceways
+    motion = scene.geometry.motion
     roller = 0.5e-3 * scene.bearing.roller_diameter_mm
-    radii = roller_radii(scene)
+    radii = scene.geometry.roller_radii
     larger = 0.0 if radii is None else radii - roller
     half_pocket = 0.5e-3 * scene.cage.pocket_clearance_mm - larger
     cage_direction, cage_size = draw.uniform(0.0, 2.0 * np.pi), draw.choice([0.3, 0.9, 1.0])

@@ -23,7 +23,6 @@ from published.common import CHEN, Check, Effort, Table, canvas, save, simulated
 from published.operating import palmgren_moments, skf_moments
 from rbdyn import Scene
 from rbdyn.contact.rolling_resistance import rolling_force
-from rbdyn.dynamics.parameters.geometry import kinematics, raceway_radii, reduced_radii, roller_mass
 from rbdyn.dynamics.parameters.model import race_contact_law, rolling_law
 
 BEARINGS = Path(__file__).parent / "catalogue_bearings.csv"
@@ -87,8 +86,8 @@ def overrides_of(name: str, speed_rpm: float, load_n: float, grade: int) -> tupl
 def contact_loads(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Loads of the rollers on the outer and the inner race [N] in static equilibrium, one roller on the load's line."""
     outer, inner = (race_contact_law(scene, which).stiffness for which in ("outer", "inner"))
-    speeds, mean = kinematics(scene), 0.5 * sum(raceway_radii(scene))
-    pull = roller_mass(scene) * speeds.cage_speed**2 * mean
+    speeds, mean = scene.geometry.motion, 0.5 * sum(scene.geometry.raceways)
+    pull = scene.geometry.roller_mass * speeds.cage_speed**2 * mean
     cosine = np.cos(2.0 * np.pi * np.arange(scene.bearing.rollers) / scene.bearing.rollers)
 
     def inner_load(room: float) -> float:
@@ -109,10 +108,10 @@ def contact_loads(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 def rolling_power(scene: Scene) -> tuple[float, float]:
     """Power of rolling resistance [W], 2 F u over the contacts that are closed, and that of rollers without load on the inner
     race, which centrifugal force rolls on the outer one."""
-    oil, speed = scene.lubricant.in_service, abs(kinematics(scene).entrainment)
+    oil, speed = scene.lubricant.in_service, abs(scene.geometry.motion.entrainment)
     total = idle = 0.0
     loads = contact_loads(scene)
-    for side, radius in zip(loads, reduced_radii(scene), strict=True):
+    for side, radius in zip(loads, scene.geometry.reduced_radii, strict=True):
         law = rolling_law(scene, oil, radius)
         power = np.array([2.0 * speed * rolling_force(law, load, speed) if load > 0.0 else 0.0 for load in side])
         total, idle = total + power.sum(), idle + power[loads[1] == 0.0].sum()
@@ -130,9 +129,9 @@ def open_contacts(scene: Scene) -> tuple[int, float]:
     loaded = room + (inner_loads.max() / race_contact_law(scene, "inner").stiffness) ** 0.9
     shift = loaded + (outer_loads.max() / stiffness) ** 0.9
     gap = (room + (outer_loads / stiffness) ** 0.9 - shift * np.cos(angle))[inner_loads == 0.0]
-    speed, oil = abs(kinematics(scene).entrainment), scene.lubricant.in_service
+    speed, oil = abs(scene.geometry.motion.entrainment), scene.lubricant.in_service
     force = 4.60 * oil.viscosity * speed * scene.bearing.effective_length_mm * 1e-3
-    return count, float((2.0 * speed * force * np.sqrt(reduced_radii(scene)[1] / gap)).sum())
+    return count, float((2.0 * speed * force * np.sqrt(scene.geometry.reduced_radii[1] / gap)).sum())
 
 
 def point(name: str, speed_rpm: float, load_n: float, grade: int) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, REJECTED
-from rbdyn.dynamics.parameters.geometry import raceway_radii, scales
+from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
@@ -166,6 +166,6 @@ def run_series(
 
 def kinematic_cage_angle(scene: Scene, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
     """Angle [rad] that an epicyclic cage turns while inner and outer ring turn from ``before`` to ``after``."""
-    outer, inner = raceway_radii(scene)
+    outer, inner = scene.geometry.raceways
     turned = after - before
     return float((turned[0] * inner + turned[1] * outer) / (inner + outer))

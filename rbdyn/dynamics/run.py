@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators.advance import advance
 from rbdyn.dynamics.integrators.method import EXPLICIT, cheaper_method, explicit_method, method_of
 from rbdyn.dynamics.integrators.records import Control, Status, carry_from, empty_tally
-from rbdyn.dynamics.parameters.geometry import absolute_tolerance, layout_of, scales, shaft_speeds
+from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of, scales
 from rbdyn.dynamics.parameters.start import start_state
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
@@ -30,7 +29,10 @@ SMALLEST_STEP_TURNS = 1e-12
 
 
 class Run:
-    """One replicate under way: parameters, integrator memory and where it stands."""
+    """One replicate under way: parameters, integrator memory and where it stands.
+
+    ``method``: "auto" until its first step, where the scene leaves it open.
+    """
 
     def __init__(self, scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> None:
         self.scene, self.bearing, self.replicate, self.stop = scene, bearing, replicate, stop
@@ -39,22 +41,27 @@ class Run:
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
         y = start_state(scene, bearing, np.random.default_rng(seeds))
         numerics = scene.numerics
-        explicit = explicit_method(numerics.method, numerics.rtol)
+        self.method: str = numerics.method
+        self.explicit = explicit_method(numerics.method, numerics.rtol)
+        allotted = self.explicit if self.method == "auto" else self.method
         first_step = 1e-3 * scales(scene).length / scales(scene).speed
-        self.carry = carry_from(y, bearing.rollers, first_step, method_of(explicit, scene, bearing))
+        self.carry = carry_from(y, bearing.rollers, first_step, method_of(allotted, scene, bearing))
         self.tally = empty_tally()
         self.sample_step = scene.turn_s / numerics.samples_per_turn
-        self.method: str = numerics.method
-        control_by = cache(self._control_by)
-        if self.method == "auto":
-            self.method, stiffness = cheaper_method(
-                scene, bearing, explicit, control_by, self.carry, self.tally, self.sample_step
-            )
-            # The implicit method does not see what it overcomes.
-            self.carry.stiffness[:] = stiffness if self.method == "rosenbrock" else 0.0
+        self.control = self._control_by(allotted)
+
+    def choose_method(self) -> None:
+        """Settle "auto" by a trial from where the run stands, which is left as it is."""
+        if self.method != "auto":
+            return
+        self.method, stiffness = cheaper_method(
+            self.scene, self.bearing, self.explicit, self._control_by, self.carry, self.tally, self.sample_step
+        )
         if self.method == "rosenbrock":
-            self.carry = self.carry._replace(method=method_of(self.method, scene, bearing))
-        self.control = control_by(self.method)
+            # The implicit method does not see what it overcomes.
+            self.carry.stiffness[:] = stiffness
+            self.carry = self.carry._replace(method=method_of(self.method, self.scene, self.bearing))
+            self.control = self._control_by(self.method)._replace(step_budget=self.control.step_budget)
 
     def _control_by(self, method: str) -> Control:
         numerics = self.scene.numerics
@@ -73,6 +80,7 @@ class Run:
 
     def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""
+        self.choose_method()
         budget, end = self.control.step_budget, turns * self.scene.turn_s
         while True:
             self.stop.check()
@@ -98,7 +106,7 @@ class Run:
         """Angles of inner and outer ring [rad] since the start."""
         clock = self.layout.clock
         if clock is None:
-            return self.carry.clock[at.NOW] * np.array(shaft_speeds(self.scene))
+            return self.carry.clock[at.NOW] * np.array(self.scene.operation.speeds)
         return self.carry.y[clock + INNER_ANGLE : clock + OUTER_ANGLE + 1].copy()
 
     def _why(self, status: Status) -> str:

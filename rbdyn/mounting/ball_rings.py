@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from rbdyn.fields import RPM
 from rbdyn.mounting.fits import mounted_rings
 from rbdyn.mounting.ring_growth import UNCHANGED, GrooveChange, groove_change, printed_growth
 from rbdyn.mounting.rings import MountedRings, Ring
 from rbdyn.scene.ball import BallScene, DoubleDeckerScene, SingleRowScene
 from rbdyn.scene.ball_bearing import BallRow
-
-RPM = math.pi / 30.0
+from rbdyn.scene.mounting import raceway_radii
 
 
 class RingPair(NamedTuple):
@@ -31,14 +31,12 @@ def mounted_of(scene: BallScene) -> MountedRings | None:
     """Shaft, rings and housing of a mounted bearing; None where the scene tells no mounting."""
     if scene.mounting is None:
         return None
-    operation = scene.operation
     return mounted_rings(
         scene.mounting,
         scene.bearing,
         scene.material("inner_ring"),
         scene.material("outer_ring"),
-        operation.inner_speed_rpm * RPM,
-        operation.outer_speed_rpm * RPM,
+        *scene.operation.speeds,
     )
 
 
@@ -47,9 +45,7 @@ def row_change(scene: SingleRowScene) -> GrooveChange:
     if not changes(scene):
         return UNCHANGED
     if printed(scene):
-        return GrooveChange(
-            _printed(scene, scene.bearing, "inner_ring", scene.operation.inner_speed_rpm * RPM), 0.0, 0.0
-        )
+        return GrooveChange(_printed(scene, scene.bearing, "inner_ring", scene.operation.inner_speed), 0.0, 0.0)
     rings = _pair(scene)
     return _between(scene, scene.bearing, rings.inner, rings.outer, rings)
 
@@ -64,14 +60,14 @@ def layer_changes(scene: DoubleDeckerScene, middle_speed: float) -> tuple[Groove
         return UNCHANGED, UNCHANGED
     bearing = scene.bearing
     if printed(scene):
-        inner = _printed(scene, bearing.inner, "inner_ring", scene.operation.inner_speed_rpm * RPM)
+        inner = _printed(scene, bearing.inner, "inner_ring", scene.operation.inner_speed)
         middle_growth = _printed(scene, bearing.outer, "middle_ring", middle_speed)
         return GrooveChange(inner, 0.0, 0.0), GrooveChange(middle_growth, 0.0, 0.0)
     rings = _pair(scene)
     still = scene.mounting is not None and not scene.mounting.rotation
     middle = Ring(
-        0.5e-3 * bearing.inner.raceway_diameters_mm[1],
-        0.5e-3 * bearing.outer.raceway_diameters_mm[0],
+        raceway_radii(bearing.inner)[1],
+        raceway_radii(bearing.outer)[0],
         scene.material("middle_ring"),
         0.5 * sum(ring.temperature_rise for ring in (rings.inner, rings.outer) if ring is not None),
         0.0 if still else middle_speed,
@@ -120,18 +116,16 @@ def _pair(scene: BallScene) -> RingPair:
             rings.outer_pressure,
             rings.element_temperature_rise,
         )
-    (below, above), operation = scene.outermost_rows, scene.operation
-    inner_race, outer_race = (0.5e-3 * diameter for diameter in scene.bearing.raceway_diameters_mm)
+    (below, above), (inner_speed, outer_speed) = scene.outermost_rows, scene.operation.speeds
+    inner_race, outer_race = raceway_radii(scene.bearing)
     inner = outer = None
     # A standing ring does not grow, and its bore or outside need not be known.
-    if operation.inner_speed_rpm != 0.0:
-        assert below.bore_mm is not None
-        speed = operation.inner_speed_rpm * RPM
-        inner = Ring(0.5e-3 * below.bore_mm, inner_race, scene.material("inner_ring"), speed=speed)
-    if operation.outer_speed_rpm != 0.0:
-        assert above.outside_diameter_mm is not None
-        speed = operation.outer_speed_rpm * RPM
-        outer = Ring(outer_race, 0.5e-3 * above.outside_diameter_mm, scene.material("outer_ring"), speed=speed)
+    if inner_speed != 0.0:
+        assert below.bore is not None
+        inner = Ring(0.5 * below.bore, inner_race, scene.material("inner_ring"), speed=inner_speed)
+    if outer_speed != 0.0:
+        assert above.outside_diameter is not None
+        outer = Ring(outer_race, 0.5 * above.outside_diameter, scene.material("outer_ring"), speed=outer_speed)
     return RingPair(inner, outer)
 
 
@@ -139,7 +133,7 @@ def _between(scene: BallScene, row: BallRow, inner: Ring | None, outer: Ring | N
     return groove_change(
         inner,
         outer,
-        1e-3 * row.ball_diameter_mm,
+        row.ball_diameter,
         row.groove_factors,
         row.contact_angle,
         ball_material=scene.material("ball"),
@@ -152,5 +146,5 @@ def _between(scene: BallScene, row: BallRow, inner: Ring | None, outer: Ring | N
 def _printed(scene: BallScene, row: BallRow, ring: str, speed: float) -> float:
     if speed == 0.0:
         return 0.0
-    assert row.bore_mm is not None
-    return printed_growth(1e-3 * row.pitch_diameter_mm, 1e-3 * row.bore_mm, scene.material(ring), speed)
+    assert row.bore is not None
+    return printed_growth(row.pitch_diameter, row.bore, scene.material(ring), speed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rbdyn.mounting.rings import MountedClearance, MountedRings, Ring, mounted_clearance
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import Bearing, Materials
-from rbdyn.scene.mounting import Mounting, Raceways, material_of
+from rbdyn.scene.mounting import Mounting, Raceways, material_of, raceway_radii
 
 
 def mounted_rings(
@@ -28,16 +28,16 @@ def mounted_rings(
     element_rise = _rise(mounting.roller_temperature_C, reference, 0.5 * (inner_rise + outer_rise))
     inner_speed, outer_speed = (inner_speed, outer_speed) if mounting.rotation else (0.0, 0.0)
 
-    shaft_bore, bore = 0.5e-3 * mounting.shaft_bore_mm, 0.5e-3 * mounting.bore_mm
-    outside, housing_outside = 0.5e-3 * mounting.outside_diameter_mm, 0.5e-3 * mounting.housing_diameter_mm
-    inner_race, outer_race = (0.5e-3 * diameter for diameter in bearing.raceway_diameters_mm)
+    shaft_bore, bore = 0.5 * mounting.shaft_bore, 0.5 * mounting.bore
+    outside, housing_outside = 0.5 * mounting.outside_diameter, 0.5 * mounting.housing_diameter
+    inner_race, outer_race = raceway_radii(bearing)
     return MountedRings(
         shaft=Ring(shaft_bore, bore, material_of(mounting.shaft_material), shaft_rise, inner_speed),
         inner_ring=Ring(bore, inner_race, inner_material, inner_rise, inner_speed),
         outer_ring=Ring(outer_race, outside, outer_material, outer_rise, outer_speed),
         housing=Ring(outside, housing_outside, material_of(mounting.housing_material), housing_rise, outer_speed),
-        inner_interference=mounting.inner_interference_um * 1e-6,
-        outer_interference=mounting.outer_interference_um * 1e-6,
+        inner_interference=mounting.inner_interference,
+        outer_interference=mounting.outer_interference,
         element_temperature_rise=element_rise,
     )
 
@@ -51,9 +51,7 @@ def operating_clearance(
     """
     material = material_of(materials.rings)
     rings = mounted_rings(mounting, bearing, material, material, inner_speed, outer_speed)
-    return mounted_clearance(
-        bearing.radial_clearance_mm * 1e-3, rings, bearing.roller_diameter_mm * 1e-3, material_of(materials.roller)
-    )
+    return mounted_clearance(bearing.radial_clearance, rings, bearing.roller_diameter, material_of(materials.roller))
 
 
 def _rise(temperature: float | None, reference: float, otherwise: float) -> float:

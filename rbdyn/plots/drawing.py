@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.dynamics.motion.orbit import largest
-from rbdyn.dynamics.parameters.geometry import raceway_radii, shaft_speeds
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
@@ -146,7 +145,7 @@ def drawing(history: History, turns: float, frames_per_turn: int, most_frames: i
         start=first * interval / scene.turn_s,
         time=history.time[kept],
         inner_angle=history.inner_angle[kept],
-        outer_angle=shaft_speeds(scene)[1] * history.time[kept],
+        outer_angle=scene.operation.speeds[1] * history.time[kept],
         cage_angle=history.cage_angle[kept],
         cage_x=1e3 * (history.cage_x - history.outer_x)[kept],
         cage_y=1e3 * (history.cage_y - history.outer_y)[kept],
@@ -165,7 +164,7 @@ def drawing(history: History, turns: float, frames_per_turn: int, most_frames: i
 def _sizes(history: History) -> dict[str, float]:
     scene = history.scene
     pitch, true_roller = 0.5 * scene.bearing.pitch_diameter_mm, 0.5 * scene.bearing.roller_diameter_mm
-    outer, inner = (1e3 * radius for radius in raceway_radii(scene))
+    outer, inner = (1e3 * radius for radius in scene.geometry.raceways)
     roller = ROLLER_SHARE * true_roller
     cage_half = CAGE_SHARE * roller
     pocket_gap = 0.5 * scene.cage.pocket_clearance_mm

@@ -23,7 +23,7 @@ from rbdyn.quasistatic.result import (
 )
 from rbdyn.quasistatic.roots import other_roots
 from rbdyn.quasistatic.row.equilibrium import Solution
-from rbdyn.quasistatic.row.model import RPM, RowModel, given_of, load_of, row_of
+from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.row_report import film_record, row_report
 from rbdyn.quasistatic.solvers import SOLVERS
 from rbdyn.result import versions
@@ -79,9 +79,7 @@ def _oil_notes(scene: BallScene) -> list[str]:
 
 def row_rating(scene: SingleRowScene, model: RowModel) -> Rating:
     """What pressure, life and remarks need of a single row."""
-    operation = scene.operation
-    speeds = operation.inner_speed_rpm, operation.outer_speed_rpm
-    return Rating(scene.bearing, model, reference_capacities(scene.bearing), speeds)
+    return Rating(scene.bearing, model, reference_capacities(scene.bearing), scene.operation.speeds)
 
 
 def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[dict[str, Any]] | None:
@@ -103,10 +101,10 @@ def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> Ba
         return nothing
     rows = solution.inner, solution.outer
     rings = {"inner": ("inner_ring", "middle_ring"), "outer": ("middle_ring", "outer_ring")}
-    operation, below, above, middle = scene.operation, scene.bearing.inner, scene.bearing.outer, model.split.speed / RPM
+    operation, below, above, middle = scene.operation, scene.bearing.inner, scene.bearing.outer, model.split.speed
     ratings = (
-        Rating(below, model.inner, reference_capacities(below), (operation.inner_speed_rpm, middle)),
-        Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed_rpm)),
+        Rating(below, model.inner, reference_capacities(below), (operation.inner_speed, middle)),
+        Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed)),
     )
     layers: dict[str, RowReport] = {}
     notes = _oil_notes(scene)

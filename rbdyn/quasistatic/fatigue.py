@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from rbdyn.life.ball_capacity import dynamic_capacity
 from rbdyn.life.balls import BallLife, Turning, lundberg_palmgren_capacities, rated_capacities, row_life
 from rbdyn.quasistatic.row.equilibrium import Solution
@@ -23,8 +21,8 @@ def capacity_of(drawing: BallRow) -> float:
 
 def reference_capacities(drawing: BallRow) -> tuple[float, float]:
     """Ball loads [N] that the inner and the outer race bear for 1e6 turns by ISO/TS 16281."""
-    gamma = drawing.ball_diameter_mm * math.cos(drawing.contact_angle) / drawing.pitch_diameter_mm
-    return rated_capacities(capacity_of(drawing), drawing.balls, gamma, drawing.contact_angle, *drawing.groove_factors)
+    angle = drawing.contact_angle
+    return rated_capacities(capacity_of(drawing), drawing.balls, drawing.gamma, angle, *drawing.groove_factors)
 
 
 def plain_capacities(drawing: BallRow) -> tuple[float, float]:
@@ -34,7 +32,7 @@ def plain_capacities(drawing: BallRow) -> tuple[float, float]:
 
 def _sizes(drawing: BallRow) -> tuple[int, float, float, float]:
     """Number of balls, their diameter and that of the pitch circle [m], contact angle [rad]."""
-    return drawing.balls, 1e-3 * drawing.ball_diameter_mm, 1e-3 * drawing.pitch_diameter_mm, drawing.contact_angle
+    return drawing.balls, drawing.ball_diameter, drawing.pitch_diameter, drawing.contact_angle
 
 
 def turning_rings(inner_speed: float, outer_speed: float) -> Turning:

@@ -200,16 +200,15 @@ def over_wear(scene: SingleRowScene, wears: Sequence[float], capacities: Capacit
 
 
 def _case(scene: SingleRowScene, capacities: Capacities) -> Case:
-    speeds = scene.operation.inner_speed_rpm, scene.operation.outer_speed_rpm
-    rating = Rating(scene.bearing, row_of(scene), capacities(scene.bearing), speeds)
+    rating = Rating(scene.bearing, row_of(scene), capacities(scene.bearing), scene.operation.speeds)
     return Case(rating, load_of(scene), given_of(scene))
 
 
 def clearance_of(drawing: BallRow) -> float:
     """Diametral clearance of a row [m], given or from its contact angle: 2 B (1 - cos alpha_0)."""
-    if drawing.radial_clearance_mm is not None:
-        return 1e-3 * drawing.radial_clearance_mm
-    return 2e-3 * drawing.groove_centre_distance_mm * (1.0 - math.cos(drawing.contact_angle))
+    if drawing.radial_clearance is not None:
+        return drawing.radial_clearance
+    return 2.0 * drawing.groove_centre_distance * (1.0 - math.cos(drawing.contact_angle))
 
 
 def worn(scene: SingleRowScene, wear: float) -> SingleRowScene:

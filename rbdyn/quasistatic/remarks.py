@@ -28,7 +28,7 @@ Vector = NDArray[np.float64]
 
 
 class Rating(NamedTuple):
-    """What pressure, life and remarks need of a row beside its loads: capacities of both races [N], speeds of both rings [rpm]."""
+    """What pressure, life and remarks need of a row beside its loads: capacities of both races [N], speeds of both rings [rad/s]."""
 
     drawing: BallRow
     model: RowModel
@@ -64,12 +64,12 @@ def overloads(balls: Vector, ratings: Sequence[Rating]) -> dict[int, str]:
     for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
         loads = balls[:, :, place]
         factor = np.array([getattr(rating.drawing, f"{race}_groove_factor") for rating in ratings])
-        groove = factor * np.array([rating.drawing.ball_diameter_mm for rating in ratings])
+        groove = factor * np.array([rating.drawing.ball_diameter for rating in ratings])
         unit = np.array([getattr(rating.model, f"{race}_contact").semi_major for rating in ratings])
-        half = 1e3 * unit * np.cbrt(loads.max(axis=1))
+        half = unit * np.cbrt(loads.max(axis=1))
         for k in np.flatnonzero(half > groove).tolist():
             ball = f"the ball at {360.0 * loads[k].argmax() / loads.shape[1]:.0f} deg would bear {loads[k].max():.4g} N"
-            why = f"over {2.0 * half[k]:.3g} mm across a groove of {groove[k]:.3g} mm radius, which no contact can; lessen the load"
+            why = f"over {2e3 * half[k]:.3g} mm across a groove of {1e3 * groove[k]:.3g} mm radius, which no contact can; lessen the load"
             found.setdefault(k, f"overloaded: {ball} on the {race} race, {why}")
     return found
 
@@ -82,7 +82,7 @@ def needed_friction(balls: Vector, ratings: Sequence[Rating]) -> Vector:
     if not isinstance(controls[0], FixedShare | FrictionShare):
         return np.zeros(len(ratings))
     share = np.array([[control[0]] for control in controls])
-    diameter = np.array([[rating.drawing.ball_diameter_mm * 1e-3] for rating in ratings])
+    diameter = np.array([[rating.drawing.ball_diameter] for rating in ratings])
     with np.errstate(divide="ignore", invalid="ignore"):
         if isinstance(controls[0], FrictionShare):
             ratio = np.array(

@@ -15,7 +15,6 @@ from rbdyn.quasistatic.fatigue import solution_life, turning_rings
 from rbdyn.quasistatic.remarks import Rating, needed_friction
 from rbdyn.quasistatic.result import RowReport, ball_records, displacement_record, stiffness_record
 from rbdyn.quasistatic.row.equilibrium import Solution
-from rbdyn.quasistatic.row.model import RPM
 from rbdyn.scene.ball import BallScene
 
 
@@ -62,9 +61,8 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
         return {}
     lubricant, drawing, model = scene.lubricant, rating.drawing, rating.model
     ball, inner, outer = (scene.material(part) for part in ("ball", *rings))
-    speeds = [speed * RPM for speed in rating.speeds]
-    gamma = drawing.ball_diameter_mm * math.cos(drawing.contact_angle) / drawing.pitch_diameter_mm
-    entrainment = point_film.entrainment_speed(1e-3 * drawing.pitch_diameter_mm, gamma, *speeds)
+    gamma = drawing.gamma
+    entrainment = point_film.entrainment_speed(drawing.pitch_diameter, gamma, *rating.speeds)
     oil, found = lubricant.in_service, {}
     for race, contact, ring, side, loads in (
         ("inner", model.inner_contact, inner, gamma, solution.inner_load),
@@ -74,14 +72,11 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
         if entrainment == 0.0 or load == 0.0:
             continue
         rolling = point_film.RollingBall(
-            contact,
-            point_film.rolling_radius(1e-3 * drawing.ball_diameter_mm, side),
-            equivalent_modulus(ball, ring),
-            entrainment,
+            contact, point_film.rolling_radius(drawing.ball_diameter, side), equivalent_modulus(ball, ring), entrainment
         )
         heat = float(point_film.thermal_factor(rolling, oil, load))
         central = float(point_film.central_film(rolling, oil, load)) * heat
-        roughness = 1e-6 * lubricant.roller_roughness_um, 1e-6 * lubricant.race_roughness_um
+        roughness = lubricant.roller_roughness, lubricant.race_roughness
         found[race] = {
             "central_film_um": 1e6 * central,
             "minimum_film_um": 1e6 * float(point_film.minimum_film(rolling, oil, load)) * heat,
@@ -94,7 +89,7 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
 def life_record(rating: Rating, solution: Solution) -> dict[str, Any]:
     """Reference life by ISO/TS 16281; None where nothing is loaded, in hours also where nothing turns."""
     life = solution_life(solution, rating.capacities, turning_rings(*rating.speeds))
-    hours = life.hours(*(speed * RPM for speed in rating.speeds))
+    hours = life.hours(*rating.speeds)
     return {
         "L10_Mrev": life.million_turns if math.isfinite(life.million_turns) else None,
         "L10_h": hours if math.isfinite(hours) else None,

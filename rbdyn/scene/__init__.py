@@ -7,6 +7,7 @@ is compiled: ``rbdyn.dynamics.parameters.model`` turns a scene into the SI param
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, cast
 
 from pydantic import model_validator
@@ -25,6 +26,7 @@ from rbdyn.scene.units import unit_notes
 
 if TYPE_CHECKING:
     from rbdyn.mounting.rings import MountedClearance
+    from rbdyn.scene.geometry import Geometry
 
 # Slices where a profile or a tilt needs them (ISO/TS 16281 asks for at least 30).
 PROFILE_SLICES = 31
@@ -144,7 +146,7 @@ class Scene(SceneFile):
         """Whether a roller that bears the whole load between tilted races touches over less than a slice."""
         bearing = self.bearing
         share = max(bearing.inner_tilt_share, 1.0 - bearing.inner_tilt_share)
-        tilt, length = abs(bearing.tilt_mrad) * 1e-3 * share, bearing.effective_length_mm * 1e-3
+        tilt, length = abs(bearing.tilt) * share, bearing.effective_length
         load = self.operation.largest_load_N
         if tilt < 1e-12 or load == 0.0:  # by then the ends move less than an atom
             return []
@@ -166,15 +168,21 @@ class Scene(SceneFile):
         mounted = self.mounted_clearance
         return self.bearing.radial_clearance_mm if mounted is None else mounted.operating * 1e3
 
-    @property
+    @cached_property
+    def geometry(self) -> Geometry:
+        """Radii, masses and speeds as mounted."""
+        from rbdyn.scene.geometry import geometry_of
+
+        return geometry_of(self)
+
+    @cached_property
     def mounted_clearance(self) -> MountedClearance | None:
         """What fits, temperatures and rotation do to the clearance; None where the scene tells no mounting."""
         if self.mounting is None:
             return None
         from rbdyn.mounting.fits import operating_clearance
 
-        speeds = (self.operation.inner_speed_rpm * math.pi / 30.0, self.operation.outer_speed_rpm * math.pi / 30.0)
-        return operating_clearance(self.mounting, self.bearing, self.materials, *speeds)
+        return operating_clearance(self.mounting, self.bearing, self.materials, *self.operation.speeds)
 
     @property
     def unit_notes(self) -> tuple[str, ...]:
@@ -202,9 +210,9 @@ class Scene(SceneFile):
     @property
     def guide_clearance_m(self) -> float | None:
         """Radial play of the cage in its land [m]; None where no land guides it."""
-        clearance = self.cage.guide_clearance_mm
+        clearance = self.cage.guide_clearance
         landless = self.cage.guidance == "roller" or self.model.guide_land == "off"
-        return None if landless or clearance is None else 0.5e-3 * clearance
+        return None if landless or clearance is None else 0.5 * clearance
 
     @property
     def turn_s(self) -> float:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self, cast
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import or_refuse
+from rbdyn.fields import SI, or_refuse
 from rbdyn.properties.materials import Material
 from rbdyn.scene.ball_bearing import BallBearing, BallRow, DoubleDecker
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
@@ -73,6 +73,7 @@ class BallOperation(Strict):
     """A spring's axial force, on top of the load."""
     preload_um: Annotated[float, Field(ge=-2000.0, le=2000.0)] | None = None
     """How far nut and spacer push the inner ring in after it touches; instead of preload_N."""
+    inner_speed, outer_speed = SI("rpm"), SI("rpm")
 
     @model_validator(mode="after")
     def _consistent(self) -> BallOperation:
@@ -109,6 +110,11 @@ class BallOperation(Strict):
         return or_refuse(self, faults)
 
     @property
+    def speeds(self) -> tuple[float, float]:
+        """Speeds of inner and outer ring [rad/s]."""
+        return self.inner_speed, self.outer_speed
+
+    @property
     def load(self) -> tuple[float, float, float]:
         """Force on the inner ring, the preload by force included [N]."""
         x, y, z = self.load_N or (self.radial_load_N or 0.0, 0.0, self.axial_load_N or 0.0)
@@ -122,13 +128,13 @@ class BallOperation(Strict):
 
     @property
     def given(self) -> tuple[float | None, ...]:
-        """Prescribed displacements x, y, z [mm] and tilts [mrad]; None where the load rules."""
+        """Prescribed displacements x, y, z [m] and tilts [rad]; None where the load rules."""
         x, y, z, tilt_x, tilt_y = self.prescribed.values
         if self.preload_um is not None:
             z = 1e-3 * self.preload_um
         if self.tilt == "fixed":
             tilt_x, tilt_y = tilt_x or 0.0, tilt_y or 0.0
-        return x, y, z, tilt_x, tilt_y
+        return tuple(None if value is None else 1e-3 * value for value in (x, y, z, tilt_x, tilt_y))
 
 
 class BallModel(Strict):

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import Positive, or_refuse
+from rbdyn.fields import SI, OptionalSI, Positive, or_refuse
 from rbdyn.scene.operation import Speed
 
 # How far a contact angle and a clearance that are both given may differ before they contradict each other.
@@ -48,6 +48,9 @@ class BallRow(Strict):
     """Bore of the inner ring; only for the growth of rotating rings."""
     outside_diameter_mm: Positive | None = None
     """Outside diameter of the outer ring; only for the growth of rotating rings."""
+
+    ball_diameter, pitch_diameter, groove_centre_distance = SI("mm"), SI("mm"), SI("mm")
+    radial_clearance, bore, outside_diameter = OptionalSI("mm"), OptionalSI("mm"), OptionalSI("mm")
 
     @model_validator(mode="after")
     def _fits(self) -> BallRow:
@@ -124,6 +127,11 @@ class BallRow(Strict):
         return math.acos(min(1.0 - self.radial_clearance_mm / (2.0 * self.groove_centre_distance_mm), 1.0))
 
     @property
+    def gamma(self) -> float:
+        """Ball over pitch diameter, in the plane of the unloaded contacts: D cos a_0/d_m."""
+        return self.ball_diameter_mm * math.cos(self.contact_angle) / self.pitch_diameter_mm
+
+    @property
     def raceway_diameters_mm(self) -> tuple[float, float]:
         """Circles on which balls touch both races at the unloaded contact angle."""
         reach = self.ball_diameter_mm * math.cos(self.contact_angle)
@@ -159,6 +167,7 @@ class MiddleRing(Strict):
     """fixed: the middle ring stays square to the outer ring; as operation.tilt where left out."""
     axial_offset_mm: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
     """Axial distance of the inner row's ball plane from the outer row's, the bearing unloaded."""
+    speed, axial_offset = OptionalSI("rpm"), SI("mm")
 
 
 class DoubleDecker(Strict):
@@ -182,6 +191,11 @@ class DoubleDecker(Strict):
             f"bearing.outer.pitch_diameter_mm = {self.outer.pitch_diameter_mm:g}: leaves no middle ring between raceways of "
             f"{below:.4g} and {above:.4g} mm; make it larger, or the inner row smaller"
         )
+
+    @property
+    def pitch_ratio(self) -> float:
+        """Pitch circle of the outer row over that of the inner one."""
+        return self.outer.pitch_diameter_mm / self.inner.pitch_diameter_mm
 
     @property
     def raceway_diameters_mm(self) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticKnownError
 
 from rbdyn.faults import Strict
-from rbdyn.fields import LIGHTEST_RING_KG, Fraction, NotVanishing, Positive, or_refuse
+from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive, or_refuse
 
 # Keys that belong to one roller profile each.
 PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "table": "profile_table_mm_um"}
@@ -25,6 +25,7 @@ class Harmonic(Strict):
     """Amplitude of the radius."""
     phase_deg: float = 0.0
     """Angle of a crest on the ring."""
+    amplitude, phase = SI("um"), SI("deg")
 
 
 class Bearing(Strict):
@@ -75,6 +76,21 @@ class Bearing(Strict):
     """Inner ring with what of the shaft moves with it, 1 to 5 kg for a main shaft of this size. A drawing gives the
     ring alone (0.04 kg in the bearing of Chen et al. 2022) and the part of the rotor's mass that this bearing carries.
     With 0.3, 1 and 3 kg that bearing has impacts of 91, 86 and 93 N and a whirl of 0.51, 0.41 and 0.55."""
+
+    roller_diameter, pitch_diameter, radial_clearance = SI("mm"), SI("mm"), SI("mm")
+    roller_length, effective_length, crown_radius = SI("mm"), SI("mm"), OptionalSI("mm")
+    tilt, tilt_direction = SI("mrad"), SI("deg")
+
+    @property
+    def diameter_ratio(self) -> float:
+        """Roller over pitch diameter."""
+        return self.roller_diameter_mm / self.pitch_diameter_mm
+
+    @property
+    def profile_table(self) -> list[tuple[float, float]] | None:
+        """Points of the profile: distance from the middle, drop [m]."""
+        points = self.profile_table_mm_um
+        return None if points is None else [(x * 1e-3, drop * 1e-6) for x, drop in points]
 
     @property
     def raceway_diameters_mm(self) -> tuple[float, float]:
@@ -210,6 +226,10 @@ class Cage(Strict):
         if value is None and given.data.get("guidance") != "roller":
             raise PydanticKnownError("missing")
         return value
+
+    guide_clearance, pocket_clearance, lip_clearance = OptionalSI("mm"), SI("mm"), OptionalSI("mm")
+    pocket_contact_length, land_width = OptionalSI("mm"), SI("mm")
+    mass, inertia, imbalance = SI("g"), OptionalSI("kg_mm2"), SI("um")
 
     @model_validator(mode="after")
     def _sensible(self) -> Cage:

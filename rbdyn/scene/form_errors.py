@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import NonNegative, NotVanishing, or_refuse
+from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI, or_refuse
 from rbdyn.scene.bearing import Harmonic
+
+if TYPE_CHECKING:
+    from numpy import float64
+    from numpy.typing import NDArray
 
 Order = Annotated[int, Field(ge=1, le=2000)]
 # Beyond this share of the ball it is no form error but a slip of the unit.
@@ -26,6 +30,7 @@ class RandomWaviness(Strict):
     """Height from peak to valley of all waves together."""
     decay: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
     """Amplitudes fall as order^-decay on the average; ground raceways: between 1 and 2."""
+    height = SI("um")
 
 
 class BallHarmonic(Strict):
@@ -39,6 +44,7 @@ class BallHarmonic(Strict):
     """Angle of a crest; drawn for each ball by errors.seed where left out."""
     balls: list[Annotated[int, Field(ge=1)]] | None = None
     """Numbers of the balls that have it, from 1; every ball where left out."""
+    amplitude, phase = SI("um"), OptionalSI("deg")
 
 
 class FormErrors(Strict):
@@ -106,6 +112,13 @@ class FormErrors(Strict):
                 f"wave; take at least {2 * highest + 1}"
             )
         return or_refuse(self, faults)
+
+    def ball_diameter_errors(self, normal: NDArray[float64]) -> NDArray[float64]:
+        """Each ball's diameter less the nominal one [m], as given or with the spread of standard ``normal`` numbers."""
+        import numpy as np
+
+        given, spread = self.ball_diameter_errors_um, self.ball_diameter_spread_um
+        return 1e-6 * (spread * normal if given is None else np.array(given))
 
     @property
     def highest_order(self) -> int:

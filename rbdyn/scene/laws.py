@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import NonNegative, NotVanishing, Positive, or_refuse
+from rbdyn.fields import SI, NonNegative, NotVanishing, Positive, or_refuse
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
 AUTO_WARM_UP_TURNS = 20.0
@@ -82,6 +82,13 @@ class Laws(Strict):
     """Drag of the rollers in the mixture of oil and air, as cylinders across a flow, or none."""
     drag_coefficient: NonNegative = 1.0
     """What multiplies the drag: 1 is a free cylinder; packed rollers shield each other (0.3 to 0.5)."""
+
+    pocket_film_floor, land_film_floor = SI("um"), SI("um")
+
+    @property
+    def race_damping_rate(self) -> float:
+        """Part of the damping engaged per approach [1/m]."""
+        return 1e6 / self.race_damping_engagement_um
 
     @model_validator(mode="after")
     def _agrees(self) -> Laws:

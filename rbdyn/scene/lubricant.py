@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import Fraction, NonNegative, NotVanishing, Positive, or_refuse
+from rbdyn.fields import SI, Fraction, NonNegative, NotVanishing, Positive, or_refuse
 from rbdyn.properties.lubricants import OILS, Oil, oil_at
 from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 
@@ -74,6 +74,7 @@ class Lubricant(Strict):
     inlet_distance: Positive | None = None
     """Where the oil begins ahead of the edge of a contact, in its half-widths; flooded where left out. ADORE-style
     inputs have 10, which leaves the film whole and takes 5 to 19 % of the rolling resistance."""
+    roller_roughness, race_roughness = SI("um"), SI("um")
 
     @model_validator(mode="after")
     def _known(self) -> Lubricant:
@@ -219,6 +220,7 @@ class Traction(Strict):
     """Friction coefficient of dry races, for model = "coulomb"."""
     blend_speed_m_s: Positive = 0.02
     """Slip over which friction changes sign, where it would otherwise jump."""
+    eyring_stress = SI("MPa")
 
     @model_validator(mode="after")
     def _consistent(self) -> Traction:

@@ -7,7 +7,7 @@ from typing import Annotated, Protocol
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import NonNegative, Positive, or_refuse
+from rbdyn.fields import SI, NonNegative, Positive, or_refuse
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
 
@@ -22,6 +22,12 @@ class Raceways(Protocol):
     @property
     def raceway_diameters_mm(self) -> tuple[float, float]:
         """Diameters of inner and outer raceway where the rolling elements touch."""
+
+
+def raceway_radii(bearing: Raceways) -> tuple[float, float]:
+    """Radii of inner and outer raceway where the rolling elements touch [m]."""
+    inner, outer = bearing.raceway_diameters_mm
+    return 0.5e-3 * inner, 0.5e-3 * outer
 
 
 class Mounting(Strict):
@@ -60,6 +66,9 @@ class Mounting(Strict):
     """Material of the housing."""
     rotation: bool = True
     """Whether rotation widens the rings."""
+
+    bore, outside_diameter, shaft_bore, housing_diameter = SI("mm"), SI("mm"), SI("mm"), SI("mm")
+    inner_interference, outer_interference = SI("um"), SI("um")
 
     @model_validator(mode="after")
     def _nests(self) -> Mounting:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import LIGHTEST_RING_KG, NonNegative, Positive, or_refuse
+from rbdyn.fields import LIGHTEST_RING_KG, SI, InSI, NonNegative, Positive, or_refuse
 
 Speed = Annotated[float, Field(ge=-1e6, le=1e6)]
 Load = Annotated[float, Field(ge=0.0, le=1e7)]
@@ -27,6 +27,7 @@ class Schedule(Strict):
     """Radial load at each time."""
     shape: Literal["linear", "smooth", "step"] = "smooth"
     """"linear" and "smooth" (half cosines) run from point to point; "step" holds each value until the next time."""
+    inner_speed = InSI[list[float] | None]("rpm")
 
     @model_validator(mode="after")
     def _matches(self) -> Schedule:
@@ -70,6 +71,7 @@ class Operation(Strict):
     """Direction of gravity, from that of the load."""
     schedule: Schedule | None = None
     """Inner speed and radial load over time, instead of constant ones."""
+    unbalance, gravity_direction = SI("g_mm"), SI("deg")
 
     @model_validator(mode="after")
     def _turns(self) -> Operation:
@@ -81,12 +83,22 @@ class Operation(Strict):
         return self
 
     @property
+    def speeds(self) -> tuple[float, float]:
+        """Nominal speeds of inner and outer ring [rad/s]."""
+        return self.inner_speed_rpm * math.pi / 30.0, self.outer_speed_rpm * math.pi / 30.0
+
+    @property
+    def fastest_inner_speed(self) -> float:
+        """Largest inner speed of the schedule, or the nominal one, either way round [rad/s]."""
+        speeds = (self.schedule.inner_speed_rpm if self.schedule else None) or [self.inner_speed_rpm]
+        return max(abs(speed) for speed in speeds) * math.pi / 30.0
+
+    @property
     def largest_load_N(self) -> float:  # noqa: N802
         """Largest load along x at any time, with the rotating load in line [N]."""
         scheduled = (self.schedule.radial_load_N if self.schedule else None) or [self.radial_load_N]
-        speeds = (self.schedule.inner_speed_rpm if self.schedule else None) or [self.inner_speed_rpm]
-        fastest = max(abs(speed) for speed in speeds) * math.pi / 30.0
-        return max(scheduled) + self.rotating_load_N + self.unbalance_g_mm * 1e-6 * fastest**2
+        fastest = self.fastest_inner_speed
+        return max(scheduled) + self.rotating_load_N + self.unbalance * fastest**2
 
     @property
     def turn_s(self) -> float:

@@ -124,9 +124,8 @@ def test_literature_nu215():
     from published.skidding import NU215, slip
 
     from rbdyn import Scene
-    from rbdyn.dynamics.parameters.geometry import raceway_radii
 
-    assert [2e3 * r for r in raceway_radii(Scene.load(NU215))] == pytest.approx([118.57, 88.5])
+    assert [2e3 * r for r in Scene.load(NU215).geometry.raceways] == pytest.approx([118.57, 88.5])
     # One traction curve, which is compiled already; the check itself takes the one that follows pressure.
     curve = ("traction.model=four_constant",)
     short = Effort(replicates=2, turns=10, discard_turns=10)

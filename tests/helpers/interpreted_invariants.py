@@ -27,8 +27,8 @@ from rbdyn.dynamics.forces.race_lanes import race_forces, scratch
 from rbdyn.dynamics.forces.races import EqualRollers, unequal_rollers
 from rbdyn.dynamics.forces.ring_motion import outer_motion
 from rbdyn.dynamics.forces.schedule import Constant
-from rbdyn.dynamics.parameters.geometry import layout_of
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import layout_of
 
 WAVINESS = "[{order=2, amplitude_um=5.0, phase_deg=10.0}, {order=13, amplitude_um=0.5, phase_deg=-30.0}]"
 SCHEDULE = (

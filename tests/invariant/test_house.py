@@ -1,6 +1,7 @@
 """The house: imports run one way, few files lie loose, files and functions stay short."""
 
 import ast
+import re
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -10,6 +11,23 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SOURCES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.py")]
 LONGEST_FILE, LONGEST_FUNCTION, MOST_AT_THE_ROOT = 360, 70, 6
+NOT_SI = re.compile(r"_(mm|mm2|um|mm_um|g|g_mm|rpm|deg|mrad|MPa|GPa)$")
+# Where a drawing's own units may be read: what speaks to people, what makes scenes of scenes, and saved records.
+EDGES = {
+    "rbdyn/scene/": "where they leave as SI",
+    "rbdyn/cli/": "speaks to people",
+    "rbdyn/plots/": "speaks to people",
+    "rbdyn/accuracy/balls/solvers.py": "makes scenes of a scene",
+    "rbdyn/accuracy/rollers/coverage.py": "makes a scene of a scene",
+    "rbdyn/accuracy/rollers/scaling.py": "makes scenes of a scene",
+    "rbdyn/accuracy/rollers/stability.py": "makes scenes of a scene",
+    "rbdyn/quasistatic/preload.py": "makes scenes of a scene",
+    "rbdyn/dynamics/simulate.py": "saves the clearance as drawn",
+    "rbdyn/dynamics/slip_map.py": "is saved by the keys that it varies",
+    "doe/dimension_chain/": "chains are in millimetres, as their drawings are",
+    "doe/study": "asks for chains",
+    "doe/report/": "shows chains",
+}
 
 
 def test_invariant_no_circle_of_imports():
@@ -42,3 +60,17 @@ def test_invariant_files_and_functions_stay_short():
                 long.append(f"{path.name}: {node.name}")
     assert not long
     assert len(list((ROOT / "rbdyn").glob("*.py"))) <= MOST_AT_THE_ROOT
+
+
+def test_invariant_units_end_at_the_scene():
+    """Invariant: beyond the scene and the edges nothing reads millimetres, micrometres, grams, rpm, degrees or MPa."""
+    found, needed = [], set()
+    for path in SOURCES:
+        name = path.relative_to(ROOT).as_posix()
+        edge = next((edge for edge in EDGES if name.startswith(edge)), None)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Attribute) and NOT_SI.search(node.attr):
+                needed.add(edge)
+                found += [f"{name}:{node.lineno} {node.attr}"] if edge is None else []
+    assert not found
+    assert needed == set(EDGES), "an edge that reads none is none"

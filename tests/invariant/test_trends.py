@@ -12,7 +12,6 @@ import pytest
 
 from rbdyn import Scene, history, simulate
 from rbdyn.dynamics.forces.state import CAGE_SPEED
-from rbdyn.dynamics.parameters.geometry import kinematics
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.start import start_state
 
@@ -95,5 +94,5 @@ def test_trend_power_loss_falls_with_guide_clearance():
 def test_trend_cage_never_outruns_rolling():
     """Trend: with an outer land that brakes, no replicate runs faster than the epicyclic cage."""
     here = result()
-    epicyclic = kinematics(Scene.load(EXAMPLE)).cage_speed * 30.0 / math.pi
+    epicyclic = Scene.load(EXAMPLE).geometry.motion.cage_speed * 30.0 / math.pi
     assert here.cage_speed_rpm.value + here.cage_speed_rpm.statistical_error < epicyclic

@@ -15,13 +15,14 @@ from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
 from rbdyn.faults import InputError
+from rbdyn.fields import RPM
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.quasistatic.double_decker import equilibrium as double_decker
 from rbdyn.quasistatic.double_decker.equilibrium import Layer, load_on_middle_ring, solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of, static_capacity
 from rbdyn.quasistatic.row.ball import ball_forces
 from rbdyn.quasistatic.row.equilibrium import solve
-from rbdyn.quasistatic.row.model import RPM, contacts, given_of, load_of
+from rbdyn.quasistatic.row.model import contacts, given_of, load_of
 from rbdyn.scene.ball_bearing import BallRow
 
 FILE = Path(__file__).parents[2] / "examples" / "double_decker.toml"

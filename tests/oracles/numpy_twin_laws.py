@@ -294,6 +294,5 @@ def roller_errors(scene):
         return nominal + 0.5e-6 * np.array(drawing.roller_diameter_errors_um)
     if drawing.roller_diameter_spread_um == 0.0:
         return np.full(drawing.rollers, nominal)
-    from rbdyn.dynamics.parameters.geometry import roller_radii
 
-    return roller_radii(scene)
+    return scene.geometry.roller_radii

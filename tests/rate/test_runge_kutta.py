@@ -16,8 +16,8 @@ from rbdyn.dynamics.integrators import dormand_prince as dp
 from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators.advance import advance, refine_peak
 from rbdyn.dynamics.integrators.method_laws import interpolate
-from rbdyn.dynamics.parameters.geometry import scales
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.run import Run
 from rbdyn.faults import RunError
 

@@ -188,7 +188,7 @@ def test_unit_defaults():
     assert operation.given == (None, None, None, 0.0, 0.0)
     assert plain.material("ball") == plain.material("inner_ring") == plain.material("outer_ring")
     assert scene(SMALL, operation={"tilt": "free"}).operation.given == (None,) * 5
-    assert scene(SMALL, operation={"axial_load_N": None, "preload_um": 4.0}).operation.given[2] == 4e-3
+    assert scene(SMALL, operation={"axial_load_N": None, "preload_um": 4.0}).operation.given[2] == pytest.approx(4e-6)
     assert scene(SMALL, operation={"preload_N": 30.0}).operation.load == (200.0, 0.0, 230.0)
 
 

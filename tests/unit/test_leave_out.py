@@ -30,8 +30,8 @@ from rbdyn.dynamics.forces.guide_land import journal_wrench
 from rbdyn.dynamics.forces.pocket import dry_walls, film_on_wall
 from rbdyn.dynamics.forces.race_form import turned_multiple
 from rbdyn.dynamics.forces.schedule import segment
-from rbdyn.dynamics.parameters.geometry import layout_of
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import Run
 

@@ -10,7 +10,6 @@ import pytest
 from rbdyn.dynamics.motion import orbit
 from rbdyn.dynamics.motion.history import History
 from rbdyn.dynamics.motion.lyapunov import lyapunov_exponent
-from rbdyn.dynamics.parameters.geometry import reduced_radii
 from rbdyn.properties.materials import equivalent_modulus
 
 TURNS, PER_TURN = 10, 512
@@ -151,7 +150,7 @@ def test_unit_contact_pressure_and_sliding(make_scene):
     load, slip = np.full((TURNS * PER_TURN, 10), 800.0), np.full((TURNS * PER_TURN, 10), -0.5)
     history = made(scene, inner_load=load, inner_slip=slip)
     modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
-    length, radius = 3.5e-3, reduced_radii(scene)[1]
+    length, radius = 3.5e-3, scene.geometry.reduced_radii[1]
     half_width = np.sqrt(8.0 * 800.0 * radius / (np.pi * length * modulus))
     pressure = orbit.contact_pressure(history, "inner")
     assert 0.5 * np.pi * half_width * pressure[0, 0] * length == pytest.approx(800.0)

@@ -20,7 +20,6 @@ from rbdyn.accuracy.rollers.scaling import (
     with_rollers,
     with_slices,
 )
-from rbdyn.dynamics.parameters.geometry import shaft_speeds
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError
@@ -41,7 +40,7 @@ def test_unit_a_larger_bearing_keeps_what_a_roller_meets(outer):
     assert larger.operation.radial_load_N / 20 == pytest.approx(outer.operation.radial_load_N / 10)
     chords = [scene.bearing.pitch_diameter_mm * np.pi / scene.bearing.rollers for scene in (outer, larger)]
     assert chords[0] == pytest.approx(chords[1])
-    speeds = [shaft_speeds(scene)[0] * scene.bearing.pitch_diameter_mm for scene in (outer, larger)]
+    speeds = [scene.operation.speeds[0] * scene.bearing.pitch_diameter for scene in (outer, larger)]
     assert speeds[1] == pytest.approx(speeds[0])
     assert roller_bearing(larger).cage.mass == pytest.approx(2.0 * roller_bearing(outer).cage.mass)
 

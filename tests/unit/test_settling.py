@@ -14,8 +14,8 @@ from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS
 from rbdyn.dynamics.forces.state import CAGE_ANGLE
 from rbdyn.dynamics.integrators.method import explicit_method
-from rbdyn.dynamics.parameters.geometry import CAGE_SHARES, absolute_tolerance, roller_radii
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import CAGE_SHARES, absolute_tolerance
 from rbdyn.dynamics.parameters.start import start_state
 from rbdyn.dynamics.recording import Recording, record
 from rbdyn.dynamics.run import Run, with_numerics
@@ -245,7 +245,7 @@ def test_unit_repeats_are_of_one_bearing(make_scene):
     """Unit: rollers drawn from a spread stay those of the scene whatever the seed of a repeat."""
     drawn = make_scene("bearing.roller_diameter_spread_um=0.5")
     fixed = with_numerics(coverage.one_bearing(drawn), seed=77)
-    assert roller_radii(fixed) == pytest.approx(roller_radii(drawn), rel=1e-12)
+    assert fixed.geometry.roller_radii == pytest.approx(drawn.geometry.roller_radii, rel=1e-12)
     plain = make_scene()
     assert coverage.one_bearing(plain) is plain
 

@@ -22,7 +22,6 @@ from rbdyn.dynamics.forces.equations import (
     SHAFT,
 )
 from rbdyn.dynamics.motion.history import history
-from rbdyn.dynamics.parameters.geometry import kinematics
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate
@@ -303,8 +302,8 @@ def record_of(speeds, scene, **changes):
         whirl=np.array([[len(speeds), speeds.sum(), (speeds**2).sum()]]),
         work=np.zeros((1, POWERS)),
         largest=np.zeros((1, LOADS)),
-        cage_angle=np.array([kinematics(scene).cage_speed]),
-        kinematic_angle=np.array([kinematics(scene).cage_speed]),
+        cage_angle=np.array([scene.geometry.motion.cage_speed]),
+        kinematic_angle=np.array([scene.geometry.motion.cage_speed]),
         energy=np.zeros(2),
         energy_scale=1.0,
         accepted_steps=1,
@@ -344,8 +343,8 @@ def test_unit_replicate_figures(outer):
         work=work,
         energy=np.array([0.0, 5.0, 0.9]),
         largest=loads,
-        cage_angle=np.full(2, 0.5 * kinematics(outer).cage_speed),
-        kinematic_angle=np.full(2, kinematics(outer).cage_speed),
+        cage_angle=np.full(2, 0.5 * outer.geometry.motion.cage_speed),
+        kinematic_angle=np.full(2, outer.geometry.motion.cage_speed),
     )
     assert (run.impact_force, run.power_loss) == (15.0, 2.0)
     assert list(run.contact_windows) == [8.0, 3.0] and list(run.impact_windows) == [10.0, 20.0]

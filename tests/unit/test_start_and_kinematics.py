@@ -6,35 +6,43 @@ import math
 
 import numpy as np
 import pytest
+from conftest import ROOT
 from numpy_twin import race_overlap
 from numpy_twin_laws import race_load, raceways, roller_errors
 from scipy.optimize import brentq
 
 from rbdyn.contact.hertz_line import LineContactOnBar
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.guide_land import InnerGuide, NoFilm, NoGuide, OuterGuide
-from rbdyn.dynamics.parameters.geometry import cage_inertia, kinematics, raceway_radii, scales
+from rbdyn.dynamics.parameters import scales as scale_module
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.race_report import race_report
+from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.parameters.start import start_state, static_share
+from rbdyn.dynamics.run import Run
+from rbdyn.mounting import fits
+from rbdyn.scene import Scene
+from rbdyn.scene.bearing import Bearing
 
 
 def test_literature_speeds_at_the_papers_point(outer):
     """Literature: raceways 34.5/52.5 mm, cage 9517 rpm, entrainment 26.2 m/s, at zero clearance (printed digits)."""
     zero = outer.model_copy(update={"bearing": outer.bearing.model_copy(update={"radial_clearance_mm": 0.0})})
-    assert raceway_radii(zero) == pytest.approx((26.25e-3, 17.25e-3), rel=1e-12)
-    motion = kinematics(zero)
+    assert zero.geometry.raceways == pytest.approx((26.25e-3, 17.25e-3), rel=1e-12)
+    motion = zero.geometry.motion
     assert motion.cage_speed * 30.0 / math.pi == pytest.approx(9517.0, abs=0.5)
     assert motion.cage_speed - motion.roller_spin == pytest.approx(5814.0, abs=0.5)
     assert motion.entrainment == pytest.approx(26.2, abs=0.05)
     # The clearance moves the raceways by a few parts in ten thousand.
-    assert kinematics(outer).cage_speed == pytest.approx(motion.cage_speed, rel=1e-3)
+    assert outer.geometry.motion.cage_speed == pytest.approx(motion.cage_speed, rel=1e-3)
 
 
 def test_invariant_rolling_without_slip(outer):
     """Invariant: at the kinematic speeds a roller slips on neither raceway of the bearing without clearance."""
     scene = outer.model_copy(update={"bearing": outer.bearing.model_copy(update={"radial_clearance_mm": 0.0})})
-    motion, (outer_radius, inner_radius) = kinematics(scene), raceway_radii(scene)
+    motion, (outer_radius, inner_radius) = scene.geometry.motion, scene.geometry.raceways
     roller = 4.5e-3
     orbit = motion.cage_speed * (outer_radius - roller)
     shaft = scene.operation.inner_speed_rpm * math.pi / 30.0
@@ -45,7 +53,7 @@ def test_invariant_rolling_without_slip(outer):
 
 def test_literature_centrifugal_force(outer):
     """Literature: 54 N on a roller of 5 mm."""
-    bearing, motion = roller_bearing(outer), kinematics(outer)
+    bearing, motion = roller_bearing(outer), outer.geometry.motion
     assert bearing.roller_mass * 21.75e-3 * motion.cage_speed**2 == pytest.approx(54.0, abs=0.5)
 
 
@@ -80,7 +88,7 @@ def equilibrium(scene, angles, orbit_speed):
 
 def test_oracle_static_share(outer):
     """Oracle and literature: ring displacement as scipy finds it; 674/387/387 N on the three loaded rollers."""
-    bearing, motion = roller_bearing(outer), kinematics(outer)
+    bearing, motion = roller_bearing(outer), outer.geometry.motion
     angles = 2.0 * np.pi * np.arange(10) / 10
     expected, loads = equilibrium(outer, angles, motion.cage_speed)
     radii = np.empty(10)
@@ -94,7 +102,7 @@ def test_oracle_static_share(outer):
 
 def test_oracle_static_share_of_an_imperfect_bearing(everything):
     """Oracle: the same with waviness, unequal rollers, a crown, a tilt and the logarithmic law."""
-    bearing, motion = roller_bearing(everything), kinematics(everything)
+    bearing, motion = roller_bearing(everything), everything.geometry.motion
     angles = 0.2 + 2.0 * np.pi * np.arange(10) / 10
     expected, loads = equilibrium(everything, angles, motion.cage_speed)
     radii = np.empty(10)
@@ -107,17 +115,17 @@ def test_literature_both_rings_turn(make_scene):
     """Literature: cage speed (w_i R_i + w_o R_o)/(R_i + R_o); zero where race surfaces run against each other."""
     scene = make_scene("bearing.radial_clearance_mm=0.0", "operation.outer_speed_rpm=9000.0")
     shaft, housing = 24000.0 * math.pi / 30.0, 9000.0 * math.pi / 30.0
-    motion, roller = kinematics(scene), 4.5e-3
+    motion, roller = scene.geometry.motion, 4.5e-3
     assert motion.cage_speed == pytest.approx((shaft * 17.25 + housing * 26.25) / 43.5, rel=1e-12)
     orbit = motion.cage_speed * 21.75e-3
     assert orbit + motion.roller_spin * roller == pytest.approx(housing * 26.25e-3, rel=1e-12)
     assert orbit - motion.roller_spin * roller == pytest.approx(shaft * 17.25e-3, rel=1e-12)
     assert (shaft - motion.cage_speed) * 17.25e-3 == pytest.approx(motion.entrainment, rel=1e-12)
     assert (housing - motion.cage_speed) * 26.25e-3 == pytest.approx(-motion.entrainment, rel=1e-12)
-    counter = kinematics(scene, shaft, -shaft * 17.25 / 26.25)
+    counter = scene.geometry.rolling(shaft, -shaft * 17.25 / 26.25)
     assert counter.cage_speed == pytest.approx(0.0, abs=1e-12 * shaft)
     assert counter.entrainment == pytest.approx(shaft * 17.25e-3, rel=1e-12)
-    together = kinematics(scene, shaft, shaft)
+    together = scene.geometry.rolling(shaft, shaft)
     assert (together.cage_speed, together.roller_spin) == pytest.approx((shaft, shaft), rel=1e-12)
     assert together.entrainment == pytest.approx(0.0, abs=1e-12 * shaft)
 
@@ -131,7 +139,7 @@ def test_unit_start_on_a_support(everything):
     shaft = 20000.0 * math.pi / 30.0
     load = 900.0 + 150.0 + 3e-6 * shaft**2
     assert y[60] == pytest.approx(load / 5e7, rel=1e-12)
-    motion = kinematics(everything, shaft, -6000.0 * math.pi / 30.0)
+    motion = everything.geometry.rolling(shaft, -6000.0 * math.pi / 30.0)
     assert y[55] == pytest.approx(motion.cage_speed, rel=1e-12)
     assert y[40:50] == pytest.approx(np.full(10, motion.roller_spin), rel=1e-12)
     assert y[56] > y[60] and np.hypot(y[50] - y[60], y[51]) == pytest.approx(7.5e-6, rel=1e-9)
@@ -184,7 +192,7 @@ def test_unit_geometry_of_guides(make_scene, outer, inner):
     assert outside.radius == pytest.approx(24.75e-3 - 75e-6) and inside.radius == pytest.approx(18.75e-3)
     assert outside.dry.play == pytest.approx(72e-6)
     # m (D^2 + d^2)/8 with 49.5 and 40.5 mm.
-    assert cage_inertia(outer) == pytest.approx(0.045 * (49.5e-3**2 + 40.5e-3**2) / 8.0, rel=1e-12)
+    assert outer.geometry.cage_inertia == pytest.approx(0.045 * (49.5e-3**2 + 40.5e-3**2) / 8.0, rel=1e-12)
     dry = roller_bearing(make_scene("model.guide_land=dry")).guide
     assert type(dry.film) is NoFilm and dry.dry.play == pytest.approx(75e-6)
     assert type(roller_bearing(make_scene("cage.guidance=roller")).guide) is NoGuide
@@ -199,3 +207,40 @@ def test_unit_scales(outer):
     assert bearing.inner.contact.stiffness * scale.length ** (10.0 / 9.0) == pytest.approx(scale.load, rel=1e-12)
     stiffness = 10.0 / 9.0 * scale.load / scale.length
     assert scale.speed == pytest.approx(scale.length * math.sqrt(stiffness / bearing.roller_mass), rel=1e-12)
+
+
+def test_invariant_what_a_scene_fixes_is_worked_out_once(monkeypatch):
+    """Invariant: mounting and slip scale once a scene, not once a replicate; a changed copy works out its own."""
+    calls = []
+    for module, name in ((fits, "operating_clearance"), (scale_module, "slip_scale")):
+        real = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *given, name=name, real=real: [calls.append(name), real(*given)][1])
+    scene = Scene.load(ROOT / "examples" / "all_options.toml")
+    bearing = roller_bearing(scene)
+    for replicate in range(3):
+        run = Run(scene, bearing, replicate, 1e-2, Stop())
+        assert not run.carry.counts.any() and run.carry.clock[0] == 0.0, "a run that is made has not begun"
+    race_report(scene, 100.0, 100.0)
+    assert sorted(calls) == ["operating_clearance", "slip_scale"]
+    tighter = scene.bearing.model_copy(update={"radial_clearance_mm": scene.bearing.radial_clearance_mm - 0.01})
+    copied = scene.model_copy(update={"bearing": tighter})
+    assert scene.geometry.clearance - copied.geometry.clearance == pytest.approx(1e-5, rel=1e-9)
+    assert scene == Scene.load(ROOT / "examples" / "all_options.toml") != copied, (
+        "what was worked out is no part of a scene"
+    )
+
+
+def test_unit_keys_in_si():
+    """Unit: a key without its unit is its SI value."""
+    scene = Scene.load(ROOT / "examples" / "all_options.toml")
+    bearing, operation = scene.bearing, scene.operation
+    assert bearing.roller_diameter == pytest.approx(bearing.roller_diameter_mm / 1e3, rel=1e-15)
+    assert bearing.tilt_direction == math.radians(bearing.tilt_direction_deg)
+    assert bearing.outer_waviness[0].amplitude == pytest.approx(bearing.outer_waviness[0].amplitude_um / 1e6, rel=1e-15)
+    assert operation.schedule.inner_speed == pytest.approx(
+        np.array(operation.schedule.inner_speed_rpm) * math.pi / 30.0
+    )
+    assert operation.unbalance == pytest.approx(operation.unbalance_g_mm / 1e6, rel=1e-15)
+    assert (
+        Bearing(**{**bearing.model_dump(), "roller_profile": "cylinder", "crown_radius_mm": None}).crown_radius is None
+    )

@@ -26,8 +26,8 @@ from rbdyn.dynamics.forces.ring_motion import HeldRing, support_energy, support_
 from rbdyn.dynamics.forces.schedule import Constant, Ramps, SmoothRamps, Steps, value_at
 from rbdyn.dynamics.forces.support import SupportedRing
 from rbdyn.dynamics.integrators.records import NOW
-from rbdyn.dynamics.parameters.geometry import layout_of
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.dynamics.run import Run
 
 TIMES, VALUES = np.array([0.0, 2.0, 3.0, 7.0]), np.array([10.0, -4.0, 6.0, 6.5])
@@ -251,7 +251,6 @@ def test_invariant_spin_up_from_rest(make_scene):
 
     from rbdyn.dynamics.forces.energy import mechanical_energy
     from rbdyn.dynamics.forces.equations import LOAD, SHAFT
-    from rbdyn.dynamics.parameters.geometry import kinematics
 
     scene = make_scene(
         *EVERYTHING,
@@ -271,7 +270,7 @@ def test_invariant_spin_up_from_rest(make_scene):
     put_in = run.tally.work[SHAFT] + run.tally.work[LOAD]
     assert abs(put_in - run.tally.work[:SHAFT].sum() - change) < 0.005 * put_in
     assert (np.diff(cage) > 0.0).all() and cage[0] > 0.0
-    rolling = kinematics(scene, 12000.0 * math.pi / 30.0, 0.0).cage_speed
+    rolling = scene.geometry.rolling(12000.0 * math.pi / 30.0, 0.0).cage_speed
     assert 0.9 * rolling < cage[-1] < 1.02 * rolling
 
 

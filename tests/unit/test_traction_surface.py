@@ -196,7 +196,9 @@ def scene(*assignments):
 def law_of(*assignments, load=2600.0, speed=26.2):
     """Law of the inner race of a scene."""
     chosen = scene(*assignments)
-    return race_traction(chosen, 3.57e-3, speed, chosen.lubricant.in_service, 226.4e9, 3.5e-3, load)
+    return race_traction(
+        chosen, films.RollingContact(3.57e-3, 3.5e-3, 226.4e9, speed), chosen.lubricant.in_service, load
+    )
 
 
 def test_unit_laws_of_a_scene():

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.quasistatic.row.control import Control
-from rbdyn.quasistatic.row.model import RPM, row_model
+from rbdyn.quasistatic.row.model import row_model
 from rbdyn.quasistatic.row.row import Row
 from rbdyn.scene.ball import BallModel, BallOperation, Prescribed
 from rbdyn.scene.ball_bearing import BallBearing
@@ -81,11 +81,10 @@ def posed(case: Case, ball: Material | None = None, rings: Material | None = Non
         ball,
         rings,
         rings,
-        operation.inner_speed_rpm * RPM,
-        operation.outer_speed_rpm * RPM,
+        *operation.speeds,
     )
-    given = [math.nan if value is None else 1e-3 * value for value in operation.given]
-    return Problem(built.row, built.control, np.array([*operation.load, *operation.moment]), np.array(given))
+    load, given = np.array([*operation.load, *operation.moment]), np.array(operation.given, float)
+    return Problem(built.row, built.control, load, given)
 
 
 def _case(draw: np.random.Generator, number: int, model: dict[str, Any]) -> Case:

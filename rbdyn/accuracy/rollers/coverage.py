@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
-from rbdyn.dynamics.parameters.geometry import roller_radii
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import FIGURES
@@ -95,7 +94,7 @@ def study(scene: Scene, progress: Callable[[int, int], None] | None = None, repe
 
 def one_bearing(scene: Scene) -> Scene:
     """The scene with the rollers that its seed draws: another seed would be another bearing, not a repeat."""
-    radii = roller_radii(scene)
+    radii = scene.geometry.roller_radii
     if radii is None:
         return scene
     errors_um = (1e6 * radii - 500.0 * scene.bearing.roller_diameter_mm) / 0.5

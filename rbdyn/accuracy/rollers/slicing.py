@@ -113,7 +113,7 @@ def slice_rows(
 def load_errors(scene: Scene, counts: Sequence[int]) -> dict[int, float]:
     """Largest relative error of the load over approaches, azimuths and both races, per number of slices."""
     largest = 2.0 * max(scene.operation.largest_load_N, 1.0)
-    directions = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)] if scene.bearing.tilt_mrad else [(1.0, 0.0)]
+    directions = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)] if scene.bearing.tilt else [(1.0, 0.0)]
     errors = dict.fromkeys(counts, 0.0)
     for race in ("outer", "inner"):
         fine, laws = (contact_law(scene, race, FINE), {count: contact_law(scene, race, count) for count in counts})

@@ -17,8 +17,8 @@ from rbdyn.accuracy.report import Table
 from rbdyn.accuracy.rollers.methods import DOP853, OURS, Method
 from rbdyn.accuracy.rollers.stretch import Stretch
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.parameters.geometry import absolute_tolerance, layout_of
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
 from rbdyn.dynamics.run import Run
 from rbdyn.faults import InputError
 from rbdyn.scene import Scene

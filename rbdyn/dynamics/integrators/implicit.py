@@ -15,7 +15,7 @@ from rbdyn.dynamics.forces.state import PARTS
 from rbdyn.dynamics.integrators.arrow_matrix import arrow_matrix
 from rbdyn.dynamics.integrators.jacobian import Differences, OneRoller
 from rbdyn.dynamics.integrators.rosenbrock import STAGES, Rodas
-from rbdyn.dynamics.parameters.geometry import absolute_tolerance, kinematics, layout_of, shaft_speeds
+from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
 from rbdyn.scene import Scene
 
 
@@ -43,11 +43,10 @@ def increments(scene: Scene, bearing: RollerBearing) -> NDArray[np.float64]:
     """Increment of each state component: the geometric mean of its round-off and of the scale on which laws change,
     so that round-off and truncation of a difference quotient are alike.
     """
-    layout, motion = layout_of(scene), kinematics(scene)
-    length = 0.5e-3 * scene.bearing.pitch_diameter_mm
-    turning = max(abs(speed) for speed in shaft_speeds(scene))
+    layout, length = layout_of(scene), 0.5 * scene.bearing.pitch_diameter
+    turning = max(abs(speed) for speed in scene.operation.speeds)
     sizes = {"m": length, "rad": 1.0, "m/s": length * turning, "rad/s": turning, "s": scene.turn_s}
-    spin = max(abs(motion.roller_spin), turning)
+    spin = max(abs(scene.geometry.motion.roller_spin), turning)
     size = layout.each(lambda part: spin if (part.body, part.unit) == ("roller", "rad/s") else sizes[part.unit])
     scale = np.minimum(absolute_tolerance(scene, bearing, 1.0, "rosenbrock"), size)
     return np.sqrt(np.finfo(float).eps * size * scale)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.observe import OBSERVED, observe
-from rbdyn.dynamics.parameters.geometry import layout_of
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.dynamics.run import Run
 from rbdyn.scene import Scene
 

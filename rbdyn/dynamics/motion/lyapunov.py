@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.records import DERIVATIVES
-from rbdyn.dynamics.parameters.geometry import absolute_tolerance
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import absolute_tolerance
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.records.record import Record, derived, keyed, unsaid
@@ -74,6 +74,7 @@ def lyapunov_exponent(
     leader = Run(scene, bearing, replicate, rtol, stop)
     follower = Run(scene, bearing, replicate, rtol, stop)
     begin = scene.numerics.warm_up_turns
+    follower.choose_method()
     leader.to(begin)
     follower.carry.clock[:] = leader.carry.clock
     # The clock of a scene that depends on time has no scale, and is not moved apart.

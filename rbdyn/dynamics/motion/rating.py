@@ -23,22 +23,22 @@ def rating_life(scene: Scene, azimuth: Array, inner_load: Array, outer_load: Arr
     ends would need a half-space solution. Rings that turn see the mean over all rollers, a ring at rest each place.
     """
     drawing = scene.bearing
-    diameter, pitch = drawing.roller_diameter_mm * 1e-3, drawing.pitch_diameter_mm * 1e-3
+    diameter = drawing.roller_diameter
     capacity = drawing.dynamic_capacity_N or dynamic_capacity(
-        drawing.rollers, diameter, drawing.effective_length_mm * 1e-3, pitch
+        drawing.rollers, diameter, drawing.effective_length, drawing.pitch_diameter
     )
     nx, ny = np.cos(azimuth), np.sin(azimuth)
     inner, outer = (
         slice_loads(race_contact_law(scene, race), scene.slices, 0.5 * diameter, loads, nx, ny)
         for race, loads in (("inner", inner_load), ("outer", outer_load))
     )
-    inner_turns, outer_turns = scene.operation.inner_speed_rpm != 0.0, scene.operation.outer_speed_rpm != 0.0
+    inner_turns, outer_turns = (speed != 0.0 for speed in scene.operation.speeds)
     turning: Turning = "inner" if not outer_turns else "both" if inner_turns else "outer"
     return reference_life(
         inner,
         outer,
         capacity=capacity,
-        gamma=diameter / pitch,
+        gamma=drawing.diameter_ratio,
         turning=turning,
         angle=np.mod(azimuth, 2.0 * math.pi),
         edges=drawing.roller_profile != "cylinder",

@@ -10,7 +10,6 @@ import numpy as np
 
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.dynamics.forces.drag import AIR_DENSITY
-from rbdyn.dynamics.parameters.geometry import cage_rim_diameter, kinematics, reduced_radii
 from rbdyn.life.minimum_load import minimum_loads
 from rbdyn.life.rollers import dynamic_capacity, static_capacity
 from rbdyn.properties.materials import equivalent_modulus
@@ -79,15 +78,15 @@ def spin_windage(scene: Scene) -> float:
     off the land over the width of its lands. The mixture has the density X rho_oil + (1 - X) rho_air and the viscosity
     of the oil.
     """
-    drawing, cage, motion = scene.bearing, scene.cage, kinematics(scene)
+    drawing, cage, motion = scene.bearing, scene.cage, scene.geometry.motion
     oil, share = scene.lubricant.in_service, scene.lubricant.oil_fraction
     mixture = share * oil.density + (1.0 - share) * AIR_DENSITY, oil.viscosity
     spin, turning = abs(motion.roller_spin - motion.cage_speed), abs(motion.cage_speed)
-    radius, length = 0.5e-3 * drawing.roller_diameter_mm, drawing.roller_length_mm * 1e-3
+    radius, length = scene.geometry.roller_radius, drawing.roller_length
     roller = disc_moment(*mixture, spin, radius) + cylinder_moment(*mixture, spin, radius, length)
-    rim, land = 0.5e-3 * cage_rim_diameter(scene), 0.5e-3 * scene.land_diameter_mm
+    rim, land = scene.geometry.rim_radius, scene.geometry.land_radius
     faces = disc_moment(*mixture, turning, max(rim, land)) - disc_moment(*mixture, turning, min(rim, land))
-    off_land = cylinder_moment(*mixture, turning, rim, cage.lands * cage.land_width_mm * 1e-3)
+    off_land = cylinder_moment(*mixture, turning, rim, cage.lands * cage.land_width)
     return drawing.rollers * roller * spin + (faces + off_land) * turning
 
 
@@ -97,18 +96,17 @@ def open_inner_films(scene: Scene) -> float:
     2 u times 4.601 eta u l sqrt(R/h) each, with the gap h = c - (c + d) cos psi of a ring that has come down by the
     radial clearance c and the approach d of the most loaded roller (Stribeck: 5 F/Z), averaged over the circle.
     """
-    clearance = 0.5e-3 * scene.mounted_clearance_mm
+    clearance = 0.5 * scene.geometry.clearance
     if clearance <= 0.0:
         return 0.0
-    drawing, count = scene.bearing, scene.bearing.rollers
-    length = drawing.effective_length_mm * 1e-3
+    count, length = scene.bearing.rollers, scene.bearing.effective_length
     modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
     load = 5.0 * scene.operation.largest_load_N / count
     approach = 2.0 * (load / palmgren(modulus, length).stiffness) ** 0.9
     angle = (np.arange(2000) + 0.5) * math.pi / 2000
     gap = clearance - (clearance + approach) * np.cos(angle)
-    speed, oil = kinematics(scene).entrainment, scene.lubricant.in_service
-    each = 2.0 * 4.601 * oil.viscosity * speed**2 * length * np.sqrt(reduced_radii(scene)[1] / gap[gap > 0.0])
+    speed, oil = scene.geometry.motion.entrainment, scene.lubricant.in_service
+    each = 2.0 * 4.601 * oil.viscosity * speed**2 * length * np.sqrt(scene.geometry.reduced_radii[1] / gap[gap > 0.0])
     return count * float(each.sum()) / angle.size
 
 
@@ -134,13 +132,13 @@ LEFT_OUT = (
         "skew of rollers",
         "axial sliding in the races and forces on the cage off its middle plane",
         "none: it asks for motion out of the plane; tilted rings cause it",
-        matters=lambda scene: scene.bearing.tilt_mrad != 0.0,
+        matters=lambda scene: scene.bearing.tilt != 0.0,
     ),
     LeftOut(
         "contact of roller ends and flanges",
         "friction at the flanges, which holds rollers against skew",
         "none: it asks for motion along the axis; tilted rings load the flanges",
-        matters=lambda scene: scene.bearing.tilt_mrad != 0.0,
+        matters=lambda scene: scene.bearing.tilt != 0.0,
     ),
     LeftOut(
         "elastic deformation of the cage ring",
@@ -190,7 +188,7 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
 def heat_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
     """A note where a power loss [W] is more than any oil carries off: the model leaves out what it would warm."""
     drawing, oil = scene.bearing, scene.lubricant
-    heat = power_loss / (2.0 * math.pi * drawing.pitch_diameter_mm * drawing.roller_length_mm * 1e-6)
+    heat = power_loss / (2.0 * math.pi * drawing.pitch_diameter * drawing.roller_length)
     if heat <= TOO_HOT * JET_COOLED:
         return ()
     return (

@@ -26,17 +26,8 @@ from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, NoPocke
 from rbdyn.dynamics.forces.race_form import RoundRace, largest_rise, wavy_race
 from rbdyn.dynamics.forces.races import EqualRollers, Race, unequal_rollers
 from rbdyn.dynamics.forces.ring_motion import HeldRing
-from rbdyn.dynamics.parameters.geometry import (
-    cage_inertia,
-    kinematics,
-    layout_of,
-    raceway_radii,
-    reduced_radii,
-    roller_mass,
-    roller_radii,
-    shaft_speeds,
-)
-from rbdyn.dynamics.parameters.race_traction import race_traction
+from rbdyn.dynamics.parameters.race_traction import race_traction, rolling_contacts
+from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.properties.lubricants import Oil
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
@@ -52,16 +43,15 @@ TRACTION_RANGE = 4.0
 
 def roller_bearing(scene: Scene) -> RollerBearing:
     """Parameters of the equations of motion."""
-    drawing = scene.bearing
-    diameter, mass = drawing.roller_diameter_mm * 1e-3, roller_mass(scene)
+    drawing, geometry = scene.bearing, scene.geometry
+    mass, radii = geometry.roller_mass, geometry.roller_radii
     angles = 2.0 * np.pi * np.arange(drawing.rollers) / drawing.rollers
     oil = scene.lubricant.in_service
-    radii = roller_radii(scene)
     return RollerBearing(
         rollers=drawing.rollers,
-        sizes=EqualRollers(0.5 * diameter) if radii is None else unequal_rollers(radii),
+        sizes=EqualRollers(geometry.roller_radius) if radii is None else unequal_rollers(radii),
         roller_mass=mass,
-        roller_inertia=mass * diameter**2 / 8.0,
+        roller_inertia=mass * drawing.roller_diameter**2 / 8.0,
         outer=_race(scene, oil, "outer"),
         inner=_race(scene, oil, "inner"),
         pocket=_pocket(scene, oil),
@@ -82,28 +72,20 @@ def _modulus(scene: Scene, first: str, second: str) -> float:
 
 
 def _race(scene: Scene, oil: Oil, which: str) -> Race:
-    place = ("outer", "inner").index(which)
-    radius, reduced = raceway_radii(scene)[place], reduced_radii(scene)[place]
+    place, geometry = ("outer", "inner").index(which), scene.geometry
+    radius, reduced, radii = geometry.raceways[place], geometry.reduced_radii[place], geometry.roller_radii
     form = _form(getattr(scene.bearing, f"{which}_waviness"))
-    radii, tilt = roller_radii(scene), abs(scene.bearing.tilt_mrad) * 1e-3
-    largest_roller = 0.5e-3 * scene.bearing.roller_diameter_mm if radii is None else float(radii.max())
+    largest_roller = geometry.roller_radius if radii is None else float(radii.max())
+    largest_load = TRACTION_RANGE * max(scene.operation.largest_load_N, 1.0)
     # A tilt may close the ends of a contact whose middle is open.
-    end_rise = 0.5e-3 * scene.bearing.effective_length_mm * tilt
+    end_rise = 0.5 * scene.bearing.effective_length * abs(scene.bearing.tilt)
     return Race(
         radius=radius,
         reach=radius + largest_roller + largest_rise(form) + end_rise,
         form=form,
         contact=race_contact_law(scene, which),
         damping=_race_damping(scene),
-        traction=race_traction(
-            scene,
-            reduced,
-            abs(kinematics(scene).entrainment),
-            oil,
-            _modulus(scene, "roller", "rings"),
-            scene.bearing.effective_length_mm * 1e-3,
-            TRACTION_RANGE * max(scene.operation.largest_load_N, 1.0),
-        ),
+        traction=race_traction(scene, rolling_contacts(scene)[which], oil, largest_load),
         rolling=rolling_law(scene, oil, reduced),
     )
 
@@ -113,22 +95,21 @@ def _form(harmonics: list[Harmonic]) -> Any:
         return RoundRace()
     return wavy_race(
         np.array([harmonic.order for harmonic in harmonics]),
-        np.array([harmonic.amplitude_um * 1e-6 for harmonic in harmonics]),
-        np.radians([harmonic.phase_deg for harmonic in harmonics]),
+        np.array([harmonic.amplitude for harmonic in harmonics]),
+        np.array([harmonic.phase for harmonic in harmonics]),
     )
 
 
 def race_contact_law(scene: Scene, which: str) -> Any:
     """Load law of a roller on the "outer" or the "inner" race."""
-    length = scene.bearing.effective_length_mm * 1e-3
+    length, gamma = scene.bearing.effective_length, scene.bearing.diameter_ratio
     modulus = _modulus(scene, "roller", "rings")
-    gamma = scene.bearing.roller_diameter_mm / scene.bearing.pitch_diameter_mm
     law = scene.model.line_contact
     whole: Any = palmgren(modulus, length)
     if law == "iso16281":
         whole = iso_16281(modulus, length)
     elif law == "houpert":
-        whole = houpert(modulus, length, reduced_radii(scene)[("outer", "inner").index(which)])
+        whole = houpert(modulus, length, scene.geometry.reduced_radii[("outer", "inner").index(which)])
     elif law == "dowson_higginson":
         whole = dowson_higginson(modulus, length, gamma if which == "outer" else -gamma)
     if scene.slices == 1:
@@ -140,8 +121,8 @@ def race_contact_law(scene: Scene, which: str) -> Any:
         whole,
         roller_relief(scene, scene.slices),
         slice_centres(scene.slices, length),
-        scene.bearing.tilt_mrad * 1e-3 * share,
-        math.radians(scene.bearing.tilt_direction_deg),
+        scene.bearing.tilt * share,
+        scene.bearing.tilt_direction,
     )
 
 
@@ -149,25 +130,24 @@ def roller_relief(scene: Scene, slices: int) -> NDArray[np.float64]:
     """Profile drop of the roller at its slice centres [m]."""
     from rbdyn.contact import profile
 
-    drawing = scene.bearing
-    length = drawing.effective_length_mm * 1e-3
+    drawing, length = scene.bearing, scene.bearing.effective_length
     position = profile.slice_centres(slices, length)
-    if drawing.crown_radius_mm is not None:
-        return profile.crowned_relief(position, drawing.crown_radius_mm * 1e-3)
+    if drawing.crown_radius is not None:
+        return profile.crowned_relief(position, drawing.crown_radius)
     if drawing.lundberg_load_N is not None:
         return profile.lundberg_relief(position, length, drawing.lundberg_load_N, _modulus(scene, "roller", "rings"))
-    if drawing.profile_table_mm_um is not None:
-        return profile.table_relief(position, [(x * 1e-3, drop * 1e-6) for x, drop in drawing.profile_table_mm_um])
+    if drawing.profile_table is not None:
+        return profile.table_relief(position, drawing.profile_table)
     if drawing.roller_profile == "logarithmic":
-        return profile.logarithmic_relief(position, drawing.roller_diameter_mm * 1e-3, length)
+        return profile.logarithmic_relief(position, drawing.roller_diameter, length)
     return np.zeros(slices)
 
 
 def _race_damping(scene: Scene) -> NoDamping | ViscousDamping | HuntCrossleyDamping:
     laws = scene.model
     if laws.race_damping == "viscous":
-        scale = 2.0 * laws.race_damping_ratio * math.sqrt(roller_mass(scene))
-        return ViscousDamping(scale, 1e6 / laws.race_damping_engagement_um)
+        scale = 2.0 * laws.race_damping_ratio * math.sqrt(scene.geometry.roller_mass)
+        return ViscousDamping(scale, laws.race_damping_rate)
     if laws.race_damping == "hunt_crossley":
         return HuntCrossleyDamping(laws.race_damping_alpha_s_m)
     return NoDamping()
@@ -186,9 +166,9 @@ def rolling_law(scene: Scene, oil: Oil, reduced_radius: float) -> Any:
     if scene.model.rolling_resistance == "off":
         return NoRollingResistance()
     # The entrainment speed varies little: the heating of the inlet is that at the kinematic speed.
-    entrainment = abs(kinematics(scene).entrainment)
+    entrainment = abs(scene.geometry.motion.entrainment)
     heating = aihara_thermal_factor(oil.viscosity_slope, oil.conductivity, entrainment)
-    modulus, length = _modulus(scene, "roller", "rings"), scene.bearing.effective_length_mm * 1e-3
+    modulus, length = _modulus(scene, "roller", "rings"), scene.bearing.effective_length
     reduction = heating * scene.model.rolling_resistance_factor
     flooded = biboulet_houpert(oil.viscosity, modulus, reduced_radius, length, reduction)
     distance = scene.lubricant.inlet_distance
@@ -201,46 +181,42 @@ def _pocket(scene: Scene, oil: Oil) -> Any:
     laws, cage = scene.model, scene.cage
     if laws.pocket == "off":
         return NoPocket()
-    touching = cage.pocket_contact_length_mm or scene.bearing.effective_length_mm
-    plain = palmgren(_modulus(scene, "roller", "cage"), touching * 1e-3)
+    touching = cage.pocket_contact_length or scene.bearing.effective_length
+    plain = palmgren(_modulus(scene, "roller", "cage"), touching)
     bar = laws.pocket_bar_stiffness_N_m
     contact = plain if bar == "rigid" else LineContactOnBar(plain.stiffness, float(bar))
     damping, friction = _hunt_crossley(laws.alpha("pocket")), _friction(scene, laws.pocket_friction)
-    clearance = 0.5e-3 * cage.pocket_clearance_mm
-    radius = 0.5e-3 * scene.bearing.roller_diameter_mm
+    clearance, radius = 0.5 * cage.pocket_clearance, scene.geometry.roller_radius
     pocket: Any = Pocket(clearance, radius, contact, damping, friction)
     if laws.pocket_film:
         from rbdyn.contact.pocket_film import pocket_film
 
-        floor = laws.pocket_film_floor_um * 1e-6
-        covered = cage.pocket_contact_length_mm or scene.bearing.roller_length_mm
-        film = pocket_film(oil.viscosity, radius, covered * 1e-3, floor, laws.pocket_fill)
+        floor = laws.pocket_film_floor
+        covered = cage.pocket_contact_length or scene.bearing.roller_length
+        film = pocket_film(oil.viscosity, radius, covered, floor, laws.pocket_fill)
         walls = Pocket(clearance - floor, radius, contact, damping, friction)
         pocket = LubricatedPocket(walls, film, clearance, radius)
-    if cage.lip_clearance_mm is None:
+    if cage.lip_clearance is None:
         return pocket
-    outer, inner = raceway_radii(scene)
-    play = 0.5e-3 * cage.lip_clearance_mm
-    return LippedPocket(pocket, 0.5 * (outer + inner), play, radius, contact, damping, friction)
+    outer, inner = scene.geometry.raceways
+    return LippedPocket(pocket, 0.5 * (outer + inner), 0.5 * cage.lip_clearance, radius, contact, damping, friction)
 
 
 def _guide(scene: Scene, oil: Oil) -> NoGuide | OuterGuide | InnerGuide:
     laws, cage, clearance = scene.model, scene.cage, scene.guide_clearance_m
     if clearance is None:
         return NoGuide()
-    land = 0.5e-3 * scene.land_diameter_mm
+    land = scene.geometry.land_radius
     journal = land - clearance if cage.guidance == "outer" else land
     film: Any = NoFilm()
     play = clearance
     if laws.guide_land == "film":
-        floor = laws.land_film_floor_um * 1e-6
+        floor = laws.land_film_floor
         play -= floor
-        film = short_journal_film(
-            oil.viscosity, journal, cage.land_width_mm * 1e-3, cage.lands, clearance, floor, laws.land_fill
-        )
+        film = short_journal_film(oil.viscosity, journal, cage.land_width, cage.lands, clearance, floor, laws.land_fill)
     dry = DryContact(
         play,
-        palmgren(_modulus(scene, "cage", "rings"), cage.lands * cage.land_width_mm * 1e-3),
+        palmgren(_modulus(scene, "cage", "rings"), cage.lands * cage.land_width),
         _hunt_crossley(laws.alpha("land")),
         _friction(scene, laws.land_friction),
     )
@@ -252,19 +228,15 @@ def _drag(scene: Scene, oil: Oil) -> Any:
     if laws.drag == "off" or laws.drag_coefficient == 0.0:
         return NoDrag()
     return cylinder_drag(
-        oil.density,
-        scene.lubricant.oil_fraction,
-        laws.drag_coefficient,
-        drawing.roller_diameter_mm * 1e-3,
-        drawing.roller_length_mm * 1e-3,
+        oil.density, scene.lubricant.oil_fraction, laws.drag_coefficient, drawing.roller_diameter, drawing.roller_length
     )
 
 
 def _cage(scene: Scene) -> BalancedCage | UnbalancedCage:
-    mass, inertia = scene.cage.mass_g * 1e-3, cage_inertia(scene)
-    if scene.cage.imbalance_um == 0.0:
-        return BalancedCage(mass, inertia)
-    return UnbalancedCage(mass, inertia, scene.cage.imbalance_um * 1e-6)
+    cage, inertia = scene.cage, scene.geometry.cage_inertia
+    if cage.imbalance == 0.0:
+        return BalancedCage(cage.mass, inertia)
+    return UnbalancedCage(cage.mass, inertia, cage.imbalance)
 
 
 def _outer_ring(scene: Scene) -> HeldRing | SupportedRing:
@@ -277,13 +249,13 @@ def _outer_ring(scene: Scene) -> HeldRing | SupportedRing:
 
 
 def _gravity(scene: Scene) -> NoGravity | Gravity:
-    size, direction = scene.operation.gravity_m_s2, math.radians(scene.operation.gravity_direction_deg)
+    size, direction = scene.operation.gravity_m_s2, scene.operation.gravity_direction
     return Gravity(size * math.cos(direction), size * math.sin(direction)) if size > 0.0 else NoGravity()
 
 
 def _drive(scene: Scene) -> SteadyDrive | TwoSpeedDrive | ClockedDrive:
     operation, clock = scene.operation, layout_of(scene).clock
-    inner, outer = shaft_speeds(scene)
+    inner, outer = operation.speeds
     load = float(operation.radial_load_N)
     if clock is None:
         return SteadyDrive(inner, load) if outer == 0.0 else TwoSpeedDrive(inner, outer, load)
@@ -291,15 +263,15 @@ def _drive(scene: Scene) -> SteadyDrive | TwoSpeedDrive | ClockedDrive:
 
     return ClockedDrive(
         clock,
-        _schedule(scene, "inner_speed_rpm", inner, math.pi / 30.0),
+        _schedule(scene, "inner_speed", inner),
         outer,
-        _schedule(scene, "radial_load_N", load, 1.0),
+        _schedule(scene, "radial_load_N", load),
         float(operation.rotating_load_N),
-        operation.unbalance_g_mm * 1e-6,
+        operation.unbalance,
     )
 
 
-def _schedule(scene: Scene, key: str, otherwise: float, unit: float) -> Any:
+def _schedule(scene: Scene, key: str, otherwise: float) -> Any:
     from rbdyn.dynamics.forces.schedule import Constant, Ramps, SmoothRamps, Steps
 
     schedule = scene.operation.schedule
@@ -307,4 +279,4 @@ def _schedule(scene: Scene, key: str, otherwise: float, unit: float) -> Any:
     if schedule is None or values is None:
         return Constant(otherwise)
     kinds: dict[str, Any] = {"step": Steps, "linear": Ramps, "smooth": SmoothRamps}
-    return kinds[schedule.shape](np.array(schedule.time_s, float), unit * np.array(values, float))
+    return kinds[schedule.shape](np.array(schedule.time_s, float), np.array(values, float))

@@ -67,8 +67,7 @@ def _most_loaded_slice(scene: Scene, race: str, load: float) -> float:
     """Load [N] of the slice that bears most of ``load`` [N] on a race, where the tilt is largest."""
     from rbdyn.dynamics.forces.slice_loads import slice_loads
 
-    direction = math.radians(scene.bearing.tilt_direction_deg)
+    direction = scene.bearing.tilt_direction
     nx, ny = np.array([math.cos(direction)]), np.array([math.sin(direction)])
-    roller = 0.5e-3 * scene.bearing.roller_diameter_mm
     law = race_contact_law(scene, race)
-    return float(slice_loads(law, scene.slices, roller, np.array([load]), nx, ny).max())
+    return float(slice_loads(law, scene.slices, scene.geometry.roller_radius, np.array([load]), nx, ny).max())

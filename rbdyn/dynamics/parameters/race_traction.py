@@ -24,7 +24,6 @@ from rbdyn.contact.traction import (
     four_constants,
     traction_surface,
 )
-from rbdyn.dynamics.parameters.geometry import kinematics, reduced_radii
 from rbdyn.faults import InputError
 from rbdyn.properties.lubricants import Oil
 from rbdyn.properties.materials import equivalent_modulus
@@ -44,27 +43,18 @@ LARGEST_PRESSURE = 4e9
 LARGEST_ERROR = 0.01
 
 
-def race_traction(
-    scene: Scene,
-    reduced_radius: float,
-    entrainment_speed: float,
-    oil: Oil,
-    equivalent_modulus: float,
-    length: float,
-    largest_load: float,
-) -> Any:
-    """Traction law of a race whose contacts have this reduced radius and length [m] and roll at this speed [m/s].
+def race_traction(scene: Scene, contact: RollingContact, oil: Oil, largest_load: float) -> Any:
+    """Traction law of a race by one of its contacts.
 
     ``oil`` is the scene's, at its temperature; a table covers loads up to ``largest_load`` [N]. The film is that of
-    pure rolling at the entrainment speed given. Raises InputError where a model needs a film and nothing rolls.
+    pure rolling. Raises InputError where a model needs a film and nothing rolls.
     """
     table = scene.traction
     if table.model not in RHEOLOGIES and table.friction == "film":
         return _load_independent(scene)
-    if not entrainment_speed > 0.0:
+    if not contact.entrainment_speed > 0.0:
         key = f"model = '{table.model}'" if table.model in RHEOLOGIES else "friction = 'mixed'"
         raise InputError([f"traction.{key}: needs a film, but the races do not roll; choose another"])
-    contact = RollingContact(reduced_radius, length, equivalent_modulus, entrainment_speed)
     law = _surface(scene, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)
     return _mixed(scene, law, contact, oil) if table.friction == "mixed" else law
 
@@ -72,10 +62,10 @@ def race_traction(
 def rolling_contacts(scene: Scene) -> dict[str, RollingContact]:
     """The "outer" and "inner" contact of a whole roller, rolling at the nominal speed."""
     modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
-    length, speed = scene.bearing.effective_length_mm * 1e-3, abs(kinematics(scene).entrainment)
+    length, speed = scene.bearing.effective_length, abs(scene.geometry.motion.entrainment)
     return {
         race: RollingContact(radius, length, modulus, speed)
-        for race, radius in zip(("outer", "inner"), reduced_radii(scene), strict=True)
+        for race, radius in zip(("outer", "inner"), scene.geometry.reduced_radii, strict=True)
     }
 
 
@@ -156,7 +146,7 @@ def _rheology(scene: Scene, oil: Oil) -> Rheology:
         name = table.rheology_oil or scene.lubricant.oil
         return thermal_newtonian(name, scene.lubricant.temperature_C, oil.conductivity, table.largest_shear_ratio)
     if table.model == "eyring":
-        stress = table.eyring_stress_MPa * 1e6
+        stress = table.eyring_stress
         return Eyring(oil.viscosity, oil.pressure_coefficient, stress, table.largest_shear_ratio)
     return LimitingShear(oil.viscosity, oil.pressure_coefficient, table.limiting_shear_ratio)
 
@@ -180,4 +170,4 @@ def _mixed(scene: Scene, fluid: Any, contact: RollingContact, oil: Oil) -> Mixed
 
 def _lambda(scene: Scene, film: Any) -> Any:
     lubricant = scene.lubricant
-    return lambda_ratio(film, lubricant.roller_roughness_um * 1e-6, lubricant.race_roughness_um * 1e-6)
+    return lambda_ratio(film, lubricant.roller_roughness, lubricant.race_roughness)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rbdyn.dynamics.forces.drive import action
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_X, CAGE_Y, RING_X
-from rbdyn.dynamics.parameters.geometry import kinematics, layout_of
+from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.dynamics.parameters.static_load import static_share
 from rbdyn.scene import Scene
 
@@ -27,14 +27,13 @@ def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Gener
     state = layout_of(scene)
     y = np.zeros(state.size)
     acting = action(bearing.drive, y)
-    motion = kinematics(scene, acting.inner_speed, acting.outer_speed)
-    pitch_radius = 0.5e-3 * scene.bearing.pitch_diameter_mm
-    pocket = 1e-3 * scene.cage.pocket_clearance_mm
-    offsets = generator.uniform(-0.2, 0.2, z) * pocket / pitch_radius
+    motion = scene.geometry.rolling(acting.inner_speed, acting.outer_speed)
+    pocket = scene.cage.pocket_clearance
+    offsets = generator.uniform(-0.2, 0.2, z) * pocket / (0.5 * scene.bearing.pitch_diameter)
     direction, cage_angle = generator.uniform(0.0, 2.0 * np.pi, 2)
     angles = cage_angle + 2.0 * np.pi * np.arange(z) / z + offsets
-    guide = scene.cage.guide_clearance_mm
-    offset = 0.1 * (0.5 * pocket if guide is None else min(0.5e-3 * guide, 0.5 * pocket))
+    guide = scene.cage.guide_clearance
+    offset = 0.1 * (0.5 * pocket if guide is None else min(0.5 * guide, 0.5 * pocket))
     radii = np.empty(z)
     ring_x = static_share(bearing, angles, motion.cage_speed, acting.load_x, radii)
     cosine, sine = np.cos(angles), np.sin(angles)

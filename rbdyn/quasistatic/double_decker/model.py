@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.contact.hertz_point import PointContact
+from rbdyn.fields import RPM
 from rbdyn.life import ball_capacity
 from rbdyn.mounting.ball_rings import layer_changes
 from rbdyn.mounting.ring_growth import GrooveChange
@@ -22,7 +23,7 @@ from rbdyn.quasistatic.double_decker.speed_split import (
     oil_share,
 )
 from rbdyn.quasistatic.result import displacement_record
-from rbdyn.quasistatic.row.model import RPM, RowModel, contacts, row_model
+from rbdyn.quasistatic.row.model import RowModel, contacts, row_model
 from rbdyn.scene.ball import DoubleDeckerScene
 from rbdyn.scene.ball_bearing import BallRow
 
@@ -46,7 +47,7 @@ def double_decker_of(scene: DoubleDeckerScene) -> DoubleDeckerModel:
     """Both rows of a scene, its rings grown as far as the scene asks for."""
     below, above, middle = scene.bearing.inner, scene.bearing.outer, scene.bearing.middle
     ball, ring = scene.material("ball"), scene.material("middle_ring")
-    inner_speed, outer_speed = scene.operation.inner_speed_rpm * RPM, scene.operation.outer_speed_rpm * RPM
+    inner_speed, outer_speed = scene.operation.speeds
     split = middle_speed(scene)
     changes = layer_changes(scene, split.speed)
     inner = row_model(
@@ -55,17 +56,17 @@ def double_decker_of(scene: DoubleDeckerScene) -> DoubleDeckerModel:
     outer = row_model(
         above, scene.model, ball, ring, scene.material("outer_ring"), split.speed, outer_speed, changes[1]
     )
-    diameter = 1e-3 * below.ball_diameter_mm
+    diameter = below.ball_diameter
     back = (below.outer_groove_factor - 0.5) * diameter
-    offset = 1e-3 * middle.axial_offset_mm
+    offset = middle.axial_offset
     # Planes of groove centres, from the ball plane of the outer row.
     plane_0 = offset + (below.inner_groove_factor - 0.5) * diameter * math.sin(below.contact_angle)
     plane_1 = offset - back * math.sin(below.contact_angle)
-    plane_2 = (above.inner_groove_factor - 0.5) * 1e-3 * above.ball_diameter_mm * math.sin(above.contact_angle)
+    plane_2 = (above.inner_groove_factor - 0.5) * above.ball_diameter * math.sin(above.contact_angle)
     stack = Stack(
         inner=Layer(inner.row, inner.control),
         outer=Layer(outer.row, outer.control),
-        outer_lever=0.5e-3 * below.pitch_diameter_mm - back * math.cos(below.contact_angle),
+        outer_lever=0.5 * below.pitch_diameter - back * math.cos(below.contact_angle),
         outer_groove_radius=below.outer_groove_factor * diameter,
         arm_0=plane_0 - plane_2,
         arm_1=plane_1 - plane_2,
@@ -78,15 +79,13 @@ def double_decker_of(scene: DoubleDeckerScene) -> DoubleDeckerModel:
 
 def middle_speed(scene: DoubleDeckerScene) -> SpeedSplit:
     """Speed of the middle ring: as given, of oil alone (Hu et al., eq 13), or from the torques of oil and load."""
-    below, above, middle = scene.bearing.inner, scene.bearing.outer, scene.bearing.middle
-    inner_speed, outer_speed = scene.operation.inner_speed_rpm * RPM, scene.operation.outer_speed_rpm * RPM
+    middle, (inner_speed, outer_speed) = scene.bearing.middle, scene.operation.speeds
     whole = inner_speed - outer_speed
-    if middle.speed_rpm is not None:
-        speed = middle.speed_rpm * RPM
-        share = (speed - outer_speed) / whole if whole != 0.0 else math.nan
-        return SpeedSplit(speed, share, math.nan, "given")
+    if middle.speed is not None:
+        share = (middle.speed - outer_speed) / whole if whole != 0.0 else math.nan
+        return SpeedSplit(middle.speed, share, math.nan, "given")
     if middle.speed_split == "oil":
-        share = oil_share(below.pitch_diameter_mm, above.pitch_diameter_mm)
+        share = oil_share(1.0, scene.bearing.pitch_ratio)
         status: Status = "shared" if whole != 0.0 else "no relative speed"
         return SpeedSplit(outer_speed + share * whole, share, math.nan, status)
     return balanced_split(*layer_frictions(scene), inner_speed, outer_speed)
@@ -107,10 +106,10 @@ def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFrict
             math.hypot(x, y),
             axial,
             row.contact_angle,
-            1e-3 * row.pitch_diameter_mm,
+            row.pitch_diameter,
             static_capacity(row, contacts(row, *materials)),
         )
-        frictions.append(LayerFriction(1e-3 * row.pitch_diameter_mm, viscosity, torque, factor))
+        frictions.append(LayerFriction(row.pitch_diameter, viscosity, torque, factor))
     return frictions[0], frictions[1]
 
 

@@ -20,7 +20,6 @@ from rbdyn.scene.ball_bearing import BallRow
 INNER_SHARE = {"outer": 0.0, "inner": 1.0, "half": 0.5}
 # Keeps a quotient finite where nothing turns.
 VANISHING = 1e-200
-RPM = math.pi / 30.0
 
 
 class RowModel(NamedTuple):
@@ -34,8 +33,7 @@ class RowModel(NamedTuple):
 
 def contacts(drawing: BallRow, ball: Material, inner: Material, outer: Material) -> tuple[PointContact, PointContact]:
     """Hertz contacts of a ball with the inner and the outer race."""
-    diameter = 1e-3 * drawing.ball_diameter_mm
-    gamma = drawing.ball_diameter_mm * math.cos(drawing.contact_angle) / drawing.pitch_diameter_mm
+    diameter, gamma = drawing.ball_diameter, drawing.gamma
     return (
         ball_on_race(diameter, drawing.inner_groove_factor, gamma, equivalent_modulus(ball, inner)),
         ball_on_race(diameter, drawing.outer_groove_factor, -gamma, equivalent_modulus(ball, outer)),
@@ -44,8 +42,7 @@ def contacts(drawing: BallRow, ball: Material, inner: Material, outer: Material)
 
 def cage_speed(drawing: BallRow, inner_speed: float, outer_speed: float) -> float:
     """Common cage speed at the unloaded contact angle [rad/s], the rings at speeds [rad/s]."""
-    gamma = drawing.ball_diameter_mm * math.cos(drawing.contact_angle) / drawing.pitch_diameter_mm
-    return 0.5 * (inner_speed * (1.0 - gamma) + outer_speed * (1.0 + gamma))
+    return 0.5 * (inner_speed * (1.0 - drawing.gamma) + outer_speed * (1.0 + drawing.gamma))
 
 
 def row_model(
@@ -64,8 +61,8 @@ def row_model(
     """
     z = drawing.balls
     azimuth = 2.0 * math.pi * np.arange(z) / z
-    diameter, pitch = 1e-3 * drawing.ball_diameter_mm, 1e-3 * drawing.pitch_diameter_mm
-    angle, between = drawing.contact_angle, 1e-3 * drawing.groove_centre_distance_mm
+    diameter, pitch = drawing.ball_diameter, drawing.pitch_diameter
+    angle, between = drawing.contact_angle, drawing.groove_centre_distance
     to_inner, to_outer = contacts(drawing, ball, inner, outer)
     mass = ball.density * math.pi * diameter**3 / 6.0
     cage = cage_speed(drawing, inner_speed, outer_speed)
@@ -117,15 +114,13 @@ def control_of(
 
 def row_of(scene: SingleRowScene) -> RowModel:
     """The row of a single-row scene, its rings grown as far as the scene asks for."""
-    operation = scene.operation
     return row_model(
         scene.bearing,
         scene.model,
         scene.material("ball"),
         scene.material("inner_ring"),
         scene.material("outer_ring"),
-        operation.inner_speed_rpm * RPM,
-        operation.outer_speed_rpm * RPM,
+        *scene.operation.speeds,
         row_change(scene),
     )
 
@@ -137,4 +132,4 @@ def load_of(scene: BallScene) -> NDArray[np.float64]:
 
 def given_of(scene: BallScene) -> NDArray[np.float64]:
     """Prescribed displacements [m, rad], NaN where the load rules."""
-    return np.array([math.nan if value is None else 1e-3 * value for value in scene.operation.given])
+    return np.array(scene.operation.given, float)

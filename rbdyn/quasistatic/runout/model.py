@@ -75,14 +75,10 @@ def single_row(scene: BallScene) -> SingleRowScene:
 
 def turning_of(scene: SingleRowScene) -> Turning:
     """Turns of the parts while the inner ring makes one against the outer; the outer ring stands where neither turns."""
-    operation, bearing = scene.operation, scene.bearing
-    inner, outer = operation.inner_speed_rpm, operation.outer_speed_rpm
+    bearing, (inner, outer) = scene.bearing, scene.operation.speeds
     against = inner - outer
     return rolling(
-        1e-3 * bearing.ball_diameter_mm,
-        1e-3 * bearing.pitch_diameter_mm,
-        bearing.contact_angle,
-        outer / against if against != 0.0 else 0.0,
+        bearing.ball_diameter, bearing.pitch_diameter, bearing.contact_angle, outer / against if against != 0.0 else 0.0
     )
 
 
@@ -96,22 +92,19 @@ def errors_of(errors: FormErrors, balls: int) -> RaceErrors:
         key.replace("side_", ""): _form(getattr(errors, key), getattr(errors, f"{key}_random"), draw)
         for key, draw in zip(GROOVES, streams, strict=False)
     }
-    given, spread = errors.ball_diameter_errors_um, errors.ball_diameter_spread_um
-    larger = np.array(given) if given is not None else spread * streams[6].standard_normal(balls)
+    larger = errors.ball_diameter_errors(streams[6].standard_normal(balls))
     sphericity = [PERFECT] * balls
     for harmonic in errors.ball_sphericity:
         drawn = streams[7].uniform(0.0, 2.0 * math.pi, balls)
         for ball in range(balls) if harmonic.balls is None else [number - 1 for number in harmonic.balls]:
-            phase = drawn[ball] if harmonic.phase_deg is None else math.radians(harmonic.phase_deg)
-            wave = waviness((harmonic.order, 1e-6 * harmonic.amplitude_um, phase))
+            phase = drawn[ball] if harmonic.phase is None else harmonic.phase
+            wave = waviness((harmonic.order, harmonic.amplitude, phase))
             sphericity[ball] = sphericity[ball].plus(wave)
-    return RaceErrors(1e-6 * larger, tuple(sphericity), **forms)
+    return RaceErrors(larger, tuple(sphericity), **forms)
 
 
 def _form(given: list[Harmonic], drawn: RandomWaviness | None, draw: np.random.Generator) -> Waviness:
-    form = waviness(*((wave.order, 1e-6 * wave.amplitude_um, math.radians(wave.phase_deg)) for wave in given))
+    form = waviness(*((wave.order, wave.amplitude, wave.phase) for wave in given))
     if drawn is None:
         return form
-    return form.plus(
-        random_waviness(drawn.lowest_order, drawn.highest_order, 1e-6 * drawn.height_um, drawn.decay, draw)
-    )
+    return form.plus(random_waviness(drawn.lowest_order, drawn.highest_order, drawn.height, drawn.decay, draw))

@@ -54,7 +54,10 @@ def row_columns(balls: Vector, ratings: Sequence[Rating]) -> Columns:
     millions = lives(inner_load, outer_load, ratings)
     speed = np.array([abs(rating.speeds[0] - rating.speeds[1]) for rating in ratings])
     with np.errstate(divide="ignore"):
-        return columns | {"L10_Mrev": millions, "L10_h": np.where(speed > 0.0, 1e6 * millions / (60.0 * speed), np.inf)}
+        return columns | {
+            "L10_Mrev": millions,
+            "L10_h": np.where(speed > 0.0, 1e6 * millions * 2.0 * math.pi / (3600.0 * speed), np.inf),
+        }
 
 
 def lives(inner_load: Vector, outer_load: Vector, ratings: Sequence[Rating]) -> Vector:

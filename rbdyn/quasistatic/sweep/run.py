@@ -190,8 +190,7 @@ def _packed(
             now = [values[place] for place in drawing]
             if now != drawn:
                 capacities, drawn = reference_capacities(point.bearing), now
-            speeds = point.operation.inner_speed_rpm, point.operation.outer_speed_rpm
-            rating = Rating(point.bearing, made, capacities, speeds)
+            rating = Rating(point.bearing, made, capacities, point.operation.speeds)
         now = [values[place] for place in loading]
         if now != loaded:
             load, given, loaded = load_of(point), given_of(point), now
