@@ -21,6 +21,7 @@ EDGES = {
     "rbdyn/accuracy/rollers/coverage.py": "makes a scene of a scene",
     "rbdyn/accuracy/rollers/scaling.py": "makes scenes of a scene",
     "rbdyn/accuracy/rollers/stability.py": "makes scenes of a scene",
+    "rbdyn/quasistatic/result.py": "is the saved record",
     "rbdyn/quasistatic/preload.py": "makes scenes of a scene",
     "rbdyn/dynamics/simulate.py": "saves the clearance as drawn",
     "rbdyn/dynamics/slip_map.py": "is saved by the keys that it varies",

@@ -253,7 +253,7 @@ def deep_groove():
 
 def test_literature_minimum_loads_of_a_nu_215():
     """Literature: at 5000 rpm 3.0, 6.0 and 6.2 kN by three rules; the fourth, with k_r = 0.15 of a table, gives 1.5 kN."""
-    found = minimum_loads(0.1035, 5000.0, 150e3, 156e3)
+    found = minimum_loads(0.1035, 5000.0 * math.pi / 30.0, 150e3, 156e3)
     assert [found[rule] for rule in ("SKF, 0.02 C", "Timken, 0.04 C", "NTN, 0.04 C0")] == pytest.approx(
         [3000, 6000, 6240]
     )

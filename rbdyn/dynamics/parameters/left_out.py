@@ -168,11 +168,13 @@ def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
 def light_load_notes(scene: Scene) -> tuple[str, ...]:
     """A note where even the largest load is below what a maker asks for, with every maker's rule."""
     drawing, operation = scene.bearing, scene.operation
-    diameter, pitch = drawing.roller_diameter_mm * 1e-3, drawing.pitch_diameter_mm * 1e-3
-    sizes = drawing.rollers, diameter, drawing.effective_length_mm * 1e-3, pitch
+    sizes = drawing.rollers, drawing.roller_diameter, drawing.effective_length, drawing.pitch_diameter
     capacity = drawing.dynamic_capacity_N or dynamic_capacity(*sizes)
-    speed = operation.inner_speed_rpm - operation.outer_speed_rpm
-    rules, load = minimum_loads(pitch, speed, capacity, static_capacity(*sizes)), operation.largest_load_N
+    inner, outer = operation.speeds
+    rules, load = (
+        minimum_loads(drawing.pitch_diameter, inner - outer, capacity, static_capacity(*sizes)),
+        operation.largest_load_N,
+    )
     missed = sum(load < least for least in rules.values())
     if not missed:
         return ()
