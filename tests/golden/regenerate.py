@@ -66,7 +66,7 @@ def equilibrium(name: str) -> list[float]:
     """Displacement, loads, angles and stiffness of an example of balls."""
     import rbdyn
 
-    record = rbdyn.equilibrium(rbdyn.BallScene.load(EXAMPLES / f"{name}.toml")).record
+    record = rbdyn.equilibrium(rbdyn.BallScene.load(EXAMPLES / f"{name}.toml")).as_dict()
     parts = [record, *(record[row] for row in ("inner", "outer") if "balls" in record.get(row, ()))]
     return list(numbers([[part.get(key) for key in ("displacement_mm", "stiffness", "balls")] for part in parts]))
 

@@ -303,7 +303,7 @@ def test_unit_pictures(grid, tmp_path, drawn):
     assert names[4:] == ["loads.png", "angles.png", "section.png"]
     assert drawn.keys() == set(names)
     for picture, figure in (("loads.png", "inner_load_N"), ("angles.png", "inner_angle_deg")):
-        assert not lacking(drawn[picture], [ball[figure] for ball in one.record["balls"]])
+        assert not lacking(drawn[picture], [ball[figure] for ball in one.as_dict()["balls"]])
 
 
 def test_unit_labels_carry_units():

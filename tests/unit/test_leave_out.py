@@ -197,7 +197,7 @@ def test_unit_compiled_code_grows_with_the_laws(outer, conservative):
         bearing = roller_bearing(scene)
         run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
         run.to(0.0)
-        sizes.append(instructions(bearing, run.carry.pair))
+        sizes.append(instructions(bearing, run.carry.method))
     assert 1000 < sizes[0] < 0.9 * sizes[1]
 
 

@@ -15,7 +15,7 @@ from rbdyn.dynamics.slip_map import Point
 from rbdyn.records.record import Record, derived, keyed, spread, unsaid
 from rbdyn.result import Quantity
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 SINGLE, DOUBLE = EXAMPLES / "angular_contact_ball.toml", EXAMPLES / "double_decker.toml"
 
 
