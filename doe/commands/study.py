@@ -1,7 +1,5 @@
 """``doe study``."""
 
-from __future__ import annotations
-
 import sys
 from contextlib import ExitStack
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Box-Behnken designs: three levels a factor, no corners, all points but the centre on one sphere."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Central composite designs in coded units: centre 0, cube corners -1 and +1, one column a factor."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The closing link as a function of the parts' sizes, and its sensitivities."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

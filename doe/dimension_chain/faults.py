@@ -1,7 +1,5 @@
 """What is wrong with a chain, one sentence a fault, with key, value and mend."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from functools import partial

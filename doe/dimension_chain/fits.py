@@ -3,8 +3,6 @@
 Rings, shafts and housings are thick cylinders of one length in plane stress (Lamé), as in `rbdyn.mounting.rings`.
 """
 
-from __future__ import annotations
-
 from rbdyn.mounting.rings import Ring, interface_pressure
 from rbdyn.properties.materials import Material
 

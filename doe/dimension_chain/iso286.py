@@ -5,8 +5,6 @@ the holes K to S. The continuous formulas stand beside the tables: the tables ta
 range of sizes and round them.
 """
 
-from __future__ import annotations
-
 import re
 from bisect import bisect_left
 from collections.abc import Mapping

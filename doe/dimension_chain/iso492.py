@@ -4,8 +4,6 @@ The upper deviation is 0. Classes Normal, 6, 5 and 4; sizes that could not be ch
 catalogue tables are left out. Not for tapered roller bearings.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_left
 
 BORE_RANGES = (2.5, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)  # mm, up to and including

@@ -1,7 +1,5 @@
 """All that is asked of a dimension chain, in one record."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ Source: Hughes, Evolutionary multi-objective ranking with uncertainty and noise 
 with uncertain objectives (2001): one dominates another only where the noise cannot have made the difference.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from doe.arrays import Array, Mask, Rows

@@ -1,7 +1,5 @@
 """Where a part falls within its tolerance: samples of offsets in half widths of the tolerance."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

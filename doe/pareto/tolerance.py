@@ -1,7 +1,5 @@
 """Backwards from a pick: the widest tolerances of its factors within which parts keep what the pick promises."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

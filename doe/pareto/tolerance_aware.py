@@ -8,8 +8,6 @@ Source: Deb and Gupta, Introducing robustness in multi-objective optimization (2
 with the worst case or a quantile in place of the mean.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ are a source of their own and no part of the model: R2 is judged on the scatter 
 Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., 2.4-2.7 and 7.5.
 """
 
-from __future__ import annotations
-
 import math
 from typing import TypedDict
 

@@ -1,7 +1,5 @@
 """How well a surface fits, in single figures: R2 and its kin."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -6,8 +6,6 @@ are so few that the extra bits cost microseconds. Sources: Björck, Numerical Me
 2.4; Golub and Van Loan, Matrix Computations, 5.2.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Points that could not be simulated: kept as records, grouped by cause."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What can be told to be wrong with a study before anything runs: one judgement for all commands."""
 
-from __future__ import annotations
-
 from doe.study.chains import check_chains
 from doe.study.design import check_runs
 from doe.study.reference import reference_runs

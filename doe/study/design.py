@@ -1,7 +1,5 @@
 """The design of a study: its points and what they can tell about the models asked for."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

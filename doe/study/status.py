@@ -1,7 +1,5 @@
 """Where a study stands, from its store: done, failed, running, missing, and the time it took and will take."""
 
-from __future__ import annotations
-
 import os
 import time
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Where the power goes, and how the bearing moves, at baseline and pick."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

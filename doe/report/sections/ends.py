@@ -1,7 +1,5 @@
 """What stands at the end: a published table beside, settings, versions, cost, notes, failures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

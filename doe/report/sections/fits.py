@@ -1,7 +1,5 @@
 """Response surfaces and whether they can be trusted."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

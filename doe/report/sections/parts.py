@@ -1,7 +1,5 @@
 """Dimension chains: the parts to make, what each contributes, how many assemblies pass."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from html import escape
 from typing import Any

@@ -1,7 +1,5 @@
 """Pictures of the cage orbit and of the power by term."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from html import escape
