@@ -3,6 +3,7 @@
 from typing import Literal
 
 import numpy as np
+from scipy.stats import norm, qmc
 
 from doe.arrays import Array
 
@@ -18,16 +19,12 @@ def offsets(shares: Array, distribution: Distribution) -> Array:
     """
     if distribution == "uniform":
         return 2.0 * shares - 1.0
-    from scipy.stats import norm
-
     outside = norm.cdf(-SIGMAS)
     return norm.ppf(outside + shares * (1.0 - 2.0 * outside)) / SIGMAS
 
 
 def even_offsets(count: int, factors: int, distribution: Distribution) -> Array:
     """Offsets (count, factors) that fill the tolerance box evenly (Sobol points, always the same)."""
-    from scipy.stats import qmc
-
     points = qmc.Sobol(factors, scramble=False).random(count)
     # Half a cell in, lest a point lie on the rim.
     return offsets((points + 0.5 / count) % 1.0, distribution)

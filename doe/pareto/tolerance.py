@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import minimize
 
 from doe.arrays import Array, Mask
 from doe.pareto.manufacture import Distribution, random_offsets
@@ -160,8 +161,6 @@ class _Parts:
 
 def _best_ratios(parts: _Parts, share: Array, probability: float, aim: Aim, weight: Array) -> Array:
     """Ratios whose widest tolerances have the largest product or sum."""
-    from scipy.optimize import minimize
-
     reach = np.log(20.0)
     free = np.flatnonzero(parts.room > 0.0)
 

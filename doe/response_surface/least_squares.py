@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import linalg
 
 from doe.arrays import Array
 
@@ -90,8 +91,6 @@ def solve(matrix: ArrayLike, response: ArrayLike, weights: ArrayLike | None = No
 
 def dependent_columns(matrix: Array) -> list[int]:
     """Columns that the others determine, found by a pivoted triangularisation of unit columns."""
-    from scipy import linalg
-
     unit = matrix / np.linalg.norm(matrix, axis=0).clip(1e-300)
     _, triangle, pivots = linalg.qr(unit, mode="economic", pivoting=True)
     return sorted(pivots[np.abs(np.diag(triangle)) <= DEPENDENT].tolist())

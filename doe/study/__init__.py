@@ -11,7 +11,3 @@
 - ``reference``: a published table beside
 - ``whole``: all of it in one go
 """
-
-from doe.study.whole import StudyResult, run_study
-
-__all__ = ["StudyResult", "run_study"]

@@ -1,27 +1,22 @@
 """The pick and what simulation says of it: where it does not keep its limits, the next best point is tried."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from doe.pareto import ParetoFront
+from doe.response_surface import Surface
 from doe.running.failure import Failure
 from doe.study.confirmation import Choice, Confirmed, confirm
+from doe.study.direct import Direct
 from doe.study.direct_pick import DirectPick, direct_pick
 from doe.study.front import find_front
 from doe.study.limits import ORDER, Limit, limits_of, verdict_of
 from doe.study.picks import choices
+from doe.study.simulations import Simulations
 from doe.study_file import Study
 from rbdyn.faults import InputError
-
-if TYPE_CHECKING:
-    from doe.pareto import ParetoFront
-    from doe.response_surface import Surface
-    from doe.study.direct import Direct
-    from doe.study.simulations import Simulations
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,25 +1,21 @@
 """The pick of the simulator's own front: what its tolerances leave of it, and its limits."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import special
 
 from doe.arrays import Array
 from doe.designs import to_coded
+from doe.pareto.direct_tolerance import DirectAware, Neighbourhood, direct_aware, pick_among
+from doe.response_surface import Surface
 from doe.study.back_off import Conditioned, Missed, standard_errors_of
 from doe.study.confirmation import Confirmed
 from doe.study.direct import Direct
 from doe.study.drawn import quadratics
 from doe.study.goals import goals_of, rounded_within, tolerance_box
 from doe.study_file import Study
-
-if TYPE_CHECKING:
-    from doe.pareto.direct_tolerance import DirectAware, Neighbourhood
-    from doe.response_surface import Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +36,6 @@ def direct_pick(
     what these missed at points ``simulated``, which are not picked again; each of the ``failed`` among them, picked and not
     kept, lets the back-off grow by its own size.
     """
-    from scipy import special
-
-    from doe.pareto.direct_tolerance import direct_aware, pick_among
-
     front, goals = direct.front, goals_of(study)
     coded = to_coded(front.points, study.centre, study.step)
     quantile = float(special.ndtri(study.file.confirmation.limit_probability))
@@ -101,8 +93,6 @@ def _neighbourhood(
     study: Study, surfaces: Sequence[Surface], direct: Direct, coded: Array, values: Array
 ) -> Neighbourhood:
     """About coded points (n, k) of known responses (n, m)."""
-    from doe.pareto.direct_tolerance import Neighbourhood
-
     forms, searched = quadratics(surfaces, len(study.factors)), direct.front.searched
     runs = to_coded(searched.points, study.centre, study.step)
     return Neighbourhood.of(forms, coded, values, runs, searched.values)

@@ -1,26 +1,23 @@
 """Where a pick or a front lies at the edge of the region, and what is to be had beyond it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import special
 
+from doe import clearance
 from doe.arrays import Array, Whole
 from doe.designs import to_coded
+from doe.response_surface import Surface
+from doe.response_surface.model_error import REACH
 from doe.running.failure import Failure
 from doe.study.confirmation import Choice, Confirmed, confirmed_from
 from doe.study.drawn import jacobian
 from doe.study.goals import goals_of, region_of
+from doe.study.simulations import Simulations
 from doe.study_file import Study
 from rbdyn.faults import InputError
-
-if TYPE_CHECKING:
-    from doe.response_surface import Surface
-    from doe.study.simulations import Simulations
-
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
@@ -129,10 +126,6 @@ def _on_surfaces(
     study: Study, surfaces: Sequence[Surface], point: Array, index: int, side: int
 ) -> dict[str, tuple[float, float]]:
     """Gains a unit of the factor outward, with the error of the slope: of the coefficients and of the model's own error."""
-    from scipy import special
-
-    from doe.response_surface.model_error import REACH
-
     goals = goals_of(study)
     coded = to_coded(point, study.centre, study.step)
     ahead = coded + side * STEP * np.eye(coded.size)[index]
@@ -160,8 +153,6 @@ def _simulated(
     study: Study, pick: Confirmed, names: Sequence[tuple[int, int]], simulations: Simulations
 ) -> dict[int, dict[str, tuple[float, float]]]:
     """Gains a unit of each factor from runs beyond its bound, like those of the confirmation; none where a run fails."""
-    from doe import clearance
-
     scenes, kept = [], []
     for index, side in names:
         point = pick.point.copy()

@@ -1,28 +1,26 @@
 """The Pareto front of a study on its response surfaces, how sure it is, and what manufacture leaves of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
+from scipy import stats
 
 from doe.arrays import Array
 from doe.designs import to_actual, to_coded
+from doe.pareto import Goals, InfeasibleError, ParetoFront, front
+from doe.pareto.archive import Archive
+from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox, tolerance_aware_front
+from doe.pareto.uncertainty import FrontUncertainty, front_uncertainty
+from doe.response_surface import Surface
 from doe.study.back_off import Doubt, surfaces_doubt
 from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
 from doe.study_file import Study
 from rbdyn.faults import InputError
-
-if TYPE_CHECKING:
-    from doe.pareto import Goals, ParetoFront
-    from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox
-    from doe.pareto.uncertainty import FrontUncertainty
-    from doe.response_surface import Surface
 
 Found = TypeVar("Found", "ParetoFront", "ToleranceAware")
 
@@ -46,8 +44,6 @@ def find_front(
 
     Raises InputError when fewer than two responses have a goal, no point keeps all limits, or a tolerance is missing.
     """
-    from doe.pareto import front
-
     goals, settings, reach = goals_of(study), study.file.front, region_of(study)
     check_goals(study)
     box = tolerance_box(study)
@@ -83,8 +79,6 @@ def find_front(
 
 def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> Found:
     """What a search finds with the largest share of the back-off that leaves any point. Raises InfeasibleError."""
-    from doe.pareto import InfeasibleError
-
     if not goals_of(study).limited:
         return search(0.0)
     for share in (1.0 + failed, *SHARES)[failed == 0 :]:
@@ -103,8 +97,6 @@ def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> 
 
 def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
     """95 % half widths (..., m) of mean responses; NaN for a surface that leaves no residual."""
-    from scipy import stats
-
     factors = [
         float(stats.t.ppf(0.975, surface.interval_dof)) if surface.interval_dof > 0 else np.nan for surface in surfaces
     ]
@@ -112,8 +104,6 @@ def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
 
 
 def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) -> FrontUncertainty:
-    from doe.pareto.uncertainty import front_uncertainty
-
     assert found.standard_errors is not None
     drawn = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
     points = np.vstack([found.points, study.baseline])
@@ -133,9 +123,6 @@ def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) 
 def _tolerance_aware(
     study: Study, surfaces: Sequence[Surface], found: ParetoFront, box: ToleranceBox, doubt: Doubt
 ) -> ToleranceAware:
-    from doe.pareto.archive import Archive
-    from doe.pareto.tolerance_aware import tolerance_aware_front
-
     reach = region_of(study)
     return tolerance_aware_front(
         quadratics(surfaces, len(study.factors)),
@@ -154,8 +141,6 @@ def _tolerance_aware(
 @contextmanager
 def _named(study: Study, goals: Goals, centre: Array, step: Array, after: str) -> Iterator[None]:
     """Turns a search that finds nothing into a sentence; ``centre`` and ``step`` are those of its points."""
-    from doe.pareto import InfeasibleError
-
     try:
         yield
     except InfeasibleError as error:

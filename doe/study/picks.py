@@ -1,22 +1,17 @@
 """The points of a front that are worth a confirmation, each once."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from doe.arrays import Array
 from doe.designs import to_actual
+from doe.pareto import ParetoFront
 from doe.study.confirmation import Choice
+from doe.study.direct import Direct
+from doe.study.direct_pick import DirectPick
 from doe.study.goals import rounded_within
 from doe.study_file import Study
-
-if TYPE_CHECKING:
-    from doe.pareto import ParetoFront
-    from doe.study.direct import Direct
-    from doe.study.direct_pick import DirectPick
 
 
 def choices(

@@ -1,19 +1,15 @@
 """A published table of the same design beside ours."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import spearmanr
 
+from doe.response_surface import Surface
 from doe.study.runs import Runs, design_points, read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError
-
-if TYPE_CHECKING:
-    from doe.response_surface import Surface
 
 
 @dataclass(frozen=True)
@@ -62,8 +58,6 @@ def reference_runs(study: Study) -> Runs | None:
 
 
 def beside(study: Study, ours: Runs, theirs: Runs) -> list[Beside]:
-    from scipy.stats import spearmanr
-
     assert study.file.reference is not None
     pairs = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
     rows = []

@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from doe import clearance
 from doe.arrays import Array, Whole
 from doe.designs import Design, to_actual, to_coded
 from doe.designs.model import model_terms
 from doe.running.failure import Failure, alike, sentence, successes
+from doe.running.store import Store
 from doe.study.design import check_runs, design_of
 from doe.study_file import Study
 from rbdyn.faults import RunError
-
-if TYPE_CHECKING:
-    from rbdyn.scene import Scene
+from rbdyn.scene import Scene
 
 Progress = Callable[[int, int], None]
 # Name of the store in the folder of a study.
@@ -75,8 +74,6 @@ class Ordered:
 
 def ordered_runs(study: Study) -> Ordered:
     """Every run of the study's design. Raises InputError when the design, a scene or a response is impossible."""
-    from doe import clearance
-
     clearance.check_responses(study)
     design = design_of(study)
     actual = to_actual(design.coded, study.centre, study.step)
@@ -101,9 +98,6 @@ def run_design(
 
     Runs that fail are left out. Raises InputError, KeyboardInterrupt, and RunError when too few are left.
     """
-    from doe import clearance
-    from doe.running.store import Store
-
     asked = ordered_runs(study)
     design, coded, actual = asked.design, asked.design.coded, asked.actual
     check_runs(study, design)

@@ -1,18 +1,14 @@
 """Where the points of a study run: its store, its workers or cluster, and who watches."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from doe import clearance
+from doe.running.failure import Failure
 from doe.running.store import Store
 from doe.study.runs import Progress
-
-if TYPE_CHECKING:
-    from doe.running.failure import Failure
-    from rbdyn.result import SimulationResult
-    from rbdyn.scene import Scene
+from rbdyn.result import SimulationResult
+from rbdyn.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -40,8 +36,6 @@ class Simulations:
 
         ``factors``: of design runs, which are numbered then.
         """
-        from doe import clearance
-
         return clearance.run_scenes(
             scenes, labels, self.store, self.workers, progress, self.scheduler, retry=self.retry, factors=factors
         )

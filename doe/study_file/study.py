@@ -1,7 +1,5 @@
 """STUDY.toml: which scene, factors, responses, front, chains. Checked before anything runs."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -132,7 +130,7 @@ class Study:
     file: StudyFile
 
     @classmethod
-    def load(cls, path: Path | str) -> Study:
+    def load(cls, path: Path | str) -> Self:
         """Read STUDY.toml. Raises InputError with all faults at once."""
         path = Path(path)
         return cls(path, validated(StudyFile, read_toml(path), str(path)))

@@ -1,22 +1,19 @@
 """Confirmed points, their gains and the direct front, as plain numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from doe import clearance
 from doe.arrays import Array
 from doe.study.confirmation import Confirmed, Gain, statement
+from doe.study.direct import Direct
+from doe.study.edge import Edge
 from doe.study.limits import Limit, limits_of
-
-if TYPE_CHECKING:
-    from doe.study import StudyResult
-    from doe.study.direct import Direct
-    from doe.study.edge import Edge
-    from doe.study_file import Study
+from doe.study.whole import StudyResult
+from doe.study_file import Study
 
 
 def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
@@ -75,8 +72,6 @@ def gains_record(gains: Sequence[Gain]) -> dict[str, Any]:
 
 def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
     """The direct front beside that of the surfaces run on the simulator, and what these lose."""
-    from doe import clearance
-
     front, loss = direct.front, direct.loss
     rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
     surrogate = zip(direct.surrogate_points, direct.surrogate_values, 1.96 * direct.surrogate_errors, strict=True)

@@ -1,15 +1,10 @@
 """A design as JSON and on the terminal."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
-from doe.designs import to_actual
+from doe.designs import Design, to_actual
+from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
-
-if TYPE_CHECKING:
-    from doe.designs import Design
-    from doe.study_file import Study
 
 
 def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:

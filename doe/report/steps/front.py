@@ -1,26 +1,23 @@
 """The Pareto front as JSON and on the terminal."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from doe.arrays import Array
 from doe.designs import to_coded
+from doe.pareto import ParetoFront
+from doe.pareto.archive import dominates
 from doe.pareto.indicators import REFERENCE
 from doe.report.steps.confirmation import point_record
 from doe.report.steps.tolerance_aware import print_tolerance_aware, tolerance_aware_record
+from doe.response_surface import Surface
 from doe.study.drawn import predict_all
 from doe.study.front import half_widths
 from doe.study.goals import beyond_runs, goals_of
 from doe.study.predicted import PredictedGain, predicted_gains, statement
+from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
-
-if TYPE_CHECKING:
-    from doe.pareto import ParetoFront
-    from doe.response_surface import Surface
-    from doe.study_file import Study
 
 
 def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
@@ -78,8 +75,6 @@ def predicted_record(study: Study, surfaces: list[Surface], point: Array) -> dic
 
 def asked_point_record(study: Study, surfaces: list[Surface], front: ParetoFront, point: Array) -> dict[str, Any]:
     """A point that was asked for: its gains over the baseline, and what the front makes of it."""
-    from doe.pareto.archive import dominates
-
     gains = predicted_gains(study, surfaces, point)
     coded = to_coded(point, study.centre, study.step)
     costs = goals_of(study).costs(predict_all(surfaces, coded[None])[0])

@@ -1,19 +1,15 @@
 """The tolerance-aware front beside the plain one, as JSON and on the terminal."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from doe.designs import to_actual
+from doe.pareto.tolerance_aware import ToleranceAware
+from doe.response_surface import Surface
 from doe.study.predicted import predicted_gains
+from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
-
-if TYPE_CHECKING:
-    from doe.pareto.tolerance_aware import ToleranceAware
-    from doe.response_surface import Surface
-    from doe.study_file import Study
 
 
 def tolerance_aware_record(study: Study, surfaces: list[Surface], found: ToleranceAware) -> dict[str, Any]:

@@ -1,22 +1,19 @@
 """The few lines of a study that a person acts on."""
 
-from __future__ import annotations
-
 import io
 from contextlib import redirect_stdout
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from doe.clearance import direct_run
 from doe.report.steps.chain import print_chain
 from doe.report.words import rounded_down
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
 from doe.study.limits import limits_of
+from doe.study.whole import StudyResult
 from rbdyn.cli.terminal import print_table
-
-if TYPE_CHECKING:
-    from doe.study import StudyResult
 
 
 def print_outcome(outcome: StudyResult, quiet: bool) -> None:
@@ -47,8 +44,6 @@ def answer_text(outcome: StudyResult) -> str:
 
 
 def _print_answer(outcome: StudyResult) -> None:
-    from doe.clearance import direct_run
-
     study = outcome.study
     if outcome.direct is not None:
         direct = outcome.direct

@@ -1,25 +1,21 @@
 """What a study asked for and what its design was, as plain numbers."""
 
-from __future__ import annotations
-
 from string import ascii_uppercase
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from doe import clearance
 from doe.designs import to_actual
 from doe.report.steps.confirmation import or_none
 from doe.report.steps.design import runs_record
+from doe.running.failure import grouped
 from doe.study.design import evaluation
 from doe.study.goals import known_tolerances, region_of
-
-if TYPE_CHECKING:
-    from doe.study import StudyResult
-    from doe.study_file import Study
+from doe.study.whole import StudyResult
+from doe.study_file import Study
 
 
 def asked_record(study: Study) -> dict[str, Any]:
     """Scene, factors with their ranges, responses with their goals."""
-    from doe import clearance
-
     reach, known = region_of(study), known_tolerances(study)
     low, high = (to_actual(side * reach, study.centre, study.step) for side in (-1.0, 1.0))
     scene = clearance.design_scenes(study, study.baseline[None])[0]
@@ -46,8 +42,6 @@ def asked_record(study: Study) -> dict[str, Any]:
 
 def design_record(outcome: StudyResult) -> dict[str, Any]:
     """Points with what they gave, what the design can tell, and which runs failed."""
-    from doe.running.failure import grouped
-
     study, design, runs = outcome.study, outcome.design, outcome.runs
     rows = {place: row for row, place in enumerate(runs.places)}
     return {

@@ -1,21 +1,18 @@
 """What a study leaves behind in its folder: tables, summary.json, pictures."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from doe import clearance
+from doe.dimension_chain import Part
 from doe.report.html import html_report
 from doe.report.markdown import markdown_report
 from doe.report.steps.fit import fit_tables
 from doe.report.study.answer import answer_text
 from doe.report.study.summary import summary
 from doe.study.limits import limits_of
+from doe.study.whole import StudyResult
 from rbdyn.result import write_json
-
-if TYPE_CHECKING:
-    from doe.dimension_chain import Part
-    from doe.study import StudyResult
 
 # Shaft turns of the motion that is drawn.
 DRAWN_TURNS = 10.0
@@ -28,7 +25,6 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     """
     import pandas as pd
 
-    from doe import clearance
     from doe.report.study import plots
 
     study, record = outcome.study, summary(outcome)

@@ -1,10 +1,7 @@
 """Pictures of a study: response surfaces and the Pareto front."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -14,12 +11,10 @@ from matplotlib import pyplot as plt
 
 from doe.designs import to_actual, to_coded
 from doe.report.words import label
+from doe.response_surface import Surface
 from doe.study.design import design_of
-
-if TYPE_CHECKING:
-    from doe.response_surface import Surface
-    from doe.study import StudyResult
-    from doe.study_file import Study
+from doe.study.whole import StudyResult
+from doe.study_file import Study
 
 
 def response_surface(study: Study, surface: Surface, path: Path) -> None:

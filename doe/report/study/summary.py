@@ -1,8 +1,6 @@
 """summary.json: everything that a study found, as plain numbers."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from doe.report.steps.confirmation import confirmation_record, direct_record, edge_record, gains_record, limits_record
 from doe.report.steps.fit import fit_record
@@ -10,11 +8,9 @@ from doe.report.steps.front import front_record, predicted_record
 from doe.report.study.asked import asked_record, design_record
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
+from doe.study.direct_pick import DirectPick
+from doe.study.whole import StudyResult
 from rbdyn.result import versions
-
-if TYPE_CHECKING:
-    from doe.study import StudyResult
-    from doe.study.direct_pick import DirectPick
 
 FORMAT = "doe.study/1"
 
