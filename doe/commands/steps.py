@@ -63,8 +63,7 @@ def searched(study: Study, found: ParetoFront, effort: Effort) -> Direct:
     """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
     from doe.running.store import Store
     from doe.study.direct import find_direct
-    from doe.study.runs import STORE
-    from doe.study.simulations import Simulations
+    from doe.study.runs import STORE, Simulations
 
     out, workers, scheduler, retry, quiet = effort
     with (

@@ -20,13 +20,12 @@ from scipy import special
 from doe.arrays import Array, Rows
 from doe.designs.model import MODELS, Model, in_actual_units, model_matrix, model_terms, second_order
 from doe.designs.replicates import replicate_groups
-from doe.response_surface.anova import AnovaRow, anova, find
+from doe.response_surface.anova import AnovaRow, anova, find, goodness, observation_variance
 from doe.response_surface.box_cox import backward, box_cox, check_positive, forward, slope
 from doe.response_surface.canonical import Canonical, StationaryPoint, canonical, stationary_point
 from doe.response_surface.data import Data, check_errors, check_matrix, checked
 from doe.response_surface.diagnostics import Diagnostics, diagnose
 from doe.response_surface.elimination import Removal, eliminate
-from doe.response_surface.goodness import goodness, observation_variance
 from doe.response_surface.known_variance import KnownVariance, compare
 from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import ModelError, model_error

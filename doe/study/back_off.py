@@ -15,7 +15,6 @@ import numpy as np
 from scipy import special
 
 from doe.arrays import Array
-from doe.designs import to_coded
 from doe.response_surface import Surface
 from doe.response_surface.model_error import correlation
 from doe.study.confirmation import Confirmed
@@ -74,7 +73,7 @@ def surfaces_doubt(
         surface = surfaces[index]
         missed = _at_design(surface)
         if simulated:
-            at = to_coded(np.array([each.point for each in simulated]), study.centre, study.step)
+            at = study.coded(np.array([each.point for each in simulated]))
             errors = standard_errors_of(simulated)[:, index]
             misses = np.array([each.values[index] for each in simulated]) - surface.predict(at)
             missed = missed.and_at(at, misses, errors, surface.prediction_standard_error(at))

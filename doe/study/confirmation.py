@@ -11,7 +11,7 @@ from doe.arrays import Array
 from doe.running.failure import Failure
 from doe.study.goals import goals_of
 from doe.study.predicted import verdict
-from doe.study.simulations import Simulations
+from doe.study.runs import Simulations
 from doe.study_file import Study
 from rbdyn.faults import RunError
 from rbdyn.result import SimulationResult

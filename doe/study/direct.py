@@ -8,15 +8,13 @@ import numpy as np
 
 from doe import clearance
 from doe.arrays import Array
-from doe.designs import to_actual
 from doe.pareto import ParetoFront
 from doe.pareto.archive import spread
 from doe.pareto.direct import DirectFront, direct_front
 from doe.pareto.surrogate_loss import SurrogateLoss, compare_with_surrogate
 from doe.running.failure import Failure, grouped
 from doe.study.goals import goals_of, region_of
-from doe.study.runs import Progress
-from doe.study.simulations import Simulations
+from doe.study.runs import Progress, Simulations
 from doe.study.surfaces import standard_errors
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError
@@ -82,8 +80,8 @@ def find_direct(study: Study, found: ParetoFront, simulations: Simulations) -> D
     try:
         front = direct_front(
             evaluate,
-            to_actual(-reach, study.centre, study.step),
-            to_actual(reach, study.centre, study.step),
+            study.actual(-reach),
+            study.actual(reach),
             goals=goals_of(study),
             baseline=study.baseline,
             pick=study.file.front.pick,

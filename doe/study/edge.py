@@ -8,14 +8,13 @@ from scipy import special
 
 from doe import clearance
 from doe.arrays import Array, Whole
-from doe.designs import to_coded
 from doe.response_surface import Surface
 from doe.response_surface.model_error import REACH
 from doe.running.failure import Failure
 from doe.study.confirmation import Choice, Confirmed, confirmed_from
 from doe.study.drawn import jacobian
 from doe.study.goals import goals_of, region_of
-from doe.study.simulations import Simulations
+from doe.study.runs import Simulations
 from doe.study_file import Study
 from rbdyn.faults import InputError
 
@@ -112,7 +111,7 @@ def edge_of(
 
 def _sides(study: Study, points: Array) -> Whole:
     """-1 at a lower bound, 1 at an upper one, else 0, for points (n, k)."""
-    coded, reach = to_coded(points, study.centre, study.step), region_of(study)
+    coded, reach = study.coded(points), region_of(study)
     near = np.abs(coded) >= reach * (1.0 - 2.0 * NEAR)
     return np.where(near, np.sign(coded), 0.0).astype(np.int64)
 
@@ -127,7 +126,7 @@ def _on_surfaces(
 ) -> dict[str, tuple[float, float]]:
     """Gains a unit of the factor outward, with the error of the slope: of the coefficients and of the model's own error."""
     goals = goals_of(study)
-    coded = to_coded(point, study.centre, study.step)
+    coded = study.coded(point)
     ahead = coded + side * STEP * np.eye(coded.size)[index]
     gains = {}
     for column, response in enumerate(goals.objectives):

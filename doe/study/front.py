@@ -9,7 +9,6 @@ import numpy as np
 from scipy import stats
 
 from doe.arrays import Array
-from doe.designs import to_actual, to_coded
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
 from doe.pareto.archive import Archive
 from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox, tolerance_aware_front
@@ -48,31 +47,28 @@ def find_front(
     check_goals(study)
     box = tolerance_box(study)
 
-    def coded(points: Array) -> Array:
-        return to_coded(points, study.centre, study.step)
-
     doubt = surfaces_doubt(study, surfaces, simulated)
 
     def plain(share: float) -> ParetoFront:
         return front(
-            lambda points: predict_all(surfaces, coded(points)),
-            to_actual(-reach, study.centre, study.step),
-            to_actual(reach, study.centre, study.step),
+            lambda points: predict_all(surfaces, study.coded(points)),
+            study.actual(-reach),
+            study.actual(reach),
             goals=goals,
             baseline=study.baseline,
             **settings.model_dump(include=SEARCH),
             standard_errors=lambda points: np.column_stack(
-                [surface.prediction_standard_error(coded(points)) for surface in surfaces]
+                [surface.prediction_standard_error(study.coded(points)) for surface in surfaces]
             ),
-            doubt=lambda points: doubt(share)(coded(points)),
+            doubt=lambda points: doubt(share)(study.coded(points)),
         )
 
-    with _named(study, goals, np.zeros(1), np.ones(1), ""):
+    with _named(study, goals, lambda point: point, ""):
         found = _backed_off(study, plain, failed)
     found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
     if box is None:
         return found
-    with _named(study, goals, study.centre, study.step, " after manufacture"):
+    with _named(study, goals, study.actual, " after manufacture"):
         aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt(share)), failed)
     return replace(found, tolerance_aware=aware)
 
@@ -107,7 +103,7 @@ def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) 
     assert found.standard_errors is not None
     drawn = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
     points = np.vstack([found.points, study.baseline])
-    values = predict_draws(surfaces, drawn, to_coded(points, study.centre, study.step), study.file.front.seed)
+    values = predict_draws(surfaces, drawn, study.coded(points), study.file.front.seed)
     return front_uncertainty(
         values[:, :-1],
         half_widths(surfaces, found.standard_errors),
@@ -130,8 +126,8 @@ def _tolerance_aware(
         -reach,
         reach,
         found.goals,
-        baseline=to_coded(study.baseline, study.centre, study.step),
-        plain=Archive(to_coded(found.points, study.centre, study.step), found.costs),
+        baseline=study.coded(study.baseline),
+        plain=Archive(study.coded(found.points), found.costs),
         plain_pick=found.pick,
         doubt=doubt,
         **study.file.front.model_dump(include=SEARCH),
@@ -139,8 +135,8 @@ def _tolerance_aware(
 
 
 @contextmanager
-def _named(study: Study, goals: Goals, centre: Array, step: Array, after: str) -> Iterator[None]:
-    """Turns a search that finds nothing into a sentence; ``centre`` and ``step`` are those of its points."""
+def _named(study: Study, goals: Goals, actual: Callable[[Array], Array], after: str) -> Iterator[None]:
+    """Turns a search that finds nothing into a sentence; ``actual`` gives its points in factor units."""
     try:
         yield
     except InfeasibleError as error:
@@ -149,8 +145,7 @@ def _named(study: Study, goals: Goals, centre: Array, step: Array, after: str) -
             for (index, sense, limit), by in zip(goals.limited, error.violations.tolist(), strict=True)
             if by > 0.0
         ]
-        point = to_actual(error.point, centre, step)
-        where = ", ".join(f"{name} = {x:.5g}" for name, x in zip(study.factors, point, strict=True))
+        where = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(actual(error.point)).items())
         raise InputError(
             [
                 f"{study.path}: response.lower, response.upper: no point of the region keeps all limits{after}; the "

@@ -7,7 +7,6 @@ import numpy as np
 from scipy import stats
 
 from doe.arrays import Array
-from doe.designs import to_coded
 from doe.pareto.uncertainty import contrast_error
 from doe.response_surface import Surface
 from doe.response_surface.model_error import correlation
@@ -65,7 +64,7 @@ class PredictedGain(Record):
 def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> list[PredictedGain]:
     """Gains at a point (k,) in factor units over the study's baseline, for every response that has a goal."""
     goals = goals_of(study)
-    coded = to_coded(np.stack([study.baseline, point]), study.centre, study.step)
+    coded = study.coded(np.stack([study.baseline, point]))
     values = predict_all(surfaces, coded)
     costs, slopes = goals.costs(values), goals.slopes(values)
     gains = []

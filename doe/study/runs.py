@@ -1,8 +1,8 @@
-"""Runs of a design: simulated, or read from a table."""
+"""Runs of a design, simulated or read from a table; and where the points of a study run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,13 +10,14 @@ import numpy as np
 
 from doe import clearance
 from doe.arrays import Array, Whole
-from doe.designs import Design, to_actual, to_coded
+from doe.designs import Design
 from doe.designs.model import model_terms
 from doe.running.failure import Failure, alike, sentence, successes
 from doe.running.store import Store
 from doe.study.design import check_runs, design_of
 from doe.study_file import Study
 from rbdyn.faults import RunError
+from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
 Progress = Callable[[int, int], None]
@@ -76,13 +77,13 @@ def ordered_runs(study: Study) -> Ordered:
     """Every run of the study's design. Raises InputError when the design, a scene or a response is impossible."""
     clearance.check_responses(study)
     design = design_of(study)
-    actual = to_actual(design.coded, study.centre, study.step)
+    actual = study.actual(design.coded)
     return Ordered(
         design,
         actual,
         clearance.design_scenes(study, actual, design.order.tolist()),
         [f"design run {run}" for run in range(1, len(actual) + 1)],
-        [dict(zip(study.factors, point.tolist(), strict=True)) for point in actual],
+        [study.by_factor(point) for point in actual],
     )
 
 
@@ -102,9 +103,8 @@ def run_design(
     design, coded, actual = asked.design, asked.design.coded, asked.actual
     check_runs(study, design)
     with Store(folder / STORE, study.path.stem) as store:
-        results = clearance.run_scenes(
-            asked.scenes, asked.labels, store, workers, progress, scheduler, retry=retry, factors=asked.factors
-        )
+        simulations = Simulations(store, workers, scheduler, retry, lambda title: progress)
+        results = simulations.run(asked.scenes, asked.labels, progress, asked.factors)
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
     if failures and len(left) < (needed := fewest_runs(study, design)):
@@ -138,5 +138,35 @@ def fewest_runs(study: Study, design: Design) -> int:
 def read_runs(study: Study, path: Path) -> Runs:
     """Runs of a CSV table instead of simulated ones. Raises InputError."""
     table = study.read_table(path)
-    coded = to_coded(table.actual, study.centre, study.step)
+    coded = study.coded(table.actual)
     return Runs(coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block)
+
+
+@dataclass(frozen=True)
+class Simulations:
+    """Runs scenes once each and keeps them in ``store``.
+
+    ``workers``: threads, all processors by default; ``scheduler``: address of a cluster to run on instead.
+    ``retry``: run those again that failed before. ``progress(title)`` gives the progress of a stage.
+    """
+
+    store: Store
+    workers: int | None
+    scheduler: str | None
+    retry: bool
+    progress: Callable[[str], Progress]
+
+    def run(
+        self,
+        scenes: Sequence[Scene],
+        labels: Sequence[str],
+        progress: Progress,
+        factors: Sequence[Mapping[str, float]] | None = None,
+    ) -> list[SimulationResult | Failure]:
+        """Results or failures of scenes, in their order. Raises InputError, RunError, KeyboardInterrupt.
+
+        ``factors``: of design runs, which are numbered then.
+        """
+        return clearance.run_scenes(
+            scenes, labels, self.store, self.workers, progress, self.scheduler, retry=self.retry, factors=factors
+        )

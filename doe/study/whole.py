@@ -26,8 +26,7 @@ from doe.study.front import find_front
 from doe.study.goals import check_goals
 from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
 from doe.study.reference import Beside, beside
-from doe.study.runs import STORE, Progress, Runs, run_design
-from doe.study.simulations import Simulations
+from doe.study.runs import STORE, Progress, Runs, Simulations, run_design
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
 from doe.study_file import Study

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from doe.arrays import Array
-from doe.designs import to_coded
 from doe.pareto.tolerance import WidestTolerances, widest_tolerances
 from doe.response_surface import Surface
 from doe.study.direct_pick import Local
@@ -27,7 +26,7 @@ def widest_of(
     surfaces predict at the point (or, where they predict a loss, loses no more), and when all limits hold.
     """
     goals = goals_of(study)
-    base, nominal = (to_coded(each, study.centre, study.step)[None] for each in (study.baseline, point))
+    base, nominal = (study.coded(each)[None] for each in (study.baseline, point))
     ends = [predict_all(surfaces, each) for each in (base, nominal)]
     if local is not None:
         ends = [local.baseline[None], local.values[None]]
@@ -41,7 +40,7 @@ def widest_of(
         return predict_paired(surfaces, drawn, coded)
 
     def objectives(points: Array) -> Array:
-        coded = to_coded(points, study.centre, study.step)
+        coded = study.coded(points)
         values = responses(coded)
         if local is not None:
             values = values - centre_values + local.values + (coded - local.coded) @ local.slopes

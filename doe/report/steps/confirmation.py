@@ -20,7 +20,7 @@ def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
     """Every confirmed point by name, with its gains over the baseline and whether they are real."""
     return {
         name: {
-            "factors": dict(zip(outcome.study.factors, each.point.tolist(), strict=True)),
+            "factors": outcome.study.by_factor(each.point),
             "reason": each.reason,
             "responses": _quantities(outcome.study, each),
             "power_terms_W": dict(each.power_terms),
@@ -105,7 +105,7 @@ def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:
 def point_record(study: Study, point: Array, values: Array, errors: Array) -> dict[str, Any]:
     """Factors (k,), responses (m,) and their 95 % half widths (m,) of a point, by name."""
     return {
-        "factors": dict(zip(study.factors, point.tolist(), strict=True)),
+        "factors": study.by_factor(point),
         "responses": dict(zip(study.responses, values.tolist(), strict=True)),
         "errors": dict(zip(study.responses, map(or_none, errors), strict=True)),
     }

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from doe.arrays import Array
-from doe.designs import to_coded
 from doe.pareto import ParetoFront
 from doe.pareto.archive import dominates
 from doe.pareto.indicators import REFERENCE
@@ -32,7 +31,7 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         )
     ]
     gains = predicted_gains(study, surfaces, front.points[front.pick])
-    beyond = beyond_runs(study, to_coded(front.points[front.pick], study.centre, study.step))
+    beyond = beyond_runs(study, study.coded(front.points[front.pick]))
     picks: dict[str, Any] = {rule: points[row] for rule, row in front.picks.items()}
     record: dict[str, Any] = {
         "front": points,
@@ -67,7 +66,7 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
 
 def predicted_record(study: Study, surfaces: list[Surface], point: Array) -> dict[str, Any]:
     """Factors, responses on the surfaces and their 95 % half widths at a point in factor units."""
-    coded = to_coded(point, study.centre, study.step)
+    coded = study.coded(point)
     errors = np.array([surface.prediction_standard_error(coded) for surface in surfaces])
     values = predict_all(surfaces, coded[None])[0]
     return point_record(study, point, values, half_widths(surfaces, errors))
@@ -76,7 +75,7 @@ def predicted_record(study: Study, surfaces: list[Surface], point: Array) -> dic
 def asked_point_record(study: Study, surfaces: list[Surface], front: ParetoFront, point: Array) -> dict[str, Any]:
     """A point that was asked for: its gains over the baseline, and what the front makes of it."""
     gains = predicted_gains(study, surfaces, point)
-    coded = to_coded(point, study.centre, study.step)
+    coded = study.coded(point)
     costs = goals_of(study).costs(predict_all(surfaces, coded[None])[0])
     beyond = beyond_runs(study, coded)
     outside = " The point lies farther out than any run: the surfaces extrapolate there." if beyond else ""

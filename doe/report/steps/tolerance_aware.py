@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from doe.designs import to_actual
 from doe.pareto.tolerance_aware import ToleranceAware
 from doe.response_surface import Surface
 from doe.study.predicted import predicted_gains
@@ -23,10 +22,10 @@ def tolerance_aware_record(study: Study, surfaces: list[Surface], found: Toleran
     def robust(costs: np.ndarray) -> dict[str, float]:
         return dict(zip(named, (sign * costs).tolist(), strict=True))
 
-    points = to_actual(found.points, study.centre, study.step)
+    points = study.actual(found.points)
     front = [
         {
-            "factors": dict(zip(study.factors, point.tolist(), strict=True)),
+            "factors": study.by_factor(point),
             "responses": dict(zip(study.responses, values.tolist(), strict=True)),
             "robust": robust(costs),
         }
@@ -37,7 +36,7 @@ def tolerance_aware_record(study: Study, surfaces: list[Surface], found: Toleran
         "kind": found.box.kind,
         "quantile": found.box.quantile if found.box.kind == "quantile" else None,
         "distribution": found.box.distribution,
-        "half_widths": dict(zip(study.factors, (found.box.half * study.step).tolist(), strict=True)),
+        "half_widths": study.by_factor(found.box.half * study.step),
         "front": front,
         "hypervolume": found.hypervolume,
         "pick": {**front[found.pick], "reason": found.pick_reason},
