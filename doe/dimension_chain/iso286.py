@@ -1,8 +1,7 @@
 """ISO system of limits and fits up to 500 mm: standard tolerances and fundamental deviations.
 
 Source: ISO 286-1:2010, Tables 1 to 5 (the same values in BS 4500:1969), and the rule of a delta of one grade for
-the holes K to S. The continuous formulas stand beside the tables: the tables take them at the geometric mean of a
-range of sizes and round them.
+the holes K to S. The tables take the formulas of the standard at the geometric mean of a range of sizes and round them.
 """
 
 import re
@@ -12,7 +11,6 @@ from math import cbrt
 
 RANGES = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)  # mm, up to and including
 LARGEST = RANGES[-1]
-GRADE_UNITS = (7, 10, 16, 25, 40, 64, 100, 160, 250, 400, 640, 1000, 1600, 2500)  # IT5 to IT18
 
 # Micrometres; a row a grade, a column a range of sizes.
 STANDARD_TOLERANCES = {
@@ -72,18 +70,6 @@ CODE = re.compile(r"(js|JS|[defghjkmnprsDEFGHJKMNPRS])(01|\d{1,2})")
 def tolerance_unit(nominal_mm: float) -> float:
     """Standard tolerance unit i of ISO 286-1 in mm: 0.45 D^(1/3) + 0.001 D in um, D > 0 in mm."""
     return 1e-3 * (0.45 * cbrt(nominal_mm) + 0.001 * nominal_mm)
-
-
-def continuous_grades(nominal_mm: float) -> dict[str, float]:
-    """Tolerance in mm of each grade IT01 to IT18 by the formulas at the nominal itself, not rounded.
-
-    IT01, IT0 and IT1 are linear in D, IT2 to IT4 a geometric series between IT1 and IT5, from IT5 on
-    multiples of the tolerance unit.
-    """
-    coarse = [units * tolerance_unit(nominal_mm) for units in GRADE_UNITS]
-    finest = [1e-3 * (a + b * nominal_mm) for a, b in ((0.3, 0.008), (0.5, 0.012), (0.8, 0.020))]
-    between = [finest[-1] * (coarse[0] / finest[-1]) ** (step / 4) for step in (1, 2, 3)]
-    return dict(zip(STANDARD_TOLERANCES, [*finest, *between, *coarse], strict=True))
 
 
 def grade_tolerances(nominal_mm: float) -> dict[str, float]:

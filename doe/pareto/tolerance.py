@@ -184,14 +184,10 @@ def _best_ratios(parts: _Parts, share: Array, probability: float, aim: Aim, weig
             "maxfev": 60 * max(free.size, 1),
             "xatol": 1e-3,
             "fatol": 1e-4,
-            "initial_simplex": _simplex(free.size),
+            "initial_simplex": np.vstack([np.zeros(free.size), 0.7 * np.eye(free.size)]),
         },
     )
     return ratios(found.x)
-
-
-def _simplex(count: int) -> Array:
-    return np.vstack([np.zeros(count), 0.7 * np.eye(count)])
 
 
 def _nothing(parts: _Parts, limit: str, cause: str) -> WidestTolerances:

@@ -3,7 +3,7 @@
 from functools import cache
 from typing import Any
 
-from doe.designs import Design, box_behnken, central_composite_design, full_factorial, latin_hypercube, sobol
+from doe.designs import Design, box_behnken, central_composite, full_factorial, latin_hypercube, sobol
 from doe.designs.model import model_terms
 from doe.study_file import Study
 from doe.study_file.design_section import KEYS_OF
@@ -26,7 +26,7 @@ def _design(text: str, factors: int) -> Design:
     centres = settings.centres
     if settings.kind == "central_composite":
         keys = settings.model_dump(include=KEYS_OF["central_composite"])
-        design = central_composite_design(factors, centre_replicates=centres, **keys)
+        design = central_composite(factors, centre_replicates=centres, **keys)
     elif settings.kind == "box_behnken":
         design = box_behnken(factors, centre_replicates=centres, blocks=settings.blocks)
     elif settings.kind == "full_factorial":

@@ -13,14 +13,10 @@ from rbdyn.faults import InputError, refuse
 def goals_of(study: Study) -> Goals:
     """What is wanted of the study's responses."""
     responses = study.file.response
-    return Goals.of(
-        [response.goal for response in responses],
-        target=[response.target for response in responses],
-        lower=[response.lower for response in responses],
-        upper=[response.upper for response in responses],
-        weight=[response.weight for response in responses],
-        desired=[response.desired for response in responses],
-    )
+    rest = {
+        key: [getattr(each, key) for each in responses] for key in ("target", "lower", "upper", "weight", "desired")
+    }
+    return Goals.of([response.goal for response in responses], **rest)
 
 
 def check_goals(study: Study) -> None:

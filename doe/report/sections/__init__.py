@@ -7,5 +7,3 @@
 """
 
 from doe.report.sections.contents import sections
-
-__all__ = ["sections"]

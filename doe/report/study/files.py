@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from doe import clearance
-from doe.dimension_chain import Part
+from doe.dimension_chain.solution import ALLOCATED
 from doe.report.html import html_report
 from doe.report.markdown import markdown_report
 from doe.report.steps.fit import fit_tables
@@ -35,7 +35,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         "front.csv": [{**point["factors"], **point["responses"]} for point in record["front"]["front"]],
         "confirmation.csv": _confirmation_table(outcome),
         "part_dimensions.csv": [
-            {"chain": name, "part": part.name, **_dimension(part)}
+            {"chain": name, "part": part.name, **{key: getattr(part, key) for key in ALLOCATED}}
             for name, chain in outcome.chains.items()
             for part in chain.allocation
         ],
@@ -119,7 +119,3 @@ def _confirmation_table(outcome: StudyResult) -> list[dict[str, Any]]:
                 }
             )
     return rows
-
-
-def _dimension(part: Part) -> dict[str, Any]:
-    return {"nominal_mm": part.nominal_mm, "upper_mm": part.upper_mm, "lower_mm": part.lower_mm, "grade": part.grade}
