@@ -14,6 +14,7 @@ from doe.study.predicted import verdict
 from doe.study.runs import Simulations
 from doe.study_file import Study
 from rbdyn.faults import RunError
+from rbdyn.records.record import Record, derived, keyed, unsaid
 from rbdyn.result import SimulationResult
 
 
@@ -49,18 +50,16 @@ class Confirmed:
         return np.where(known, joint, np.nan)
 
 
-@dataclass(frozen=True)
-class Gain:
-    """Relative improvement [%] of a response at a point over the baseline, with its 95 % half-width."""
+class Gain(Record):
+    """Relative improvement [%] of a response at a point over the baseline, with its 95 % half-width.
 
-    response: str
+    ``verdict``: whether the change is larger than its error.
+    """
+
+    response: str = unsaid()
     percent: float
-    error: float
-
-    @property
-    def verdict(self) -> str:
-        """Whether the change is larger than its error."""
-        return verdict(self.percent, self.error)
+    error: float = keyed("error_percent")
+    verdict: str = derived(lambda self: verdict(self.percent, self.error))
 
 
 def confirm(

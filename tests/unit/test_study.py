@@ -17,7 +17,7 @@ from short_studies import SHORT, rows, short_study, silent, stored
 from doe import clearance
 from doe.report.steps.front import front_record
 from doe.report.study.files import write
-from doe.study.confirmation import Confirmed, Gain, gains
+from doe.study.confirmation import Confirmed, gains
 from doe.study.finished import finished as is_finished
 from doe.study.finished import inputs_digest
 from doe.study.front import find_front
@@ -254,7 +254,8 @@ def test_gain_counts_only_beyond_its_error(tmp_path):
     pick = Confirmed(study.baseline, np.array([96.0, 0.9, 51.0]), np.array([4.0, 0.0, 0.0]), none)
     found = gains(study, baseline, pick)
     assert [gain.verdict for gain in found] == ["within error", "better", "worse"]
-    assert found[0] == Gain("impact_force_N", pytest.approx(4.0), pytest.approx(5.0))
+    assert found[0].response == "impact_force_N"
+    assert (found[0].percent, found[0].error) == (pytest.approx(4.0), pytest.approx(5.0))
 
 
 def test_key_follows_scene_and_version(tmp_path):

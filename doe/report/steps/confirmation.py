@@ -12,6 +12,7 @@ from doe.study.confirmation import Confirmed, Gain, statement
 from doe.study.direct import Direct
 from doe.study.edge import Edge
 from doe.study.limits import Limit, limits_of
+from doe.study.predicted import PredictedGain
 from doe.study.whole import StudyResult
 from doe.study_file import Study
 
@@ -63,11 +64,9 @@ def edge_record(edge: Edge) -> dict[str, Any]:
     }
 
 
-def gains_record(gains: Sequence[Gain]) -> dict[str, Any]:
-    """Gains by response."""
-    return {
-        gain.response: {"percent": gain.percent, "error_percent": gain.error, "verdict": gain.verdict} for gain in gains
-    }
+def gains_record(gains: Sequence[Gain | PredictedGain]) -> dict[str, Any]:
+    """JSON of gains, simulated or predicted, by response."""
+    return {gain.response: gain.as_dict() for gain in gains}
 
 
 def direct_record(study: Study, direct: Direct) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from doe.arrays import Array
 from doe.pareto import ParetoFront
 from doe.pareto.archive import dominates
 from doe.pareto.indicators import REFERENCE
-from doe.report.steps.confirmation import point_record
+from doe.report.steps.confirmation import gains_record, point_record
 from doe.report.steps.tolerance_aware import print_tolerance_aware, tolerance_aware_record
 from doe.response_surface import Surface
 from doe.study.drawn import predict_all
@@ -88,11 +88,6 @@ def asked_point_record(study: Study, surfaces: list[Surface], front: ParetoFront
         "sentences": [gain.sentence for gain in gains],
         "statement": statement(gains) + outside,
     }
-
-
-def gains_record(gains: list[PredictedGain]) -> dict[str, Any]:
-    """JSON of predicted gains, by response."""
-    return {gain.response: gain.as_dict() for gain in gains}
 
 
 def _with_optimism(gains: list[PredictedGain], optimism: Array | None) -> dict[str, Any]:

@@ -47,7 +47,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "gains": gains_record(gains),
         "statement": statement(gains),
         "chains": {name: chain.as_dict() for name, chain in outcome.chains.items()},
-        "beside_reference": _beside_record(outcome),
+        "beside_reference": {row.response: row.as_dict() for row in outcome.beside},
         "notes": list(outcome.notes),
         "failures": grouped(outcome.failures),
         "cost": dict(outcome.cost),
@@ -72,23 +72,6 @@ def _chosen_record(pick: DirectPick) -> dict[str, Any]:
         "row": pick.row,
         "reason": pick.reason,
         "survives": None if aware is None or aware.survives is None else float(aware.survives[pick.row]),
-    }
-
-
-def _beside_record(outcome: StudyResult) -> dict[str, Any]:
-    return {
-        row.response: {
-            "ours_min_mean_max": [float(x) for x in row.our_range],
-            "theirs_min_mean_max": [float(x) for x in row.their_range],
-            "linear_effects": {
-                factor: {"ours": ours[0], "theirs": theirs[0], "same_sign": ours[0] * theirs[0] > 0.0}
-                for factor, (ours, theirs) in row.effects.items()
-            },
-            "rank_correlation": row.rank_correlation,
-            "verdict": row.verdict,
-            "why": row.why,
-        }
-        for row in outcome.beside
     }
 
 
