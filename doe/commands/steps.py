@@ -61,9 +61,10 @@ def fitted(path: Path, data: Path | None, effort: Effort) -> tuple[Study, list[S
 
 def searched(study: Study, found: ParetoFront, effort: Effort) -> Direct:
     """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
+    from doe.clearance import Simulations
     from doe.running.store import Store
     from doe.study.direct import find_direct
-    from doe.study.runs import STORE, Simulations
+    from doe.study.runs import STORE
 
     out, workers, scheduler, retry, quiet = effort
     with (

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.arrays import Array
+from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.response_surface import Surface
 from doe.running.failure import Failure
@@ -16,7 +17,6 @@ from doe.study.direct_pick import DirectPick, direct_pick
 from doe.study.front import find_front
 from doe.study.goals import rounded_within
 from doe.study.limits import ORDER, Limit, limits_of, verdict_of
-from doe.study.runs import Simulations
 from doe.study_file import Study
 from rbdyn.faults import InputError
 

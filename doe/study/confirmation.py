@@ -8,10 +8,10 @@ from scipy import special
 
 from doe import clearance
 from doe.arrays import Array
+from doe.clearance import Simulations
 from doe.running.failure import Failure
 from doe.study.goals import goals_of
 from doe.study.predicted import verdict
-from doe.study.runs import Simulations
 from doe.study_file import Study
 from rbdyn.faults import RunError
 from rbdyn.records.record import Record, derived, keyed, unsaid

@@ -8,13 +8,14 @@ import numpy as np
 
 from doe import clearance
 from doe.arrays import Array
+from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.pareto.archive import spread
 from doe.pareto.direct import DirectFront, direct_front
 from doe.pareto.surrogate_loss import SurrogateLoss, compare_with_surrogate
 from doe.running.failure import Failure, grouped
+from doe.running.runner import Progress
 from doe.study.goals import goals_of, region_of
-from doe.study.runs import Progress, Simulations
 from doe.study.surfaces import standard_errors
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError

@@ -8,13 +8,13 @@ from scipy import special
 
 from doe import clearance
 from doe.arrays import Array, Whole
+from doe.clearance import Simulations
 from doe.response_surface import Surface
 from doe.response_surface.model_error import REACH
 from doe.running.failure import Failure
 from doe.study.confirmation import Choice, Confirmed, confirmed_from
 from doe.study.drawn import jacobian
 from doe.study.goals import goals_of, region_of
-from doe.study.runs import Simulations
 from doe.study_file import Study
 from rbdyn.faults import InputError
 

@@ -1,8 +1,8 @@
-"""Runs of a design, simulated or read from a table; and where the points of a study run."""
+"""Runs of a design: simulated, or read from a table."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,15 +12,14 @@ from doe import clearance
 from doe.arrays import Array, Whole
 from doe.designs import Design
 from doe.designs.model import model_terms
-from doe.running.failure import Failure, alike, sentence, successes
+from doe.running.failure import Failure, alike, sentence
+from doe.running.runner import Progress
 from doe.running.store import Store
 from doe.study.design import check_runs, design_of
 from doe.study_file import Study
 from rbdyn.faults import RunError
-from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 
-Progress = Callable[[int, int], None]
 # Name of the store in the folder of a study.
 STORE = "study.sqlite"
 
@@ -103,7 +102,7 @@ def run_design(
     design, coded, actual = asked.design, asked.design.coded, asked.actual
     check_runs(study, design)
     with Store(folder / STORE, study.path.stem) as store:
-        simulations = Simulations(store, workers, scheduler, retry, lambda title: progress)
+        simulations = clearance.Simulations(store, workers, scheduler, retry, lambda title: progress)
         results = simulations.run(asked.scenes, asked.labels, progress, asked.factors)
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
@@ -112,7 +111,7 @@ def run_design(
             f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}: "
             f"{sentence(failures)}"
         )
-    found = successes(results[row] for row in left)
+    found = [result for result in results if not isinstance(result, Failure)]
     notes = _told_once(note for result in found for note in result.notes)
     if failures:
         notes.append(f"{len(failures)} design runs failed and are left out: {sentence(failures)}")
@@ -140,33 +139,3 @@ def read_runs(study: Study, path: Path) -> Runs:
     table = study.read_table(path)
     coded = study.coded(table.actual)
     return Runs(coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block)
-
-
-@dataclass(frozen=True)
-class Simulations:
-    """Runs scenes once each and keeps them in ``store``.
-
-    ``workers``: threads, all processors by default; ``scheduler``: address of a cluster to run on instead.
-    ``retry``: run those again that failed before. ``progress(title)`` gives the progress of a stage.
-    """
-
-    store: Store
-    workers: int | None
-    scheduler: str | None
-    retry: bool
-    progress: Callable[[str], Progress]
-
-    def run(
-        self,
-        scenes: Sequence[Scene],
-        labels: Sequence[str],
-        progress: Progress,
-        factors: Sequence[Mapping[str, float]] | None = None,
-    ) -> list[SimulationResult | Failure]:
-        """Results or failures of scenes, in their order. Raises InputError, RunError, KeyboardInterrupt.
-
-        ``factors``: of design runs, which are numbered then.
-        """
-        return clearance.run_scenes(
-            scenes, labels, self.store, self.workers, progress, self.scheduler, retry=self.retry, factors=factors
-        )

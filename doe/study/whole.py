@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from doe.arrays import Array
+from doe.clearance import Simulations
 from doe.designs import Design
 from doe.dimension_chain import ChainResult
 from doe.pareto import ParetoFront
 from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
 from doe.running.failure import Failure
+from doe.running.runner import Progress
 from doe.running.store import Store
 from doe.study.chains import solve_chains
 from doe.study.checked import check_study
@@ -26,7 +28,7 @@ from doe.study.front import find_front
 from doe.study.goals import check_goals
 from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
 from doe.study.reference import Beside, beside
-from doe.study.runs import STORE, Progress, Runs, Simulations, run_design
+from doe.study.runs import STORE, Runs, run_design
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
 from doe.study_file import Study

@@ -9,6 +9,7 @@ import pytest
 from short_studies import SHORT, short_study, silent
 
 from doe import clearance
+from doe.clearance import Simulations
 from doe.pareto.surrogate_loss import SurrogateLoss
 from doe.report.steps.confirmation import direct_record
 from doe.running.store import Store
@@ -17,7 +18,7 @@ from doe.study.chosen import choices
 from doe.study.confirmation import Confirmed, Gain, gains, statement
 from doe.study.direct import Evaluator, find_direct
 from doe.study.front import find_front
-from doe.study.runs import STORE, Simulations, read_runs
+from doe.study.runs import STORE, read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError
