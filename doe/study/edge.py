@@ -1,13 +1,12 @@
 """Where a pick or a front lies at the edge of the region, and what is to be had beyond it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
 
 from doe import clearance
-from doe.arrays import Array, Whole
+from doe.arrays import Array, Whole, or_none
 from doe.clearance import Simulations
 from doe.response_surface import Surface
 from doe.response_surface.model_error import REACH
@@ -17,6 +16,7 @@ from doe.study.drawn import jacobian
 from doe.study.goals import goals_of, region_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
+from rbdyn.records.record import Record, derived, keyed, unsaid
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
@@ -24,8 +24,7 @@ STEP = 1e-3  # coded units over which surfaces are differentiated
 MICROMETRE_MM = 1e-3
 
 
-@dataclass(frozen=True)
-class Outward:
+class Outward(Record):
     """A factor whose pick lies at a bound of the region, and how each response with a goal changes beyond it.
 
     ``gains`` by response: [improvement, its 95 % half-width] in units of the response over ``unit`` (a micrometre of a
@@ -33,12 +32,16 @@ class Outward:
     "surfaces" or "simulation".
     """
 
-    factor: str
+    factor: str = unsaid()
     side: str
     bound: float
-    gains: Mapping[str, tuple[float, float]]
-    unit: str
+    unit: str = keyed("per")
     source: str
+    gains: Mapping[str, tuple[float, float]] = unsaid()
+    told: dict[str, dict[str, float | None]] = derived(
+        lambda self: {name: {"value": gain, "error": or_none(error)} for name, (gain, error) in self.gains.items()},
+        "gains",
+    )
 
     @property
     def sentence(self) -> str:
@@ -50,17 +53,19 @@ class Outward:
         )
 
 
-@dataclass(frozen=True)
-class Edge:
-    """Factors of the pick at a bound, and the shares of the fronts within `NEAR` of one (None: no such front)."""
+class Edge(Record):
+    """Factors of the pick at a bound, and the shares of the fronts within `NEAR` of one (None: no such front).
 
-    outward: tuple[Outward, ...]
+    ``sentence`` is all of it in words.
+    """
+
+    outward: tuple[Outward, ...] = unsaid()
+    factors: dict[str, Outward] = derived(lambda self: {each.factor: each for each in self.outward})
     front_share: float
-    direct_share: float | None
+    direct_share: float | None = keyed("direct_front_share")
+    sentence: str = derived(lambda self: self._sentence())
 
-    @property
-    def sentence(self) -> str:
-        """All of it in words."""
+    def _sentence(self) -> str:
         shares = f"{100.0 * self.front_share:.0f} % of the front on the surfaces"
         if self.direct_share is not None:
             shares += f" and {100.0 * self.direct_share:.0f} % of the direct front"
@@ -100,9 +105,9 @@ def edge_of(
                 study.factors[index],
                 "upper" if side > 0 else "lower",
                 float(study.centre[index] + side * reach),
-                {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()},
                 unit,
                 source,
+                {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()},
             )
         )
     far = None if direct is None else share_at_edge(study, direct)

@@ -107,7 +107,7 @@ def test_stands_beside_the_published_table(finished):
     # Table 4 itself: its own mean impact force, and the signs of its own linear effects.
     impact = outcome.beside[0]
     assert impact.their_range == pytest.approx((145.6, 203.7, 278.2))
-    assert all(theirs[0] > 0.0 and theirs[1] for _, theirs in impact.effects.values())
+    assert all(effect.theirs > 0.0 and effect.theirs_significant for effect in impact.effects.values())
 
 
 def test_nothing_runs_twice(finished, monkeypatch):

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from doe import clearance
-from doe.arrays import Array
+from doe.arrays import Array, or_none
 from doe.study.confirmation import Confirmed, Gain, statement
 from doe.study.direct import Direct
-from doe.study.edge import Edge
 from doe.study.limits import Limit, limits_of
 from doe.study.predicted import PredictedGain
 from doe.study.whole import StudyResult
@@ -42,25 +41,6 @@ def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
         limit.response: {key: getattr(limit, key) for key in ("bound", "sense", "value", "error", "verdict")}
         | {"error": or_none(limit.error)}
         for limit in limits
-    }
-
-
-def edge_record(edge: Edge) -> dict[str, Any]:
-    """The factors of the pick at a bound of the region, what lies beyond, and the share of the fronts at a bound."""
-    return {
-        "factors": {
-            each.factor: {
-                "side": each.side,
-                "bound": each.bound,
-                "per": each.unit,
-                "source": each.source,
-                "gains": {name: {"value": gain, "error": or_none(error)} for name, (gain, error) in each.gains.items()},
-            }
-            for each in edge.outward
-        },
-        "front_share": edge.front_share,
-        "direct_front_share": edge.direct_share,
-        "sentence": edge.sentence,
     }
 
 
@@ -108,8 +88,3 @@ def point_record(study: Study, point: Array, values: Array, errors: Array) -> di
         "responses": dict(zip(study.responses, values.tolist(), strict=True)),
         "errors": dict(zip(study.responses, map(or_none, errors), strict=True)),
     }
-
-
-def or_none(value: float) -> float | None:
-    """A number for JSON; None for what is not known."""
-    return None if np.isnan(value) else float(value)

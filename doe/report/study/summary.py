@@ -4,14 +4,8 @@ from string import ascii_uppercase
 from typing import Any
 
 from doe import clearance
-from doe.report.steps.confirmation import (
-    confirmation_record,
-    direct_record,
-    edge_record,
-    gains_record,
-    limits_record,
-    or_none,
-)
+from doe.arrays import or_none
+from doe.report.steps.confirmation import confirmation_record, direct_record, gains_record, limits_record
 from doe.report.steps.design import runs_record
 from doe.report.steps.fit import fit_record
 from doe.report.steps.front import front_record, predicted_record
@@ -36,7 +30,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "limits": limits_record(outcome.limits),
         "limits_sentence": outcome.limits_sentence,
         "tried": outcome.tried,
-        "edge": edge_record(outcome.edge),
+        "edge": outcome.edge.as_dict(),
         "asked": asked_record(study),
         "design": design_record(outcome),
         "fit": fit_record(outcome.surfaces),
