@@ -1,5 +1,6 @@
 """Where a part falls within its tolerance: samples of offsets in half widths of the tolerance."""
 
+import math
 from typing import Literal
 
 import numpy as np
@@ -33,3 +34,8 @@ def even_offsets(count: int, factors: int, distribution: Distribution) -> Array:
 def random_offsets(count: int, factors: int, distribution: Distribution, seed: int) -> Array:
     """Independent offsets (count, factors) of parts."""
     return offsets(np.random.default_rng(seed).uniform(size=(count, factors)), distribution)
+
+
+def error_of_share(share: float, count: int) -> float:
+    """Monte Carlo standard error of the share of ``count`` parts that keep something; never nil."""
+    return math.sqrt(max(share * (1.0 - share), 1.0 / count) / count)

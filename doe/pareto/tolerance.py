@@ -1,6 +1,5 @@
 """Backwards from a pick: the widest tolerances of its factors within which parts keep what the pick promises."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -10,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 
 from doe.arrays import Array, Mask
-from doe.pareto.manufacture import Distribution, random_offsets
+from doe.pareto.manufacture import Distribution, error_of_share, random_offsets
 
 Costs = Callable[[Array], Array]
 Aim = Literal["ratios", "product", "sum"]
@@ -135,8 +134,8 @@ class _Parts:
 
     def probability(self, half: Array) -> tuple[float, float]:
         """Share of the parts that keep all limits and its standard error."""
-        share, count = self.kept(half), len(self.offsets)
-        return share, math.sqrt(max(share * (1.0 - share), 1.0 / count) / count)
+        share = self.kept(half)
+        return share, error_of_share(share, len(self.offsets))
 
     def half(self, ratios: Array, scale: float) -> Array:
         """Half widths at a scale, none beyond the region."""
