@@ -6,10 +6,9 @@ what was missed there is known: the field is conditioned on it, after its scale 
 are likely, if they are not (maximum likelihood). Source: Sacks, Welch, Mitchell and Wynn, Stat. Sci. 4 (1989), section 4.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy import special
@@ -38,10 +37,10 @@ class Missed:
     errors: Array
     stated: Array
 
-    def and_at(self, points: Array, misses: Array, errors: Array, stated: Array) -> Missed:
+    def and_at(self, points: Array, misses: Array, errors: Array, stated: Array) -> Self:
         """With more points."""
         more = zip((self.points, self.misses, self.errors, self.stated), (points, misses, errors, stated), strict=True)
-        return Missed(*(np.concatenate(pair) for pair in more))
+        return type(self)(*(np.concatenate(pair) for pair in more))
 
 
 class Conditioned:

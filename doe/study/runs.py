@@ -1,10 +1,9 @@
 """Runs of a design: simulated, or read from a table."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -48,11 +47,11 @@ class Runs:
         failed = {failure.run for failure in self.failures}
         return [row for row in range(len(self.coded) + len(failed)) if row + 1 not in failed]
 
-    def only(self, places: list[int]) -> Runs:
+    def only(self, places: list[int]) -> Self:
         """The rows at these places."""
         coded, actual, values, errors = (array[places] for array in (self.coded, self.actual, self.values, self.errors))
         replicates, block = (None if array is None else array[places] for array in (self.replicates, self.block))
-        return Runs(coded, actual, values, errors, self.notes, replicates, block)
+        return type(self)(coded, actual, values, errors, self.notes, replicates, block)
 
 
 def design_points(study: Study) -> Array:
