@@ -8,8 +8,6 @@ its process gives (Chase and Greenwood, Design issues in mechanical tolerance an
 from collections.abc import Sequence
 from math import exp, inf
 
-from scipy.optimize import brentq
-
 from doe.dimension_chain.intervals import total
 from doe.dimension_chain.links import Cost, Mode
 
@@ -22,6 +20,8 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
     Where even the widest fill less than the width, these. Raises ValueError, with the width that is needed, where
     even the narrowest fill more.
     """
+
+    from scipy.optimize import brentq
 
     def tolerances(log_multiplier: float) -> list[float]:
         found = []

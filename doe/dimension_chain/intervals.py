@@ -10,7 +10,6 @@ from itertools import product
 from math import sqrt
 
 import numpy as np
-from scipy.optimize import minimize
 
 from doe.arrays import Array
 from doe.dimension_chain.closing import ClosingFunction, middle
@@ -81,6 +80,8 @@ def _least(function: ClosingFunction, parts: list[Part], sign: int) -> float:
     at_inside = value(inside)
     if len(varying) <= CORNERS and at_inside.min() >= lowest:
         return lowest
+    from scipy.optimize import minimize
+
     start = inside[at_inside.argmin()] if at_inside.min() < lowest else corners[at_corners.argmin()]
     scale = max(part.tolerance_mm for part in varying)
     found = minimize(lambda place: float(value(place[None, :])[0]) / scale, start, bounds=[(0.0, 1.0)] * len(varying))
