@@ -11,7 +11,7 @@ import socket
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ import numpy as np
 
 from doe.arrays import Array, Whole
 from doe.running.failure import Failure
-from doe.running.runner import Give, Ran, RunResult, Take, run_points
+from doe.running.runner import Give, Progress, Ran, RunResult, Take, run_points
 from doe.running.store import Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
@@ -143,32 +143,41 @@ def direct_run(study: Study) -> str:
     )
 
 
-def run_scenes(
-    scenes: Sequence[Scene],
-    labels: Sequence[str],
-    store: Store,
-    workers: int | None,
-    progress: Callable[[int, int], None],
-    scheduler: str | None = None,
-    *,
-    retry: bool = False,
-    factors: Sequence[Mapping[str, float]] | None = None,
-) -> list[SimulationResult | Failure]:
-    """Results or failures of scenes, from the store or simulated: in threads, or on the cluster of ``scheduler``.
+@dataclass(frozen=True)
+class Simulations:
+    """Runs scenes once each and keeps them in ``store``.
 
-    ``retry``: run those again that failed before. ``factors``: of design runs, which are numbered then. Raises RunError
-    when the store cannot be written, InputError when the cluster is not there, KeyboardInterrupt on Ctrl-C, always with
-    all finished runs stored.
+    ``workers``: threads, all processors by default; ``scheduler``: address of a cluster to run on instead.
+    ``retry``: run those again that failed before. ``progress(title)`` gives the progress of a stage.
     """
-    points = points_of(scenes, labels, factors)
-    if scheduler is None:
-        by_key = dict(zip((point.key for point in points), scenes, strict=True))
-        engine = partial(_in_threads, by_key, workers)
-    else:
-        texts = {point.key: scene.model_dump_json() for point, scene in zip(points, scenes, strict=True)}
-        engine = partial(_on_cluster, texts, scheduler)
-    found = run_points(points, store, engine, progress, sound, retry)
-    return [_result(point, found[point.key]) for point in points]
+
+    store: Store
+    workers: int | None
+    scheduler: str | None
+    retry: bool
+    progress: Callable[[str], Progress]
+
+    def run(
+        self,
+        scenes: Sequence[Scene],
+        labels: Sequence[str],
+        progress: Progress,
+        factors: Sequence[Mapping[str, float]] | None = None,
+    ) -> list[SimulationResult | Failure]:
+        """Results or failures of scenes, in their order, from the store or simulated.
+
+        ``factors``: of design runs, which are numbered then. Raises RunError when the store cannot be written, InputError
+        when the cluster is not there, KeyboardInterrupt on Ctrl-C, always with all finished runs stored.
+        """
+        points = points_of(scenes, labels, factors)
+        if self.scheduler is None:
+            by_key = dict(zip((point.key for point in points), scenes, strict=True))
+            engine = partial(_in_threads, by_key, self.workers)
+        else:
+            texts = {point.key: scene.model_dump_json() for point, scene in zip(points, scenes, strict=True)}
+            engine = partial(_on_cluster, texts, self.scheduler)
+        found = run_points(points, self.store, engine, progress, sound, self.retry)
+        return [_result(point, found[point.key]) for point in points]
 
 
 def points_of(

@@ -1,7 +1,5 @@
 """The command ``doe``."""
 
-from __future__ import annotations
-
 from rbdyn.cli.loading import Loading
 
 with Loading():

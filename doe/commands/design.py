@@ -1,7 +1,5 @@
 """``doe design``."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from doe.commands.options import Save, StudyPath

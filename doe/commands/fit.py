@@ -1,7 +1,5 @@
 """``doe fit``."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from doe.commands.options import Data, Out, Quiet, Retry, Scheduler, StudyPath, Workers

@@ -67,7 +67,7 @@ def _point(study: Study, text: str) -> list[float]:
     """Factor values that ``--point`` names. Raises InputError with every fault."""
     from math import isfinite
 
-    values = dict(zip(study.factors, study.baseline.tolist(), strict=True))
+    values = study.by_factor(study.baseline)
     parts = [part.strip() for part in text.split(",")]
     named = any("=" in part for part in parts)
     if not named and len(parts) != len(study.factors):

@@ -1,7 +1,5 @@
 """``doe keys``."""
 
-from __future__ import annotations
-
 from rbdyn.cli.keys import AsSchema, Word, run
 from rbdyn.cli.options import Json
 from rbdyn.cli.terminal import guarded

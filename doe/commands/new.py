@@ -1,7 +1,5 @@
 """``doe new``."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``doe status``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from doe.commands.options import Out, Quiet, StudyPath

@@ -61,10 +61,10 @@ def fitted(path: Path, data: Path | None, effort: Effort) -> tuple[Study, list[S
 
 def searched(study: Study, found: ParetoFront, effort: Effort) -> Direct:
     """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
+    from doe.clearance import Simulations
     from doe.running.store import Store
     from doe.study.direct import find_direct
     from doe.study.runs import STORE
-    from doe.study.simulations import Simulations
 
     out, workers, scheduler, retry, quiet = effort
     with (

@@ -1,7 +1,5 @@
 """``doe study``."""
 
-from __future__ import annotations
-
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -44,7 +42,7 @@ def study(
         from doe.report.steps.fit import print_fit
         from doe.report.study.answer import print_outcome, print_verdict
         from doe.report.study.files import write
-        from doe.study import run_study
+        from doe.study.whole import run_study
 
         outcome = run_study(
             loaded,

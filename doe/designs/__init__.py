@@ -5,20 +5,7 @@
 """
 
 from doe.designs.box_behnken import box_behnken
-from doe.designs.central_composite import axial_distance, central_composite, central_composite_design
+from doe.designs.central_composite import axial_distance, central_composite
 from doe.designs.coding import to_actual, to_coded
 from doe.designs.design import Design
 from doe.designs.grids import full_factorial, latin_hypercube, sobol
-
-__all__ = [
-    "Design",
-    "axial_distance",
-    "box_behnken",
-    "central_composite",
-    "central_composite_design",
-    "full_factorial",
-    "latin_hypercube",
-    "sobol",
-    "to_actual",
-    "to_coded",
-]

@@ -1,7 +1,5 @@
 """Box-Behnken designs: three levels a factor, no corners, all points but the centre on one sphere."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np
@@ -56,10 +54,5 @@ def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = Fals
             part = place * number // len(TOGETHER[factors])
             of_run.append(int(np.prod(signs) > 0) if len(columns) == 3 else part)
     centres = np.zeros((centre_replicates, factors))
-    of_run = (
-        [*of_run, *(each % number for each in range(centre_replicates))]
-        if number > 1
-        else [0] * (len(edges) + centre_replicates)
-    )
     parts = [("edge", np.array(edges)), ("centre", centres)]
-    return assembled(parts, [each % number for each in of_run], 1.0, "ball")
+    return assembled(parts, [each % number for each in (*of_run, *range(centre_replicates))], 1.0, "ball")

@@ -1,12 +1,9 @@
 """Central composite designs in coded units: centre 0, cube corners -1 and +1, one column a factor."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
-from doe.arrays import Array
 from doe.designs.cube import corner_blocks, cube_points
 from doe.designs.design import Design, assembled
 
@@ -14,16 +11,6 @@ WORDS = ("rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "f
 
 
 def central_composite(
-    factors: int, *, alpha: float | str = "rotatable", centre_replicates: int = 6, cube: str = "full"
-) -> Array:
-    """Points (n, k) of a central composite design in standard order: cube (first factor fastest), axial, centre.
-
-    See `central_composite_design` for the parameters and what is raised.
-    """
-    return central_composite_design(factors, alpha=alpha, centre_replicates=centre_replicates, cube=cube).coded
-
-
-def central_composite_design(
     factors: int,
     *,
     alpha: float | str = "rotatable",

@@ -1,7 +1,5 @@
 """Coded and actual units of factors."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """Two-level factorials, full and fractional, and their division into blocks. Corners at -1 and +1."""
 
-from __future__ import annotations
-
 from itertools import combinations, product
 
 import numpy as np

@@ -1,10 +1,8 @@
 """A design of experiments as a record: its points, their blocks and kinds, and the order of the runs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -46,7 +44,7 @@ class Design:
         """Number of blocks."""
         return int(self.block.max()) + 1
 
-    def by_blocks(self, seed: int | None = None) -> Design:
+    def by_blocks(self, seed: int | None = None) -> Self:
         """Blocks one after the other, within each the standard order or, with a ``seed``, a random one."""
         ties = np.arange(len(self.coded))
         if seed is not None:

@@ -3,8 +3,6 @@
 Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., chapters 8 and 9.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

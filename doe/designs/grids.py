@@ -1,7 +1,5 @@
 """Designs that fill the box from -1 to +1: full factorials, Latin hypercubes and Sobol sequences."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -4,8 +4,6 @@ Which a model has, their columns, hierarchy, and the polynomial that they and th
 in the innermost loop of every search, so no columns of powers are built here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from itertools import combinations

@@ -1,7 +1,5 @@
 """The region where a design is meant to predict: its moments, its points, its directions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Which runs are replicates of each other."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from doe.arrays import Array, Whole

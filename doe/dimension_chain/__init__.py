@@ -7,26 +7,8 @@ its parts (``fits`` and ``expressions`` are the links that are no sums), ``inter
 """
 
 from doe.dimension_chain.faults import faults
-from doe.dimension_chain.iso286 import continuous_grades, fit_limits, grade_tolerances, tolerance_unit
+from doe.dimension_chain.iso286 import fit_limits, grade_tolerances, tolerance_unit
 from doe.dimension_chain.iso492 import ring_limits
 from doe.dimension_chain.links import Chain, Link, Part
 from doe.dimension_chain.reading import chain_from, is_several, read_chain, read_chains
 from doe.dimension_chain.solution import ChainResult, solve
-
-__all__ = [
-    "Chain",
-    "ChainResult",
-    "Link",
-    "Part",
-    "chain_from",
-    "continuous_grades",
-    "faults",
-    "fit_limits",
-    "grade_tolerances",
-    "is_several",
-    "read_chain",
-    "read_chains",
-    "ring_limits",
-    "solve",
-    "tolerance_unit",
-]

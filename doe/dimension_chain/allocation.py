@@ -7,8 +7,6 @@ narrowed together until they fill the limits. The nominal of one part is moved: 
 meets its upper limit; for a yield, so that its mean (with functions, the middle of its tails) lies midway.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The closing link as a function of the parts' sizes, and its sensitivities."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -120,24 +118,6 @@ def used_links(link: Link) -> list[str]:
     return names_in(link.expression) if link.expression else []
 
 
-def fit_factor(fit: PressFit, bore_nominal: float) -> float:
-    """Change of the raceway's diameter per interference of a press fit. Raises ValueError as `press_fit_factor`."""
-    fit_mm = fit.fit_mm or bore_nominal
-    outer = fit.raceway_mm > fit_mm
-    # The raceway bounds the part that it stands on, unless told otherwise.
-    shaft_bore = (0.0 if outer else fit.raceway_mm) if fit.shaft_bore_mm is None else fit.shaft_bore_mm
-    outside = fit.raceway_mm if fit.outside_mm is None else fit.outside_mm
-    if fit.outside_mm is None and not outer:
-        raise ValueError("outside_mm is missing: give the outside diameter of what holds the ring")
-    return press_fit_factor(
-        fit_mm=fit_mm,
-        raceway_mm=fit.raceway_mm,
-        shaft_bore_mm=shaft_bore,
-        outside_mm=outside,
-        **fit.model_dump(include={"shaft_modulus_GPa", "bore_modulus_GPa", "shaft_poisson", "bore_poisson"}),
-    )
-
-
 def middle(parts: Sequence[Part]) -> dict[str, float]:
     """Sizes of the parts at mid-tolerance, mm."""
     return {part.name: part.nominal_mm + part.middle_mm for part in parts}
@@ -159,5 +139,5 @@ def _function(link: Link, by_name: Mapping[str, Link]) -> Callable[[Sizes], Any]
 
 
 def _press_fit(fit: PressFit, bore_nominal: float) -> Callable[[Sizes], Any]:
-    factor, change = fit_factor(fit, bore_nominal), fit.interference_change_mm
+    factor, change = press_fit_factor(fit, bore_nominal), fit.interference_change_mm
     return lambda sizes: factor * np.maximum(sizes[fit.shaft] - sizes[fit.bore] + change, 0.0)

@@ -5,8 +5,6 @@ T = (k b/(2 L c^2))^(1/(k+2)) by root sum square, sum c^2 T^2 = W^2, each kept b
 its process gives (Chase and Greenwood, Design issues in mechanical tolerance analysis, 1988).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import exp, inf
 

@@ -4,8 +4,6 @@ A normal part has the standard deviation T/(6 capability), a truncated normal th
 limits; uniform and triangular parts fill the tolerance about its middle.
 """
 
-from __future__ import annotations
-
 from math import exp, pi, sqrt
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Arithmetic on links, written as text: safe, since only numbers, names and the functions below are read."""
 
-from __future__ import annotations
-
 import ast
 import json
 import operator

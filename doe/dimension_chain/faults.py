@@ -1,14 +1,13 @@
 """What is wrong with a chain, one sentence a fault, with key, value and mend."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
 
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import NoValueError, fit_factor, is_part, used_links
+from doe.dimension_chain.closing import NoValueError, is_part, used_links
 from doe.dimension_chain.expressions import shown
+from doe.dimension_chain.fits import press_fit_factor
 from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.iso286 import LARGEST, positioned
 from doe.dimension_chain.links import SLACK, Allocate, Chain, ClosingLink, Link
@@ -129,7 +128,7 @@ def _reference_faults(chain: Chain) -> list[str]:
             if grown and not (grown.is_dimension and grown.nominal > 0):
                 found.append(f'link "{link.name}": thermal_growth.of = "{grown.name}": must be a positive dimension')
         bore = link.press_fit and before.get(link.press_fit.bore)
-        if link.press_fit and bore and (wrong := _sentence(partial(fit_factor, link.press_fit, bore.nominal))):
+        if link.press_fit and bore and (wrong := _sentence(partial(press_fit_factor, link.press_fit, bore.nominal))):
             found.append(f'link "{link.name}": press_fit: {wrong}')
         before.setdefault(link.name, link)
     return found

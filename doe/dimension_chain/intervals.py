@@ -5,8 +5,6 @@ points between them; the best point is polished where it is no corner. The root 
 sensitivities at mid-tolerance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 from math import sqrt

@@ -5,8 +5,6 @@ fit, the growth by temperature, an expression. The closing link is the sum of co
 that only functions use has the coefficient 0.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Literal
 

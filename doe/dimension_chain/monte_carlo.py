@@ -5,8 +5,6 @@ and every part takes one normal and one uniform number; all distributions share 
 are those of the normal with what lies outside the limits drawn again.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor

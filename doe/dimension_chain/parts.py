@@ -1,7 +1,5 @@
 """Parts of links: given deviations, codes of fits, allocated tolerances in their place."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from doe.dimension_chain.iso286 import fit_limits, positioned

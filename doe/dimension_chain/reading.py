@@ -1,7 +1,5 @@
 """Chains from TOML: one of its own, or several under names in one file."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path

@@ -5,8 +5,6 @@ in which one part is scarcer leaves the surplus of the other unmatched (Mansoor,
 applications, 1961).
 """
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import pairwise

@@ -1,13 +1,10 @@
 """All that is asked of a dimension chain, in one record."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from doe.arrays import Array
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, middle
 from doe.dimension_chain.cost import total_cost
@@ -145,7 +142,7 @@ def _solved(search: Allocation, samples: int, seed: int, threads: int | None) ->
         status=_status(search, parts, allocation, yields["as_given"], given),
         mean_mm=mean,
         standard_deviation_mm=deviation,
-        quantiles_mm=_quantiles(drawn.values),
+        quantiles_mm=dict(zip(QUANTILES, np.quantile(drawn.values, QUANTILES).tolist(), strict=True)),
         rejected=sampled_ppm(drawn),
         exact_yields=_exact(search, parts),
         normal_yield=normal_yield(function, parts, limits),
@@ -171,10 +168,6 @@ def _contributions(function: ClosingFunction, parts: Sequence[Part]) -> dict[str
         }
         for part, variance, width in zip(parts, spread, reach, strict=True)
     }
-
-
-def _quantiles(values: Array) -> dict[float, float]:
-    return dict(zip(QUANTILES, np.quantile(values, QUANTILES).tolist(), strict=True))
 
 
 def _exact(search: Allocation, parts: Sequence[Part]) -> dict[str, float] | None:

@@ -1,7 +1,5 @@
 """Yield: share of assemblies within the limits, by Monte Carlo, by convolution, by the normal law."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import sqrt
 

@@ -14,5 +14,3 @@ from doe.pareto.goals import Goals
 from doe.pareto.indicators import hypervolume
 from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import knee_depth
-
-__all__ = ["Goals", "InfeasibleError", "ParetoFront", "front", "hypervolume", "knee_depth", "non_dominated"]

@@ -1,7 +1,5 @@
 """Archives of evaluated points: the non-dominated of all, generation by generation, and evenly spread picks of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

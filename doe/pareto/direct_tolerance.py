@@ -6,11 +6,10 @@ there (Cleveland, Robust locally weighted regression, 1979). The level is that o
 may lie beyond the bounds of the search by the tolerance, where the same shape goes on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Self
 
 import numpy as np
 
@@ -36,9 +35,7 @@ class Neighbourhood:
     slopes: Array
 
     @classmethod
-    def of(
-        cls, surfaces: Sequence[Quadratic], points: Array, values: Array, runs: Array, responses: Array
-    ) -> Neighbourhood:
+    def of(cls, surfaces: Sequence[Quadratic], points: Array, values: Array, runs: Array, responses: Array) -> Self:
         """About coded points (n, k) of responses (n, m), from the search's ``runs`` (a, k) and ``responses`` (a, m)."""
         good = np.isfinite(responses).all(axis=1)
         runs, responses = runs[good], responses[good]

@@ -4,9 +4,8 @@ Source: Hughes, Evolutionary multi-objective ranking with uncertainty and noise 
 with uncertain objectives (2001): one dominates another only where the noise cannot have made the difference.
 """
 
-from __future__ import annotations
-
 import numpy as np
+from scipy.stats import norm
 
 from doe.arrays import Array, Mask, Rows
 from doe.pareto.archive import dominates
@@ -23,8 +22,6 @@ def error_aware_dominance(costs: Array, errors: Array, confidence: float) -> Mas
     Row i of ``costs`` (n, q) must be smaller than row j in every cost, by more than the one-sided normal quantile of
     ``confidence`` times the combined standard error of both (``errors`` (n, q)).
     """
-    from scipy.stats import norm
-
     difference = costs[None, :] - costs[:, None]
     combined = np.sqrt(errors[None, :] ** 2 + errors[:, None] ** 2)
     return (difference > norm.ppf(confidence) * combined).all(axis=-1)

@@ -3,11 +3,8 @@
 Responses stay in their own units; the search minimises the costs that their goals make of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,10 +14,8 @@ from doe.pareto.goals import Goals
 from doe.pareto.indicators import hypervolume
 from doe.pareto.nsga2 import Doubt, Judged, Objectives, check_search, search
 from doe.pareto.picks import NAMES, Rule, knee_depth, thinned
-
-if TYPE_CHECKING:
-    from doe.pareto.tolerance_aware import ToleranceAware
-    from doe.pareto.uncertainty import FrontUncertainty
+from doe.pareto.tolerance_aware import ToleranceAware
+from doe.pareto.uncertainty import FrontUncertainty
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,11 +4,9 @@ A *cost* is what the search minimises: the response itself ("min"), its negative
 target ("target"). A response of goal "none" has no cost; it may still have limits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -43,7 +41,7 @@ class Goals:
         upper: Sequence[float | None] | None = None,
         weight: Sequence[float] | None = None,
         desired: Sequence[Sequence[float] | None] | None = None,
-    ) -> Goals:
+    ) -> Self:
         """Goals with None for what is not given.
 
         Raises ValueError for a target without its number or a lower limit that is not below the upper one.

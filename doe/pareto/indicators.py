@@ -4,8 +4,6 @@ Normalised costs are 0 at the ideal point and 1 at the nadir point. The hypervol
 to `REFERENCE` in each of them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from doe.arrays import Array

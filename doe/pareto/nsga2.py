@@ -6,8 +6,6 @@ gives way to what keeps it (constrained domination), and only the latter enters 
 Source: Deb et al., A fast and elitist multiobjective genetic algorithm: NSGA-II (2002).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

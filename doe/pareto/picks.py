@@ -4,8 +4,6 @@ Sources: Das, On characterizing the "knee" of the Pareto curve (1999); Derringer
 of several response variables (1980); Steuer and Choo, An interactive weighted Tchebycheff procedure (1983).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal, NamedTuple, get_args
 

@@ -4,8 +4,6 @@ A response surface of first or second order is such a quadratic, seen through a 
 was transformed before it was fitted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache

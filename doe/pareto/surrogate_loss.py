@@ -1,7 +1,5 @@
 """What response surfaces lose against the simulator itself: hypervolumes of two noisy fronts, with their errors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,17 +1,15 @@
 """Backwards from a pick: the widest tolerances of its factors within which parts keep what the pick promises."""
 
-from __future__ import annotations
-
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import minimize
 
 from doe.arrays import Array, Mask
-from doe.pareto.manufacture import Distribution, random_offsets
+from doe.pareto.manufacture import Distribution, error_of_share, random_offsets
 
 Costs = Callable[[Array], Array]
 Aim = Literal["ratios", "product", "sum"]
@@ -136,8 +134,8 @@ class _Parts:
 
     def probability(self, half: Array) -> tuple[float, float]:
         """Share of the parts that keep all limits and its standard error."""
-        share, count = self.kept(half), len(self.offsets)
-        return share, math.sqrt(max(share * (1.0 - share), 1.0 / count) / count)
+        share = self.kept(half)
+        return share, error_of_share(share, len(self.offsets))
 
     def half(self, ratios: Array, scale: float) -> Array:
         """Half widths at a scale, none beyond the region."""
@@ -162,8 +160,6 @@ class _Parts:
 
 def _best_ratios(parts: _Parts, share: Array, probability: float, aim: Aim, weight: Array) -> Array:
     """Ratios whose widest tolerances have the largest product or sum."""
-    from scipy.optimize import minimize
-
     reach = np.log(20.0)
     free = np.flatnonzero(parts.room > 0.0)
 
@@ -187,14 +183,10 @@ def _best_ratios(parts: _Parts, share: Array, probability: float, aim: Aim, weig
             "maxfev": 60 * max(free.size, 1),
             "xatol": 1e-3,
             "fatol": 1e-4,
-            "initial_simplex": _simplex(free.size),
+            "initial_simplex": np.vstack([np.zeros(free.size), 0.7 * np.eye(free.size)]),
         },
     )
     return ratios(found.x)
-
-
-def _simplex(count: int) -> Array:
-    return np.vstack([np.zeros(count), 0.7 * np.eye(count)])
 
 
 def _nothing(parts: _Parts, limit: str, cause: str) -> WidestTolerances:

@@ -8,9 +8,6 @@ Source: Deb and Gupta, Introducing robustness in multi-objective optimization (2
 with the worst case or a quantile in place of the mean.
 """
 
-from __future__ import annotations
-
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -22,7 +19,7 @@ from doe.arrays import Array
 from doe.pareto.archive import Archive, dominates
 from doe.pareto.goals import Goals
 from doe.pareto.indicators import hypervolume
-from doe.pareto.manufacture import Distribution, even_offsets
+from doe.pareto.manufacture import Distribution, error_of_share, even_offsets
 from doe.pareto.nsga2 import Doubt, Judged, check_search, search
 from doe.pareto.picks import NAMES, Rule, thinned
 from doe.pareto.quadratic import Quadratic
@@ -169,12 +166,8 @@ def tolerance_aware_front(
         plain_inside=bool(np.take(inside, plain_pick)),
         plain_survives=survives[0],
         pick_survives=survives[1],
-        survival_error=max(_error_of_share(each, SURVIVAL_PARTS) for each in survives),
+        survival_error=max(error_of_share(each, SURVIVAL_PARTS) for each in survives),
     )
-
-
-def _error_of_share(share: float, count: int) -> float:
-    return math.sqrt(max(share * (1.0 - share), 1.0 / count) / count)
 
 
 def _nominal(surfaces: Sequence[Quadratic], points: Array) -> Array:

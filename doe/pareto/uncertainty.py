@@ -7,8 +7,6 @@ of two points.
 Source: Box and Tiao, Bayesian Inference in Statistical Analysis, section 2.7.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A study as Markdown: the same answer and tables as the page, with links to the pictures."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

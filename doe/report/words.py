@@ -1,7 +1,5 @@
 """How names and numbers are written for people: units, sensible digits, errors, tolerances."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -7,5 +7,3 @@
 from doe.designs.model import model_matrix
 from doe.response_surface.surface import Surface, fit
 from doe.response_surface.words import describe
-
-__all__ = ["Surface", "describe", "fit", "model_matrix"]

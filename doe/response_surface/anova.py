@@ -1,4 +1,4 @@
-"""Analysis of variance with partial (type III) sums of squares, and what repeated runs say of the fit.
+"""Analysis of variance with partial (type III) sums of squares, what repeated runs say of the fit, R2 and its kin.
 
 Weighted fits have weighted sums. Repeated runs count within a block. Where there are blocks, their differences
 are a source of their own and no part of the model: R2 is judged on the scatter within blocks.
@@ -6,16 +6,15 @@ are a source of their own and no part of the model: R2 is judged on the scatter 
 Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., 2.4-2.7 and 7.5.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from scipy import stats
 
 from doe.arrays import Array, Whole
 from doe.designs.replicates import replicate_groups
+from doe.response_surface.diagnostics import press
 from doe.response_surface.least_squares import LeastSquares
 
 
@@ -110,3 +109,25 @@ def _lack_of_fit(response: Array, solution: LeastSquares, groups: Whole) -> tupl
     pure = sum_within(response, solution.weights, groups)
     lack = max(solution.residual_sum - pure, 0.0)
     return (row("lack_of_fit", lack, solution.dof - pure_df, pure / pure_df, pure_df), row("pure_error", pure, pure_df))
+
+
+def observation_variance(solution: LeastSquares) -> float:
+    """Variance of a new run about the surface; of the mean run, where they differ."""
+    return solution.mean_square * float((1.0 / solution.weights).mean())
+
+
+def goodness(solution: LeastSquares, response: Array, predicted: Array, block: Whole) -> dict[str, Any]:
+    """R2 and its kin on the scatter within blocks; the others by the definitions of Myers et al."""
+    within = sum_within(response, solution.weights, block)
+    free = len(response) - len(np.unique(block))
+    missed, variance = press(solution), observation_variance(solution)
+    size = len(solution.coefficients)
+    mean = float(solution.weights @ response / solution.weights.sum())
+    return {
+        "r2": complement(solution.residual_sum, within),
+        "adjusted_r2": complement(solution.mean_square, within / free),
+        "predicted_r2": None if missed is None else complement(missed, within),
+        "press": missed,
+        "cv_percent": ratio(100 * math.sqrt(variance), abs(mean)),
+        "adequate_precision": ratio(float(np.ptp(predicted)), math.sqrt(size * variance / len(response))),
+    }

@@ -6,8 +6,6 @@ scatter of y grows with its size or a bend is only one of scale.
 Source: Box and Cox, An analysis of transformations, J. R. Stat. Soc. B 26 (1964) 211-252.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from operator import itemgetter

@@ -4,8 +4,6 @@ Sources: Myers, Montgomery and Anderson-Cook, 4th ed., 6.3-6.4 (nature, ridges);
 Standard errors for the eigenvalues in second-order response surface models (1996).
 """
 
-from __future__ import annotations
-
 from string import ascii_uppercase
 from typing import Literal, TypedDict
 

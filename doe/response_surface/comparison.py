@@ -1,7 +1,5 @@
 """A polynomial surface against a Gaussian process: which one foretells points that it has not seen."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress

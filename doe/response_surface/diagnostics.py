@@ -4,8 +4,6 @@ Sources: Belsley, Kuh and Welsch, Regression Diagnostics (1980); Cook and Weisbe
 Regression (1982); Shapiro and Wilk (1965).
 """
 
-from __future__ import annotations
-
 from typing import TypedDict
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Backward elimination: the least significant term goes, again and again, hierarchy kept."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypedDict
 

@@ -7,8 +7,6 @@ the largest marginal likelihood.
 Source: Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), eqs 2.25, 2.26, 4.17, 5.8.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Callable

@@ -7,8 +7,6 @@ doubted at 5 % in 1 to 2 % of fits; with equal weights in 5 %).
 Sources: Satterthwaite, An approximate distribution of estimates of variance components (1946); Welch (1951).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

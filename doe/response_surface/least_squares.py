@@ -6,13 +6,12 @@ are so few that the extra bits cost microseconds. Sources: Björck, Numerical Me
 2.4; Golub and Van Loan, Matrix Computations, 5.2.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import linalg
 
 from doe.arrays import Array
 
@@ -92,8 +91,6 @@ def solve(matrix: ArrayLike, response: ArrayLike, weights: ArrayLike | None = No
 
 def dependent_columns(matrix: Array) -> list[int]:
     """Columns that the others determine, found by a pivoted triangularisation of unit columns."""
-    from scipy import linalg
-
     unit = matrix / np.linalg.norm(matrix, axis=0).clip(1e-300)
     _, triangle, pivots = linalg.qr(unit, mode="economic", pivoting=True)
     return sorted(pivots[np.abs(np.diag(triangle)) <= DEPENDENT].tolist())

@@ -12,8 +12,6 @@ Wynn, Design and analysis of computer experiments, Stat. Sci. 4 (1989), for the 
 Variance Components (1992), for the estimate.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 

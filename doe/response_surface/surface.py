@@ -20,12 +20,12 @@ from scipy import special
 from doe.arrays import Array, Rows
 from doe.designs.model import MODELS, Model, in_actual_units, model_matrix, model_terms, second_order
 from doe.designs.replicates import replicate_groups
-from doe.response_surface.anova import AnovaRow, anova, find
+from doe.response_surface.anova import AnovaRow, anova, find, goodness, observation_variance
+from doe.response_surface.box_cox import backward, box_cox, check_positive, forward, slope
 from doe.response_surface.canonical import Canonical, StationaryPoint, canonical, stationary_point
 from doe.response_surface.data import Data, check_errors, check_matrix, checked
 from doe.response_surface.diagnostics import Diagnostics, diagnose
 from doe.response_surface.elimination import Removal, eliminate
-from doe.response_surface.goodness import goodness, observation_variance
 from doe.response_surface.known_variance import KnownVariance, compare
 from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import ModelError, model_error
@@ -115,8 +115,6 @@ class Surface:
         error = np.sqrt(variance + (0.0 if self.model_error is None else self.model_error.variance))
         if self.transform is None:
             return error
-        from doe.response_surface.box_cox import slope
-
         return error / slope(self.predict(coded), self.transform)
 
     def refit(self, rows: Rows) -> Surface:
@@ -152,8 +150,6 @@ class Surface:
         """Advice on a power transform for an untransformed fit; None where values or fit allow none."""
         if self.transform is not None or (self.data.values <= 0).any() or self.residual_mean_square == 0:
             return None
-        from doe.response_surface.box_cox import box_cox
-
         return dict(box_cox(_columns(self.data, self.terms), self.data.values, name=self.name))
 
     def coefficient_table(self, level: float = 0.95) -> list[dict[str, Any]]:
@@ -191,8 +187,6 @@ class Surface:
     def _back(self, values: Array) -> Array:
         if self.transform is None:
             return values
-        from doe.response_surface.box_cox import backward
-
         return backward(values, self.transform)
 
 
@@ -300,8 +294,6 @@ def _columns(data: Data, terms: tuple[str, ...]) -> Array:
 def _exponent(name: str, data: Data, terms: tuple[str, ...], transform: Transform) -> float | None:
     if transform == "none":
         return None
-    from doe.response_surface.box_cox import box_cox, check_positive
-
     check_positive(data.values, name)
     if transform == "box_cox":
         transform = box_cox(_columns(data, terms), data.values, name=name)["recommended"]
@@ -314,8 +306,6 @@ def _on_scale_of_fit(data: Data, exponent: float | None) -> tuple[Array, Array |
     errors = data.standard_errors
     if exponent is None:
         return data.values, None if errors is None else errors**2
-    from doe.response_surface.box_cox import forward, slope
-
     variances = None if errors is None else (errors * slope(data.values, exponent)) ** 2
     return forward(data.values, exponent), variances
 

@@ -1,16 +1,10 @@
 """What the statistics of a surface say, in sentences."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from doe.response_surface.anova import find
 from doe.response_surface.canonical import describe_canonical
 from doe.response_surface.diagnostics import describe_diagnostics, p_text
 from doe.response_surface.known_variance import describe_known_variance
-
-if TYPE_CHECKING:
-    from doe.response_surface.surface import Surface
+from doe.response_surface.surface import Surface
 
 FAR_APART = 0.2  # difference of adjusted and predicted R2 above which they disagree
 DISCERNIBLE = 4.0  # adequate precision above which the surface can steer a search

@@ -1,7 +1,5 @@
 """Runs on a cluster: the workers of a dask scheduler, reached through joblib."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import queue

@@ -1,7 +1,5 @@
 """The sqlite file beneath a store: opened, checked, written in transactions; what goes wrong is one sentence with its mend."""
 
-from __future__ import annotations
-
 import sqlite3
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Points that could not be simulated: kept as records, grouped by cause."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -61,16 +59,3 @@ def alike(items: Iterable[T], text: Callable[[T], str]) -> list[list[T]]:
 def sentence(failures: Sequence[Failure]) -> str:
     """All failures in one sentence: each cause once, with the points that it stopped."""
     return "; ".join(f"{', '.join(group['labels'])}: {group['cause']}" for group in grouped(failures))
-
-
-def successes(outcomes: Iterable[T | Failure]) -> list[T]:
-    """What went well, where all must. Raises RunError that names the rest."""
-    found, failures = list[T](), list[Failure]()
-    for outcome in outcomes:
-        if isinstance(outcome, Failure):
-            failures.append(outcome)
-        else:
-            found.append(outcome)
-    if failures:
-        raise RunError(sentence(failures))
-    return found

@@ -3,8 +3,6 @@
 Where points run is the business of an engine: threads of this process, or the workers of a cluster.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

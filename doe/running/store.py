@@ -8,8 +8,6 @@ its own SHA-256, so that a row spoilt later is told and run again, not read.
 Several processes of one machine may use a store at once: whoever claims a run does it, the others wait for it.
 """
 
-from __future__ import annotations
-
 import json
 import sqlite3
 import threading
@@ -19,7 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 from doe.running.database import Database
 from doe.running.failure import Failure
@@ -235,7 +233,7 @@ class Store(Database):
         with self._lock:
             self._connection.close()
 
-    def __enter__(self) -> Store:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(

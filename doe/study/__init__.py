@@ -1,17 +1,13 @@
 """The study that joins the steps.
 
 - ``design``: the points of the study and what they can tell
-- ``runs``, ``surfaces``: design runs, simulated or of a table, and the surfaces through them
+- ``runs``, ``surfaces``: design runs, simulated or of a table, where any points run, and the surfaces through the runs
 - ``goals``, ``front``, ``drawn``, ``predicted``: the front on the surfaces, how sure it is, what it promises
 - ``direct``: the front of the simulator itself
-- ``picks``, ``confirmation``: points worth a simulation, and whether what they gain is real
+- ``chosen``, ``confirmation``: points worth a simulation, and whether what they gain is real
 - ``widest``, ``chains``: tolerances that keep the gains, and the parts
-- ``simulations``: points beside the design; ``checked``: one judgement of a study before anything runs
+- ``checked``: one judgement of a study before anything runs
 - ``status``, ``finished``: where a study stands
 - ``reference``: a published table beside
 - ``whole``: all of it in one go
 """
-
-from doe.study.whole import StudyResult, run_study
-
-__all__ = ["StudyResult", "run_study"]

@@ -6,21 +6,19 @@ what was missed there is known: the field is conditioned on it, after its scale 
 are likely, if they are not (maximum likelihood). Source: Sacks, Welch, Mitchell and Wynn, Stat. Sci. 4 (1989), section 4.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
+from scipy import special
 
 from doe.arrays import Array
-from doe.designs import to_coded
+from doe.response_surface import Surface
+from doe.response_surface.model_error import correlation
 from doe.study.confirmation import Confirmed
+from doe.study.goals import goals_of
 from doe.study_file import Study
-
-if TYPE_CHECKING:
-    from doe.response_surface import Surface
 
 # How far below and above what is foretold (n, m) the responses at coded points (n, k) may be.
 Doubt = Callable[[Array], tuple[Array, Array]]
@@ -39,18 +37,16 @@ class Missed:
     errors: Array
     stated: Array
 
-    def and_at(self, points: Array, misses: Array, errors: Array, stated: Array) -> Missed:
+    def and_at(self, points: Array, misses: Array, errors: Array, stated: Array) -> Self:
         """With more points."""
         more = zip((self.points, self.misses, self.errors, self.stated), (points, misses, errors, stated), strict=True)
-        return Missed(*(np.concatenate(pair) for pair in more))
+        return type(self)(*(np.concatenate(pair) for pair in more))
 
 
 class Conditioned:
     """The error of a forecast as a field, given what was missed."""
 
     def __init__(self, missed: Missed) -> None:
-        from doe.response_surface.model_error import correlation
-
         prior = correlation(missed.points, missed.points) * np.outer(missed.stated, missed.stated)
         self._missed, self._noise = missed, np.diag(missed.errors**2)
         self._scale = _scale(prior, self._noise, missed.misses)
@@ -58,8 +54,6 @@ class Conditioned:
 
     def __call__(self, coded: Array, stated: Array) -> tuple[Array, Array]:
         """Mean (n,) and standard deviation (n,) of the error at coded points (n, k) of ``stated`` standard errors (n,)."""
-        from doe.response_surface.model_error import correlation
-
         link = self._scale**2 * correlation(coded, self._missed.points) * np.outer(stated, self._missed.stated)
         told = link @ self._solve
         left = (self._scale * stated) ** 2 - (told * link).sum(axis=1)
@@ -71,10 +65,6 @@ def surfaces_doubt(
 ) -> Callable[[float], Doubt]:
     """Range in which the limited responses lie with the study's probability, from the surfaces, what these missed at the
     design runs and at points ``simulated``; a function of the share of it that is taken."""
-    from scipy import special
-
-    from doe.study.goals import goals_of
-
     probability = study.file.confirmation.limit_probability
     limited = sorted({index for index, _, _ in goals_of(study).limited})
     fields, quantiles, more = {}, {}, {}
@@ -82,7 +72,7 @@ def surfaces_doubt(
         surface = surfaces[index]
         missed = _at_design(surface)
         if simulated:
-            at = to_coded(np.array([each.point for each in simulated]), study.centre, study.step)
+            at = study.coded(np.array([each.point for each in simulated]))
             errors = standard_errors_of(simulated)[:, index]
             misses = np.array([each.values[index] for each in simulated]) - surface.predict(at)
             missed = missed.and_at(at, misses, errors, surface.prediction_standard_error(at))

@@ -1,21 +1,16 @@
 """The dimension chains of a study, solved at the pick: from clearances with tolerances to parts."""
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from doe.arrays import Array
+from doe.dimension_chain import Chain, ChainResult, chain_from, solve
+from doe.pareto.tolerance import WidestTolerances
 from doe.study.goals import region_of
 from doe.study_file import Study
 from doe.study_file.chain_section import chain_table
 from rbdyn.faults import InputError, check_all
-
-if TYPE_CHECKING:
-    from doe.dimension_chain import Chain, ChainResult
-    from doe.pareto.tolerance import WidestTolerances
 
 
 def check_chains(study: Study) -> None:
@@ -33,8 +28,6 @@ def solve_chains(
     study: Study, pick: Array, tolerances: WidestTolerances | None
 ) -> tuple[dict[str, ChainResult], list[str]]:
     """Every chain by name at the picked point (k,), and why any has no parts."""
-    from doe.dimension_chain import solve
-
     half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
     solved, notes = {}, []
     for number, chain in enumerate(study.file.chain):
@@ -54,8 +47,6 @@ def solve_chains(
 
 
 def _chain(study: Study, number: int, point: Array, half_widths: Array) -> Chain:
-    from doe.dimension_chain import chain_from
-
     chain = study.file.chain[number]
     factor = study.factors.index(chain.factor)
     half_width = float(half_widths[factor]) if half_widths[factor] > 0.0 else None

@@ -1,7 +1,6 @@
 """What can be told to be wrong with a study before anything runs: one judgement for all commands."""
 
-from __future__ import annotations
-
+from doe import clearance
 from doe.study.chains import check_chains
 from doe.study.design import check_runs
 from doe.study.reference import reference_runs
@@ -12,8 +11,6 @@ from rbdyn.faults import check_all
 
 def check_study(study: Study) -> Runs | None:
     """The published runs, if any. Raises InputError with all faults of keys, responses, scenes, design and chains."""
-    from doe import clearance
-
     check_all(
         (
             lambda: check_runs(study, ordered_runs(study).design),

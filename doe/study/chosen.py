@@ -1,27 +1,24 @@
-"""The pick and what simulation says of it: where it does not keep its limits, the next best point is tried."""
+"""The points of a front that are worth a simulation, each once; where the pick does not keep its limits, the next best is
+tried."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from doe.arrays import Array
+from doe.clearance import Simulations
+from doe.pareto import ParetoFront
+from doe.response_surface import Surface
 from doe.running.failure import Failure
 from doe.study.confirmation import Choice, Confirmed, confirm
+from doe.study.direct import Direct
 from doe.study.direct_pick import DirectPick, direct_pick
 from doe.study.front import find_front
+from doe.study.goals import rounded_within
 from doe.study.limits import ORDER, Limit, limits_of, verdict_of
-from doe.study.picks import choices
 from doe.study_file import Study
 from rbdyn.faults import InputError
-
-if TYPE_CHECKING:
-    from doe.pareto import ParetoFront
-    from doe.response_surface import Surface
-    from doe.study.direct import Direct
-    from doe.study.simulations import Simulations
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,3 +83,42 @@ def _kept(study: Study, pick: Confirmed) -> bool:
 def _badness(limits: Sequence[Limit]) -> tuple[int, float]:
     worst = min((limit.room / (abs(limit.bound) or 1.0) for limit in limits), default=0.0)
     return ORDER.index(verdict_of(limits)), -worst
+
+
+def choices(
+    study: Study, front: ParetoFront, direct: Direct | None, chosen: DirectPick | None = None
+) -> dict[str, Choice]:
+    """The pick, then the picks by the other rules and of the direct front, by name.
+
+    What was ``chosen`` of the direct front is the pick, and the pick of the surfaces stands beside it. Where the study asks
+    for a tolerance-aware front, its pick is that of the surfaces. Of those that the drawing cannot tell apart
+    the first stands for all, and its reason says so.
+    """
+    found: dict[str, Choice] = {}
+    for name, point, reason in _candidates(study, front, direct, chosen):
+        rounded = rounded_within(study, point)
+        twin = next((known for known, each in found.items() if np.array_equal(each.point, rounded)), None)
+        if twin is None:
+            found[name] = Choice(rounded, reason)
+        elif name != study.file.front.pick:
+            found[twin] = Choice(rounded, f"{found[twin].reason}; also {reason}")
+    return found
+
+
+def _candidates(
+    study: Study, front: ParetoFront, direct: Direct | None, chosen: DirectPick | None
+) -> Iterator[tuple[str, Array, str]]:
+    aware, name = front.tolerance_aware, "pick"
+    if direct is not None and chosen is not None:
+        yield "pick", direct.front.points[chosen.row], chosen.reason
+        name = "pick_of_surfaces"
+    if aware is None:
+        yield name, front.points[front.pick], front.pick_reason
+    else:
+        point = study.actual(aware.points[aware.pick])
+        yield name, point, f"{aware.pick_reason}, by what its tolerances leave of it"
+        yield "without_tolerances", front.points[front.pick], front.pick_reason
+    for rule, row in front.picks.items():
+        yield rule, front.points[row], f"the pick by {rule}"
+    if direct is not None:
+        yield "direct", direct.front.points[direct.front.pick], "the pick of the direct front"

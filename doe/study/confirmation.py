@@ -1,23 +1,21 @@
 """Simulations at chosen points, and whether what they gain over the baseline is more than their error."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import special
 
+from doe import clearance
 from doe.arrays import Array
+from doe.clearance import Simulations
 from doe.running.failure import Failure
 from doe.study.goals import goals_of
 from doe.study.predicted import verdict
 from doe.study_file import Study
 from rbdyn.faults import RunError
-
-if TYPE_CHECKING:
-    from doe.study.simulations import Simulations
-    from rbdyn.result import SimulationResult
+from rbdyn.records.record import Record, derived, keyed, unsaid
+from rbdyn.result import SimulationResult
 
 
 @dataclass(frozen=True)
@@ -52,18 +50,16 @@ class Confirmed:
         return np.where(known, joint, np.nan)
 
 
-@dataclass(frozen=True)
-class Gain:
-    """Relative improvement [%] of a response at a point over the baseline, with its 95 % half-width."""
+class Gain(Record):
+    """Relative improvement [%] of a response at a point over the baseline, with its 95 % half-width.
 
-    response: str
+    ``verdict``: whether the change is larger than its error.
+    """
+
+    response: str = unsaid()
     percent: float
-    error: float
-
-    @property
-    def verdict(self) -> str:
-        """Whether the change is larger than its error."""
-        return verdict(self.percent, self.error)
+    error: float = keyed("error_percent")
+    verdict: str = derived(lambda self: verdict(self.percent, self.error))
 
 
 def confirm(
@@ -73,8 +69,6 @@ def confirm(
 
     Raises RunError where the baseline or the pick cannot be simulated, InputError, KeyboardInterrupt.
     """
-    from doe import clearance
-
     wanted = {"baseline": Choice(study.baseline, "the original design"), **choices}
     scenes = [clearance.confirmation_scene(study, choice.point) for choice in wanted.values()]
     results = simulations.run(scenes, list(wanted), simulations.progress("confirmation"))
@@ -119,8 +113,6 @@ def statement(gains: Sequence[Gain]) -> str:
     A gain counts as real where it is more than its error with all responses judged at once: the intervals are widened
     so that together they hold with 95 % (Bonferroni).
     """
-    from scipy import special
-
     wider = float(special.ndtri(1.0 - 0.025 / len(gains)) / special.ndtri(0.975))
     told = {
         "real, more than its error": [gain for gain in gains if gain.percent > wider * gain.error],

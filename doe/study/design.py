@@ -1,16 +1,19 @@
 """The design of a study: its points and what they can tell about the models asked for."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from doe.designs import Design, box_behnken, central_composite_design, full_factorial, latin_hypercube, sobol
+from doe.designs import Design, box_behnken, central_composite, full_factorial, latin_hypercube, sobol
 from doe.designs.model import model_terms
 from doe.study_file import Study
 from doe.study_file.design_section import KEYS_OF
 from doe.study_file.design_section import Design as DesignSettings
 from rbdyn.faults import InputError, refuse
+
+MAKERS: dict[str, Callable[..., Design]] = {
+    make.__name__: make for make in (central_composite, box_behnken, full_factorial, latin_hypercube, sobol)
+}
 
 
 def design_of(study: Study) -> Design:
@@ -25,17 +28,9 @@ def design_of(study: Study) -> Design:
 def _design(text: str, factors: int) -> Design:
     """The design of settings in JSON; several steps of a study ask for it, and some designs take a while."""
     settings = DesignSettings.model_validate_json(text)
-    centres = settings.centres
-    if settings.kind == "central_composite":
-        keys = settings.model_dump(include=KEYS_OF["central_composite"])
-        design = central_composite_design(factors, centre_replicates=centres, **keys)
-    elif settings.kind == "box_behnken":
-        design = box_behnken(factors, centre_replicates=centres, blocks=settings.blocks)
-    elif settings.kind == "full_factorial":
-        design = full_factorial(factors, levels=settings.levels, centre_replicates=centres)
-    else:
-        sampled = latin_hypercube if settings.kind == "latin_hypercube" else sobol
-        design = sampled(factors, runs=settings.runs, seed=settings.seed, centre_replicates=centres)
+    make, seed = MAKERS[settings.kind], {"seed"} if settings.kind in ("latin_hypercube", "sobol") else set()
+    keys = settings.model_dump(include=KEYS_OF[settings.kind] | seed)
+    design = make(factors, centre_replicates=settings.centres, **keys)
     return design.by_blocks(settings.seed if settings.order == "random" else None)
 
 

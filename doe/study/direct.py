@@ -1,28 +1,24 @@
 """The front of the simulator itself, and what the response surfaces lose against it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from doe import clearance
 from doe.arrays import Array
-from doe.designs import to_actual
+from doe.clearance import Simulations
+from doe.pareto import ParetoFront
+from doe.pareto.archive import spread
+from doe.pareto.direct import DirectFront, direct_front
+from doe.pareto.surrogate_loss import SurrogateLoss, compare_with_surrogate
 from doe.running.failure import Failure, grouped
+from doe.running.runner import Progress
 from doe.study.goals import goals_of, region_of
 from doe.study.surfaces import standard_errors
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError
-
-if TYPE_CHECKING:
-    from doe.pareto import ParetoFront
-    from doe.pareto.direct import DirectFront
-    from doe.pareto.surrogate_loss import SurrogateLoss
-    from doe.study.runs import Progress
-    from doe.study.simulations import Simulations
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +53,6 @@ class Evaluator:
 
     def __call__(self, points: Array) -> tuple[Array, Array]:
         """Responses (n, m) and their standard errors (n, m) at points (n, k) in factor units; NaN where a run failed."""
-        from doe import clearance
-
         scenes = clearance.direct_scenes(self._study, points, self.done)
         labels = [f"direct run {self.done + row}" for row in range(1, len(points) + 1)]
         results = self._simulations.run(scenes, labels, self._watch)
@@ -81,18 +75,14 @@ def find_direct(study: Study, found: ParetoFront, simulations: Simulations) -> D
 
     Raises RunError where every run of a stage fails, InputError for impossible settings, KeyboardInterrupt.
     """
-    from doe.pareto.archive import spread
-    from doe.pareto.direct import direct_front
-    from doe.pareto.surrogate_loss import compare_with_surrogate
-
     settings, reach = study.file.direct, region_of(study)
     evaluate = Evaluator(study, simulations, simulations.progress("direct front"), settings.evaluations)
     started = time.perf_counter()
     try:
         front = direct_front(
             evaluate,
-            to_actual(-reach, study.centre, study.step),
-            to_actual(reach, study.centre, study.step),
+            study.actual(-reach),
+            study.actual(reach),
             goals=goals_of(study),
             baseline=study.baseline,
             pick=study.file.front.pick,

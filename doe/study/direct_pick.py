@@ -1,25 +1,20 @@
 """The pick of the simulator's own front: what its tolerances leave of it, and its limits."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import special
 
 from doe.arrays import Array
-from doe.designs import to_coded
+from doe.pareto.direct_tolerance import DirectAware, Neighbourhood, direct_aware, pick_among
+from doe.response_surface import Surface
 from doe.study.back_off import Conditioned, Missed, standard_errors_of
 from doe.study.confirmation import Confirmed
 from doe.study.direct import Direct
 from doe.study.drawn import quadratics
 from doe.study.goals import goals_of, rounded_within, tolerance_box
 from doe.study_file import Study
-
-if TYPE_CHECKING:
-    from doe.pareto.direct_tolerance import DirectAware, Neighbourhood
-    from doe.response_surface import Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +35,8 @@ def direct_pick(
     what these missed at points ``simulated``, which are not picked again; each of the ``failed`` among them, picked and not
     kept, lets the back-off grow by its own size.
     """
-    from scipy import special
-
-    from doe.pareto.direct_tolerance import direct_aware, pick_among
-
     front, goals = direct.front, goals_of(study)
-    coded = to_coded(front.points, study.centre, study.step)
+    coded = study.coded(front.points)
     quantile = float(special.ndtri(study.file.confirmation.limit_probability))
     shift, margin = _doubt(study, direct, coded, simulated)
     margin *= quantile * (1.0 + failed)
@@ -58,7 +49,7 @@ def direct_pick(
     if (box := tolerance_box(study)) is not None:
         here, base = _neighbourhood(study, surfaces, direct, coded, front.values), None
         if ran is not None:
-            at = to_coded(study.baseline, study.centre, study.step)[None]
+            at = study.coded(study.baseline)[None]
             base = _neighbourhood(study, surfaces, direct, at, ran[None])
         aware = direct_aware(box, here, goals, base, below, above)
         costs, violations = aware.costs, aware.violations
@@ -92,7 +83,7 @@ class Local:
 
 def local_of(study: Study, surfaces: Sequence[Surface], direct: Direct, pick: Confirmed, baseline: Confirmed) -> Local:
     """About the simulated pick of a direct front."""
-    coded = to_coded(pick.point, study.centre, study.step)
+    coded = study.coded(pick.point)
     here = _neighbourhood(study, surfaces, direct, coded[None], pick.values[None])
     return Local(coded, pick.values, here.slopes[0], baseline.values)
 
@@ -101,10 +92,8 @@ def _neighbourhood(
     study: Study, surfaces: Sequence[Surface], direct: Direct, coded: Array, values: Array
 ) -> Neighbourhood:
     """About coded points (n, k) of known responses (n, m)."""
-    from doe.pareto.direct_tolerance import Neighbourhood
-
     forms, searched = quadratics(surfaces, len(study.factors)), direct.front.searched
-    runs = to_coded(searched.points, study.centre, study.step)
+    runs = study.coded(searched.points)
     return Neighbourhood.of(forms, coded, values, runs, searched.values)
 
 
@@ -115,7 +104,7 @@ def _doubt(study: Study, direct: Direct, coded: Array, simulated: Sequence[Confi
     shift, deviation = np.zeros_like(front.values), front.standard_errors.copy()
     if not simulated:
         return shift, deviation
-    at = to_coded(np.array([each.point for each in simulated]), study.centre, study.step)
+    at = study.coded(np.array([each.point for each in simulated]))
     rows = ((at[:, None] - coded[None]) ** 2).sum(axis=-1).argmin(axis=1)
     values, errors = np.array([each.values for each in simulated]), standard_errors_of(simulated)
     for index in range(values.shape[1]):

@@ -1,18 +1,17 @@
 """Predictions of several surfaces at once: on drawn coefficients, and how they change with the coefficients."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from doe.arrays import Array
-
-if TYPE_CHECKING:
-    from doe.pareto.quadratic import Quadratic
-    from doe.response_surface import Surface
+from doe.designs.model import second_order
+from doe.pareto.quadratic import Quadratic, identity
+from doe.pareto.uncertainty import draw_coefficients
+from doe.response_surface import Surface, model_matrix
+from doe.response_surface.box_cox import backward, slope
+from doe.response_surface.model_error import draw_fields
 
 
 def predict_all(surfaces: Sequence[Surface], coded: Array) -> Array:
@@ -22,8 +21,6 @@ def predict_all(surfaces: Sequence[Surface], coded: Array) -> Array:
 
 def draw_all(surfaces: Sequence[Surface], draws: int, seed: int) -> list[Array]:
     """Coefficients (draws, p) of each surface, drawn from their multivariate t independently by response."""
-    from doe.pareto.uncertainty import draw_coefficients
-
     random = np.random.default_rng(seed)
     return [
         draw_coefficients(surface.coefficients, surface.covariance, surface.residual_dof, draws, random)
@@ -33,8 +30,6 @@ def draw_all(surfaces: Sequence[Surface], draws: int, seed: int) -> list[Array]:
 
 def predict_draws(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array, seed: int = 1) -> Array:
     """Responses (d, n, m) on drawn coefficients, and with what the models may miss, at coded points (n, k)."""
-    from doe.response_surface.model_error import draw_fields
-
     random = np.random.default_rng(seed)
     columns = [
         surface.draws(coded, coefficients, draw_fields(surface.model_error, coded, len(coefficients), random))
@@ -45,8 +40,6 @@ def predict_draws(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Ar
 
 def predict_paired(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array) -> Array:
     """Responses (n, m) at coded points (n, k), each on the drawn coefficients (n, p) of its own row."""
-    from doe.response_surface import model_matrix
-
     columns = [
         link_of(surface)((model_matrix(coded, surface.terms) * coefficients).sum(axis=-1))
         for surface, coefficients in zip(surfaces, drawn, strict=True)
@@ -56,29 +49,19 @@ def predict_paired(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: A
 
 def jacobian(surface: Surface, coded: Array) -> Array:
     """Derivatives (p,) of the prediction at a coded point (k,) by the coefficients."""
-    from doe.response_surface import model_matrix
-
     row = model_matrix(coded, surface.terms)
     if surface.transform is None:
         return row
-    from doe.response_surface.box_cox import slope
-
     return np.asarray(row / slope(surface.predict(coded), surface.transform))
 
 
 def link_of(surface: Surface) -> Callable[[Array], Array]:
     """From the scale of the fit to the units of the response."""
-    from doe.pareto.quadratic import identity
-    from doe.response_surface.box_cox import backward
-
     return identity if surface.transform is None else partial(backward, exponent=surface.transform)
 
 
 def quadratics(surfaces: Sequence[Surface], factors: int) -> list[Quadratic]:
     """The surfaces as quadratics of the coded factors."""
-    from doe.designs.model import second_order
-    from doe.pareto.quadratic import Quadratic
-
     return [
         Quadratic(*second_order(surface.terms, surface.coefficients, factors), link_of(surface)) for surface in surfaces
     ]

@@ -1,26 +1,22 @@
 """Where a pick or a front lies at the edge of the region, and what is to be had beyond it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import special
 
-from doe.arrays import Array, Whole
-from doe.designs import to_coded
+from doe import clearance
+from doe.arrays import Array, Whole, or_none
+from doe.clearance import Simulations
+from doe.response_surface import Surface
+from doe.response_surface.model_error import REACH
 from doe.running.failure import Failure
 from doe.study.confirmation import Choice, Confirmed, confirmed_from
 from doe.study.drawn import jacobian
 from doe.study.goals import goals_of, region_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
-
-if TYPE_CHECKING:
-    from doe.response_surface import Surface
-    from doe.study.simulations import Simulations
-
+from rbdyn.records.record import Record, derived, keyed, unsaid
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
@@ -28,8 +24,7 @@ STEP = 1e-3  # coded units over which surfaces are differentiated
 MICROMETRE_MM = 1e-3
 
 
-@dataclass(frozen=True)
-class Outward:
+class Outward(Record):
     """A factor whose pick lies at a bound of the region, and how each response with a goal changes beyond it.
 
     ``gains`` by response: [improvement, its 95 % half-width] in units of the response over ``unit`` (a micrometre of a
@@ -37,12 +32,16 @@ class Outward:
     "surfaces" or "simulation".
     """
 
-    factor: str
+    factor: str = unsaid()
     side: str
     bound: float
-    gains: Mapping[str, tuple[float, float]]
-    unit: str
+    unit: str = keyed("per")
     source: str
+    gains: Mapping[str, tuple[float, float]] = unsaid()
+    told: dict[str, dict[str, float | None]] = derived(
+        lambda self: {name: {"value": gain, "error": or_none(error)} for name, (gain, error) in self.gains.items()},
+        "gains",
+    )
 
     @property
     def sentence(self) -> str:
@@ -54,17 +53,19 @@ class Outward:
         )
 
 
-@dataclass(frozen=True)
-class Edge:
-    """Factors of the pick at a bound, and the shares of the fronts within `NEAR` of one (None: no such front)."""
+class Edge(Record):
+    """Factors of the pick at a bound, and the shares of the fronts within `NEAR` of one (None: no such front).
 
-    outward: tuple[Outward, ...]
+    ``sentence`` is all of it in words.
+    """
+
+    outward: tuple[Outward, ...] = unsaid()
+    factors: dict[str, Outward] = derived(lambda self: {each.factor: each for each in self.outward})
     front_share: float
-    direct_share: float | None
+    direct_share: float | None = keyed("direct_front_share")
+    sentence: str = derived(lambda self: self._sentence())
 
-    @property
-    def sentence(self) -> str:
-        """All of it in words."""
+    def _sentence(self) -> str:
         shares = f"{100.0 * self.front_share:.0f} % of the front on the surfaces"
         if self.direct_share is not None:
             shares += f" and {100.0 * self.direct_share:.0f} % of the direct front"
@@ -104,9 +105,9 @@ def edge_of(
                 study.factors[index],
                 "upper" if side > 0 else "lower",
                 float(study.centre[index] + side * reach),
-                {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()},
                 unit,
                 source,
+                {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()},
             )
         )
     far = None if direct is None else share_at_edge(study, direct)
@@ -115,7 +116,7 @@ def edge_of(
 
 def _sides(study: Study, points: Array) -> Whole:
     """-1 at a lower bound, 1 at an upper one, else 0, for points (n, k)."""
-    coded, reach = to_coded(points, study.centre, study.step), region_of(study)
+    coded, reach = study.coded(points), region_of(study)
     near = np.abs(coded) >= reach * (1.0 - 2.0 * NEAR)
     return np.where(near, np.sign(coded), 0.0).astype(np.int64)
 
@@ -129,12 +130,8 @@ def _on_surfaces(
     study: Study, surfaces: Sequence[Surface], point: Array, index: int, side: int
 ) -> dict[str, tuple[float, float]]:
     """Gains a unit of the factor outward, with the error of the slope: of the coefficients and of the model's own error."""
-    from scipy import special
-
-    from doe.response_surface.model_error import REACH
-
     goals = goals_of(study)
-    coded = to_coded(point, study.centre, study.step)
+    coded = study.coded(point)
     ahead = coded + side * STEP * np.eye(coded.size)[index]
     gains = {}
     for column, response in enumerate(goals.objectives):
@@ -160,8 +157,6 @@ def _simulated(
     study: Study, pick: Confirmed, names: Sequence[tuple[int, int]], simulations: Simulations
 ) -> dict[int, dict[str, tuple[float, float]]]:
     """Gains a unit of each factor from runs beyond its bound, like those of the confirmation; none where a run fails."""
-    from doe import clearance
-
     scenes, kept = [], []
     for index, side in names:
         point = pick.point.copy()

@@ -1,7 +1,5 @@
 """Whether a study lies finished in its folder, so that nothing needs to be done again."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from pathlib import Path

@@ -1,28 +1,25 @@
 """The Pareto front of a study on its response surfaces, how sure it is, and what manufacture leaves of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
+from scipy import stats
 
 from doe.arrays import Array
-from doe.designs import to_actual, to_coded
+from doe.pareto import Goals, InfeasibleError, ParetoFront, front
+from doe.pareto.archive import Archive
+from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox, tolerance_aware_front
+from doe.pareto.uncertainty import FrontUncertainty, front_uncertainty
+from doe.response_surface import Surface
 from doe.study.back_off import Doubt, surfaces_doubt
 from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
 from doe.study_file import Study
 from rbdyn.faults import InputError
-
-if TYPE_CHECKING:
-    from doe.pareto import Goals, ParetoFront
-    from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox
-    from doe.pareto.uncertainty import FrontUncertainty
-    from doe.response_surface import Surface
 
 Found = TypeVar("Found", "ParetoFront", "ToleranceAware")
 
@@ -46,45 +43,38 @@ def find_front(
 
     Raises InputError when fewer than two responses have a goal, no point keeps all limits, or a tolerance is missing.
     """
-    from doe.pareto import front
-
     goals, settings, reach = goals_of(study), study.file.front, region_of(study)
     check_goals(study)
     box = tolerance_box(study)
-
-    def coded(points: Array) -> Array:
-        return to_coded(points, study.centre, study.step)
 
     doubt = surfaces_doubt(study, surfaces, simulated)
 
     def plain(share: float) -> ParetoFront:
         return front(
-            lambda points: predict_all(surfaces, coded(points)),
-            to_actual(-reach, study.centre, study.step),
-            to_actual(reach, study.centre, study.step),
+            lambda points: predict_all(surfaces, study.coded(points)),
+            study.actual(-reach),
+            study.actual(reach),
             goals=goals,
             baseline=study.baseline,
             **settings.model_dump(include=SEARCH),
             standard_errors=lambda points: np.column_stack(
-                [surface.prediction_standard_error(coded(points)) for surface in surfaces]
+                [surface.prediction_standard_error(study.coded(points)) for surface in surfaces]
             ),
-            doubt=lambda points: doubt(share)(coded(points)),
+            doubt=lambda points: doubt(share)(study.coded(points)),
         )
 
-    with _named(study, goals, np.zeros(1), np.ones(1), ""):
+    with _named(study, goals, lambda point: point, ""):
         found = _backed_off(study, plain, failed)
     found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
     if box is None:
         return found
-    with _named(study, goals, study.centre, study.step, " after manufacture"):
+    with _named(study, goals, study.actual, " after manufacture"):
         aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt(share)), failed)
     return replace(found, tolerance_aware=aware)
 
 
 def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> Found:
     """What a search finds with the largest share of the back-off that leaves any point. Raises InfeasibleError."""
-    from doe.pareto import InfeasibleError
-
     if not goals_of(study).limited:
         return search(0.0)
     for share in (1.0 + failed, *SHARES)[failed == 0 :]:
@@ -103,8 +93,6 @@ def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> 
 
 def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
     """95 % half widths (..., m) of mean responses; NaN for a surface that leaves no residual."""
-    from scipy import stats
-
     factors = [
         float(stats.t.ppf(0.975, surface.interval_dof)) if surface.interval_dof > 0 else np.nan for surface in surfaces
     ]
@@ -112,12 +100,10 @@ def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
 
 
 def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) -> FrontUncertainty:
-    from doe.pareto.uncertainty import front_uncertainty
-
     assert found.standard_errors is not None
     drawn = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
     points = np.vstack([found.points, study.baseline])
-    values = predict_draws(surfaces, drawn, to_coded(points, study.centre, study.step), study.file.front.seed)
+    values = predict_draws(surfaces, drawn, study.coded(points), study.file.front.seed)
     return front_uncertainty(
         values[:, :-1],
         half_widths(surfaces, found.standard_errors),
@@ -133,9 +119,6 @@ def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) 
 def _tolerance_aware(
     study: Study, surfaces: Sequence[Surface], found: ParetoFront, box: ToleranceBox, doubt: Doubt
 ) -> ToleranceAware:
-    from doe.pareto.archive import Archive
-    from doe.pareto.tolerance_aware import tolerance_aware_front
-
     reach = region_of(study)
     return tolerance_aware_front(
         quadratics(surfaces, len(study.factors)),
@@ -143,8 +126,8 @@ def _tolerance_aware(
         -reach,
         reach,
         found.goals,
-        baseline=to_coded(study.baseline, study.centre, study.step),
-        plain=Archive(to_coded(found.points, study.centre, study.step), found.costs),
+        baseline=study.coded(study.baseline),
+        plain=Archive(study.coded(found.points), found.costs),
         plain_pick=found.pick,
         doubt=doubt,
         **study.file.front.model_dump(include=SEARCH),
@@ -152,10 +135,8 @@ def _tolerance_aware(
 
 
 @contextmanager
-def _named(study: Study, goals: Goals, centre: Array, step: Array, after: str) -> Iterator[None]:
-    """Turns a search that finds nothing into a sentence; ``centre`` and ``step`` are those of its points."""
-    from doe.pareto import InfeasibleError
-
+def _named(study: Study, goals: Goals, actual: Callable[[Array], Array], after: str) -> Iterator[None]:
+    """Turns a search that finds nothing into a sentence; ``actual`` gives its points in factor units."""
     try:
         yield
     except InfeasibleError as error:
@@ -164,8 +145,7 @@ def _named(study: Study, goals: Goals, centre: Array, step: Array, after: str) -
             for (index, sense, limit), by in zip(goals.limited, error.violations.tolist(), strict=True)
             if by > 0.0
         ]
-        point = to_actual(error.point, centre, step)
-        where = ", ".join(f"{name} = {x:.5g}" for name, x in zip(study.factors, point, strict=True))
+        where = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(actual(error.point)).items())
         raise InputError(
             [
                 f"{study.path}: response.lower, response.upper: no point of the region keeps all limits{after}; the "

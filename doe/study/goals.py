@@ -1,34 +1,22 @@
 """Goals, tolerances and the region of a study as the methods want them."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from doe.arrays import Array
+from doe.pareto import Goals
+from doe.pareto.tolerance_aware import ToleranceBox
 from doe.study.design import design_of
 from doe.study_file import Study
 from rbdyn.faults import InputError, refuse
 
-if TYPE_CHECKING:
-    from doe.pareto import Goals
-    from doe.pareto.tolerance_aware import ToleranceBox
-
 
 def goals_of(study: Study) -> Goals:
     """What is wanted of the study's responses."""
-    from doe.pareto import Goals
-
     responses = study.file.response
-    return Goals.of(
-        [response.goal for response in responses],
-        target=[response.target for response in responses],
-        lower=[response.lower for response in responses],
-        upper=[response.upper for response in responses],
-        weight=[response.weight for response in responses],
-        desired=[response.desired for response in responses],
-    )
+    rest = {
+        key: [getattr(each, key) for each in responses] for key in ("target", "lower", "upper", "weight", "desired")
+    }
+    return Goals.of([response.goal for response in responses], **rest)
 
 
 def check_goals(study: Study) -> None:
@@ -75,8 +63,6 @@ def known_tolerances(study: Study) -> dict[str, float]:
 
 def tolerance_box(study: Study) -> ToleranceBox | None:
     """What the tolerance-aware front makes of the parts; None where the study asks for none. Raises as `tolerances_of`."""
-    from doe.pareto.tolerance_aware import ToleranceBox
-
     front = study.file.front
     if front.tolerance_aware == "none":
         return None

@@ -1,7 +1,5 @@
 """Limits of responses, judged by what was simulated: kept, broken or undecided."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist

@@ -1,22 +1,19 @@
 """What the surfaces promise at any point: gains over the baseline, with the interval of the difference."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import stats
 
 from doe.arrays import Array
-from doe.designs import to_coded
+from doe.pareto.uncertainty import contrast_error
+from doe.response_surface import Surface
+from doe.response_surface.model_error import correlation
 from doe.study.drawn import jacobian, predict_all
 from doe.study.goals import goals_of
 from doe.study_file import Study
 from rbdyn.records.record import Record, derived, keyed, unsaid
-
-if TYPE_CHECKING:
-    from doe.response_surface import Surface
 
 
 def verdict(percent: float, error: float | None) -> str:
@@ -66,12 +63,8 @@ class PredictedGain(Record):
 
 def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> list[PredictedGain]:
     """Gains at a point (k,) in factor units over the study's baseline, for every response that has a goal."""
-    from scipy import stats
-
-    from doe.pareto.uncertainty import contrast_error
-
     goals = goals_of(study)
-    coded = to_coded(np.stack([study.baseline, point]), study.centre, study.step)
+    coded = study.coded(np.stack([study.baseline, point]))
     values = predict_all(surfaces, coded)
     costs, slopes = goals.costs(values), goals.slopes(values)
     gains = []
@@ -108,8 +101,6 @@ def _missed(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
 
     ``rows`` are the derivatives of either cost by the coefficients; that by the constant is that by the field.
     """
-    from doe.response_surface.model_error import correlation
-
     if surface.model_error is None:
         return 0.0
     constant = surface.terms.index("1")

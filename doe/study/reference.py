@@ -1,41 +1,46 @@
 """A published table of the same design beside ours."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from string import ascii_uppercase
 
 import numpy as np
+from scipy.stats import spearmanr
 
+from doe.response_surface import Surface
 from doe.study.runs import Runs, design_points, read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError
-
-if TYPE_CHECKING:
-    from doe.response_surface import Surface
+from rbdyn.records.record import Record, derived, keyed, unsaid
 
 
-@dataclass(frozen=True)
-class Beside:
+class Effect(Record):
+    """Linear effect of a factor per coded unit, ours and theirs, and whether either is significant at 5 %."""
+
+    ours: float
+    theirs: float
+    same_sign: bool = derived(lambda self: self.ours * self.theirs > 0.0)
+    ours_significant: bool = unsaid()
+    theirs_significant: bool = unsaid()
+
+
+class Beside(Record):
     """One response next to a published table of the same design.
 
-    ``effects``: factor name to the pair of linear effects per coded unit (ours, theirs), each with whether it is
-    significant at 5 %. ``rank_correlation`` is Spearman's over the runs.
+    Ranges are least, mean, largest value; ``effects`` go by factor. ``rank_correlation`` is Spearman's over the runs,
+    ``verdict`` a sentence: level, signs of the effects that the published table shows, ranks.
     """
 
-    response: str
-    our_range: tuple[float, float, float]
-    their_range: tuple[float, float, float]
-    effects: dict[str, tuple[tuple[float, bool], tuple[float, bool]]]
+    response: str = unsaid()
+    our_range: tuple[float, float, float] = keyed("ours_min_mean_max")
+    their_range: tuple[float, float, float] = keyed("theirs_min_mean_max")
+    effects: dict[str, Effect] = keyed("linear_effects")
     rank_correlation: float
+    verdict: str = derived(lambda self: self._sentence())
     why: str
 
-    @property
-    def verdict(self) -> str:
-        """In a sentence: level, signs of the effects that the published table shows, ranks."""
-        shown = {factor: pair for factor, pair in self.effects.items() if pair[1][1]}
-        opposite = [factor for factor, (ours, theirs) in shown.items() if ours[0] * theirs[0] <= 0.0]
+    def _sentence(self) -> str:
+        shown = {factor: effect for factor, effect in self.effects.items() if effect.theirs_significant}
+        opposite = [factor for factor, effect in shown.items() if not effect.same_sign]
         signs = f"sign differs for {', '.join(opposite)}" if opposite else "all with our sign"
         return (
             f"{self.response}: our mean is {self.our_range[1] / self.their_range[1]:.2f} of theirs; of their "
@@ -62,20 +67,21 @@ def reference_runs(study: Study) -> Runs | None:
 
 
 def beside(study: Study, ours: Runs, theirs: Runs) -> list[Beside]:
-    from scipy.stats import spearmanr
-
+    """Every response of both, with the linear effects on the surfaces through either."""
     assert study.file.reference is not None
-    pairs = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
+    surfaces = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
     rows = []
-    for index, (name, (our_surface, their_surface)) in enumerate(zip(study.responses, pairs, strict=True)):
+    for index, (name, pair) in enumerate(zip(study.responses, surfaces, strict=True)):
         our_values, their_values = ours.values[:, index], theirs.values[:, index]
-        our_effects, their_effects = (_linear_effects(study, each) for each in (our_surface, their_surface))
         rows.append(
             Beside(
                 response=name,
                 our_range=(our_values.min(), our_values.mean(), our_values.max()),
                 their_range=(their_values.min(), their_values.mean(), their_values.max()),
-                effects={factor: (our_effects[factor], their_effects[factor]) for factor in study.factors},
+                effects={
+                    factor: _effect(*pair, letter)
+                    for factor, letter in zip(study.factors, ascii_uppercase, strict=False)
+                },
                 rank_correlation=float(spearmanr(our_values, their_values).statistic),
                 why=study.file.reference.why.get(name, ""),
             )
@@ -83,11 +89,9 @@ def beside(study: Study, ours: Runs, theirs: Runs) -> list[Beside]:
     return rows
 
 
-def _linear_effects(study: Study, surface: Surface) -> dict[str, tuple[float, bool]]:
-    coefficients = dict(zip(surface.terms, surface.coefficients.tolist(), strict=True))
-    significant = {row["source"]: row["p"] is not None and row["p"] < 0.05 for row in surface.anova}
-    letters = "ABCDEFGH"[: len(study.factors)]
-    return {
-        factor: (coefficients.get(letter, 0.0), significant.get(letter, False))
-        for factor, letter in zip(study.factors, letters, strict=True)
-    }
+def _effect(ours: Surface, theirs: Surface, letter: str) -> Effect:
+    values = [
+        dict(zip(each.terms, each.coefficients.tolist(), strict=True)).get(letter, 0.0) for each in (ours, theirs)
+    ]
+    p = [{row["source"]: row["p"] for row in each.anova}.get(letter) for each in (ours, theirs)]
+    return Effect(*values, *(each is not None and each < 0.05 for each in p))

@@ -1,26 +1,24 @@
 """Runs of a design: simulated, or read from a table."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 
+from doe import clearance
 from doe.arrays import Array, Whole
-from doe.designs import Design, to_actual, to_coded
+from doe.designs import Design
 from doe.designs.model import model_terms
-from doe.running.failure import Failure, alike, sentence, successes
+from doe.running.failure import Failure, alike, sentence
+from doe.running.runner import Progress
+from doe.running.store import Store
 from doe.study.design import check_runs, design_of
 from doe.study_file import Study
 from rbdyn.faults import RunError
+from rbdyn.scene import Scene
 
-if TYPE_CHECKING:
-    from rbdyn.scene import Scene
-
-Progress = Callable[[int, int], None]
 # Name of the store in the folder of a study.
 STORE = "study.sqlite"
 
@@ -49,11 +47,11 @@ class Runs:
         failed = {failure.run for failure in self.failures}
         return [row for row in range(len(self.coded) + len(failed)) if row + 1 not in failed]
 
-    def only(self, places: list[int]) -> Runs:
+    def only(self, places: list[int]) -> Self:
         """The rows at these places."""
         coded, actual, values, errors = (array[places] for array in (self.coded, self.actual, self.values, self.errors))
         replicates, block = (None if array is None else array[places] for array in (self.replicates, self.block))
-        return Runs(coded, actual, values, errors, self.notes, replicates, block)
+        return type(self)(coded, actual, values, errors, self.notes, replicates, block)
 
 
 def design_points(study: Study) -> Array:
@@ -75,17 +73,15 @@ class Ordered:
 
 def ordered_runs(study: Study) -> Ordered:
     """Every run of the study's design. Raises InputError when the design, a scene or a response is impossible."""
-    from doe import clearance
-
     clearance.check_responses(study)
     design = design_of(study)
-    actual = to_actual(design.coded, study.centre, study.step)
+    actual = study.actual(design.coded)
     return Ordered(
         design,
         actual,
         clearance.design_scenes(study, actual, design.order.tolist()),
         [f"design run {run}" for run in range(1, len(actual) + 1)],
-        [dict(zip(study.factors, point.tolist(), strict=True)) for point in actual],
+        [study.by_factor(point) for point in actual],
     )
 
 
@@ -101,16 +97,12 @@ def run_design(
 
     Runs that fail are left out. Raises InputError, KeyboardInterrupt, and RunError when too few are left.
     """
-    from doe import clearance
-    from doe.running.store import Store
-
     asked = ordered_runs(study)
     design, coded, actual = asked.design, asked.design.coded, asked.actual
     check_runs(study, design)
     with Store(folder / STORE, study.path.stem) as store:
-        results = clearance.run_scenes(
-            asked.scenes, asked.labels, store, workers, progress, scheduler, retry=retry, factors=asked.factors
-        )
+        simulations = clearance.Simulations(store, workers, scheduler, retry, lambda title: progress)
+        results = simulations.run(asked.scenes, asked.labels, progress, asked.factors)
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
     if failures and len(left) < (needed := fewest_runs(study, design)):
@@ -118,7 +110,7 @@ def run_design(
             f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}: "
             f"{sentence(failures)}"
         )
-    found = successes(results[row] for row in left)
+    found = [result for result in results if not isinstance(result, Failure)]
     notes = _told_once(note for result in found for note in result.notes)
     if failures:
         notes.append(f"{len(failures)} design runs failed and are left out: {sentence(failures)}")
@@ -144,5 +136,5 @@ def fewest_runs(study: Study, design: Design) -> int:
 def read_runs(study: Study, path: Path) -> Runs:
     """Runs of a CSV table instead of simulated ones. Raises InputError."""
     table = study.read_table(path)
-    coded = to_coded(table.actual, study.centre, study.step)
+    coded = study.coded(table.actual)
     return Runs(coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block)

@@ -1,13 +1,12 @@
 """Where a study stands, from its store: done, failed, running, missing, and the time it took and will take."""
 
-from __future__ import annotations
-
 import os
 import time
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from doe import clearance
 from doe.running.failure import Failure, grouped
 from doe.running.store import Claim, EndedRun, Point, Store
 from doe.study.runs import STORE, ordered_runs
@@ -18,8 +17,6 @@ FORMAT = "doe.status/1"
 
 def study_status(study: Study, folder: Path) -> dict[str, Any]:
     """Record of ``doe status``. Changes nothing, not even while the study runs. Raises InputError."""
-    from doe import clearance
-
     asked = ordered_runs(study)
     points = clearance.points_of(asked.scenes, asked.labels, asked.factors)
     if not (folder / STORE).exists():

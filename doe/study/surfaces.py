@@ -1,26 +1,20 @@
 """A response surface for each response of a study, and its rival."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import special
 
 from doe.arrays import Array, Whole
+from doe.response_surface import Surface, fit, model_matrix
 from doe.study.runs import Runs
 from doe.study_file import Study
 from rbdyn.faults import refuse
 
-if TYPE_CHECKING:
-    from doe.response_surface import Surface
-
 
 def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
     """A surface a response. Raises InputError when the runs do not suffice."""
-    from doe.response_surface import fit
-
     surfaces, faults = [], []
     number = independent_values(runs)
     errors = standard_errors(runs.errors, number)
@@ -57,7 +51,6 @@ def with_rivals(surfaces: Sequence[Surface], seed: int = 1) -> list[Surface]:
 
 
 def _with_rival(surface: Surface, seed: int) -> Surface:
-    from doe.response_surface import model_matrix
     from doe.response_surface.comparison import compare
 
     data = surface.data
@@ -89,7 +82,5 @@ def standard_errors(half_widths: Array, number: Whole) -> Array:
     The quantile is Student's with ``number`` - 1 degrees of freedom, where ``number`` (n, m) counts the independent
     values behind each mean; of unknown numbers (0) it is the normal one.
     """
-    from scipy import special
-
     student = special.stdtrit(np.maximum(number - 1, 1), 0.975)
     return half_widths / np.where(number > 1, student, special.ndtri(0.975))

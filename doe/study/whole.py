@@ -1,15 +1,20 @@
 """The whole study: design, runs, surfaces, front, confirmation, tolerances, dimension chains, a published table beside."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from doe.arrays import Array
+from doe.clearance import Simulations
+from doe.designs import Design
+from doe.dimension_chain import ChainResult
+from doe.pareto import ParetoFront
+from doe.pareto.tolerance import WidestTolerances
+from doe.response_surface import Surface
 from doe.running.failure import Failure
+from doe.running.runner import Progress
+from doe.running.store import Store
 from doe.study.chains import solve_chains
 from doe.study.checked import check_study
 from doe.study.chosen import choose
@@ -23,17 +28,10 @@ from doe.study.front import find_front
 from doe.study.goals import check_goals
 from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
 from doe.study.reference import Beside, beside
-from doe.study.runs import STORE, Progress, Runs, run_design
-from doe.study.simulations import Simulations
+from doe.study.runs import STORE, Runs, run_design
 from doe.study.surfaces import fit_surfaces, with_rivals
+from doe.study.widest import widest_of
 from doe.study_file import Study
-
-if TYPE_CHECKING:
-    from doe.designs import Design
-    from doe.dimension_chain import ChainResult
-    from doe.pareto import ParetoFront
-    from doe.pareto.tolerance import WidestTolerances
-    from doe.response_surface import Surface
 
 
 @dataclass(frozen=True)
@@ -105,9 +103,6 @@ def run_study(
     ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself. Raises
     InputError, RunError, KeyboardInterrupt.
     """
-    from doe.running.store import Store
-    from doe.study.widest import widest_of
-
     clock = _Clock()
     inputs = inputs_digest(study, direct)
     check_goals(study)

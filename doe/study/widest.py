@@ -1,23 +1,17 @@
 """The widest tolerances of a study's factors about a point, within which parts keep its gains."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from doe.arrays import Array
-from doe.designs import to_coded
+from doe.pareto.tolerance import WidestTolerances, widest_tolerances
+from doe.response_surface import Surface
+from doe.study.direct_pick import Local
 from doe.study.drawn import draw_all, predict_all, predict_paired
 from doe.study.goals import goals_of, known_tolerances, region_of
 from doe.study_file import Study
 from doe.study_file.front_section import Tolerances
-
-if TYPE_CHECKING:
-    from doe.pareto.tolerance import WidestTolerances
-    from doe.response_surface import Surface
-    from doe.study.direct_pick import Local
 
 
 def widest_of(
@@ -31,10 +25,8 @@ def widest_of(
     A part keeps its promise when every response with a goal has at least the share ``keep`` of the gain that the
     surfaces predict at the point (or, where they predict a loss, loses no more), and when all limits hold.
     """
-    from doe.pareto.tolerance import widest_tolerances
-
     goals = goals_of(study)
-    base, nominal = (to_coded(each, study.centre, study.step)[None] for each in (study.baseline, point))
+    base, nominal = (study.coded(each)[None] for each in (study.baseline, point))
     ends = [predict_all(surfaces, each) for each in (base, nominal)]
     if local is not None:
         ends = [local.baseline[None], local.values[None]]
@@ -48,7 +40,7 @@ def widest_of(
         return predict_paired(surfaces, drawn, coded)
 
     def objectives(points: Array) -> Array:
-        coded = to_coded(points, study.centre, study.step)
+        coded = study.coded(points)
         values = responses(coded)
         if local is not None:
             values = values - centre_values + local.values + (coded - local.coded) @ local.slopes

@@ -1,10 +1,8 @@
 """Dimension chains of STUDY.toml."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
@@ -33,7 +31,7 @@ class StudyChain(Strict):
     """Selective assembly, as in a CHAIN.toml."""
 
     @model_validator(mode="after")
-    def _links_are_somewhere(self) -> StudyChain:
+    def _links_are_somewhere(self) -> Self:
         if self.file is None and not self.link:
             raise ValueError("link: missing; give the links, or the file that has them")
         if self.file is not None and (self.link or self.allocate or self.monte_carlo or self.selective):

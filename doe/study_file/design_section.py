@@ -1,7 +1,5 @@
 """Factors and the design of STUDY.toml."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator

@@ -1,7 +1,5 @@
 """Goals of the responses, the front, the direct front and the widest tolerances of STUDY.toml."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -94,7 +92,7 @@ class Direct(Strict):
     """Keys of the scene that are replaced, as "key=value"."""
 
     @model_validator(mode="after")
-    def _something_is_counted(self) -> Direct:
+    def _something_is_counted(self) -> Self:
         if self.turns is not None and (self.discard_turns or 0.0) >= self.turns:
             raise ValueError(
                 f"discard_turns = {self.discard_turns:g}: must be below turns = {self.turns:g}; discard fewer"

@@ -1,7 +1,5 @@
 """STUDY.toml: which scene, factors, responses, front, chains. Checked before anything runs."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from doe.arrays import Array
+from doe.designs.coding import to_actual, to_coded
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Design, Factor, Name
 from doe.study_file.front_section import Direct, Front, Goal, Tolerances
@@ -132,7 +131,7 @@ class Study:
     file: StudyFile
 
     @classmethod
-    def load(cls, path: Path | str) -> Study:
+    def load(cls, path: Path | str) -> Self:
         """Read STUDY.toml. Raises InputError with all faults at once."""
         path = Path(path)
         return cls(path, validated(StudyFile, read_toml(path), str(path)))
@@ -161,6 +160,18 @@ class Study:
     def baseline(self) -> Array:
         """Baseline in factor units; the centre unless given."""
         return np.array([self.file.baseline.get(factor.name, factor.centre) for factor in self.file.factor])
+
+    def coded(self, points: Array) -> Array:
+        """Coded values of points (..., k) in factor units."""
+        return to_coded(points, self.centre, self.step)
+
+    def actual(self, coded: Array) -> Array:
+        """Factor values of coded points (..., k)."""
+        return to_actual(coded, self.centre, self.step)
+
+    def by_factor(self, point: Array) -> dict[str, float]:
+        """Values (k,) by name of the factor."""
+        return dict(zip(self.factors, point.tolist(), strict=True))
 
     def rounded(self, point: Array) -> Array:
         """A point with every factor at its resolution."""

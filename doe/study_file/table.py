@@ -1,7 +1,5 @@
 """Tables of runs: a column a factor and a response, optionally errors, replicates and blocks."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from doe.cli import app
 from doe.dimension_chain import read_chains
 from doe.report.steps.design import design_record
-from doe.report.study.asked import design_record as summary_design
+from doe.report.study.summary import design_record as summary_design
 from doe.study.design import design_of, evaluation
 from doe.study_file import Study
 from doe.study_file.table import read_table
@@ -250,8 +250,9 @@ def test_blocks_are_numbered_from_one_everywhere(tmp_path):
     assert [run["block"] for run in record["runs"]] == expected
     values = np.ones((20, 3))
     outcome = SimpleNamespace(study=loaded, design=design, runs=Runs(design.coded, design.coded, values, values))
-    assert [row["block"] for row in _runs_table(outcome)] == expected
-    assert [point["block"] for point in summary_design(outcome)["points"]] == expected
+    summary = summary_design(outcome)
+    assert [row["block"] for row in _runs_table({"design": summary})] == expected
+    assert [point["block"] for point in summary["points"]] == expected
     lines = CliRunner().invoke(app, ["design", str(path), "--csv"]).stdout.splitlines()
     assert [int(line.split(",")[1]) for line in lines[1:]] == expected
 

@@ -179,7 +179,7 @@ def test_a_run_that_is_stopped_says_what_is_kept(tmp_path, monkeypatch, kept):
     def stop(*arguments, **options):
         raise StoppedError("the scheduler is gone", "start again")
 
-    monkeypatch.setattr("doe.clearance.run_scenes", stop)
+    monkeypatch.setattr("doe.clearance.Simulations.run", stop)
     path = study(tmp_path)
     (tmp_path / "cylindrical_roller.toml").write_text((EXAMPLES / "cylindrical_roller.toml").read_text())
     found = CliRunner().invoke(app, ["fit", str(path), *(["--out", str(tmp_path / "out")] if kept else [])])

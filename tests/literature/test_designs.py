@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from doe.designs import axial_distance, box_behnken, central_composite, central_composite_design, to_actual, to_coded
+from doe.designs import axial_distance, box_behnken, central_composite, to_actual, to_coded
 from doe.designs.central_composite import centre_shares
 from doe.designs.cube import RESOLUTION_V, corner_blocks, cube_points
 from doe.designs.evaluation import block_contrasts
@@ -52,7 +52,7 @@ def cosines_of_blocks(design) -> float:
 
 
 def test_three_factors_in_standard_order():
-    design = central_composite(3)
+    design = central_composite(3).coded
     assert design.shape == (20, 3)
     assert design[:3].tolist() == [[-1, -1, -1], [1, -1, -1], [-1, 1, -1]]
     assert design[8:10] == pytest.approx(np.array([[-1.681792831, 0, 0], [1.681792831, 0, 0]]), abs=5e-10)
@@ -68,7 +68,7 @@ def test_three_factors_in_standard_order():
 )  # fmt: skip
 def test_literature_rotatable_alpha(factors, cube, alpha):
     """Literature: NIST/SEMATECH e-Handbook, Table 3.23."""
-    assert central_composite(factors, cube=cube).max() == pytest.approx(alpha, abs=5e-4)
+    assert central_composite(factors, cube=cube).coded.max() == pytest.approx(alpha, abs=5e-4)
 
 
 @pytest.mark.parametrize(
@@ -84,14 +84,14 @@ def test_literature_alpha_of_five_factors(corners, with_cube, cubes, with_axial,
 
 def test_literature_two_factors_in_two_blocks():
     """Literature: NIST/SEMATECH e-Handbook, Table 3.29: 4 corners and 4 axial points at 1.414, 3 centres each."""
-    design = central_composite_design(2, alpha="orthogonal_blocks", centre_replicates=6, blocks=True)
+    design = central_composite(2, alpha="orthogonal_blocks", centre_replicates=6, blocks=True)
     assert np.bincount(design.block).tolist() == [7, 7]
     assert design.coded.max() == pytest.approx(1.414, abs=5e-4)
 
 
 def test_literature_three_factors_in_three_blocks():
     """Literature: NIST/SEMATECH e-Handbook, Table 3.30: half cubes of 4, 6 axial points at 1.633, 2 centres each."""
-    design = central_composite_design(3, alpha="orthogonal_blocks", centre_replicates=6, blocks=True, cube_blocks=2)
+    design = central_composite(3, alpha="orthogonal_blocks", centre_replicates=6, blocks=True, cube_blocks=2)
     assert np.bincount(design.block).tolist() == [6, 6, 8]
     assert design.coded.max() == pytest.approx(1.63299, abs=5e-6)
     for block in (0, 1):
@@ -105,7 +105,7 @@ def test_literature_three_factors_in_three_blocks():
      (6, "resolution_v", 2, 6), (7, "full", 4, 9)],
 )  # fmt: skip
 def test_blocks_disturb_no_term(factors, cube, cube_blocks, centres):
-    design = central_composite_design(
+    design = central_composite(
         factors, alpha="orthogonal_blocks", cube=cube, centre_replicates=centres, blocks=True, cube_blocks=cube_blocks
     )
     assert design.blocks == cube_blocks + 1
@@ -114,29 +114,29 @@ def test_blocks_disturb_no_term(factors, cube, cube_blocks, centres):
 
 def test_blocks_of_a_rotatable_design_disturb_the_squares_a_little():
     """Its alpha is not the orthogonal one; the centre points are shared so that it is as near as can be."""
-    design = central_composite_design(3, blocks=True)
+    design = central_composite(3, blocks=True)
     assert np.bincount(design.block).tolist() == [12, 8]
     assert 1e-3 < cosines_of_blocks(design) < 0.03
     assert centre_shares(3, 8, "spherical", 6) == (3, 3)
 
 
 def test_squares_are_estimated_independently_of_each_other():
-    design = central_composite(3, alpha="orthogonal_columns", centre_replicates=4)
+    design = central_composite(3, alpha="orthogonal_columns", centre_replicates=4).coded
     covariance = np.linalg.inv(np.cov((design**2).T))
     assert np.abs(covariance - np.diag(np.diag(covariance))).max() < 1e-9 * covariance.max()
 
 
 def test_words_of_alpha_are_what_they_say():
     assert axial_distance(5, "spherical") == pytest.approx(5**0.5)
-    assert np.abs(central_composite(4, alpha="face_centred")).max() == 1.0
-    inscribed, rotatable = central_composite(3, alpha="inscribed"), central_composite(3)
+    assert np.abs(central_composite(4, alpha="face_centred").coded).max() == 1.0
+    inscribed, rotatable = central_composite(3, alpha="inscribed").coded, central_composite(3).coded
     assert inscribed == pytest.approx(rotatable / rotatable.max())
-    assert central_composite_design(3, alpha=1.5).reach == 1.5
-    assert central_composite_design(3, alpha="inscribed").reach == 1.0
+    assert central_composite(3, alpha=1.5).reach == 1.5
+    assert central_composite(3, alpha="inscribed").reach == 1.0
 
 
 def test_alpha_and_centre_replicates_are_free():
-    design = central_composite(2, alpha=1.0, centre_replicates=0)
+    design = central_composite(2, alpha=1.0, centre_replicates=0).coded
     assert len(design) == 8
     assert np.abs(design).max() == 1.0
 
@@ -145,7 +145,7 @@ def test_alpha_and_centre_replicates_are_free():
 @given(st.integers(2, 5), st.floats(0.1, 2.0), st.sampled_from(["rotatable", "inscribed"]))
 def test_prediction_variance_depends_on_the_radius_only(factors, radius, alpha):
     cube = "resolution_v" if factors == 5 else "full"
-    design = central_composite(factors, alpha=alpha, cube=cube)
+    design = central_composite(factors, alpha=alpha, cube=cube).coded
     towards = np.random.default_rng(factors).normal(size=(20, factors))
     errors = prediction_errors(design, radius * towards / np.linalg.norm(towards, axis=1, keepdims=True))
     assert errors == pytest.approx(errors[0], rel=1e-9)
@@ -153,7 +153,7 @@ def test_prediction_variance_depends_on_the_radius_only(factors, radius, alpha):
 
 def test_another_alpha_is_not_rotatable():
     at = np.array([[1.0, 0.0, 0.0], np.full(3, 3**-0.5)])
-    on_axis, on_diagonal = prediction_errors(central_composite(3, alpha=1.0), at)
+    on_axis, on_diagonal = prediction_errors(central_composite(3, alpha=1.0).coded, at)
     assert abs(on_axis / on_diagonal - 1) > 0.01
 
 
@@ -196,7 +196,7 @@ def test_random_order_stays_within_blocks_and_keeps_the_names_of_the_runs():
     assert np.array_equal(mixed.order, design.by_blocks(seed=3).order)
     assert not np.array_equal(mixed.order, design.by_blocks(seed=4).order)
     assert sorted(mixed.order) == list(range(30))
-    assert np.array_equal(central_composite_design(3).by_blocks().coded, central_composite(3))
+    assert np.array_equal(central_composite(3).by_blocks().coded, central_composite(3).coded)
 
 
 @given(st.lists(st.floats(-2, 2), min_size=3, max_size=3))

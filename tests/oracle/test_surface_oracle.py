@@ -13,7 +13,7 @@ from statsmodels.stats.anova import anova_lm
 from statsmodels.stats.outliers_influence import variance_inflation_factor
 from surface_intervals import interval, new_run_interval
 
-from doe.designs import central_composite_design, to_coded
+from doe.designs import central_composite, to_coded
 from doe.response_surface import fit
 
 TABLE = Path(__file__).parents[2] / "examples" / "ccd_table4.csv"
@@ -204,7 +204,7 @@ def test_pure_error_counts_within_blocks():
 
 
 def test_orthogonal_blocks_leave_the_surface_as_it_is():
-    design = central_composite_design(3, alpha="orthogonal_blocks", centre_replicates=6, blocks=True)
+    design = central_composite(3, alpha="orthogonal_blocks", centre_replicates=6, blocks=True)
     values = 10 + design.coded @ [1.0, 2.0, 3.0] + np.random.default_rng(5).normal(size=len(design.coded))
     with_blocks, without = (
         fit(design.coded, values, name="y", centre=CENTRE, step=STEP, block=block) for block in (design.block, None)

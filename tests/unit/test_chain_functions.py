@@ -12,6 +12,7 @@ from doe.dimension_chain.closing import closing_function
 from doe.dimension_chain.expressions import evaluate, names_in
 from doe.dimension_chain.fits import press_fit_factor
 from doe.dimension_chain.intervals import interval
+from doe.dimension_chain.links import PressFit
 from doe.dimension_chain.monte_carlo import draw
 from doe.dimension_chain.parts import given_parts
 from rbdyn.faults import InputError
@@ -22,28 +23,28 @@ GROWTH = {"name": "growth", "coefficient": -1, "press_fit": {"shaft": "c", "bore
 SAMPLES = 50_000
 
 
+def factor_of(fit_mm, **press_fit):
+    return press_fit_factor(PressFit(shaft="c", bore="d", **press_fit), fit_mm)
+
+
 def fitted(limits=(0.1, 0.3), **press_fit):
     return with_functions(chain(FITTED, limits), GROWTH | {"press_fit": GROWTH["press_fit"] | press_fit})
 
 
 def test_solid_shaft_in_a_ring_of_its_steel_keeps_the_ratio_of_diameters():
-    factor = press_fit_factor(fit_mm=27, raceway_mm=34.5, shaft_bore_mm=0, outside_mm=34.5)
+    factor = factor_of(27, raceway_mm=34.5, shaft_bore_mm=0, outside_mm=34.5)
     assert factor == pytest.approx(27 / 34.5, rel=1e-12)
 
 
 def test_ring_in_a_rigid_housing_shrinks_at_its_raceway_as_lame_says():
-    factor = press_fit_factor(
-        fit_mm=60, raceway_mm=52.5, shaft_bore_mm=52.5, outside_mm=120, bore_modulus_GPa=1e9, shaft_poisson=0.3
-    )
+    factor = factor_of(60, raceway_mm=52.5, shaft_bore_mm=52.5, outside_mm=120, bore_modulus_GPa=1e9, shaft_poisson=0.3)
     # u(a)/u(b) of a ring under outer pressure: 2 a b/((1 - nu) b^2 + (1 + nu) a^2), all the interference at b.
     a, b, nu = 52.5, 60.0, 0.3
     assert factor == pytest.approx(-2 * a * b / ((1 - nu) * b**2 + (1 + nu) * a**2), rel=1e-6)
 
 
 def test_a_hollow_shaft_gives_way():
-    solid, hollow = (
-        press_fit_factor(fit_mm=27, raceway_mm=34.5, shaft_bore_mm=bore, outside_mm=34.5) for bore in (0, 18)
-    )
+    solid, hollow = (factor_of(27, raceway_mm=34.5, shaft_bore_mm=bore, outside_mm=34.5) for bore in (0, 18))
     assert 0 < hollow < solid < 1
 
 

@@ -10,7 +10,7 @@ from scipy import stats
 from scipy.stats import qmc
 from statsmodels.stats.outliers_influence import variance_inflation_factor
 
-from doe.designs import box_behnken, central_composite, central_composite_design, full_factorial, latin_hypercube, sobol
+from doe.designs import box_behnken, central_composite, full_factorial, latin_hypercube, sobol
 from doe.designs.evaluation import evaluate, untold_terms
 from doe.designs.model import model_matrix, model_terms
 from doe.designs.region import moment_matrix, sample
@@ -40,7 +40,7 @@ def test_closed_form_three_level_factorial():
 
 @pytest.mark.parametrize(
     ("design", "centres"),
-    [(central_composite(2, centre_replicates=5), 5), (box_behnken(3, centre_replicates=3).coded, 3)],
+    [(central_composite(2, centre_replicates=5).coded, 5), (box_behnken(3, centre_replicates=3).coded, 3)],
 )
 def test_closed_form_centre_of_a_spherical_design(design, centres):
     """Closed form: with all other points on one sphere only the centre runs tell of the centre: N/n0."""
@@ -50,9 +50,9 @@ def test_closed_form_centre_of_a_spherical_design(design, centres):
 
 
 def test_rotatable_means_one_variance_by_radius():
-    shells = evaluate(central_composite(3), QUADRATIC)["by_radius"]
+    shells = evaluate(central_composite(3).coded, QUADRATIC)["by_radius"]
     assert all(shell["max"] == pytest.approx(shell["min"]) for shell in shells)
-    other = evaluate(central_composite(3, alpha="face_centred"), QUADRATIC)["by_radius"]
+    other = evaluate(central_composite(3, alpha="face_centred").coded, QUADRATIC)["by_radius"]
     assert other[-1]["max"] > 1.2 * other[-1]["min"]
 
 
@@ -79,8 +79,8 @@ def test_oracle_variance_inflation_leverage_and_errors():
 
 
 def test_oracle_power_by_the_noncentral_t_distribution():
-    matrix = model_matrix(central_composite(3), QUADRATIC)
-    found = evaluate(central_composite(3), QUADRATIC)
+    matrix = model_matrix(central_composite(3).coded, QUADRATIC)
+    found = evaluate(central_composite(3).coded, QUADRATIC)
     covariance = np.linalg.inv(matrix.T @ matrix)
     limit = stats.t.isf(0.025, 10)
     for term, change, key in (("A", 0.5, "one_sigma"), ("BC", 1.0, "two_sigma"), ("B^2", 1.0, "one_sigma")):
@@ -91,7 +91,7 @@ def test_oracle_power_by_the_noncentral_t_distribution():
 
 
 def test_blocks_take_degrees_of_freedom_but_no_precision_when_orthogonal():
-    design = central_composite_design(3, alpha="orthogonal_blocks", blocks=True)
+    design = central_composite(3, alpha="orthogonal_blocks", blocks=True)
     blocked = evaluate(design.coded, QUADRATIC, design.block)
     plain = evaluate(design.coded, QUADRATIC)
     assert blocked["degrees_of_freedom"] == {
@@ -106,7 +106,7 @@ def test_blocks_take_degrees_of_freedom_but_no_precision_when_orthogonal():
 
 
 def test_record_is_plain_json_without_residual_degrees_of_freedom_too():
-    record = evaluate(central_composite(2), model_terms(2, "interaction"))
+    record = evaluate(central_composite(2).coded, model_terms(2, "interaction"))
     assert json.loads(json.dumps(record, allow_nan=False)) == record
     saturated = evaluate(full_factorial(2, levels=2).coded, model_terms(2, "interaction"))
     assert saturated["power_percent"]["AB"] == {"one_sigma": None, "two_sigma": None}

@@ -43,7 +43,7 @@ def shown(path: Path, *options: str) -> str:
 def test_example_study_keeps_its_points_order_and_seeds():
     record = json.loads(shown(EXAMPLE, "--json"))
     coded = np.array([list(run["coded"].values()) for run in record["runs"]])
-    assert np.array_equal(coded, central_composite(3, alpha=8**0.25, centre_replicates=6))
+    assert np.array_equal(coded, central_composite(3, alpha=8**0.25, centre_replicates=6).coded)
     assert [run["seed"] for run in record["runs"]] == list(range(1, 21))
     assert [run["kind"] for run in record["runs"]] == ["cube"] * 8 + ["axial"] * 6 + ["centre"] * 6
     assert record["evaluation"]["model"] == "quadratic"

@@ -13,7 +13,7 @@ from doe.pareto.direct_tolerance import Neighbourhood, direct_aware, pick_among
 from doe.pareto.quadratic import Quadratic
 from doe.pareto.tolerance_aware import ToleranceBox
 from doe.report.study.files import write
-from doe.study import run_study
+from doe.study.whole import run_study
 from doe.study_file import Study
 
 GOALS = Goals.of(["min", "min"])

@@ -15,7 +15,7 @@ from doe.response_surface.comparison import compare
 from doe.response_surface.gaussian_process import fit_gaussian
 from doe.response_surface.surface import model_matrix
 
-POINTS = central_composite(2, centre_replicates=4)
+POINTS = central_composite(2, centre_replicates=4).coded
 
 
 def bent(points: np.ndarray, scatter: float = 0.05) -> np.ndarray:
@@ -77,7 +77,7 @@ def test_same_seed_same_bits():
 
 def test_left_out_polynomial_misses_agree_with_press():
     """Closed form: without replicates the squared misses of the polynomial are the PRESS of the surface."""
-    points = central_composite(2, alpha=1.0, centre_replicates=1)
+    points = central_composite(2, alpha=1.0, centre_replicates=1).coded
     values = bent(points)
     found = compare(points, values, refit_of(points, values), name="y")
     surface = refit_of(points, values)(np.arange(len(points)))

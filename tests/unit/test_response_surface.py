@@ -196,7 +196,7 @@ def test_summary_numbers_by_their_definitions(printed):
 
 def exact(function, **keywords):
     """Surface through noise-free values of a function on a three-factor design."""
-    points = central_composite(3)
+    points = central_composite(3).coded
     return fit(points, function(points), name="y", centre=CENTRE, step=STEP, **keywords)
 
 
@@ -244,7 +244,7 @@ def test_reduction_of_pure_noise_leaves_little():
 
 
 def test_without_replicates_there_is_no_pure_error():
-    points = central_composite(3, centre_replicates=1)
+    points = central_composite(3, centre_replicates=1).coded
     values = np.random.default_rng(2).normal(size=len(points))
     surface = fit(points, values, name="y", centre=CENTRE, step=STEP)
     assert surface.pure_error == {"ss": None, "df": 0, "ms": None}
@@ -261,7 +261,7 @@ def test_equal_replicates_leave_lack_of_fit_undefined():
 
 
 def test_replicates_away_from_the_centre_count():
-    points = np.vstack([central_composite(2, centre_replicates=1)] * 2)
+    points = np.vstack([central_composite(2, centre_replicates=1).coded] * 2)
     values = np.random.default_rng(4).normal(size=18)
     surface = fit(points + 1e-12, values, name="y", centre=[0, 0], step=[1, 1])
     assert surface.pure_error["df"] == 9
@@ -298,7 +298,7 @@ def test_reduction_takes_terms_from_the_quadratic_in_order(printed):
     ],
 )
 def test_bad_data_are_refused_with_the_mend(change, words):
-    points = central_composite(3)
+    points = central_composite(3).coded
     coded, values, model = change(points, np.arange(20.0))
     with pytest.raises(ValueError, match=words):
         fit(coded, values, name="y", model=model, centre=CENTRE, step=STEP)

@@ -18,14 +18,14 @@ from short_studies import SHORT, rows, short_study, silent, stored
 from doe import clearance
 from doe.report.steps.front import front_record
 from doe.report.study.files import write
-from doe.study import run_study
-from doe.study.confirmation import Confirmed, Gain, gains
+from doe.study.confirmation import Confirmed, gains
 from doe.study.finished import finished as is_finished
 from doe.study.finished import inputs_digest
 from doe.study.front import find_front
 from doe.study.reference import reference_runs
 from doe.study.runs import read_runs, run_design
 from doe.study.surfaces import fit_surfaces
+from doe.study.whole import run_study
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError
 from rbdyn.records.kept import run_key
@@ -116,7 +116,7 @@ def test_stands_beside_the_published_table(finished):
     # Table 4 itself: its own mean impact force, and the signs of its own linear effects.
     impact = outcome.beside[0]
     assert impact.their_range == pytest.approx((145.6, 203.7, 278.2))
-    assert all(theirs[0] > 0.0 and theirs[1] for _, theirs in impact.effects.values())
+    assert all(effect.theirs > 0.0 and effect.theirs_significant for effect in impact.effects.values())
 
 
 def test_nothing_runs_twice(finished, monkeypatch):
@@ -263,7 +263,8 @@ def test_gain_counts_only_beyond_its_error(tmp_path):
     pick = Confirmed(study.baseline, np.array([96.0, 0.9, 51.0]), np.array([4.0, 0.0, 0.0]), none)
     found = gains(study, baseline, pick)
     assert [gain.verdict for gain in found] == ["within error", "better", "worse"]
-    assert found[0] == Gain("impact_force_N", pytest.approx(4.0), pytest.approx(5.0))
+    assert found[0].response == "impact_force_N"
+    assert (found[0].percent, found[0].error) == (pytest.approx(4.0), pytest.approx(5.0))
 
 
 def test_key_follows_scene_and_version(tmp_path):

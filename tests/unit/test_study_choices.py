@@ -9,16 +9,16 @@ import pytest
 from short_studies import SHORT, short_study, silent
 
 from doe import clearance
+from doe.clearance import Simulations
 from doe.pareto.surrogate_loss import SurrogateLoss
 from doe.report.steps.confirmation import direct_record
 from doe.running.store import Store
 from doe.study.chains import check_chains, solve_chains
+from doe.study.chosen import choices
 from doe.study.confirmation import Confirmed, Gain, gains, statement
 from doe.study.direct import Evaluator, find_direct
 from doe.study.front import find_front
-from doe.study.picks import choices
 from doe.study.runs import STORE, read_runs
-from doe.study.simulations import Simulations
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError

@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 from doe import clearance
 from doe.cli import app
 from doe.report.study.files import write
-from doe.study import run_study
 from doe.study.back_off import Conditioned, Missed
 from doe.study.confirmation import Confirmed
 from doe.study.edge import edge_of, share_at_edge
 from doe.study.goals import rounded_within
 from doe.study.limits import Limit, limits_of, sentence, verdict_of
+from doe.study.whole import run_study
 from doe.study_file import Study
 from rbdyn.faults import InputError
 

@@ -22,12 +22,11 @@ from instant_runs import instantly
 from short_studies import SHORT, short_study, silent, stored
 
 from doe import clearance
+from doe.clearance import Simulations
 from doe.running.store import Store
-from doe.study.confirmation import confirm
-from doe.study.picks import Choice
+from doe.study.confirmation import Choice, confirm
 from doe.study.reference import reference_runs
 from doe.study.runs import STORE, run_design
-from doe.study.simulations import Simulations
 from doe.study.status import study_status
 from doe.study_file import Study
 from rbdyn.faults import RunError

@@ -15,7 +15,7 @@ from doe.response_surface.least_squares import solve
 from doe.study.runs import Runs
 from doe.study.surfaces import independent_values, standard_errors, with_rivals
 
-POINTS = central_composite(3)
+POINTS = central_composite(3).coded
 CENTRE, STEP = np.array([0.02, 0.15, 0.3]), np.array([0.005, 0.05, 0.05])
 
 
@@ -214,7 +214,7 @@ def test_an_outlier_an_influential_run_and_a_bad_forecast_are_named():
 
 
 def test_a_run_met_exactly_leaves_its_figures_undefined():
-    points = np.vstack([central_composite(2, centre_replicates=0), [[0.0, 0.0]], [[0.5, 0.5]]])
+    points = np.vstack([central_composite(2, centre_replicates=0).coded, [[0.0, 0.0]], [[0.5, 0.5]]])
     points = np.column_stack([points, np.zeros(len(points))])
     points[-1, 2] = 1.0
     surface = fit(points, noise(18, len(points)), name="y", model="linear", centre=np.zeros(3), step=np.ones(3))

@@ -6,5 +6,3 @@
 """
 
 from doe.report.html.build import html_report
-
-__all__ = ["html_report"]

@@ -1,7 +1,5 @@
 """The page, put together from its parts."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping

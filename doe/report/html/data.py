@@ -1,7 +1,5 @@
 """The numbers behind the interactive pictures, and nothing else."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

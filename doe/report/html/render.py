@@ -1,7 +1,5 @@
 """Blocks as HTML; every text is escaped here."""
 
-from __future__ import annotations
-
 from html import escape
 
 from doe.report.sections.blocks import Block, Bullets, Figures, Heading, Table, Tile, Tiles, Words

@@ -3,9 +3,7 @@
 - ``blocks``: words, tables, figures, places for interactive pictures
 - ``record``: reading summary.json, any part of which may be missing
 - ``answer``, ``experiments``, ``fits``, ``fronts``, ``parts``, ``bearing``, ``ends``: the sections, in this order
-- ``plot``: static pictures as SVG; ``plots_of_fits``, ``plots_of_fronts``, ``plots_of_motion`` draw them
+- ``plot``: static pictures as SVG; ``plots_of_fits``, ``plots_of_fronts`` draw most of them
 """
 
 from doe.report.sections.contents import sections
-
-__all__ = ["sections"]

@@ -1,7 +1,5 @@
 """The answer an engineer acts on, what was asked, and what simulation confirmed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,9 +1,8 @@
 """What a section is made of. Text is plain: whoever renders it escapes it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class Table:
     text_columns: Sequence[int] = ()
     sortable: bool = False
 
-    def without_empty_columns(self) -> Table:
+    def without_empty_columns(self) -> Self:
         """The same table, columns in which no row says anything left out."""
         kept = [place for place in range(len(self.header)) if place == 0 or any(row[place] for row in self.rows)]
         return replace(

@@ -1,7 +1,5 @@
 """All sections of a report in the order in which they are read; what the summary does not hold is left out."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import PurePath

@@ -1,7 +1,5 @@
 """What stands at the end: a published table beside, settings, versions, cost, notes, failures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,11 +12,8 @@ from doe.report.words import label, shown
 
 def reference(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Levels, effects and ranks beside a published table, with the reasons for what differs."""
-    beside = part(summary, "beside_reference")
-    if not beside:
-        return None
     levels, effects, words = [], [], []
-    for name, each in beside.items():
+    for name, each in (part(summary, "beside_reference") or {}).items():
         for whose in ("ours", "theirs"):
             levels.append(
                 (f"{label(name)}, {whose}", *(shown(x) for x in each.get(f"{whose}_min_mean_max") or ("",) * 3))

@@ -1,7 +1,5 @@
 """The design: its points with what they gave, how good it is, what failed."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Response surfaces and whether they can be trusted."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -65,8 +63,6 @@ def _stationary(summary: Record, fitted: Record) -> Table:
 def diagnostics(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Analysis of variance, what it says, and pictures of the residuals, a response at a time."""
     fitted = fits(summary)
-    if not fitted:
-        return None
     rows = [
         [label(name), *(shown(each.get(key)) for key, _ in STATISTICS), probability(part(each, "lack_of_fit", "p"))]
         for name, each in fitted.items()

@@ -1,7 +1,5 @@
 """The Pareto front: every trade-off on the surfaces, the picks, and the fronts that stand beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Dimension chains: the parts to make, what each contributes, how many assemblies pass."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from html import escape
 from typing import Any
@@ -28,7 +26,9 @@ def chains(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 
 def _chain(name: str, chain: Record) -> list[Block]:
-    blocks: list[Block] = [Words(_first_upper(str(chain["status"])) + ".")] if chain.get("status") else []
+    blocks: list[Block] = []
+    if status := str(chain.get("status") or ""):
+        blocks.append(Words(f"{status[:1].upper()}{status[1:]}."))
     shares = chain.get("contributions") or {}
     rows = [
         (label(each), dimension(dimensions), dimensions.get("grade") or "",
@@ -91,7 +91,3 @@ def _percent(value: float | None) -> str:
 
 def _length(value: Any) -> str:
     return " to ".join(f"{each:.4f}" for each in value) if isinstance(value, list | tuple) else f"{value:.4f}"
-
-
-def _first_upper(text: str) -> str:
-    return text[:1].upper() + text[1:]

@@ -1,7 +1,5 @@
 """Static pictures as SVG: axes with tidy ticks, points, lines, symbols. Colours come from the style sheet by role."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from html import escape

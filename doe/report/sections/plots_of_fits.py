@@ -1,7 +1,5 @@
 """Pictures of the residuals of a fit, and of how well a design predicts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from statistics import NormalDist
 

@@ -1,7 +1,5 @@
 """Pictures of fronts: pairs of responses, parallel coordinates, the course of the search."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape

@@ -1,7 +1,5 @@
 """Reading a summary, any optional part of which may be missing or null."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping

@@ -1,14 +1,10 @@
 """A dimension chain on the terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from doe.dimension_chain import ChainResult
 from rbdyn.cli.terminal import print_table
-
-if TYPE_CHECKING:
-    from doe.dimension_chain import ChainResult
 
 BAR = 20  # characters of a contribution of 100 %
 

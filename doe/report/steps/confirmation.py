@@ -1,29 +1,26 @@
 """Confirmed points, their gains and the direct front, as plain numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from doe.arrays import Array
+from doe import clearance
+from doe.arrays import Array, or_none
 from doe.study.confirmation import Confirmed, Gain, statement
+from doe.study.direct import Direct
 from doe.study.limits import Limit, limits_of
-
-if TYPE_CHECKING:
-    from doe.study import StudyResult
-    from doe.study.direct import Direct
-    from doe.study.edge import Edge
-    from doe.study_file import Study
+from doe.study.predicted import PredictedGain
+from doe.study.whole import StudyResult
+from doe.study_file import Study
 
 
 def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
     """Every confirmed point by name, with its gains over the baseline and whether they are real."""
     return {
         name: {
-            "factors": dict(zip(outcome.study.factors, each.point.tolist(), strict=True)),
+            "factors": outcome.study.by_factor(each.point),
             "reason": each.reason,
             "responses": _quantities(outcome.study, each),
             "power_terms_W": dict(each.power_terms),
@@ -47,36 +44,13 @@ def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
     }
 
 
-def edge_record(edge: Edge) -> dict[str, Any]:
-    """The factors of the pick at a bound of the region, what lies beyond, and the share of the fronts at a bound."""
-    return {
-        "factors": {
-            each.factor: {
-                "side": each.side,
-                "bound": each.bound,
-                "per": each.unit,
-                "source": each.source,
-                "gains": {name: {"value": gain, "error": or_none(error)} for name, (gain, error) in each.gains.items()},
-            }
-            for each in edge.outward
-        },
-        "front_share": edge.front_share,
-        "direct_front_share": edge.direct_share,
-        "sentence": edge.sentence,
-    }
-
-
-def gains_record(gains: Sequence[Gain]) -> dict[str, Any]:
-    """Gains by response."""
-    return {
-        gain.response: {"percent": gain.percent, "error_percent": gain.error, "verdict": gain.verdict} for gain in gains
-    }
+def gains_record(gains: Sequence[Gain | PredictedGain]) -> dict[str, Any]:
+    """JSON of gains, simulated or predicted, by response."""
+    return {gain.response: gain.as_dict() for gain in gains}
 
 
 def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
     """The direct front beside that of the surfaces run on the simulator, and what these lose."""
-    from doe import clearance
-
     front, loss = direct.front, direct.loss
     rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
     surrogate = zip(direct.surrogate_points, direct.surrogate_values, 1.96 * direct.surrogate_errors, strict=True)
@@ -110,12 +84,7 @@ def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:
 def point_record(study: Study, point: Array, values: Array, errors: Array) -> dict[str, Any]:
     """Factors (k,), responses (m,) and their 95 % half widths (m,) of a point, by name."""
     return {
-        "factors": dict(zip(study.factors, point.tolist(), strict=True)),
+        "factors": study.by_factor(point),
         "responses": dict(zip(study.responses, values.tolist(), strict=True)),
         "errors": dict(zip(study.responses, map(or_none, errors), strict=True)),
     }
-
-
-def or_none(value: float) -> float | None:
-    """A number for JSON; None for what is not known."""
-    return None if np.isnan(value) else float(value)

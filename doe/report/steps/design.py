@@ -1,27 +1,22 @@
 """A design as JSON and on the terminal."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
-from doe.designs import to_actual
+from doe.designs import Design
+from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
-
-if TYPE_CHECKING:
-    from doe.designs import Design
-    from doe.study_file import Study
 
 
 def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:
     """Runs in their order, from 1."""
-    actual = to_actual(design.coded, study.centre, study.step)
+    actual = study.actual(design.coded)
     return [
         {
             "run": number,
             "kind": kind,
             "block": block,
-            "coded": dict(zip(study.factors, coded.tolist(), strict=True)),
-            "factors": dict(zip(study.factors, values.tolist(), strict=True)),
+            "coded": study.by_factor(coded),
+            "factors": study.by_factor(values),
             "seed": study.file.design.seed + place,
         }
         for number, (place, kind, block, coded, values) in enumerate(

@@ -1,14 +1,10 @@
 """Response surfaces as JSON, as tables and on the terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from doe.response_surface import Surface, describe
 from rbdyn.cli.terminal import print_table
-
-if TYPE_CHECKING:
-    from doe.response_surface import Surface
 
 STARS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 LEGEND = "*** p <= 0.001, ** p <= 0.01, * p <= 0.05; sums of squares of terms are partial (type III)"
@@ -17,8 +13,6 @@ RUN_COLUMNS = ("observed", "predicted", "residual", "standardized", "studentized
 
 def fit_record(surfaces: Sequence[Surface]) -> dict[str, Any]:
     """JSON of ``doe fit``."""
-    from doe.response_surface import describe
-
     return {"responses": {each.name: each.as_dict() | {"sentences": describe(each)} for each in surfaces}}
 
 
@@ -43,8 +37,6 @@ def print_fit(
     Quietly, only what they say; verbosely, also the diagnostics of every run. ``factors`` are the names behind
     the letters.
     """
-    from doe.response_surface import describe
-
     for surface in surfaces:
         if not quiet:
             _print_anova(surface)

@@ -1,7 +1,5 @@
 """Where a study stands, on the terminal."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rbdyn.cli.terminal import print_table

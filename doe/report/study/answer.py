@@ -1,22 +1,19 @@
 """The few lines of a study that a person acts on."""
 
-from __future__ import annotations
-
 import io
 from contextlib import redirect_stdout
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from doe.clearance import direct_run
 from doe.report.steps.chain import print_chain
 from doe.report.words import rounded_down
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
 from doe.study.limits import limits_of
+from doe.study.whole import StudyResult
 from rbdyn.cli.terminal import print_table
-
-if TYPE_CHECKING:
-    from doe.study import StudyResult
 
 
 def print_outcome(outcome: StudyResult, quiet: bool) -> None:
@@ -47,8 +44,6 @@ def answer_text(outcome: StudyResult) -> str:
 
 
 def _print_answer(outcome: StudyResult) -> None:
-    from doe.clearance import direct_run
-
     study = outcome.study
     if outcome.direct is not None:
         direct = outcome.direct
@@ -124,9 +119,10 @@ def _print_beside(reference: str, outcome: StudyResult) -> None:
     rows = []
     for row in outcome.beside:
         rows.append((row.response, "level: min, mean, max", _three(row.our_range), _three(row.their_range), ""))
-        for factor, (ours, theirs) in row.effects.items():
-            same = "same sign" if ours[0] * theirs[0] > 0.0 else "opposite sign"
-            rows.append(("", f"effect of {factor}", _effect(ours), _effect(theirs), same))
+        for factor, effect in row.effects.items():
+            same = "same sign" if effect.same_sign else "opposite sign"
+            ours = _effect(effect.ours, effect.ours_significant)
+            rows.append(("", f"effect of {factor}", ours, _effect(effect.theirs, effect.theirs_significant), same))
         rows.append(("", "rank correlation of the runs", f"{row.rank_correlation:+.2f}", "", ""))
     print_table(f"our runs beside {reference} (* significant at 5 %)", ("", "", "ours", "theirs", ""), rows)
     for row in outcome.beside:
@@ -137,8 +133,8 @@ def _value(confirmed: Any, index: int) -> str:
     return f"{confirmed.values[index]:.5g} ± {np.nan_to_num(confirmed.error[index]):.2g}"
 
 
-def _effect(effect: tuple[float, bool]) -> str:
-    return f"{effect[0]:+.3g}{'*' if effect[1] else ''}"
+def _effect(effect: float, significant: bool) -> str:
+    return f"{effect:+.3g}{'*' if significant else ''}"
 
 
 def _three(values: tuple[float, float, float]) -> str:

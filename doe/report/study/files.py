@@ -1,21 +1,17 @@
 """What a study leaves behind in its folder: tables, summary.json, pictures."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from doe import clearance
+from doe.dimension_chain.solution import ALLOCATED
 from doe.report.html import html_report
 from doe.report.markdown import markdown_report
 from doe.report.steps.fit import fit_tables
 from doe.report.study.answer import answer_text
 from doe.report.study.summary import summary
-from doe.study.limits import limits_of
+from doe.study.whole import StudyResult
 from rbdyn.result import write_json
-
-if TYPE_CHECKING:
-    from doe.dimension_chain import Part
-    from doe.study import StudyResult
 
 # Shaft turns of the motion that is drawn.
 DRAWN_TURNS = 10.0
@@ -28,18 +24,17 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     """
     import pandas as pd
 
-    from doe import clearance
     from doe.report.study import plots
 
     study, record = outcome.study, summary(outcome)
     (folder / "summary.json").unlink(missing_ok=True)
     tables = {
-        "design_runs.csv": _runs_table(outcome),
+        "design_runs.csv": _runs_table(record),
         **fit_tables(outcome.surfaces),
         "front.csv": [{**point["factors"], **point["responses"]} for point in record["front"]["front"]],
-        "confirmation.csv": _confirmation_table(outcome),
+        "confirmation.csv": _confirmation_table(outcome, record),
         "part_dimensions.csv": [
-            {"chain": name, "part": part.name, **_dimension(part)}
+            {"chain": name, "part": part.name, **{key: getattr(part, key) for key in ALLOCATED}}
             for name, chain in outcome.chains.items()
             for part in chain.allocation
         ],
@@ -68,19 +63,18 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     return record
 
 
-def _runs_table(outcome: StudyResult) -> list[dict[str, Any]]:
-    study, runs, design = outcome.study, outcome.runs, outcome.design
+def _runs_table(record: dict[str, Any]) -> list[dict[str, Any]]:
+    """The runs that went well."""
     return [
         {
-            "run": place + 1,
-            "kind": design.kind[place],
-            "block": design.block_numbers[place],
-            **{f"coded_{name}": x for name, x in zip(study.factors, runs.coded[row], strict=True)},
-            **dict(zip(study.factors, runs.actual[row], strict=True)),
-            **dict(zip(study.responses, runs.values[row], strict=True)),
-            **{f"{name}_error": e for name, e in zip(study.responses, runs.errors[row], strict=True)},
+            **{key: run[key] for key in ("run", "kind", "block")},
+            **{f"coded_{name}": x for name, x in run["coded"].items()},
+            **run["factors"],
+            **{name: each["value"] for name, each in run["responses"].items()},
+            **{f"{name}_error": each["error"] for name, each in run["responses"].items()},
         }
-        for row, place in enumerate(runs.places)
+        for run in record["design"]["points"]
+        if run["responses"]
     ]
 
 
@@ -98,32 +92,25 @@ def _beside_table(outcome: StudyResult) -> list[dict[str, Any]]:
     ]
 
 
-def _confirmation_table(outcome: StudyResult) -> list[dict[str, Any]]:
-    study = outcome.study
+def _confirmation_table(outcome: StudyResult, record: dict[str, Any]) -> list[dict[str, Any]]:
+    """A row a point and response."""
     rows = []
-    for name, each in outcome.confirmed.items():
-        gains = {gain.response: gain for gain in outcome.gains.get(name, [])}
-        limits = {limit.response: limit for limit in limits_of(study, each)}
-        for index, response in enumerate(study.responses):
-            gain, limit = gains.get(response), limits.get(response)
+    for name, point in record["confirmation"].items():
+        joint = outcome.confirmed[name].error
+        for (response, quantity), error in zip(point["responses"].items(), joint, strict=True):
+            gain, limit = point.get("gains", {}).get(response, {}), point["limits"].get(response)
             rows.append(
                 {
                     "point": name,
-                    **dict(zip(study.factors, each.point, strict=True)),
+                    **point["factors"],
                     "response": response,
-                    "value": each.values[index],
-                    "statistical_error": each.statistical[index],
-                    "numerical_error": each.numerical[index],
-                    "improvement_percent": None if gain is None else gain.percent,
-                    "improvement_error_percent": None if gain is None else gain.error,
-                    "verdict": "" if gain is None else gain.verdict,
-                    "joint_error": each.error[index],
-                    "limit": "" if limit is None else f"{limit.sense} {limit.bound:g}",
-                    "limit_verdict": "" if limit is None else limit.verdict,
+                    **quantity,
+                    "improvement_percent": gain.get("percent"),
+                    "improvement_error_percent": gain.get("error_percent"),
+                    "verdict": gain.get("verdict", ""),
+                    "joint_error": error,
+                    "limit": f"{limit['sense']} {limit['bound']:g}" if limit else "",
+                    "limit_verdict": limit["verdict"] if limit else "",
                 }
             )
     return rows
-
-
-def _dimension(part: Part) -> dict[str, Any]:
-    return {"nominal_mm": part.nominal_mm, "upper_mm": part.upper_mm, "lower_mm": part.lower_mm, "grade": part.grade}

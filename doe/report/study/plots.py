@@ -1,10 +1,7 @@
 """Pictures of a study: response surfaces and the Pareto front."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -12,14 +9,11 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-from doe.designs import to_actual, to_coded
 from doe.report.words import label
+from doe.response_surface import Surface
 from doe.study.design import design_of
-
-if TYPE_CHECKING:
-    from doe.response_surface import Surface
-    from doe.study import StudyResult
-    from doe.study_file import Study
+from doe.study.whole import StudyResult
+from doe.study_file import Study
 
 
 def response_surface(study: Study, surface: Surface, path: Path) -> None:
@@ -31,7 +25,7 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
     for panel in range(1, factors):
         coded = np.zeros((grid.size, grid.size, factors))
         coded[..., 0], coded[..., panel] = np.meshgrid(grid, grid, indexing="ij")
-        actual = to_actual(coded, study.centre, study.step)
+        actual = study.actual(coded)
         values = surface.predict(coded)
         axis = figure.add_subplot(1, factors - 1, panel, projection="3d")
         x, y = actual[..., 0], actual[..., panel]
@@ -82,7 +76,7 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
             ("baseline", outcome.baseline, "s", "black"),
             ("pick", outcome.pick, "*", "tab:red"),
         ):
-            coded = to_coded(each.point, study.centre, study.step)
+            coded = study.coded(each.point)
             predicted = [float(surface.predict(coded)) for surface in surfaces]
             size = 13 if marker == "*" else 6
             for x, simulated, face in ((predicted, "on the surfaces", color), (each.values, "simulated", "none")):

@@ -1,20 +1,22 @@
-"""summary.json: everything that a study found, as plain numbers."""
+"""summary.json: what a study asked for, and everything that it found, as plain numbers."""
 
-from __future__ import annotations
+from string import ascii_uppercase
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
-from doe.report.steps.confirmation import confirmation_record, direct_record, edge_record, gains_record, limits_record
+from doe import clearance
+from doe.arrays import or_none
+from doe.report.steps.confirmation import confirmation_record, direct_record, gains_record, limits_record
+from doe.report.steps.design import runs_record
 from doe.report.steps.fit import fit_record
 from doe.report.steps.front import front_record, predicted_record
-from doe.report.study.asked import asked_record, design_record
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
+from doe.study.design import evaluation
+from doe.study.direct_pick import DirectPick
+from doe.study.goals import known_tolerances, region_of
+from doe.study.whole import StudyResult
+from doe.study_file import Study
 from rbdyn.result import versions
-
-if TYPE_CHECKING:
-    from doe.study import StudyResult
-    from doe.study.direct_pick import DirectPick
 
 FORMAT = "doe.study/1"
 
@@ -28,18 +30,18 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "limits": limits_record(outcome.limits),
         "limits_sentence": outcome.limits_sentence,
         "tried": outcome.tried,
-        "edge": edge_record(outcome.edge),
+        "edge": outcome.edge.as_dict(),
         "asked": asked_record(study),
         "design": design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),
         "pick_on_surfaces": predicted_record(study, outcome.surfaces, outcome.pick.point),
-        "pick": dict(zip(study.factors, outcome.pick.point.tolist(), strict=True)),
+        "pick": study.by_factor(outcome.pick.point),
         "confirmation": confirmation_record(outcome),
         "gains": gains_record(gains),
         "statement": statement(gains),
         "chains": {name: chain.as_dict() for name, chain in outcome.chains.items()},
-        "beside_reference": _beside_record(outcome),
+        "beside_reference": {row.response: row.as_dict() for row in outcome.beside},
         "notes": list(outcome.notes),
         "failures": grouped(outcome.failures),
         "cost": dict(outcome.cost),
@@ -67,18 +69,56 @@ def _chosen_record(pick: DirectPick) -> dict[str, Any]:
     }
 
 
-def _beside_record(outcome: StudyResult) -> dict[str, Any]:
+def asked_record(study: Study) -> dict[str, Any]:
+    """Scene, factors with their ranges, responses with their goals."""
+    reach, known = region_of(study), known_tolerances(study)
+    low, high = (study.actual(side * reach) for side in (-1.0, 1.0))
+    scene = clearance.design_scenes(study, study.baseline[None])[0]
     return {
-        row.response: {
-            "ours_min_mean_max": [float(x) for x in row.our_range],
-            "theirs_min_mean_max": [float(x) for x in row.their_range],
-            "linear_effects": {
-                factor: {"ours": ours[0], "theirs": theirs[0], "same_sign": ours[0] * theirs[0] > 0.0}
-                for factor, (ours, theirs) in row.effects.items()
-            },
-            "rank_correlation": row.rank_correlation,
-            "verdict": row.verdict,
-            "why": row.why,
-        }
-        for row in outcome.beside
+        "study_file": study.path.name,
+        "scene_file": study.file.scene.file,
+        "scene": scene.model_dump(mode="json", exclude_none=True),
+        "factors": [
+            {
+                "letter": letter,
+                **factor.model_dump(include={"name", "key", "centre", "step", "resolution"}),
+                "low": float(low[index]),
+                "high": float(high[index]),
+                "tolerance": known.get(factor.name),
+            }
+            for index, (letter, factor) in enumerate(zip(ascii_uppercase, study.file.factor, strict=False))
+        ],
+        "responses": [response.model_dump() for response in study.file.response],
+        "replicates": scene.numerics.replicates,
+        "turns": scene.numerics.turns,
+        "confirmation_replicates": study.file.confirmation.replicates,
+    }
+
+
+def design_record(outcome: StudyResult) -> dict[str, Any]:
+    """Points with what they gave, what the design can tell, and which runs failed."""
+    study, design, runs = outcome.study, outcome.design, outcome.runs
+    rows = {place: row for row, place in enumerate(runs.places)}
+    return {
+        "kind": study.file.design.kind,
+        "runs": len(design.coded),
+        "factors": study.factors,
+        "responses": study.responses,
+        "points": [
+            {**run, "responses": _responses(outcome, rows.get(place))}
+            for place, run in enumerate(runs_record(study, design))
+        ],
+        "evaluation": evaluation(study, design),
+        "failures": grouped(runs.failures),
+    }
+
+
+def _responses(outcome: StudyResult, row: int | None) -> dict[str, Any]:
+    """What a run gave, by response; nothing of one that failed."""
+    if row is None:
+        return {}
+    runs = outcome.runs
+    return {
+        name: {"value": float(value), "error": or_none(error)}
+        for name, value, error in zip(outcome.study.responses, runs.values[row], runs.errors[row], strict=True)
     }
