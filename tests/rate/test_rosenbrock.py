@@ -20,6 +20,7 @@ from rbdyn.dynamics.integrators.arrow_matrix import arrow_matrix, factor, shifte
 from rbdyn.dynamics.integrators.implicit import differences, rodas
 from rbdyn.dynamics.integrators.jacobian import jacobian
 from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
+from rbdyn.dynamics.integrators.runge_kutta import DormandPrince
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of, scales, slip_scale
 from rbdyn.dynamics.recording import run_replicate
