@@ -16,11 +16,11 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 import typer
+from published import iso281
 from published.common import Check, Table, canvas, percent, save, tell
 
 from rbdyn import BallScene
 from rbdyn.contact.hertz_point import peak_pressure
-from rbdyn.life import ball_capacity as rating
 from rbdyn.life.balls import row_life
 from rbdyn.quasistatic import fatigue, preload
 from rbdyn.quasistatic.row.equilibrium import solve
@@ -135,8 +135,8 @@ def solved(scene: Any) -> dict[str, float]:
 
 def catalogue_life(axial: float, capacity: float) -> float:
     """ISO 281 life [h] at 63000 rpm from a rating [N], with X and Y of 15 degrees."""
-    factors = rating.load_factors(math.radians(ANGLE_DEG), axial, BALLS, 1e-3 * BALL_MM)
-    million = rating.basic_life(capacity, rating.equivalent_load(RADIAL_N, axial, factors))
+    factors = iso281.load_factors(math.radians(ANGLE_DEG), axial, BALLS, 1e-3 * BALL_MM)
+    million = iso281.basic_life(capacity, iso281.equivalent_load(RADIAL_N, axial, factors))
     return million * 1e6 / (60.0 * SPEED_RPM)
 
 

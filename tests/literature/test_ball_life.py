@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -160,25 +162,27 @@ def test_capacity_scales_with_balls_rows_and_size():
     assert rating.ball_size_term(50e-3) == pytest.approx(3.647 * 50.0**1.4, rel=1e-13)
 
 
-def test_literature_load_factors():
+def test_literature_load_factors(monkeypatch):
     """Literature: table 3 of ISO 281 at its nodes, midway between angles, and the columns f_0 F_a/C_0 of 15 degrees."""
-    factors = rating.load_factors(0.0, 1.38 * 9 * 100.0, 9, 10e-3)
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
+    iso281 = importlib.import_module("published.iso281")
+    factors = iso281.load_factors(0.0, 1.38 * 9 * 100.0, 9, 10e-3)
     assert factors == pytest.approx((0.56, 1.45, 0.30))
     # At 15 degrees the standard enters with f_0 F_a/(i C_0), the relative load over cos(alpha).
     relative = 1.43 * math.cos(math.radians(15.0))
-    assert rating.load_factors(math.radians(15.0), relative * 900.0, 9, 10e-3) == pytest.approx(
+    assert iso281.load_factors(math.radians(15.0), relative * 900.0, 9, 10e-3) == pytest.approx(
         (0.44, 1.19, 0.47), rel=2e-3
     )
-    assert rating.load_factors(math.radians(40.0), 5.0, 9, 10e-3) == pytest.approx((0.35, 0.57, 1.14))
-    assert rating.load_factors(math.radians(22.5), 5.0, 9, 10e-3) == pytest.approx((0.42, 0.935, 0.625))
-    assert rating.load_factors(math.radians(45.0), 5.0, 9, 10e-3).axial == pytest.approx(0.5)
+    assert iso281.load_factors(math.radians(40.0), 5.0, 9, 10e-3) == pytest.approx((0.35, 0.57, 1.14))
+    assert iso281.load_factors(math.radians(22.5), 5.0, 9, 10e-3) == pytest.approx((0.42, 0.935, 0.625))
+    assert iso281.load_factors(math.radians(45.0), 5.0, 9, 10e-3).axial == pytest.approx(0.5)
     with pytest.raises(ValueError, match="contact angle"):
-        rating.load_factors(math.radians(60.0), 5.0, 9, 10e-3)
-    assert rating.equivalent_load(100.0, 20.0, factors) == 100.0
-    assert rating.equivalent_load(100.0, 50.0, factors) == pytest.approx(56.0 + 72.5)
-    assert rating.equivalent_load(0.0, 50.0, factors) == pytest.approx(72.5)
-    assert rating.basic_life(1000.0, 100.0) == pytest.approx(1000.0)
-    assert rating.basic_life(1000.0, 0.0) == math.inf
+        iso281.load_factors(math.radians(60.0), 5.0, 9, 10e-3)
+    assert iso281.equivalent_load(100.0, 20.0, factors) == 100.0
+    assert iso281.equivalent_load(100.0, 50.0, factors) == pytest.approx(56.0 + 72.5)
+    assert iso281.equivalent_load(0.0, 50.0, factors) == pytest.approx(72.5)
+    assert iso281.basic_life(1000.0, 100.0) == pytest.approx(1000.0)
+    assert iso281.basic_life(1000.0, 0.0) == math.inf
 
 
 @pytest.mark.parametrize("angle", [0.0, 15.0, 40.0])
