@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -54,6 +54,12 @@ def cell(value: Any, form: str) -> str:
     if value is None:
         return ""
     return f"{100.0 * value:{form[:-2]}} %" if form.endswith(" %") else format(value, form)
+
+
+def columns_of(kind: type[Any]) -> dict[str, tuple[str, str]]:
+    """Columns of the fields of a record that are ``shown``."""
+    columns = ((one.metadata["column"], one.name) for one in fields(kind) if "column" in one.metadata)
+    return {heading: (name, form) for (heading, form), name in columns}
 
 
 def tabled(title: str, rows: Iterable[Any], columns: Columns) -> Table:

@@ -32,12 +32,17 @@ def derived(by: Callable[[Any], Any], *path: str, spread: bool = False, init: Li
     return field(init=init, repr=False, metadata={"by": by} | ({"path": path} if path or spread else {}))
 
 
+def shown(heading: str, form: str = "", **options: Any) -> Any:
+    """A field with its heading in tables and the format of its figure there."""
+    return field(metadata={"column": (heading, form)}, **options)
+
+
 def unsaid(**options: Any) -> Any:
     """A field of which JSON does not tell."""
     return field(metadata={"path": None}, **options)
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, unsaid))
+@dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, unsaid))
 @dataclass(frozen=True)
 class Record:
     """Base of all records, which makes frozen dataclasses of them; ``kw_only``: with named arguments only."""

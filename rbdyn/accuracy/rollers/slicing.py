@@ -7,13 +7,12 @@ up to twice the largest on the shaft. Statistics are compared with those of the 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
-from rbdyn.accuracy.report import Columns, Progress, Report, flat, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, columns_of, flat, record, records, tabled
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of
 from rbdyn.contact.hertz_line import line_load
@@ -23,6 +22,7 @@ from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError
+from rbdyn.records.record import shown
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.slices/1"
@@ -33,20 +33,12 @@ LOADS = 40
 LIGHTEST = 0.02
 
 
-@dataclass(frozen=True)
 class Row(Bias):
     """One number of slices: largest relative error of the load at equal approach, nanoseconds a right-hand side."""
 
-    slices: int
-    load_error: float
-    rhs_ns: float
-
-
-COLUMNS: Columns = {
-    "slices": ("slices", ""),
-    "load error": ("load_error", ".2g %"),
-    "ns a right-hand side": ("rhs_ns", ".0f"),
-}
+    slices: int = shown("slices")
+    load_error: float = shown("load error", ".2g %")
+    rhs_ns: float = shown("ns a right-hand side", ".0f")
 
 
 def study(
@@ -68,7 +60,7 @@ def study(
         record=record(
             FORMAT, rows=written, conclusion=chosen, turns=numerics.turns, replicates=numerics.replicates, sought=sought
         ),
-        tables=(tabled(title, rows, {**COLUMNS, **bias_columns(sought, finest)}),),
+        tables=(tabled(title, rows, {**columns_of(Row), **bias_columns(sought, finest)}),),
         sentences=(
             chosen,
             f"{numerics.replicates} replicates of {numerics.turns:g} turns; load errors against {FINE} slices",
