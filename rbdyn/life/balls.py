@@ -9,14 +9,12 @@ Lubrication, cleanliness and the fatigue limit (a_ISO) are left out.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.life.ball_capacity import ball_size_term, groove_ratio, refuse_impossible
-from rbdyn.life.turns import Life
+from rbdyn.life.turns import Life, Turning
 
 LOAD_LIFE = 3.0
 WEIBULL = 10.0 / 9.0
@@ -24,23 +22,6 @@ RACE_EXPONENT = LOAD_LIFE * WEIBULL
 LUNDBERG_PALMGREN = 98.1  # [N, mm]
 # Parts of Z cos(alpha) Q_max that make the rating, when half of the balls are loaded (ISO/TS 16281).
 INNER_SHARE, OUTER_SHARE = 0.407, 0.389
-
-Turning = Literal["inner", "outer", "both"]
-
-
-@dataclass(frozen=True)
-class BallLife(Life):
-    """Life that nine rows in ten reach.
-
-    ``million_turns``: L10 in 1e6 turns of the inner ring against the outer; infinite without a load.
-    ``inner_load, outer_load``: the steady load on every ball that would do as much [N], against the
-    ``inner_capacity, outer_capacity`` of the races [N].
-    """
-
-    inner_load: float
-    outer_load: float
-    inner_capacity: float
-    outer_capacity: float
 
 
 def lundberg_palmgren_capacities(
@@ -109,7 +90,7 @@ def row_life(
     outer_load: NDArray[np.float64],
     capacities: tuple[float, float],
     turning: Turning = "inner",
-) -> BallLife:
+) -> Life:
     """Life of a row from the loads on its balls, (Z,) or (samples, Z), on the inner and on the outer race [N].
 
     ``capacities``: of the inner and the outer race [N], by one of the functions above. ``turning``: the rings that
@@ -124,7 +105,7 @@ def row_life(
     damage = (inner_equivalent / inner_capacity) ** RACE_EXPONENT
     damage += (outer_equivalent / outer_capacity) ** RACE_EXPONENT
     million_turns = damage ** (-1.0 / WEIBULL) if damage > 0.0 else math.inf
-    return BallLife(million_turns, inner_equivalent, outer_equivalent, inner_capacity, outer_capacity)
+    return Life(million_turns, inner_equivalent, outer_equivalent, inner_capacity, outer_capacity)
 
 
 def _loads(loads: NDArray[np.float64], race: str) -> NDArray[np.float64]:

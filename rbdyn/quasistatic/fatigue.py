@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from rbdyn.life.ball_capacity import dynamic_capacity
-from rbdyn.life.balls import BallLife, Turning, lundberg_palmgren_capacities, rated_capacities, row_life
+from rbdyn.life.balls import lundberg_palmgren_capacities, rated_capacities, row_life
+from rbdyn.life.turns import Life, Turning
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.scene.ball_bearing import BallRow
 
@@ -42,6 +43,6 @@ def turning_rings(inner_speed: float, outer_speed: float) -> Turning:
     return "outer" if inner_speed == 0.0 else "both"
 
 
-def solution_life(solution: Solution, capacities: tuple[float, float], turning: Turning = "inner") -> BallLife:
+def solution_life(solution: Solution, capacities: tuple[float, float], turning: Turning = "inner") -> Life:
     """Life of a row in equilibrium."""
     return row_life(solution.inner_load, solution.outer_load, capacities, turning)

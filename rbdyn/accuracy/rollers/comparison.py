@@ -13,8 +13,7 @@ from rbdyn.accuracy.judgement import SOUGHT
 from rbdyn.accuracy.report import Progress, Report, Table, columns_of, flat, record, records, tabled
 from rbdyn.accuracy.rollers import method_bias
 from rbdyn.accuracy.rollers.equal_error import Speedup, times_faster
-from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, compiled
-from rbdyn.accuracy.rollers.stretch import Stretch
+from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, Stretch, compiled
 from rbdyn.accuracy.rollers.trajectory import (
     DEFAULT_TURNS,
     STARTS,

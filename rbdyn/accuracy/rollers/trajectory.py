@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.accuracy.report import Table
-from rbdyn.accuracy.rollers.methods import DOP853, OURS, Method
-from rbdyn.accuracy.rollers.stretch import Stretch
+from rbdyn.accuracy.rollers.methods import DOP853, OURS, Method, Stretch
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
