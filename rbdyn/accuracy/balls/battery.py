@@ -16,7 +16,7 @@ import numpy as np
 
 from rbdyn.accuracy.balls.cases import CONTROLS, LOADS, SCENES, SEED, Case, Problem, cases, posed
 from rbdyn.accuracy.balls.solvers import WHOLE, Success, causes, fared, success_table
-from rbdyn.accuracy.report import Progress, Report, Table, record, records
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, record, records
 from rbdyn.quasistatic.rivals.finite_search import loaded
 from rbdyn.quasistatic.rivals.full_system import system_of, unknowns
 from rbdyn.quasistatic.row.equilibrium import Solution
@@ -44,7 +44,7 @@ class Run(NamedTuple):
     solve_us: float
 
 
-def study(scene: BallScene, progress: Callable[[int, int], None] | None = None, scenes: int = SCENES) -> Report:
+def study(scene: BallScene, progress: Reporter | None = None, scenes: int = SCENES) -> Report:
     """``rbdyn accuracy --battery``, its first ``scenes`` scenes."""
     drawn = cases(scenes, SEED, **{key: getattr(scene.model, key) for key in MODEL})
     ball, rings = scene.material("ball"), scene.material("inner_ring")

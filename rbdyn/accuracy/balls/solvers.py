@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from rbdyn.accuracy.balls.cases import Problem
-from rbdyn.accuracy.report import Progress, Report, Table, columns_of, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, record, records, tabled
 from rbdyn.faults import InputError, RunError
 from rbdyn.quasistatic.rivals import finite_search, limited, minpack, plain_newton
 from rbdyn.quasistatic.row import equilibrium
@@ -91,7 +91,7 @@ def share(count: int, total: int) -> tuple[float, float]:
 
 def study(
     scene: BallScene,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter | None = None,
     limits: Sequence[int] = LIMITS,
     perturbations: int = PERTURBATIONS,
 ) -> Report:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT
-from rbdyn.accuracy.report import Progress, Report, Table, columns_of, flat, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, record, records, tabled
 from rbdyn.accuracy.rollers import method_bias
 from rbdyn.accuracy.rollers.equal_error import Speedup, times_faster
 from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, Stretch, compiled
@@ -54,7 +54,7 @@ class Attempt(Record):
 
 def study(
     scene: Scene,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter | None = None,
     turns: float = DEFAULT_TURNS,
     methods: Sequence[Method] = METHODS,
     sought: float = SOUGHT,
@@ -77,9 +77,7 @@ def study(
     )
 
 
-def trajectories(
-    scene: Scene, progress: Callable[[int, int], None] | None, turns: float, methods: Sequence[Method]
-) -> Report:
+def trajectories(scene: Scene, progress: Reporter | None, turns: float, methods: Sequence[Method]) -> Report:
     """Error and time of every method at every setting. Raises as ``study``."""
     stretches = settled(scene, turns)
     compile_s = compiling(stretches[0], methods)

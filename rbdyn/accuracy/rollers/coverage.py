@@ -9,9 +9,8 @@ always holds the truth is too wide.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
-from rbdyn.accuracy.report import Progress, Report, columns_of, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, record, records, tabled
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import FIGURES
@@ -42,7 +41,7 @@ class Row(Record):
     offset: float = shown("offset", "+.2g %")
 
 
-def study(scene: Scene, progress: Callable[[int, int], None] | None = None, repeats: int = REPEATS) -> Report:
+def study(scene: Scene, progress: Reporter | None = None, repeats: int = REPEATS) -> Report:
     """``rbdyn accuracy --coverage``. Raises RunError, KeyboardInterrupt."""
     scene = one_bearing(scene)
     counted = Progress(progress, repeats + 1)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
-from rbdyn.accuracy.report import Progress, Table, columns_of, tabled
+from rbdyn.accuracy.report import Progress, Reporter, Table, columns_of, tabled
 from rbdyn.accuracy.rollers.methods import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
 from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of
 from rbdyn.dynamics.ensemble import Stop
@@ -42,9 +42,7 @@ class Row(Record):
 
 
 def bias_rows(
-    scene: Scene,
-    settings: Sequence[tuple[Method, Sequence[float]]] = SETTINGS,
-    progress: Callable[[int, int], None] | None = None,
+    scene: Scene, settings: Sequence[tuple[Method, Sequence[float]]] = SETTINGS, progress: Reporter | None = None
 ) -> list[Row]:
     """A row a setting. Raises InputError for a single replicate, RunError where the reference fails, KeyboardInterrupt."""
     check_replicates(scene)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.accuracy.judgement import NORMAL, SOUGHT, about, percent
-from rbdyn.accuracy.report import Columns, Progress, Report, columns_of, flat, record, records, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, record, records, tabled
 from rbdyn.accuracy.rollers.tolerances import OUTPUTS
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -67,7 +67,7 @@ class Slope(Record):
 
 def study(
     scene: Scene,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter | None = None,
     turns: Sequence[float] = TURNS,
     pool: int = POOL,
     sought: float = SOUGHT,
@@ -97,7 +97,7 @@ def study(
 
 
 def pool_of_runs(
-    scene: Scene, turns: Sequence[float], pool: int, progress: Callable[[int, int], None] | None = None
+    scene: Scene, turns: Sequence[float], pool: int, progress: Reporter | None = None
 ) -> tuple[dict[float, dict[str, NDArray[np.float64]]], dict[float, float]]:
     """Per length the outputs of every replicate, and the mean processor time of one [s], discarded turns included.
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, record, records, tabled
 from rbdyn.accuracy.rollers.footprint import printed
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
@@ -90,7 +90,7 @@ def scaling(
     rollers: Sequence[int] = ROLLERS,
     slices: Sequence[int] = SLICES,
     memory_turns: Sequence[int] = MEMORY_TURNS,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter | None = None,
 ) -> Scaling:
     """Measure a scene. Raises InputError where it cannot be enlarged or cut, RunError, KeyboardInterrupt."""
     scenes = {
@@ -210,7 +210,7 @@ def _largest_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * per_unit / 1024.0**2
 
 
-def study(scene: Scene, progress: Callable[[int, int], None] | None = None) -> Report:
+def study(scene: Scene, progress: Reporter | None = None) -> Report:
     """``rbdyn accuracy --scaling``. Raises InputError, RunError, KeyboardInterrupt."""
     return report(scaling(scene, progress=progress))
 

@@ -6,13 +6,13 @@ up to twice the largest on the shaft. Statistics are compared with those of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
-from rbdyn.accuracy.report import Progress, Report, columns_of, flat, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, record, records, tabled
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of
 from rbdyn.contact.hertz_line import line_load
@@ -42,10 +42,7 @@ class Row(Bias):
 
 
 def study(
-    scene: Scene,
-    progress: Callable[[int, int], None] | None = None,
-    counts: Sequence[int] = COUNTS,
-    sought: float = SOUGHT,
+    scene: Scene, progress: Reporter | None = None, counts: Sequence[int] = COUNTS, sought: float = SOUGHT
 ) -> Report:
     """``rbdyn accuracy --slices``.
 
@@ -70,9 +67,7 @@ def study(
     )
 
 
-def slice_rows(
-    scene: Scene, counts: Sequence[int] = COUNTS, progress: Callable[[int, int], None] | None = None
-) -> list[Row]:
+def slice_rows(scene: Scene, counts: Sequence[int] = COUNTS, progress: Reporter | None = None) -> list[Row]:
     """A row a number of slices, fewest first; the last is the reference of the statistics."""
     if not scene.needs_slices:
         raise InputError(

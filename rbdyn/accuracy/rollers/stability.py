@@ -7,10 +7,10 @@ runs once more at a tenth of the tolerance, to see whether tightening mends it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, record, records, tabled
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
@@ -118,7 +118,7 @@ def cases(scene: Scene) -> dict[str, tuple[str, ...]]:
 
 
 def battery(
-    scene: Scene, chosen: Mapping[str, Sequence[str]] | None = None, progress: Callable[[int, int], None] | None = None
+    scene: Scene, chosen: Mapping[str, Sequence[str]] | None = None, progress: Reporter | None = None
 ) -> list[Ending]:
     """A row a case; all cases unless some are ``chosen``. Raises KeyboardInterrupt."""
     listed = cases(scene) if chosen is None else chosen
@@ -182,7 +182,7 @@ def _judge(run: Replicate, rtol: float, tightened: bool) -> tuple[str, str]:
     return CLOSED, ""
 
 
-def study(scene: Scene, progress: Callable[[int, int], None] | None = None) -> Report:
+def study(scene: Scene, progress: Reporter | None = None) -> Report:
     """``rbdyn accuracy --stability``. Raises KeyboardInterrupt."""
     return report(battery(scene, progress=progress))
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, Difference, Verdict, check_replicates, judged, overall, percent, undecided
-from rbdyn.accuracy.report import Progress, Table, columns_of, tabled
+from rbdyn.accuracy.report import Progress, Reporter, Table, columns_of, tabled
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
@@ -83,7 +83,7 @@ class StatisticsBias(Record):
 
 
 def statistics_bias(
-    scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Callable[[int, int], None] | None = None
+    scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Reporter | None = None
 ) -> StatisticsBias:
     """A row a tolerance. Runs one replicate at a time.
 
