@@ -63,21 +63,6 @@ class Sweep:
     longest_life: Point
     notes: tuple[str, ...]
 
-    @property
-    def values(self) -> NDArray[np.float64]:
-        """What is swept, in SI."""
-        return np.array([point.value for point in self.points])
-
-    @property
-    def peak_pressure(self) -> NDArray[np.float64]:
-        """Largest Hertz pressure at each point [Pa]."""
-        return np.array([point.peak_pressure for point in self.points])
-
-    @property
-    def million_turns(self) -> NDArray[np.float64]:
-        """L10 at each point [1e6 turns]."""
-        return np.array([point.million_turns for point in self.points])
-
 
 def solved(value: float, case: Case, start: Solution | None = None) -> Point:
     """Equilibrium, stress and life of a case; ``start``: a solution nearby."""

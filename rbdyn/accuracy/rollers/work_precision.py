@@ -59,6 +59,8 @@ _MOTION = ("rows", "conclusion", "turns", "starts", "reference", "resolved_m", "
 
 
 def _draw(rows: Sequence[tolerances.Row], path: Any, sought: float) -> None:
-    from rbdyn.accuracy.rollers import pictures
+    """Bias of each output and gap of the power balance against the time of a shaft turn, marked with rtol."""
+    from rbdyn.accuracy.rollers.pictures import biases_at_work
 
-    pictures.work_precision(rows, path, sought)
+    labels = "relative bias, or gap of the power balance", "processor time of a shaft turn [ms]"
+    biases_at_work(rows, path, sought, labels, "turn_ms", ("gap of the power balance", "power_gap"), "rtol")
