@@ -18,6 +18,7 @@ import pandas as pd
 import typer
 from published import iso281
 from published.common import Check, Table, canvas, percent, save, tell
+from published.lundberg_palmgren import plain_capacities
 
 from rbdyn import BallScene
 from rbdyn.contact.hertz_point import peak_pressure
@@ -123,7 +124,7 @@ def solved(scene: Any) -> dict[str, float]:
     if not solution.found:
         raise RuntimeError(solution.status)
     most = int(np.argmax(solution.inner_load))
-    life = row_life(solution.inner_load, solution.outer_load, fatigue.plain_capacities(scene.bearing), "inner")
+    life = row_life(solution.inner_load, solution.outer_load, plain_capacities(scene.bearing), "inner")
     return {
         "inner": 1e-6 * float(peak_pressure(model.inner_contact, solution.inner_load.max())),
         "outer": 1e-6 * float(peak_pressure(model.outer_contact, solution.outer_load.max())),
@@ -201,7 +202,7 @@ def optima() -> dict[str, preload.Sweep]:
     """Preload on top of the working 40 N, for each model."""
     return {
         name: preload.over_preload(
-            bearing(WORKING_AXIAL_N, name), [10.0 * step for step in range(14)], fatigue.plain_capacities
+            bearing(WORKING_AXIAL_N, name), [10.0 * step for step in range(14)], plain_capacities
         )
         for name in MODELS
     }

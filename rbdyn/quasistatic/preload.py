@@ -143,8 +143,8 @@ def over_preload(
 ) -> Sweep:
     """Sweep of the axial force of a preload spring [N], on top of the scene's load.
 
-    ``capacities``: how races are rated, ``fatigue.reference_capacities`` or ``fatigue.plain_capacities``. Raises
-    ValueError as ``sweep``, or where the scene prescribes the axial displacement, which no force can change.
+    ``capacities``: how races are rated, ``fatigue.reference_capacities`` or another. Raises ValueError as ``sweep``, or where the
+    scene prescribes the axial displacement, which no force can change.
     """
     at = _case(scene, capacities)
     if not math.isnan(at.given[2]):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -107,7 +109,7 @@ def test_wear_raises_stress_and_shortens_life():
     assert np.all(np.diff(of(swept, "peak_pressure")) > 0.0) and np.all(np.diff(of(swept, "million_turns")) < 0.0)
 
 
-def test_ratings_of_a_drawing():
+def test_ratings_of_a_drawing(monkeypatch):
     """Unit: a catalogue's capacity is taken as it is; grooves closer than 0.52 rate no higher than 0.52."""
     drawing = scene().bearing
     rated = drawing.model_copy(update={"dynamic_capacity_N": 2.0 * fatigue.capacity_of(drawing)})
@@ -115,7 +117,9 @@ def test_ratings_of_a_drawing():
     assert twice == pytest.approx((2.0, 2.0))
     close = drawing.model_copy(update={"inner_groove_factor": 0.51})
     assert fatigue.capacity_of(close) == pytest.approx(fatigue.capacity_of(drawing))
-    assert fatigue.plain_capacities(close)[0] > fatigue.plain_capacities(drawing)[0]
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
+    plain_capacities = importlib.import_module("published.lundberg_palmgren").plain_capacities
+    assert plain_capacities(close)[0] > plain_capacities(drawing)[0]
     assert [fatigue.turning_rings(*speeds) for speeds in ((0, 0), (1, 0), (0, 1), (1, -1))] == [
         "inner", "inner", "outer", "both",
     ]  # fmt: skip
