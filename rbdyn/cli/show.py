@@ -5,7 +5,6 @@ A result keeps no motion. It keeps scene and seed, and equal scenes give equal b
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -181,11 +180,9 @@ def _race(motion: History, race: Race) -> dict[str, float]:
 
 def _life(motion: History) -> dict[str, float | str | None]:
     """Of the contact loads shown; None where nothing is loaded or nothing turns."""
-    life, operation = motion.life(), motion.scene.operation
-    hours = life.hours(operation.inner_speed_rpm * math.pi / 30.0, operation.outer_speed_rpm * math.pi / 30.0)
+    life = motion.life()
     return {
-        "L10_Mrev": life.million_turns if math.isfinite(life.million_turns) else None,
-        "L10_h": hours if math.isfinite(hours) else None,
+        **life.told(*motion.scene.operation.speeds),
         "equivalent_load_N": life.equivalent_load,
         "method": "ISO/TS 16281 reference life from the contact loads over time",
     }

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from rbdyn.records.record import finite
+
 # The rings that turn against the load.
 Turning = Literal["inner", "outer", "both"]
 
@@ -24,6 +26,10 @@ class Life:
     outer_load: float
     inner_capacity: float
     outer_capacity: float
+
+    def told(self, inner_speed: float, outer_speed: float) -> dict[str, float | None]:
+        """What a report tells of it, hours at ring speeds [rad/s]; None where nothing is loaded, or nothing turns."""
+        return {"L10_Mrev": finite(self.million_turns), "L10_h": finite(self.hours(inner_speed, outer_speed))}
 
     def hours(self, inner_speed: float, outer_speed: float = 0.0) -> float:
         """Life in hours at ring speeds [rad/s]; infinite where they do not turn against each other."""

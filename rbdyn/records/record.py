@@ -7,6 +7,7 @@ the others; one whose default is None is left out where it is None.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, field, fields
@@ -99,6 +100,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+def finite(value: float) -> float | None:
+    """A figure; None where it is infinite or no number, which JSON does not know."""
+    return value if math.isfinite(value) else None
 
 
 def restored(kind: Any, value: Any) -> Any:

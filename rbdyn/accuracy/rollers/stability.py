@@ -17,7 +17,7 @@ from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError, RunError
-from rbdyn.records.record import Record, shown
+from rbdyn.records.record import Record, finite, shown
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.stability/1"
@@ -153,7 +153,7 @@ def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
         turn_ms=run.cpu_s / turns * 1e3,
         held=held,
         stiffness_ratio=eigenvalue * varied.turn_s,
-        **{name: value if math.isfinite(value) else None for name, value in figures.items()},
+        **{name: finite(value) for name, value in figures.items()},
     )
 
 
