@@ -20,11 +20,11 @@ import numpy as np
 import pandas as pd
 import typer
 from published.common import Table, canvas, save
+from published.homogenisation import homogenisation
 
 from rbdyn.quasistatic.runout.classes import running_accuracy
 from rbdyn.quasistatic.runout.linear import linear_response
 from rbdyn.quasistatic.runout.lots import Lot, draw_parts, readings
-from rbdyn.quasistatic.runout.measures import homogenisation
 from rbdyn.quasistatic.runout.model import bench_of
 from rbdyn.quasistatic.runout.race_errors import RaceErrors, ball_path, perfect, waviness
 from rbdyn.quasistatic.runout.tolerance_design import Bench, RaceLimits, design, runouts

@@ -16,11 +16,12 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 import typer
+from published import iso281
 from published.common import Check, Table, canvas, percent, save, tell
+from published.lundberg_palmgren import plain_capacities
 
 from rbdyn import BallScene
 from rbdyn.contact.hertz_point import peak_pressure
-from rbdyn.life import ball_capacity as rating
 from rbdyn.life.balls import row_life
 from rbdyn.quasistatic import fatigue, preload
 from rbdyn.quasistatic.row.equilibrium import solve
@@ -123,7 +124,7 @@ def solved(scene: Any) -> dict[str, float]:
     if not solution.found:
         raise RuntimeError(solution.status)
     most = int(np.argmax(solution.inner_load))
-    life = row_life(solution.inner_load, solution.outer_load, fatigue.plain_capacities(scene.bearing), "inner")
+    life = row_life(solution.inner_load, solution.outer_load, plain_capacities(scene.bearing), "inner")
     return {
         "inner": 1e-6 * float(peak_pressure(model.inner_contact, solution.inner_load.max())),
         "outer": 1e-6 * float(peak_pressure(model.outer_contact, solution.outer_load.max())),
@@ -135,8 +136,8 @@ def solved(scene: Any) -> dict[str, float]:
 
 def catalogue_life(axial: float, capacity: float) -> float:
     """ISO 281 life [h] at 63000 rpm from a rating [N], with X and Y of 15 degrees."""
-    factors = rating.load_factors(math.radians(ANGLE_DEG), axial, BALLS, 1e-3 * BALL_MM)
-    million = rating.basic_life(capacity, rating.equivalent_load(RADIAL_N, axial, factors))
+    factors = iso281.load_factors(math.radians(ANGLE_DEG), axial, BALLS, 1e-3 * BALL_MM)
+    million = iso281.basic_life(capacity, iso281.equivalent_load(RADIAL_N, axial, factors))
     return million * 1e6 / (60.0 * SPEED_RPM)
 
 
@@ -201,7 +202,7 @@ def optima() -> dict[str, preload.Sweep]:
     """Preload on top of the working 40 N, for each model."""
     return {
         name: preload.over_preload(
-            bearing(WORKING_AXIAL_N, name), [10.0 * step for step in range(14)], fatigue.plain_capacities
+            bearing(WORKING_AXIAL_N, name), [10.0 * step for step in range(14)], plain_capacities
         )
         for name in MODELS
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,6 +12,8 @@ from rbdyn.result import versions, write_json
 
 # Of each heading the field of a row and the format of its figure, see ``cell``, or a function that words it.
 Columns = Mapping[str, tuple[str, str] | Callable[[Any], str]]
+# Told (done, total) as a study goes on.
+Reporter = Callable[[int, int], None]
 
 
 class Table(NamedTuple):
@@ -39,7 +41,7 @@ class Report:
 class Progress:
     """Counts what is done out of a known total."""
 
-    def __init__(self, report: Callable[[int, int], None] | None, total: int) -> None:
+    def __init__(self, report: Reporter | None, total: int) -> None:
         self.report, self.total, self.done = report, total, 0
 
     def step(self, *part: int) -> None:
@@ -54,6 +56,12 @@ def cell(value: Any, form: str) -> str:
     if value is None:
         return ""
     return f"{100.0 * value:{form[:-2]}} %" if form.endswith(" %") else format(value, form)
+
+
+def columns_of(kind: type[Any]) -> dict[str, tuple[str, str]]:
+    """Columns of the fields of a record that are ``shown``."""
+    columns = ((one.metadata["column"], one.name) for one in fields(kind) if "column" in one.metadata)
+    return {heading: (name, form) for (heading, form), name in columns}
 
 
 def tabled(title: str, rows: Iterable[Any], columns: Columns) -> Table:

@@ -5,7 +5,6 @@ A result keeps no motion. It keeps scene and seed, and equal scenes give equal b
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -80,16 +79,19 @@ def write(
     from rbdyn.dynamics.motion.history import history
 
     motion = history(asked.scene, asked.turns, asked.replicate)
-    tasks: list[Callable[[], list[str]]] = [
-        lambda: _table(motion, folder),
-        *(_picture_tasks(asked, motion, folder)),
-        *([lambda: _animation(motion, folder)] if animate else []),
-    ]
-    steps = 1 + len(tasks) + lyapunov
+    tasks: dict[str, Callable[[Path], object]] = {
+        "history.csv": partial(motion.table().to_csv, index=False, float_format="%.6g"),
+        **_pictures(asked, motion),
+    }
+    steps = 1 + len(tasks) + animate + lyapunov
     files: list[str] = []
-    for done, task in enumerate(tasks, 1):
+    for done, (name, make) in enumerate(tasks.items(), 1):
         progress(done, steps)
-        files += task()
+        make(folder / name)
+        files.append(name)
+    if animate:
+        progress(len(tasks) + 1, steps)
+        files += _animation(motion, folder)
     record = {**_record(asked, motion), "notes": asked.notes, "versions": versions()}
     if lyapunov:
         from rbdyn.dynamics.motion.lyapunov import lyapunov_exponent
@@ -103,16 +105,11 @@ def write(
     return record
 
 
-def _table(motion: History, folder: Path) -> list[str]:
-    motion.table().to_csv(folder / "history.csv", index=False, float_format="%.6g")
-    return ["history.csv"]
-
-
-def _picture_tasks(asked: Asked, motion: History, folder: Path) -> list[Callable[[], list[str]]]:
+def _pictures(asked: Asked, motion: History) -> dict[str, Callable[[Path], object]]:
     from rbdyn import plots
 
     title = f"{asked.turns:g} counted shaft turns, replicate {asked.replicate + 1}"
-    pictures: dict[str, Callable[[Path], object]] = {
+    return {
         "cage_orbit.png": partial(plots.cage_orbit, {title: motion}),
         "forces.png": partial(plots.forces, motion),
         "whirl.png": partial(plots.whirl, motion),
@@ -122,12 +119,6 @@ def _picture_tasks(asked: Asked, motion: History, folder: Path) -> list[Callable
         "sliding.png": partial(plots.sliding, motion),
         "power.png": partial(plots.power_by_loss, asked.result.power_terms),
     }
-    return [partial(_picture, folder, name, draw) for name, draw in pictures.items()]
-
-
-def _picture(folder: Path, name: str, draw: Callable[[Path], object]) -> list[str]:
-    draw(folder / name)
-    return [name]
 
 
 def _animation(motion: History, folder: Path) -> list[str]:
@@ -189,11 +180,9 @@ def _race(motion: History, race: Race) -> dict[str, float]:
 
 def _life(motion: History) -> dict[str, float | str | None]:
     """Of the contact loads shown; None where nothing is loaded or nothing turns."""
-    life, operation = motion.life(), motion.scene.operation
-    hours = life.hours(operation.inner_speed_rpm * math.pi / 30.0, operation.outer_speed_rpm * math.pi / 30.0)
+    life = motion.life()
     return {
-        "L10_Mrev": life.million_turns if math.isfinite(life.million_turns) else None,
-        "L10_h": hours if math.isfinite(hours) else None,
+        **life.told(*motion.scene.operation.speeds),
         "equivalent_load_N": life.equivalent_load,
         "method": "ISO/TS 16281 reference life from the contact loads over time",
     }

@@ -1,71 +1,25 @@
 """Fatigue life of a row of balls from the loads on them: Lundberg and Palmgren, and ISO/TS 16281.
 
-Either way a race lives (Q_c/Q_e)^3 million turns, Q_c being the ball load it bears for one million and Q_e the
-equivalent of its loads; races combine by a Weibull slope of 10/9. The two differ in Q_c only: from the dimensions
-(Lundberg and Palmgren 1947, as in the Sensors 2023 paper on preload, eqs 8-10), or from the catalogue's C_r.
+A race lives (Q_c/Q_e)^3 million turns, Q_c being the ball load it bears for one million, from the catalogue's C_r, and Q_e
+the equivalent of its loads; races combine by a Weibull slope of 10/9 (Sensors 2023 paper on preload, eqs 9-10).
 Lubrication, cleanliness and the fatigue limit (a_ISO) are left out.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.life.ball_capacity import ball_size_term, groove_ratio, refuse_impossible
-from rbdyn.life.turns import Life
+from rbdyn.life.ball_capacity import groove_ratio
+from rbdyn.life.turns import Life, Turning
 
 LOAD_LIFE = 3.0
 WEIBULL = 10.0 / 9.0
 RACE_EXPONENT = LOAD_LIFE * WEIBULL
-LUNDBERG_PALMGREN = 98.1  # [N, mm]
 # Parts of Z cos(alpha) Q_max that make the rating, when half of the balls are loaded (ISO/TS 16281).
 INNER_SHARE, OUTER_SHARE = 0.407, 0.389
-
-Turning = Literal["inner", "outer", "both"]
-
-
-@dataclass(frozen=True)
-class BallLife(Life):
-    """Life that nine rows in ten reach.
-
-    ``million_turns``: L10 in 1e6 turns of the inner ring against the outer; infinite without a load.
-    ``inner_load, outer_load``: the steady load on every ball that would do as much [N], against the
-    ``inner_capacity, outer_capacity`` of the races [N].
-    """
-
-    inner_load: float
-    outer_load: float
-    inner_capacity: float
-    outer_capacity: float
-
-
-def lundberg_palmgren_capacities(
-    balls: int,
-    ball_diameter: float,
-    pitch_diameter: float,
-    contact_angle: float,
-    inner_groove_factor: float,
-    outer_groove_factor: float,
-) -> tuple[float, float]:
-    """Ball load [N] that the inner and the outer race bear for 1e6 turns, from the dimensions [m, rad].
-
-    98.1 (2f/(2f-1))^0.41 (1-+g)^1.39/(1+-g)^(1/3) (g/cos alpha)^0.3 D^1.8 Z^(-1/3) in N and mm, g = D cos(alpha)/d_m,
-    upper signs inside (Sensors 2023, eq 8). Raises ValueError unless 0 < g < 1 and both groove factors exceed 0.5.
-    """
-    relative = ball_diameter / pitch_diameter
-    gamma = relative * math.cos(contact_angle)
-    refuse_impossible(gamma, inner_groove_factor, outer_groove_factor)
-
-    def capacity(groove: float, signed: float) -> float:
-        shape = (1.0 - signed) ** 1.39 / (1.0 + signed) ** (1.0 / 3.0) * relative**0.3
-        close = (2.0 * groove / (2.0 * groove - 1.0)) ** 0.41
-        return LUNDBERG_PALMGREN * close * shape * ball_size_term(ball_diameter) * balls ** (-1.0 / 3.0)
-
-    return capacity(inner_groove_factor, gamma), capacity(outer_groove_factor, -gamma)
 
 
 def rated_capacities(
@@ -109,7 +63,7 @@ def row_life(
     outer_load: NDArray[np.float64],
     capacities: tuple[float, float],
     turning: Turning = "inner",
-) -> BallLife:
+) -> Life:
     """Life of a row from the loads on its balls, (Z,) or (samples, Z), on the inner and on the outer race [N].
 
     ``capacities``: of the inner and the outer race [N], by one of the functions above. ``turning``: the rings that
@@ -124,7 +78,7 @@ def row_life(
     damage = (inner_equivalent / inner_capacity) ** RACE_EXPONENT
     damage += (outer_equivalent / outer_capacity) ** RACE_EXPONENT
     million_turns = damage ** (-1.0 / WEIBULL) if damage > 0.0 else math.inf
-    return BallLife(million_turns, inner_equivalent, outer_equivalent, inner_capacity, outer_capacity)
+    return Life(million_turns, inner_equivalent, outer_equivalent, inner_capacity, outer_capacity)
 
 
 def _loads(loads: NDArray[np.float64], race: str) -> NDArray[np.float64]:

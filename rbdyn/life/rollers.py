@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.life.turns import Life
+from rbdyn.life.turns import Life, Turning
 
 # Life of a race falls with the fourth power of its load; 9/8 is the slope of the Weibull line.
 LOAD_LIFE = 4.0
@@ -24,23 +23,12 @@ LAMINA_EXPONENT = LOAD_LIFE * WEIBULL
 # lambda nu: what ISO 281 takes off for edge stress and uneven loads, which laminae describe themselves.
 REDUCTION = 0.83
 
-Turning = Literal["inner", "outer", "both"]
-
 
 @dataclass(frozen=True)
 class ReferenceLife(Life):
-    """Life that nine bearings in ten reach.
-
-    ``million_turns``: L10r in 1e6 turns of the inner ring against the outer; infinite without a load.
-    ``equivalent_load``: the radial load P_ref of equal life by ISO 281 [N]. ``inner_load, outer_load``: the steady
-    load on every roller that would do as much [N], against the ``inner_capacity, outer_capacity`` of the races [N].
-    """
+    """Reference rating life L10r; ``equivalent_load``: the radial load P_ref of equal life by ISO 281 [N]."""
 
     equivalent_load: float
-    inner_load: float
-    outer_load: float
-    inner_capacity: float
-    outer_capacity: float
 
 
 def capacity_factor(gamma: float) -> float:
@@ -177,7 +165,7 @@ def reference_life(
     inner_capacity, outer_capacity = race_capacities(capacity, rollers, gamma)
     damage = (inner_load / inner_capacity) ** LAMINA_EXPONENT + (outer_load / outer_capacity) ** LAMINA_EXPONENT
     life = damage ** (-1.0 / WEIBULL) if damage > 0.0 else math.inf
-    return ReferenceLife(life, capacity * life**-0.3, inner_load, outer_load, inner_capacity, outer_capacity)
+    return ReferenceLife(life, inner_load, outer_load, inner_capacity, outer_capacity, capacity * life**-0.3)
 
 
 def _lamina_loads(loads: NDArray[np.float64], race: str) -> NDArray[np.float64]:

@@ -1,16 +1,35 @@
-"""Life in turns of one ring against the other, as time."""
+"""Life of a bearing in turns of one ring against the other, as time, and what of its races it rests on."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
+
+from rbdyn.records.record import finite
+
+# The rings that turn against the load.
+Turning = Literal["inner", "outer", "both"]
 
 
 @dataclass(frozen=True)
 class Life:
-    """Turns of the inner ring against the outer in 1e6; infinite without a load."""
+    """Life that nine bearings, or rows, in ten reach.
+
+    ``million_turns``: L10 in 1e6 turns of the inner ring against the outer; infinite without a load.
+    ``inner_load, outer_load``: the steady load on every ball or roller that would do as much [N], against the
+    ``inner_capacity, outer_capacity`` of the races [N].
+    """
 
     million_turns: float
+    inner_load: float
+    outer_load: float
+    inner_capacity: float
+    outer_capacity: float
+
+    def told(self, inner_speed: float, outer_speed: float) -> dict[str, float | None]:
+        """What a report tells of it, hours at ring speeds [rad/s]; None where nothing is loaded, or nothing turns."""
+        return {"L10_Mrev": finite(self.million_turns), "L10_h": finite(self.hours(inner_speed, outer_speed))}
 
     def hours(self, inner_speed: float, outer_speed: float = 0.0) -> float:
         """Life in hours at ring speeds [rad/s]; infinite where they do not turn against each other."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 from rbdyn.fields import RPM
 from rbdyn.mounting.fits import mounted_rings
 from rbdyn.mounting.ring_growth import UNCHANGED, GrooveChange, groove_change, printed_growth
 from rbdyn.mounting.rings import MountedRings, Ring
+from rbdyn.records.record import finite
 from rbdyn.scene.ball import BallScene, DoubleDeckerScene, SingleRowScene
 from rbdyn.scene.ball_bearing import BallRow
 from rbdyn.scene.mounting import raceway_radii
@@ -95,12 +95,11 @@ def growth_record(scene: BallScene, names: dict[str, GrooveChange]) -> dict[str,
     record: dict[str, Any] = {"ring_growth_um": {name: 1e6 * change.radial for name, change in names.items()}}
     rings = mounted_of(scene)
     if rings is not None:
-        loosens = rings.loosening_speed / RPM
         record["fits"] = {
             "inner_pressure_MPa": 1e-6 * rings.inner_pressure,
             "outer_pressure_MPa": 1e-6 * rings.outer_pressure,
             # null: at no speed.
-            "inner_ring_loosens_rpm": loosens if math.isfinite(loosens) else None,
+            "inner_ring_loosens_rpm": finite(rings.loosening_speed / RPM),
             "inner_ring_loose": rings.inner_pressure == 0.0,
         }
     return record

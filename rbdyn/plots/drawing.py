@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,8 @@ ROLLER_SHARE, CAGE_SHARE, RING_SHARE = 0.62, 0.4, 0.45
 # The longest arrows, in pitch radii.
 RACE_ARROW, CAGE_ARROW = 0.32, 0.32
 TIDY = (1.0, 2.0, 5.0)
+# Of a history, what is drawn as it was sampled.
+AS_SAMPLED = ("time", "inner_angle", "cage_angle", "outer_load", "inner_load", "pocket_load", "land_load")
 
 
 class Shape(NamedTuple):
@@ -143,10 +145,7 @@ def drawing(history: History, turns: float, frames_per_turn: int, most_frames: i
         cage_scale=cage / (CAGE_ARROW * pitch),
         turns=window * interval / scene.turn_s,
         start=first * interval / scene.turn_s,
-        time=history.time[kept],
-        inner_angle=history.inner_angle[kept],
         outer_angle=scene.operation.speeds[1] * history.time[kept],
-        cage_angle=history.cage_angle[kept],
         cage_x=1e3 * (history.cage_x - history.outer_x)[kept],
         cage_y=1e3 * (history.cage_y - history.outer_y)[kept],
         ring_x=1e3 * (history.ring_x - history.outer_x)[kept],
@@ -154,14 +153,11 @@ def drawing(history: History, turns: float, frames_per_turn: int, most_frames: i
         ahead=pitch * ((lead + np.pi) % (2.0 * np.pi) - np.pi),
         out=1e3 * np.hypot(x, y) - pitch,
         spin=turned,
-        outer_load=history.outer_load[kept],
-        inner_load=history.inner_load[kept],
-        pocket_load=history.pocket_load[kept],
-        land_load=history.land_load[kept],
+        **{name: getattr(history, name)[kept] for name in AS_SAMPLED},
     )
 
 
-def _sizes(history: History) -> dict[str, float]:
+def _sizes(history: History) -> dict[str, Any]:
     scene = history.scene
     pitch, true_roller = 0.5 * scene.bearing.pitch_diameter_mm, 0.5 * scene.bearing.roller_diameter_mm
     outer, inner = (1e3 * radius for radius in scene.geometry.raceways)

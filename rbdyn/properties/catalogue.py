@@ -117,11 +117,6 @@ def read_designation(text: str) -> Designation:
     )
 
 
-def roller_sizes() -> tuple[str, ...]:
-    """Sizes of roller bearings that the catalogue lists, as series and bore code."""
-    return tuple(row["size"] for row in table("cylindrical_rollers"))
-
-
 def envelope(named: Designation) -> Envelope:
     """What the catalogue lists of a designation. Raises ValueError where it does not."""
     size, bore = named.series + named.code, BORES.get(named.code, 5.0 * int(named.code))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -21,15 +22,21 @@ from rbdyn.quasistatic.result import (
     displacement_record,
     stiffness_record,
 )
+from rbdyn.quasistatic.rivals import finite_search, plain_newton
 from rbdyn.quasistatic.roots import other_roots
-from rbdyn.quasistatic.row.equilibrium import Solution
+from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.row_report import film_record, row_report
-from rbdyn.quasistatic.solvers import SOLVERS
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 
+# Those that a scene may choose: ``solver(row, control, load, given, start) -> Solution``.
+SOLVERS: dict[str, Callable[..., Solution]] = {
+    "convex": solve,
+    "finite_search": finite_search.solve,
+    "newton": plain_newton.solve,
+}
 # Raceway controls under which there may be more than one equilibrium.
 SEVERAL_ROOTS = ("inner", "half")
 

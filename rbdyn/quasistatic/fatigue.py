@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from rbdyn.life.ball_capacity import dynamic_capacity
-from rbdyn.life.balls import BallLife, Turning, lundberg_palmgren_capacities, rated_capacities, row_life
+from rbdyn.life.balls import rated_capacities, row_life
+from rbdyn.life.turns import Life, Turning
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.scene.ball_bearing import BallRow
 
@@ -16,23 +17,14 @@ def capacity_of(drawing: BallRow) -> float:
     if drawing.dynamic_capacity_N is not None:
         return drawing.dynamic_capacity_N
     inner, outer = (max(factor, CLOSEST_RATED) for factor in drawing.groove_factors)
-    return dynamic_capacity(*_sizes(drawing), inner, outer)
+    sizes = drawing.balls, drawing.ball_diameter, drawing.pitch_diameter, drawing.contact_angle
+    return dynamic_capacity(*sizes, inner, outer)
 
 
 def reference_capacities(drawing: BallRow) -> tuple[float, float]:
     """Ball loads [N] that the inner and the outer race bear for 1e6 turns by ISO/TS 16281."""
     angle = drawing.contact_angle
     return rated_capacities(capacity_of(drawing), drawing.balls, drawing.gamma, angle, *drawing.groove_factors)
-
-
-def plain_capacities(drawing: BallRow) -> tuple[float, float]:
-    """The same by Lundberg and Palmgren from the dimensions alone: steel and finish of 1947, no b_m."""
-    return lundberg_palmgren_capacities(*_sizes(drawing), *drawing.groove_factors)
-
-
-def _sizes(drawing: BallRow) -> tuple[int, float, float, float]:
-    """Number of balls, their diameter and that of the pitch circle [m], contact angle [rad]."""
-    return drawing.balls, drawing.ball_diameter, drawing.pitch_diameter, drawing.contact_angle
 
 
 def turning_rings(inner_speed: float, outer_speed: float) -> Turning:
@@ -42,6 +34,6 @@ def turning_rings(inner_speed: float, outer_speed: float) -> Turning:
     return "outer" if inner_speed == 0.0 else "both"
 
 
-def solution_life(solution: Solution, capacities: tuple[float, float], turning: Turning = "inner") -> BallLife:
+def solution_life(solution: Solution, capacities: tuple[float, float], turning: Turning = "inner") -> Life:
     """Life of a row in equilibrium."""
     return row_life(solution.inner_load, solution.outer_load, capacities, turning)

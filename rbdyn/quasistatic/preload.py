@@ -63,21 +63,6 @@ class Sweep:
     longest_life: Point
     notes: tuple[str, ...]
 
-    @property
-    def values(self) -> NDArray[np.float64]:
-        """What is swept, in SI."""
-        return np.array([point.value for point in self.points])
-
-    @property
-    def peak_pressure(self) -> NDArray[np.float64]:
-        """Largest Hertz pressure at each point [Pa]."""
-        return np.array([point.peak_pressure for point in self.points])
-
-    @property
-    def million_turns(self) -> NDArray[np.float64]:
-        """L10 at each point [1e6 turns]."""
-        return np.array([point.million_turns for point in self.points])
-
 
 def solved(value: float, case: Case, start: Solution | None = None) -> Point:
     """Equilibrium, stress and life of a case; ``start``: a solution nearby."""
@@ -158,8 +143,8 @@ def over_preload(
 ) -> Sweep:
     """Sweep of the axial force of a preload spring [N], on top of the scene's load.
 
-    ``capacities``: how races are rated, ``fatigue.reference_capacities`` or ``fatigue.plain_capacities``. Raises
-    ValueError as ``sweep``, or where the scene prescribes the axial displacement, which no force can change.
+    ``capacities``: how races are rated, ``fatigue.reference_capacities`` or another. Raises ValueError as ``sweep``, or where the
+    scene prescribes the axial displacement, which no force can change.
     """
     at = _case(scene, capacities)
     if not math.isnan(at.given[2]):

@@ -148,12 +148,9 @@ def ball_records(figures: NDArray[np.float64]) -> list[dict[str, float]]:
 
 def stiffness_record(stiffness: NDArray[np.float64]) -> dict[str, Any]:
     """Diagonal stiffnesses and the whole matrix."""
-    across, tilt = np.diag(stiffness)[:3] * 1e-6, np.diag(stiffness)[3:] * 1e-3
+    across, tilt = (np.diag(stiffness)[:3] * 1e-6).tolist(), (np.diag(stiffness)[3:] * 1e-3).tolist()
     return {
-        "x_N_per_um": float(across[0]),
-        "y_N_per_um": float(across[1]),
-        "z_N_per_um": float(across[2]),
-        "tilt_x_Nm_per_mrad": float(tilt[0]),
-        "tilt_y_Nm_per_mrad": float(tilt[1]),
+        **{f"{axis}_N_per_um": value for axis, value in zip("xyz", across, strict=True)},
+        **{f"tilt_{axis}_Nm_per_mrad": value for axis, value in zip("xy", tilt, strict=True)},
         "matrix_SI": stiffness.tolist(),
     }

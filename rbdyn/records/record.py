@@ -7,6 +7,7 @@ the others; one whose default is None is left out where it is None.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, field, fields
@@ -32,12 +33,17 @@ def derived(by: Callable[[Any], Any], *path: str, spread: bool = False, init: Li
     return field(init=init, repr=False, metadata={"by": by} | ({"path": path} if path or spread else {}))
 
 
+def shown(heading: str, form: str = "", **options: Any) -> Any:
+    """A field with its heading in tables and the format of its figure there."""
+    return field(metadata={"column": (heading, form)}, **options)
+
+
 def unsaid(**options: Any) -> Any:
     """A field of which JSON does not tell."""
     return field(metadata={"path": None}, **options)
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, unsaid))
+@dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, unsaid))
 @dataclass(frozen=True)
 class Record:
     """Base of all records, which makes frozen dataclasses of them; ``kw_only``: with named arguments only."""
@@ -94,6 +100,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+def finite(value: float) -> float | None:
+    """A figure; None where it is infinite or no number, which JSON does not know."""
+    return value if math.isfinite(value) else None
 
 
 def restored(kind: Any, value: Any) -> Any:

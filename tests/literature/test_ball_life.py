@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +20,13 @@ from rbdyn.life import balls as life
 GAMMA = 11.5 / 43.5
 CAPACITY = 23400.0
 MODULUS = 210e9 / (1.0 - 0.3**2)
+
+
+@pytest.fixture
+def published(monkeypatch):
+    """A module beside the examples by its name, imported as they do."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
+    return lambda name: importlib.import_module(f"published.{name}")
 
 
 def reported_row(clearance, lever=None):
@@ -160,34 +169,35 @@ def test_capacity_scales_with_balls_rows_and_size():
     assert rating.ball_size_term(50e-3) == pytest.approx(3.647 * 50.0**1.4, rel=1e-13)
 
 
-def test_literature_load_factors():
+def test_literature_load_factors(published):
     """Literature: table 3 of ISO 281 at its nodes, midway between angles, and the columns f_0 F_a/C_0 of 15 degrees."""
-    factors = rating.load_factors(0.0, 1.38 * 9 * 100.0, 9, 10e-3)
+    iso281 = published("iso281")
+    factors = iso281.load_factors(0.0, 1.38 * 9 * 100.0, 9, 10e-3)
     assert factors == pytest.approx((0.56, 1.45, 0.30))
     # At 15 degrees the standard enters with f_0 F_a/(i C_0), the relative load over cos(alpha).
     relative = 1.43 * math.cos(math.radians(15.0))
-    assert rating.load_factors(math.radians(15.0), relative * 900.0, 9, 10e-3) == pytest.approx(
+    assert iso281.load_factors(math.radians(15.0), relative * 900.0, 9, 10e-3) == pytest.approx(
         (0.44, 1.19, 0.47), rel=2e-3
     )
-    assert rating.load_factors(math.radians(40.0), 5.0, 9, 10e-3) == pytest.approx((0.35, 0.57, 1.14))
-    assert rating.load_factors(math.radians(22.5), 5.0, 9, 10e-3) == pytest.approx((0.42, 0.935, 0.625))
-    assert rating.load_factors(math.radians(45.0), 5.0, 9, 10e-3).axial == pytest.approx(0.5)
+    assert iso281.load_factors(math.radians(40.0), 5.0, 9, 10e-3) == pytest.approx((0.35, 0.57, 1.14))
+    assert iso281.load_factors(math.radians(22.5), 5.0, 9, 10e-3) == pytest.approx((0.42, 0.935, 0.625))
+    assert iso281.load_factors(math.radians(45.0), 5.0, 9, 10e-3).axial == pytest.approx(0.5)
     with pytest.raises(ValueError, match="contact angle"):
-        rating.load_factors(math.radians(60.0), 5.0, 9, 10e-3)
-    assert rating.equivalent_load(100.0, 20.0, factors) == 100.0
-    assert rating.equivalent_load(100.0, 50.0, factors) == pytest.approx(56.0 + 72.5)
-    assert rating.equivalent_load(0.0, 50.0, factors) == pytest.approx(72.5)
-    assert rating.basic_life(1000.0, 100.0) == pytest.approx(1000.0)
-    assert rating.basic_life(1000.0, 0.0) == math.inf
+        iso281.load_factors(math.radians(60.0), 5.0, 9, 10e-3)
+    assert iso281.equivalent_load(100.0, 20.0, factors) == 100.0
+    assert iso281.equivalent_load(100.0, 50.0, factors) == pytest.approx(56.0 + 72.5)
+    assert iso281.equivalent_load(0.0, 50.0, factors) == pytest.approx(72.5)
+    assert iso281.basic_life(1000.0, 100.0) == pytest.approx(1000.0)
+    assert iso281.basic_life(1000.0, 0.0) == math.inf
 
 
 @pytest.mark.parametrize("angle", [0.0, 15.0, 40.0])
 @pytest.mark.parametrize("gamma", [0.1, 0.2])
-def test_both_roads_to_the_race_capacities_meet(angle, gamma):
+def test_both_roads_to_the_race_capacities_meet(published, angle, gamma):
     """Oracle: Q_c from the dimensions is Q_c from C_r (without b_m and the 0.95), up to cos^0.3 and rounded constants."""
     radians = math.radians(angle)
     pitch = 10e-3 * math.cos(radians) / gamma
-    direct = life.lundberg_palmgren_capacities(12, 10e-3, pitch, radians, 0.52, 0.53)
+    direct = published("lundberg_palmgren").lundberg_palmgren_capacities(12, 10e-3, pitch, radians, 0.52, 0.53)
     capacity = rating.dynamic_capacity(12, 10e-3, pitch, radians, 0.52, 0.53, rating_factor=1.0 / rating.REDUCTION)
     rated = life.rated_capacities(capacity, 12, gamma, radians, 0.52, 0.53)
     scaled = np.array(rated) * math.cos(radians) ** -0.3
@@ -227,7 +237,7 @@ def test_invariants_of_life(loads, factor):
     assert life.standing_race_load(rounds) == pytest.approx(life.turning_race_load(rounds), rel=1e-9)
 
 
-def test_unit_bad_loads_are_named():
+def test_unit_bad_loads_are_named(published):
     """Unit: each fault says which race, and how loads should look."""
     good = np.ones(5)
     for bad, says in (
@@ -239,9 +249,9 @@ def test_unit_bad_loads_are_named():
         with pytest.raises(ValueError, match=says):
             life.row_life(good, bad, (1.0, 1.0))
     with pytest.raises(ValueError, match="gamma"):
-        life.lundberg_palmgren_capacities(9, 10e-3, 9e-3, 0.0, 0.52, 0.52)
+        published("lundberg_palmgren").lundberg_palmgren_capacities(9, 10e-3, 9e-3, 0.0, 0.52, 0.52)
     with pytest.raises(ValueError, match="groove"):
-        life.lundberg_palmgren_capacities(9, 10e-3, 50e-3, 0.0, 0.5, 0.52)
+        published("lundberg_palmgren").lundberg_palmgren_capacities(9, 10e-3, 50e-3, 0.0, 0.5, 0.52)
 
 
 @pytest.mark.parametrize("tilts", [True, False])

@@ -17,9 +17,9 @@ from rbdyn.properties.catalogue import (
     radial_clearance,
     read_designation,
     roller_interior,
-    roller_sizes,
 )
 from rbdyn.properties.oils import oil_named
+from rbdyn.properties.tables import table
 from rbdyn.scene import Scene
 
 # Orders of a catalogue (Timken, ball bearing housed units, table A-9): number of balls BPFO + BPFI, and BSF = (1/g - g)/2
@@ -37,6 +37,9 @@ NSK = {
     "7205B": (16700, 10200, 12), "7206B": (22600, 14300, 12), "7301B": (10500, 4950, 8), "7303B": (16000, 8300, 9),
     "7304B": (18900, 10500, 10), "7305B": (25900, 14900, 10),
 }  # fmt: skip
+
+
+SIZES = [row["size"] for row in table("cylindrical_rollers")]
 
 
 def interior(text):
@@ -64,7 +67,7 @@ def test_literature_nu_215():
     assert inside.pitch_diameter == pytest.approx(0.5 * (88.5 + 118.57), rel=1e-3)
 
 
-@pytest.mark.parametrize("size", roller_sizes())
+@pytest.mark.parametrize("size", SIZES)
 def test_literature_every_roller_bearing_of_the_catalogue(size):
     """Literature: each row gives a scene that validates, and its interior the catalogue's ratings within the error told."""
     named = read_designation(f"NU{size}")
@@ -88,7 +91,7 @@ def data_of(template, values):
 def test_literature_rollers_without_a_listed_raceway():
     """Literature: from the envelope alone, rollers and pitch circle of the sizes that list both raceways, within the error told."""
     errors = []
-    for size in roller_sizes():
+    for size in SIZES:
         sizes, known = interior(f"N{size}")
         if sizes.outer_raceway is None:
             continue

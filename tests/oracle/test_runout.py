@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn.quasistatic.runout.classes import running_accuracy
-from rbdyn.quasistatic.runout.measures import error_motion, face_runout, homogenisation, runout
+from rbdyn.quasistatic.runout.measures import error_motion, face_runout, runout
 from rbdyn.quasistatic.runout.roundness import convex_hull, diameter, least_squares_circle, minimum_zone, zone_about
 
 ANGLE = 2.0 * math.pi * np.arange(360) / 360
@@ -161,8 +163,10 @@ def test_unit_broken_turns_are_refused():
         runout(np.zeros((100, 5)), 3, 0.04)
 
 
-def test_literature_homogenisation():
+def test_literature_homogenisation(monkeypatch):
     """Literature: Zhou et al.'s 1.89 um from 1.5 and 1.6 um is 0.61, 1.98 um from 1.6 and 1.7 um is 0.60 (eqs 23-26)."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
+    homogenisation = importlib.import_module("published.homogenisation").homogenisation
     assert homogenisation(1.89, 1.5, 1.6) == pytest.approx(0.61, abs=0.005)
     assert homogenisation(1.98, 1.6, 1.7) == pytest.approx(0.60, abs=0.005)
     with pytest.raises(ValueError, match="without errors"):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from rbdyn.accuracy.balls.cases import CONTROLS, LOADS, SCENES, SEED, Case, Problem, cases, posed
 from rbdyn.accuracy.balls.solvers import WHOLE, Success, causes, fared, success_table
-from rbdyn.accuracy.report import Progress, Report, Table, record
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, record, records
 from rbdyn.quasistatic.rivals.finite_search import loaded
 from rbdyn.quasistatic.rivals.full_system import system_of, unknowns
 from rbdyn.quasistatic.row.equilibrium import Solution
@@ -31,6 +32,7 @@ OURS = "convex"
 MODEL = ("gyroscopic", "light_load_share", "friction_limit")
 # Balls whose loads differ by more than this share of the largest are in another equilibrium.
 SAME = 1e-6
+_control, _load = attrgetter("control"), attrgetter("load")
 
 
 class Run(NamedTuple):
@@ -42,7 +44,7 @@ class Run(NamedTuple):
     solve_us: float
 
 
-def study(scene: BallScene, progress: Callable[[int, int], None] | None = None, scenes: int = SCENES) -> Report:
+def study(scene: BallScene, progress: Reporter | None = None, scenes: int = SCENES) -> Report:
     """``rbdyn accuracy --battery``, its first ``scenes`` scenes."""
     drawn = cases(scenes, SEED, **{key: getattr(scene.model, key) for key in MODEL})
     ball, rings = scene.material("ball"), scene.material("inner_ring")
@@ -51,9 +53,8 @@ def study(scene: BallScene, progress: Callable[[int, int], None] | None = None, 
     counted = Progress(progress, sum(sizes.values()))
     runs = {name: run(name, drawn[:size], problems, counted) for name, size in sizes.items()}
     ours = runs[OURS]
-    by_control = [_of(control, [r for r in ours if r.case.control == control]) for control in CONTROLS]
-    by_load = [_of(load, [r for r in ours if r.case.load == load]) for load in LOADS]
-    solvers = [_of(name, found) for name, found in runs.items()]
+    by_control, by_load = _by_kind(ours, CONTROLS, _control), _by_kind(ours, LOADS, _load)
+    solvers = [_fared(name, found) for name, found in runs.items()]
     others = {name: _elsewhere(found, ours) for name, found in runs.items() if name != OURS}
     refused = _refused_by_rule_a(runs["finite search"], problems)
     sentence = conclusion(solvers)
@@ -63,23 +64,23 @@ def study(scene: BallScene, progress: Callable[[int, int], None] | None = None, 
             FORMAT,
             scenes=scenes,
             seed=SEED,
-            by_control=[row._asdict() for row in by_control if row is not None],
-            by_load=[row._asdict() for row in by_load if row is not None],
-            solvers=[row._asdict() for row in solvers if row is not None],
+            by_control=records(by_control),
+            by_load=records(by_load),
+            solvers=records(solvers),
             another_equilibrium=others,
             refused_by_rule_a=refused,
             conclusion=sentence,
         ),
         tables=(
-            success_table("convex solver, by raceway control", _some(by_control), "control"),
-            success_table("convex solver, by load", _some(by_load), "load"),
+            success_table("convex solver, by raceway control", by_control, "control"),
+            success_table("convex solver, by load", by_load, "load"),
             _steps_table(ours),
-            success_table(_title(sizes, scenes), _some(solvers)),
-            _share_table("solved by load", LOADS, runs, lambda case: case.load),
-            _share_table("solved by raceway control", CONTROLS, runs, lambda case: case.control),
+            success_table(_title(sizes, scenes), solvers),
+            _share_table("solved by load", LOADS, runs, _load),
+            _share_table("solved by raceway control", CONTROLS, runs, _control),
         ),
         sentences=(
-            *causes(_some(solvers)),
+            *causes(solvers),
             *(f"{name}: {count} of its equilibria are others than ours" for name, count in others.items() if count),
             f"rule a as printed refuses {refused} of the equilibria that the finite search found, for their unloaded balls",
             sentence,
@@ -104,9 +105,9 @@ def run(name: str, drawn: Sequence[Case], problems: Sequence[Problem], counted: 
     return runs
 
 
-def conclusion(rows: Sequence[Success | None]) -> str:
+def conclusion(rows: Sequence[Success]) -> str:
     """Who solves most, and how the others compare."""
-    ranked = sorted(_some(rows), key=lambda row: -row.solved)
+    ranked = sorted(rows, key=lambda row: -row.solved)
     best, rest = ranked[0], ranked[1:]
     others = ", ".join(f"{row.solver} {row.shown_share}" for row in rest)
     return (
@@ -115,12 +116,14 @@ def conclusion(rows: Sequence[Success | None]) -> str:
     )
 
 
-def _of(name: str, runs: Sequence[Run]) -> Success | None:
-    return fared(name, [r.solution for r in runs], [r.solve_us for r in runs]) if runs else None
+def _fared(name: str, runs: Sequence[Run]) -> Success:
+    return fared(name, [r.solution for r in runs], [r.solve_us for r in runs])
 
 
-def _some(rows: Sequence[Success | None]) -> list[Success]:
-    return [row for row in rows if row is not None]
+def _by_kind(runs: Sequence[Run], kinds: Sequence[str], kind_of: Callable[[Case], str]) -> list[Success]:
+    """How the cases of each kind fared, of the kinds that were drawn."""
+    groups = {kind: [r for r in runs if kind_of(r.case) == kind] for kind in kinds}
+    return [_fared(kind, found) for kind, found in groups.items() if found]
 
 
 def _elsewhere(runs: Sequence[Run], ours: Sequence[Run]) -> int:

@@ -11,17 +11,18 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from rbdyn.accuracy.balls.cases import Problem
-from rbdyn.accuracy.report import Columns, Progress, Report, Table, record, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, record, records, tabled
 from rbdyn.faults import InputError, RunError
 from rbdyn.quasistatic.rivals import finite_search, limited, minpack, plain_newton
 from rbdyn.quasistatic.row import equilibrium
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.records.record import Record, shown
 from rbdyn.scene.ball import BallScene, SingleRowScene
 
 # Below, a residual is rounding.
@@ -46,34 +47,26 @@ LIMITED: dict[str, Solver] = {
 WHOLE: dict[str, Solver] = {**LIMITED, "convex": equilibrium.solve}
 
 
-class Attempt(NamedTuple):
+class Attempt(Record):
     """One solver stopped after ``limit`` iterations: residual over the largest force, and time [us]."""
 
-    solver: str
-    limit: int
-    residual: float
-    solve_us: float
+    solver: str = shown("solver")
+    limit: int = shown("iterations at most")
+    residual: float = shown("residual over largest force", ".1e")
+    solve_us: float = shown("time [us]", ".0f")
     status: str
 
 
-COLUMNS: Columns = {
-    "solver": ("solver", ""),
-    "iterations at most": ("limit", ""),
-    "residual over largest force": ("residual", ".1e"),
-    "time [us]": ("solve_us", ".0f"),
-}
-
-
-class Success(NamedTuple):
+class Success(Record):
     """How a solver fares over many problems: share solved; median, 99 % and longest time [us]; median steps; causes."""
 
     solver: str
-    problems: int
-    solved: float
-    median_us: float
-    slow_us: float
-    longest_us: float
-    median_steps: float
+    problems: int = shown("scenes")
+    solved: float = shown("solved", ".2f %")
+    median_us: float = shown("median [us]", ".0f")
+    slow_us: float = shown("99 % [us]", ".0f")
+    longest_us: float = shown("longest [us]", ".0f")
+    median_steps: float = shown("steps", ".0f")
     causes: dict[str, int]
 
     @property
@@ -88,16 +81,6 @@ class Success(NamedTuple):
         return f"{100.0 * self.solved:.2f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"
 
 
-SUCCESS_COLUMNS: Columns = {
-    "scenes": ("problems", ""),
-    "solved": ("solved", ".2f %"),
-    "median [us]": ("median_us", ".0f"),
-    "99 % [us]": ("slow_us", ".0f"),
-    "longest [us]": ("longest_us", ".0f"),
-    "steps": ("median_steps", ".0f"),
-}
-
-
 def share(count: int, total: int) -> tuple[float, float]:
     """95 % interval of a share of which ``count`` of ``total`` were seen (Wilson 1927, J. Am. Stat. Assoc. 22, 209)."""
     z, seen = 1.96, count / total
@@ -108,7 +91,7 @@ def share(count: int, total: int) -> tuple[float, float]:
 
 def study(
     scene: BallScene,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter | None = None,
     limits: Sequence[int] = LIMITS,
     perturbations: int = PERTURBATIONS,
 ) -> Report:
@@ -119,13 +102,13 @@ def study(
     attempts = work_precision(problem_of(scene), limits, counted)
     nearby = perturbed(scene, perturbations)
     rows = [_fared(name, solver, nearby, counted) for name, solver in WHOLE.items()]
-    sentence = conclusion(attempts, rows)
+    sentence, written = conclusion(attempts, rows), records(attempts)
     return Report(
         stem="solvers",
         record=record(
             FORMAT,
-            rows=[attempt._asdict() for attempt in attempts],
-            nearby=[row._asdict() for row in rows],
+            rows=written,
+            nearby=records(rows),
             perturbations={
                 "count": perturbations,
                 "seed": SEED,
@@ -135,11 +118,11 @@ def study(
             conclusion=sentence,
         ),
         tables=(
-            tabled("residual against time", _until_done(attempts), COLUMNS),
+            tabled("residual against time", _until_done(attempts), columns_of(Attempt)),
             success_table(f"{perturbations} seeded scenes nearby", rows),
         ),
         sentences=(*causes(rows), sentence),
-        sheets={"solvers": [attempt._asdict() for attempt in attempts]},
+        sheets={"solvers": written},
         pictures={"solvers": lambda path: _draw(attempts, path)},
     )
 
@@ -219,7 +202,7 @@ def fared(name: str, found: Sequence[Solution], took_us: Sequence[float]) -> Suc
 
 def success_table(title: str, rows: Sequence[Success], first: str = "solver") -> Table:
     """Table of how solvers fare."""
-    return tabled(title, rows, {first: ("solver", ""), **SUCCESS_COLUMNS})
+    return tabled(title, rows, {first: ("solver", ""), **columns_of(Success)})
 
 
 def causes(rows: Sequence[Success]) -> list[str]:
@@ -261,14 +244,14 @@ def _fared(name: str, solver: Solver, problems: Sequence[Problem], counted: Prog
 
 def _until_done(attempts: Sequence[Attempt]) -> list[Attempt]:
     """Attempts of each solver up to the first that converges."""
-    shown: list[Attempt] = []
+    kept: list[Attempt] = []
     done: set[str] = set()
     for attempt in attempts:
         if attempt.solver not in done:
-            shown.append(attempt)
+            kept.append(attempt)
         if attempt.status == "ok":
             done.add(attempt.solver)
-    return shown
+    return kept
 
 
 def _draw(attempts: Sequence[Attempt], path: Path) -> None:

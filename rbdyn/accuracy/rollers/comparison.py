@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT
-from rbdyn.accuracy.report import Columns, Progress, Report, Table, flat, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, record, records, tabled
 from rbdyn.accuracy.rollers import method_bias
 from rbdyn.accuracy.rollers.equal_error import Speedup, times_faster
-from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, compiled
-from rbdyn.accuracy.rollers.stretch import Stretch
+from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, Stretch, compiled
 from rbdyn.accuracy.rollers.trajectory import (
     DEFAULT_TURNS,
     STARTS,
@@ -29,6 +28,7 @@ from rbdyn.accuracy.rollers.trajectory import (
 )
 from rbdyn.dynamics.run import prepare
 from rbdyn.faults import RunError
+from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.methods/1"
@@ -37,36 +37,24 @@ OK = "ok"
 REPEATS, TIMED_S = 5, 0.1
 
 
-@dataclass(frozen=True)
-class Attempt:
+class Attempt(Record):
     """One method at one setting over all stretches: worst error, processor time and right-hand sides a shaft turn.
 
     Where it failed, ``status`` says why, the errors are None and the time is what it took to fail.
     """
 
-    method: str
-    setting: str
+    method: str = shown("method")
+    setting: str = shown("setting")
     status: str
-    position_error_m: float | None
-    scaled_error: float | None
-    turn_ms: float | None
-    rhs_per_turn: float | None
-
-
-COLUMNS: Columns = {
-    "method": ("method", ""),
-    "setting": ("setting", ""),
-    "position error [m]": ("position_error_m", ".2g"),
-    "worst over scale": ("scaled_error", ".2g"),
-    "ms a turn": ("turn_ms", ".3g"),
-    "right-hand sides a turn": ("rhs_per_turn", ".0f"),
-    "status": ("status", ""),
-}
+    position_error_m: float | None = shown("position error [m]", ".2g")
+    scaled_error: float | None = shown("worst over scale", ".2g")
+    turn_ms: float | None = shown("ms a turn", ".3g")
+    rhs_per_turn: float | None = shown("right-hand sides a turn", ".0f")
 
 
 def study(
     scene: Scene,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter | None = None,
     turns: float = DEFAULT_TURNS,
     methods: Sequence[Method] = METHODS,
     sought: float = SOUGHT,
@@ -89,9 +77,7 @@ def study(
     )
 
 
-def trajectories(
-    scene: Scene, progress: Callable[[int, int], None] | None, turns: float, methods: Sequence[Method]
-) -> Report:
+def trajectories(scene: Scene, progress: Reporter | None, turns: float, methods: Sequence[Method]) -> Report:
     """Error and time of every method at every setting. Raises as ``study``."""
     stretches = settled(scene, turns)
     compile_s = compiling(stretches[0], methods)
@@ -230,7 +216,7 @@ def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: f
 def table(attempts: Sequence[Attempt], turns: float) -> Table:
     """Table for the terminal, failures in their places."""
     title = f"errors after {turns:g} shaft turns, worst of {STARTS} starts; one thread"
-    return tabled(title, attempts, COLUMNS)
+    return tabled(title, attempts, {**columns_of(Attempt), "status": ("status", "")})
 
 
 def ratio_table(ratios: dict[str, Speedup]) -> Table:

@@ -9,13 +9,12 @@ always holds the truth is too wide.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 
-from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, record, records, tabled
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import FIGURES
+from rbdyn.records.record import Record, shown
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
@@ -29,32 +28,20 @@ FIRST_SEED, SEED_STEP = 5000, 37
 POOLED, LOWEST = (0.94, 0.96), 0.90
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(Record):
     """One figure: truth with its error, shares of repeats whose stated and whose statistical error alone hold it, mean
     half-width and mean offset relative to it."""
 
-    figure: str
-    truth: float
-    truth_error: float
-    covered: float
-    statistical_alone: float
-    half_width: float
-    offset: float
+    figure: str = shown("figure")
+    truth: float = shown("truth", ".6g")
+    truth_error: float = shown("±", ".2g")
+    covered: float = shown("covered", ".3f")
+    statistical_alone: float = shown("statistical alone", ".3f")
+    half_width: float = shown("half-width", ".2g %")
+    offset: float = shown("offset", "+.2g %")
 
 
-COLUMNS: Columns = {
-    "figure": ("figure", ""),
-    "truth": ("truth", ".6g"),
-    "±": ("truth_error", ".2g"),
-    "covered": ("covered", ".3f"),
-    "statistical alone": ("statistical_alone", ".3f"),
-    "half-width": ("half_width", ".2g %"),
-    "offset": ("offset", "+.2g %"),
-}
-
-
-def study(scene: Scene, progress: Callable[[int, int], None] | None = None, repeats: int = REPEATS) -> Report:
+def study(scene: Scene, progress: Reporter | None = None, repeats: int = REPEATS) -> Report:
     """``rbdyn accuracy --coverage``. Raises RunError, KeyboardInterrupt."""
     scene = one_bearing(scene)
     counted = Progress(progress, repeats + 1)
@@ -86,7 +73,7 @@ def study(scene: Scene, progress: Callable[[int, int], None] | None = None, repe
             lengthened=longer,
             conclusion=" ".join(sentences),
         ),
-        tables=(tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, COLUMNS),),
+        tables=(tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, columns_of(Row)),),
         sentences=sentences,
         sheets={"coverage": written},
     )

@@ -7,12 +7,11 @@ same tally; the reference is ours at a tight tolerance.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
-from rbdyn.accuracy.report import Columns, Progress, Table, tabled
+from rbdyn.accuracy.report import Progress, Reporter, Table, columns_of, tabled
 from rbdyn.accuracy.rollers.methods import OURS, RUNGE_KUTTA_4, VELOCITY_VERLET, FixedStepRun, Method, fixed_step
 from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of
 from rbdyn.dynamics.ensemble import Stop
@@ -21,40 +20,29 @@ from rbdyn.dynamics.recording import record
 from rbdyn.dynamics.run import Run, prepare
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import RunError
+from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
 REFERENCE_RTOL = 1e-4
 SETTINGS = ((OURS, (1e-1, 1e-2, 1e-3)), (RUNGE_KUTTA_4, (2.0, 1.0, 0.5)), (VELOCITY_VERLET, (1.0, 0.5, 0.25, 0.125)))
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(Record):
     """One method at one setting: processor time a shaft turn [ms], largest relative power gap, bias of the outputs.
 
     Where a replicate could not go on, ``status`` says why and the rest is None.
     """
 
-    method: str
-    setting: str
-    status: str
-    turn_ms: float | None
-    power_gap: float | None
+    method: str = shown("method")
+    setting: str = shown("setting")
+    status: str = shown("status")
+    turn_ms: float | None = shown("ms a turn", ".2f")
+    power_gap: float | None = shown("power gap", ".2g %")
     found: Bias | None
 
 
-COLUMNS: Columns = {
-    "method": ("method", ""),
-    "setting": ("setting", ""),
-    "status": ("status", ""),
-    "ms a turn": ("turn_ms", ".2f"),
-    "power gap": ("power_gap", ".2g %"),
-}
-
-
 def bias_rows(
-    scene: Scene,
-    settings: Sequence[tuple[Method, Sequence[float]]] = SETTINGS,
-    progress: Callable[[int, int], None] | None = None,
+    scene: Scene, settings: Sequence[tuple[Method, Sequence[float]]] = SETTINGS, progress: Reporter | None = None
 ) -> list[Row]:
     """A row a setting. Raises InputError for a single replicate, RunError where the reference fails, KeyboardInterrupt."""
     check_replicates(scene)
@@ -113,7 +101,9 @@ def table(rows: Sequence[Row], sought: float = SOUGHT) -> Table:
         return lambda row: "" if row.found is None else text(row.found)
 
     biases = {heading: where_found(text) for heading, text in bias_columns(sought).items()}
-    return tabled(f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors", rows, {**COLUMNS, **biases})
+    return tabled(
+        f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors", rows, {**columns_of(Row), **biases}
+    )
 
 
 def _steps(scene: Scene, contact_times: float) -> float:

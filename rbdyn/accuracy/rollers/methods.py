@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 
 from rbdyn.accuracy.rollers.fixed_step import runge_kutta_4, steps_of, velocity_of, velocity_verlet
 from rbdyn.accuracy.rollers.right_hand_side import BudgetSpent, RightHandSide
-from rbdyn.accuracy.rollers.stretch import Stretch
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, NOW
@@ -26,12 +26,27 @@ from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 
 Array = NDArray[np.float64]
-Function = Callable[[float, Array], Array]
 
 # Right-hand sides a turn past which a method counts as failed.
 BUDGET_PER_TURN = 4_000_000
 # The least relative tolerance that SciPy takes: beside the absolute ones it is round-off.
 NO_RELATIVE_TOLERANCE = 2.3e-14
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """From the state ``start`` (n,) over so many shaft turns; ``scale`` (n,): the size of each component's errors."""
+
+    scene: Scene
+    bearing: RollerBearing
+    start: NDArray[np.float64]
+    turns: float
+    scale: NDArray[np.float64]
+
+    @property
+    def duration(self) -> float:
+        """Its length [s]."""
+        return self.turns * self.scene.turn_s
 
 
 class NotInstalledError(RunError):

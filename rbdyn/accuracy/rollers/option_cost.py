@@ -13,7 +13,7 @@ from dataclasses import asdict
 
 import numpy as np
 
-from rbdyn.accuracy.report import Columns, Progress, Report, record, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, record, tabled
 from rbdyn.accuracy.rollers.footprint import Footprint, added_modules, footprint
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -105,7 +105,7 @@ COLUMNS: Columns = {
 
 
 def option_costs(
-    scene: Scene, options: Mapping[str, Sequence[str]] = OPTIONS, progress: Callable[[int, int], None] | None = None
+    scene: Scene, options: Mapping[str, Sequence[str]] = OPTIONS, progress: Reporter | None = None
 ) -> list[OptionCost]:
     """A row an option that the scene allows. Raises RunError, KeyboardInterrupt."""
     plain = with_options(scene, (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}"))
@@ -149,9 +149,7 @@ def with_options(scene: Scene, assignments: Sequence[str]) -> Scene:
     return Scene.from_dict(data, " ".join(assignments))
 
 
-def study(
-    scene: Scene, progress: Callable[[int, int], None] | None = None, options: Mapping[str, Sequence[str]] = OPTIONS
-) -> Report:
+def study(scene: Scene, progress: Reporter | None = None, options: Mapping[str, Sequence[str]] = OPTIONS) -> Report:
     """``rbdyn accuracy --options``. Raises RunError, KeyboardInterrupt."""
     costs = option_costs(scene, options, progress)
     rows = [cost.as_dict() for cost in costs]

@@ -9,7 +9,6 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from rbdyn.accuracy.rollers.tolerances import Row
 from rbdyn.plots.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, label_ends, plain, plt, save
 
 COLOURS = {"impact_force_N": VERMILION, "whirl_deviation_ratio": ORANGE, "power_loss_W": BLUE}
@@ -33,12 +32,6 @@ def logarithmic(axis: Axes, across: str, up: str) -> None:
     axis.yaxis.set_minor_formatter(NullFormatter())
     axis.xaxis.set_minor_formatter(NullFormatter())
     plain(axis)
-
-
-def work_precision(rows: Sequence[Row], path: Path, sought: float) -> None:
-    """Bias of each output and gap of the power balance against the time of a shaft turn, marked with rtol."""
-    labels = "relative bias, or gap of the power balance", "processor time of a shaft turn [ms]"
-    biases_at_work(rows, path, sought, labels, "turn_ms", ("gap of the power balance", "power_gap"), "rtol")
 
 
 def biases_at_work(

@@ -9,20 +9,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.accuracy.judgement import NORMAL, SOUGHT, about, percent
-from rbdyn.accuracy.report import Columns, Progress, Report, flat, record, records, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, record, records, tabled
 from rbdyn.accuracy.rollers.tolerances import OUTPUTS
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
+from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.replicates/1"
@@ -33,13 +34,12 @@ COUNTS = (2, 4, 8, 16, 32)
 SLOPE_ERROR = 0.25
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(Record):
     """So many replicates of so many counted turns: processor time [s], per output the relative half-width."""
 
-    replicates: int
-    turns: float
-    cpu_s: float
+    replicates: int = shown("replicates")
+    turns: float = shown("turns each", "g")
+    cpu_s: float = shown("processor s", ".2f")
     half_width: dict[str, float]
 
 
@@ -47,16 +47,10 @@ def _half_width(name: str) -> Callable[[Row], str]:
     return lambda row: percent(row.half_width[name])
 
 
-COLUMNS: Columns = {
-    "replicates": ("replicates", ""),
-    "turns each": ("turns", "g"),
-    "processor s": ("cpu_s", ".2f"),
-    **{f"{name} ±": _half_width(name) for name in OUTPUTS},
-}
+COLUMNS: Columns = {**columns_of(Row), **{f"{name} ±": _half_width(name) for name in OUTPUTS}}
 
 
-@dataclass(frozen=True)
-class Slope:
+class Slope(Record):
     """Power of the counted turns with which the scatter between replicates falls, and its 95 % half-width; -0.5 where
     pieces of a run are independent."""
 
@@ -73,7 +67,7 @@ class Slope:
 
 def study(
     scene: Scene,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter | None = None,
     turns: Sequence[float] = TURNS,
     pool: int = POOL,
     sought: float = SOUGHT,
@@ -103,7 +97,7 @@ def study(
 
 
 def pool_of_runs(
-    scene: Scene, turns: Sequence[float], pool: int, progress: Callable[[int, int], None] | None = None
+    scene: Scene, turns: Sequence[float], pool: int, progress: Reporter | None = None
 ) -> tuple[dict[float, dict[str, NDArray[np.float64]]], dict[float, float]]:
     """Per length the outputs of every replicate, and the mean processor time of one [s], discarded turns included.
 

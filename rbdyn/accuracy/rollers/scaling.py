@@ -10,12 +10,12 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
-from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, record, records, tabled
 from rbdyn.accuracy.rollers.footprint import printed
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
@@ -24,6 +24,7 @@ from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError
+from rbdyn.records.record import Record
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.scaling/1"
@@ -34,8 +35,7 @@ TURNS, DISCARDED = 4, 1
 REPEATS = 5
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(Record):
     """One size: least processor time per right-hand side [ns], per shaft turn [ms] and over the time simulated [-],
     right-hand sides per turn."""
 
@@ -54,8 +54,7 @@ COLUMNS: Columns = {
 }
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(Record):
     """Time of a right-hand side over the size n: straight line [ns], its r2, and p of the power law n^p."""
 
     fixed_ns: float
@@ -64,16 +63,14 @@ class Line:
     exponent: float
 
 
-@dataclass(frozen=True)
-class Memory:
+class Memory(Record):
     """Largest memory [MiB] of a process that simulates so many counted turns and keeps no history."""
 
     turns: int
     peak_MiB: float  # noqa: N815
 
 
-@dataclass(frozen=True)
-class Scaling:
+class Scaling(Record):
     """Times over "rollers" and "slices" with their fits, and memory over turns."""
 
     points: dict[str, list[Point]]
@@ -90,7 +87,7 @@ def scaling(
     rollers: Sequence[int] = ROLLERS,
     slices: Sequence[int] = SLICES,
     memory_turns: Sequence[int] = MEMORY_TURNS,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter | None = None,
 ) -> Scaling:
     """Measure a scene. Raises InputError where it cannot be enlarged or cut, RunError, KeyboardInterrupt."""
     scenes = {
@@ -210,7 +207,7 @@ def _largest_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * per_unit / 1024.0**2
 
 
-def study(scene: Scene, progress: Callable[[int, int], None] | None = None) -> Report:
+def study(scene: Scene, progress: Reporter | None = None) -> Report:
     """``rbdyn accuracy --scaling``. Raises InputError, RunError, KeyboardInterrupt."""
     return report(scaling(scene, progress=progress))
 

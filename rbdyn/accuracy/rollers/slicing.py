@@ -6,14 +6,13 @@ up to twice the largest on the shaft. Statistics are compared with those of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
-from rbdyn.accuracy.report import Columns, Progress, Report, flat, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, record, records, tabled
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of
 from rbdyn.contact.hertz_line import line_load
@@ -23,6 +22,7 @@ from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError
+from rbdyn.records.record import shown
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.slices/1"
@@ -33,27 +33,16 @@ LOADS = 40
 LIGHTEST = 0.02
 
 
-@dataclass(frozen=True)
 class Row(Bias):
     """One number of slices: largest relative error of the load at equal approach, nanoseconds a right-hand side."""
 
-    slices: int
-    load_error: float
-    rhs_ns: float
-
-
-COLUMNS: Columns = {
-    "slices": ("slices", ""),
-    "load error": ("load_error", ".2g %"),
-    "ns a right-hand side": ("rhs_ns", ".0f"),
-}
+    slices: int = shown("slices")
+    load_error: float = shown("load error", ".2g %")
+    rhs_ns: float = shown("ns a right-hand side", ".0f")
 
 
 def study(
-    scene: Scene,
-    progress: Callable[[int, int], None] | None = None,
-    counts: Sequence[int] = COUNTS,
-    sought: float = SOUGHT,
+    scene: Scene, progress: Reporter | None = None, counts: Sequence[int] = COUNTS, sought: float = SOUGHT
 ) -> Report:
     """``rbdyn accuracy --slices``.
 
@@ -68,7 +57,7 @@ def study(
         record=record(
             FORMAT, rows=written, conclusion=chosen, turns=numerics.turns, replicates=numerics.replicates, sought=sought
         ),
-        tables=(tabled(title, rows, {**COLUMNS, **bias_columns(sought, finest)}),),
+        tables=(tabled(title, rows, {**columns_of(Row), **bias_columns(sought, finest)}),),
         sentences=(
             chosen,
             f"{numerics.replicates} replicates of {numerics.turns:g} turns; load errors against {FINE} slices",
@@ -78,9 +67,7 @@ def study(
     )
 
 
-def slice_rows(
-    scene: Scene, counts: Sequence[int] = COUNTS, progress: Callable[[int, int], None] | None = None
-) -> list[Row]:
+def slice_rows(scene: Scene, counts: Sequence[int] = COUNTS, progress: Reporter | None = None) -> list[Row]:
     """A row a number of slices, fewest first; the last is the reference of the statistics."""
     if not scene.needs_slices:
         raise InputError(

@@ -7,18 +7,17 @@ runs once more at a tenth of the tolerance, to see whether tightening mends it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
-from rbdyn.accuracy.report import Columns, Progress, Report, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, record, records, tabled
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
-from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError, RunError
+from rbdyn.records.record import Record, finite, shown
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.stability/1"
@@ -26,42 +25,29 @@ LARGEST_GAP = 0.01
 TURNS, DISCARDED = 5, 2
 # What a case may end with. All but "open" say what to do; "refused" and "stopped" do so in their reason.
 CLOSED, TIGHTENED, OPEN, STOPPED, REFUSED = "closed", "closed, tightened", "open", "stopped", "refused"
-COLUMNS: Columns = {
-    "case": ("case", ""),
-    "status": ("status", ""),
-    "method": ("method", ""),
-    "steps a turn": ("steps_per_turn", ".0f"),
-    "ms a turn": ("turn_ms", ".3g"),
-    "power gap": ("power_gap", ".1e"),
-    "stiffness ratio": ("stiffness_ratio", ".1e"),
-    "impact [N]": ("impact_force_N", ".4g"),
-    "whirl ratio": ("whirl_deviation_ratio", ".3g"),
-    "loss [W]": ("power_loss_W", ".4g"),
-}
 
 
-@dataclass(frozen=True)
-class Ending:
+class Ending(Record):
     """How a case ended; figures are None where it did not run.
 
     ``held``: share of the explicit steps that stability held, not accuracy; ``stiffness_ratio``: |eigenvalue| of the motion
     that held them times the duration of a shaft turn, zero where none was held.
     """
 
-    case: str
+    case: str = shown("case")
     assignments: tuple[str, ...]
-    status: str
+    status: str = shown("status")
     reason: str = ""
-    method: str | None = None
+    method: str | None = shown("method", default=None)
     rtol: float | None = None
-    steps_per_turn: float | None = None
-    turn_ms: float | None = None
-    power_gap: float | None = None
+    steps_per_turn: float | None = shown("steps a turn", ".0f", default=None)
+    turn_ms: float | None = shown("ms a turn", ".3g", default=None)
+    power_gap: float | None = shown("power gap", ".1e", default=None)
     held: float | None = None
-    stiffness_ratio: float | None = None
-    impact_force_N: float | None = None  # noqa: N815
-    whirl_deviation_ratio: float | None = None
-    power_loss_W: float | None = None  # noqa: N815
+    stiffness_ratio: float | None = shown("stiffness ratio", ".1e", default=None)
+    impact_force_N: float | None = shown("impact [N]", ".4g", default=None)  # noqa: N815
+    whirl_deviation_ratio: float | None = shown("whirl ratio", ".3g", default=None)
+    power_loss_W: float | None = shown("loss [W]", ".4g", default=None)  # noqa: N815
 
     @property
     def unexplained(self) -> bool:
@@ -118,7 +104,7 @@ def cases(scene: Scene) -> dict[str, tuple[str, ...]]:
 
 
 def battery(
-    scene: Scene, chosen: Mapping[str, Sequence[str]] | None = None, progress: Callable[[int, int], None] | None = None
+    scene: Scene, chosen: Mapping[str, Sequence[str]] | None = None, progress: Reporter | None = None
 ) -> list[Ending]:
     """A row a case; all cases unless some are ``chosen``. Raises KeyboardInterrupt."""
     listed = cases(scene) if chosen is None else chosen
@@ -147,15 +133,15 @@ def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
             run = run_replicate(varied, bearing, 0, rtol, Stop())
     except RunError as error:
         return Ending(case, assignments, STOPPED, str(error))
-    status, reason = _judge(run, rtol, tightened)
     turns = varied.numerics.turns + varied.numerics.warm_up_turns
     eigenvalue, held = largest_eigenvalue(run.stiffness), held_by_stability(run.stiffness)
-    finite = {
+    figures = {
         "power_gap": run.power_gap,
         "impact_force_N": run.impact_force,
         "whirl_deviation_ratio": run.whirl_deviation_ratio,
         "power_loss_W": run.power_loss,
     }
+    status, reason = _judge(figures, rtol, tightened)
     return Ending(
         case,
         assignments,
@@ -167,22 +153,21 @@ def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
         turn_ms=run.cpu_s / turns * 1e3,
         held=held,
         stiffness_ratio=eigenvalue * varied.turn_s,
-        **{name: value if math.isfinite(value) else None for name, value in finite.items()},
+        **{name: finite(value) for name, value in figures.items()},
     )
 
 
-def _judge(run: Replicate, rtol: float, tightened: bool) -> tuple[str, str]:
-    figures = (run.power_gap, run.impact_force, run.whirl_deviation_ratio, run.power_loss)
-    if not all(math.isfinite(figure) for figure in figures):
+def _judge(figures: Mapping[str, float], rtol: float, tightened: bool) -> tuple[str, str]:
+    if not all(math.isfinite(figure) for figure in figures.values()):
         return OPEN, "a figure is not finite"
-    if run.power_gap > LARGEST_GAP:
-        return OPEN, f"power balance closes only to {100.0 * run.power_gap:.2g} %, even at rtol {rtol:g}"
+    if (gap := figures["power_gap"]) > LARGEST_GAP:
+        return OPEN, f"power balance closes only to {100.0 * gap:.2g} %, even at rtol {rtol:g}"
     if tightened:
         return TIGHTENED, f"the power balance closes only with numerics.rtol = {rtol:g}; set it"
     return CLOSED, ""
 
 
-def study(scene: Scene, progress: Callable[[int, int], None] | None = None) -> Report:
+def study(scene: Scene, progress: Reporter | None = None) -> Report:
     """``rbdyn accuracy --stability``. Raises KeyboardInterrupt."""
     return report(battery(scene, progress=progress))
 
@@ -197,7 +182,7 @@ def report(rows: Sequence[Ending]) -> Report:
     return Report(
         stem="stability",
         record=written,
-        tables=(tabled(title, rows, COLUMNS),),
+        tables=(tabled(title, rows, columns_of(Ending)),),
         sentences=[f"{row.case}: {row.reason}" for row in rows if row.reason],
         sheets={"stability": [row | {"assignments": " ".join(row["assignments"])} for row in records(rows)]},
         failed=unexplained > 0,

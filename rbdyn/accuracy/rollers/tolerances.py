@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, Difference, Verdict, check_replicates, judged, overall, percent, undecided
-from rbdyn.accuracy.report import Columns, Progress, Table, tabled
+from rbdyn.accuracy.report import Progress, Reporter, Table, columns_of, tabled
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
@@ -22,6 +21,7 @@ from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import RunError
+from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
 TOLERANCES = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 1e-3, 1e-4)
@@ -34,8 +34,7 @@ OUTPUTS: dict[str, Callable[[Replicate], float]] = {
 NEGLIGIBLE = 0.005
 
 
-@dataclass(frozen=True)
-class Bias:
+class Bias(Record):
     """Per output: its mean, its relative bias against a reference and the 95 % error of that."""
 
     value: dict[str, float]
@@ -64,29 +63,18 @@ class Bias:
         ]
 
 
-@dataclass(frozen=True)
 class Row(Bias):
     """One tolerance: processor time per shaft turn [ms] and per right-hand side [ns] (medians over replicates),
     steps per turn, largest relative power gap."""
 
-    rtol: float
-    turn_ms: float
-    rhs_ns: float
-    steps_per_turn: float
-    power_gap: float
+    rtol: float = shown("rtol", "g")
+    turn_ms: float = shown("ms a turn", ".2f")
+    rhs_ns: float = shown("ns a right-hand side", ".0f")
+    steps_per_turn: float = shown("steps a turn", ".0f")
+    power_gap: float = shown("power gap", ".2g %")
 
 
-COLUMNS: Columns = {
-    "rtol": ("rtol", "g"),
-    "ms a turn": ("turn_ms", ".2f"),
-    "ns a right-hand side": ("rhs_ns", ".0f"),
-    "steps a turn": ("steps_per_turn", ".0f"),
-    "power gap": ("power_gap", ".2g %"),
-}
-
-
-@dataclass(frozen=True)
-class StatisticsBias:
+class StatisticsBias(Record):
     """Rows, loosest tolerance first; the last is the reference. ``failures``: tolerances at which a replicate could
     not go on, and why."""
 
@@ -95,7 +83,7 @@ class StatisticsBias:
 
 
 def statistics_bias(
-    scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Callable[[int, int], None] | None = None
+    scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Reporter | None = None
 ) -> StatisticsBias:
     """A row a tolerance. Runs one replicate at a time.
 
@@ -164,7 +152,7 @@ def table(found: StatisticsBias, sought: float = SOUGHT) -> Table:
     """Table for the terminal; failed tolerances at the end."""
     reference = found.rows[-1]
     title = f"bias against rtol {reference.rtol:g}, 95 % errors"
-    ran = tabled(title, found.rows, {**COLUMNS, **bias_columns(sought, reference)})
+    ran = tabled(title, found.rows, {**columns_of(Row), **bias_columns(sought, reference)})
     failed = [(f"{rtol:g}", "failed", *[""] * (len(ran.header) - 2)) for rtol in found.failures]
     return ran._replace(cells=[*ran.cells, *failed])
 

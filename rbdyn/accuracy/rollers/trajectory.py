@@ -7,20 +7,20 @@ turn only, and every span has its own floor below which the reference itself is 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.accuracy.report import Table
-from rbdyn.accuracy.rollers.methods import DOP853, OURS, Method
-from rbdyn.accuracy.rollers.stretch import Stretch
+from rbdyn.accuracy.rollers.methods import DOP853, OURS, Method, Stretch
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
 from rbdyn.dynamics.run import Run
 from rbdyn.faults import InputError
+from rbdyn.records.record import Record
 from rbdyn.scene import Scene
 
 Array = NDArray[np.float64]
@@ -34,8 +34,7 @@ OUR_REFERENCE_RTOL, THEIR_REFERENCE_RTOL = 1e-12, 1e-13
 RESOLVED = 10.0
 
 
-@dataclass(frozen=True)
-class Error:
+class Error(Record):
     """Largest difference of two states: of any position of roller, cage or ring [m], and of any component over its
     scale (the approach or speed of a race contact)."""
 
@@ -43,8 +42,7 @@ class Error:
     scaled: float
 
 
-@dataclass(frozen=True)
-class Reference:
+class Reference(Record):
     """Ends of the stretches by our method, and how far DOP853 is off them after spans of turns."""
 
     ends: Sequence[Array]

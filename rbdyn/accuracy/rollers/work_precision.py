@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rbdyn.accuracy.judgement import SOUGHT
-from rbdyn.accuracy.report import Report, flat, record, records
+from rbdyn.accuracy.report import Report, Reporter, flat, record, records
 from rbdyn.accuracy.rollers import comparison, tolerances
 from rbdyn.accuracy.rollers.methods import COMPILED
 from rbdyn.accuracy.rollers.trajectory import DEFAULT_TURNS
@@ -17,7 +17,7 @@ FORMAT = "rbdyn.accuracy/1"
 
 def study(
     scene: Scene,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter | None = None,
     turns: float = DEFAULT_TURNS,
     rtols: Sequence[float] = tolerances.TOLERANCES,
     sought: float = SOUGHT,
@@ -59,6 +59,8 @@ _MOTION = ("rows", "conclusion", "turns", "starts", "reference", "resolved_m", "
 
 
 def _draw(rows: Sequence[tolerances.Row], path: Any, sought: float) -> None:
-    from rbdyn.accuracy.rollers import pictures
+    """Bias of each output and gap of the power balance against the time of a shaft turn, marked with rtol."""
+    from rbdyn.accuracy.rollers.pictures import biases_at_work
 
-    pictures.work_precision(rows, path, sought)
+    labels = "relative bias, or gap of the power balance", "processor time of a shaft turn [ms]"
+    biases_at_work(rows, path, sought, labels, "turn_ms", ("gap of the power balance", "power_gap"), "rtol")

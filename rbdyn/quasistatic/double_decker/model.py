@@ -24,6 +24,7 @@ from rbdyn.quasistatic.double_decker.speed_split import (
 )
 from rbdyn.quasistatic.result import displacement_record
 from rbdyn.quasistatic.row.model import RowModel, contacts, row_model
+from rbdyn.records.record import finite
 from rbdyn.scene.ball import DoubleDeckerScene
 from rbdyn.scene.ball_bearing import BallRow
 
@@ -122,16 +123,12 @@ def static_capacity(row: BallRow, races: tuple[PointContact, PointContact]) -> f
 def middle_record(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> dict[str, Any]:
     """What is reported of the middle ring."""
     split = model.split
-
-    def or_null(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
     return {
         **displacement_record(solution.middle_displacement),
         "speed_rpm": split.speed / RPM,
-        "speed_share": or_null(split.share),
+        "speed_share": finite(split.share),
         "speed_status": split.status,
-        "friction_torque_Nmm": or_null(1e3 * split.torque),
+        "friction_torque_Nmm": finite(1e3 * split.torque),
         **load_record(solution.middle_load),
     }
 

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.compiled.kernel import entry
-from rbdyn.quasistatic.rivals.full_system import solution_at, system_of
+from rbdyn.quasistatic.rivals.full_system import Stop, System, rival
 from rbdyn.quasistatic.rivals.levenberg_marquardt import (
     CONVERGED,
     EXHAUSTED,
@@ -129,27 +129,22 @@ def loaded(system: Any, u: Any) -> bool:
     return True
 
 
+@rival
 def solve(
-    row: Row,
     control: Control,
-    load: Vector,
-    given: Vector | None = None,
-    start: Solution | None = None,
+    system: System,
+    start: Solution | None,
     search: Search = SEARCH,
     damping: Damping = DAMPING,
     strict: bool = False,
     limit: int | None = None,
-) -> Solution:
-    """As ``equilibrium.solve``, by the search, at most ``limit`` iterations in all. Never raises: see ``status``.
-
-    ``start``: its balls are tried first.
-    """
-    system = system_of(row, load, given)
-    points = search_points(row, search)
+) -> Stop:
+    """The search, at most ``limit`` iterations in all; the balls of a ``start`` are tried first."""
+    points = search_points(system.row, search)
     if start is not None:
         points = np.concatenate((start.balls[np.newaxis, :, :2], points))
     u = np.zeros(system.size)
     most = damping.iterations * len(points) if limit is None else limit
     outcome, searches, iterations, residual = _search(control, system, damping, points, most, strict, u)
     status = OK if outcome == CONVERGED else f"none of {searches} searches converged; the last {SENTENCES[outcome]}"
-    return solution_at(control, system, u, status, iterations, residual, searches)
+    return Stop(u, status, iterations, residual, searches)

@@ -7,6 +7,8 @@ that knows nothing of their structure.
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -122,14 +124,34 @@ def _finish(task: Any, at: Any, figures: Any) -> None:
     fill_figures(task, at, figures)
 
 
-def solution_at(
-    control: Control, system: System, u: Vector, status: str, steps: int, residual: float, searches: int | None = None
-) -> Solution:
-    """What a solver of the full system found at ``u``, or where it stopped and why, with the ``residual`` [N] there."""
-    row, z = system.row, system.row.cosine.size
+class Stop(NamedTuple):
+    """Where a solver of the full system stopped: at the unknowns ``u``, "ok" or why there, with the ``residual`` [N] there."""
+
+    u: Vector
+    status: str
+    steps: int
+    residual: float
+    searches: int | None = None
+
+
+def rival(search: Callable[..., Stop]) -> Callable[..., Solution]:
+    """A solver that is called as ``equilibrium.solve``, with the options of ``search(control, system, start, ...)``."""
+
+    @functools.wraps(search)
+    def solve(
+        row: Row, control: Control, load: Vector, given: Vector | None = None, start: Any = None, **options: Any
+    ) -> Solution:
+        system = system_of(row, load, given)
+        return _solution_at(control, system, search(control, system, start, **options))
+
+    return solve
+
+
+def _solution_at(control: Control, system: System, stop: Stop) -> Solution:
+    row, z, u = system.row, system.row.cosine.size, stop.u
     at, figures = space(z), np.zeros((z, FIGURES))
-    at.counts[STEPS] = steps
+    at.counts[STEPS] = stop.steps
     at.q[:], at.balls[:, :2] = ring_of(system, u), u[: 2 * z].reshape(z, 2)
     # Nothing is solved any more: which components are free does not matter.
     _finish(Task(control, row, system.load, np.ones_like(system.load)), at, figures)
-    return solution_of(row, at, figures, status, residual, searches)
+    return solution_of(row, at, figures, stop.status, stop.residual, stop.searches)

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from rbdyn.compiled.kernel import entry
-from rbdyn.quasistatic.rivals.full_system import evaluate, solution_at, system_of, unknowns
+from rbdyn.quasistatic.rivals.full_system import Stop, System, evaluate, rival, unknowns
 from rbdyn.quasistatic.row.ball import rules
 from rbdyn.quasistatic.row.control import Control
-from rbdyn.quasistatic.row.equilibrium import OK, Solution
+from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.row.newton import CONVEX_MARCH, descend, go_to, march, roughly, start_afresh
-from rbdyn.quasistatic.row.row import Row
-from rbdyn.quasistatic.row.space import STEPS, Task, Vector, posed, space
+from rbdyn.quasistatic.row.ring import RING
+from rbdyn.quasistatic.row.space import STEPS, Task, space
 
 
 @entry
@@ -31,21 +31,13 @@ def _within(task: Any, limit: int, at: Any) -> bool:
     return march(task, 1.0, 0.0, limit - at.counts[STEPS], at)
 
 
-def solve(
-    row: Row,
-    control: Control,
-    load: Vector,
-    given: Vector | None = None,
-    start: Solution | None = None,
-    limit: int = 1000,
-) -> Solution:
-    """As ``equilibrium.solve`` in at most ``limit`` steps, without continuation. ``start`` is not used."""
-    system = system_of(row, load, given)
-    force, free, held = posed(row, load, given)
-    at = space(row.cosine.size)
-    at.q[:] = held
-    arrived = _within(Task(control, row, force, free), limit, at)
+@rival
+def solve(control: Control, system: System, start: None, limit: int = 1000) -> Stop:
+    """The convex solver in at most ``limit`` steps, without continuation; a ``start`` is not used."""
+    at, free = space(system.row.cosine.size), np.zeros(RING)
+    at.q[:], free[system.free] = system.held, 1.0
+    arrived = _within(Task(control, system.row, system.load, free), limit, at)
     u = unknowns(system, at.q, at.balls)
     worst, _ = evaluate(control, system, u, np.zeros(system.size), np.zeros((system.size, system.size)))
     status = OK if arrived else f"not converged in {limit} steps"
-    return solution_at(control, system, u, status, int(at.counts[STEPS]), worst)
+    return Stop(u, status, int(at.counts[STEPS]), worst)

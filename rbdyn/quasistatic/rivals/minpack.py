@@ -11,12 +11,11 @@ import math
 
 import numpy as np
 
-from rbdyn.quasistatic.rivals.full_system import evaluate, solution_at, system_of
+from rbdyn.quasistatic.rivals.full_system import Stop, System, evaluate, rival
 from rbdyn.quasistatic.rivals.plain_newton import unloaded
 from rbdyn.quasistatic.row.control import Control
-from rbdyn.quasistatic.row.equilibrium import OK, Solution
+from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.row.newton import ACCEPTED
-from rbdyn.quasistatic.row.row import Row
 from rbdyn.quasistatic.row.space import Vector
 
 EVALUATIONS = 1000
@@ -25,18 +24,11 @@ TIGHTEST = {"hybr": {"xtol": 1e-15}, "lm": {"xtol": 1e-15, "ftol": 1e-15, "gtol"
 LIMIT = {"hybr": "maxfev", "lm": "maxiter"}
 
 
-def solve(
-    row: Row,
-    control: Control,
-    load: Vector,
-    given: Vector | None = None,
-    limit: int = EVALUATIONS,
-    method: str = "hybr",
-) -> Solution:
-    """As ``equilibrium.solve``, by MINPACK's hybrj or lmder ("lm") in at most ``limit`` evaluations."""
+@rival
+def solve(control: Control, system: System, start: None, limit: int = EVALUATIONS, method: str = "hybr") -> Stop:
+    """MINPACK's hybrj or lmder ("lm") in at most ``limit`` evaluations; a ``start`` is not used."""
     from scipy.optimize import root
 
-    system = system_of(row, load, given)
     residual, jacobian = np.zeros(system.size), np.zeros((system.size, system.size))
     calls = 0
 
@@ -63,7 +55,7 @@ def solve(
         u = first
         worst, largest = evaluate(control, system, u, residual, jacobian)
     status = OK if worst <= ACCEPTED * largest else why
-    return solution_at(control, system, u, status, calls, worst)
+    return Stop(u, status, calls, worst)
 
 
 hybrid = functools.partial(solve, method="hybr")

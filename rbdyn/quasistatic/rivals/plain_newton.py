@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from rbdyn.compiled.kernel import entry
-from rbdyn.quasistatic.rivals.full_system import System, forces, solution_at, system_of, unknowns
+from rbdyn.quasistatic.rivals.full_system import Stop, System, forces, rival, unknowns
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.elimination import eliminate
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
 from rbdyn.quasistatic.row.newton import ACCEPTED
-from rbdyn.quasistatic.row.row import Row, component_lengths
+from rbdyn.quasistatic.row.row import component_lengths
 from rbdyn.quasistatic.row.space import Vector, space
 from rbdyn.quasistatic.row.start import settle_all
 
@@ -84,20 +84,13 @@ def _rest_balls(row: Any, at: Any) -> None:
     settle_all(row, at)
 
 
-def solve(
-    row: Row,
-    control: Control,
-    load: Vector,
-    given: Vector | None = None,
-    start: Solution | None = None,
-    limit: int = STEPS,
-) -> Solution:
-    """As ``equilibrium.solve``, by plain Newton in at most ``limit`` steps. Never raises: see ``status``."""
-    system = system_of(row, load, given)
+@rival
+def solve(control: Control, system: System, start: Solution | None, limit: int = STEPS) -> Stop:
+    """Plain Newton in at most ``limit`` steps, from a ``start`` or the unloaded geometry."""
     if start is None:
         u = unloaded(system)
     else:
-        u = unknowns(system, start.displacement * component_lengths(row.lever), start.balls)
+        u = unknowns(system, start.displacement * component_lengths(system.row.lever), start.balls)
     outcome, steps, residual = iterate(control, system, limit, u)
     status = OK if outcome == CONVERGED else SENTENCES[outcome].format(limit=limit)
-    return solution_at(control, system, u, status, steps, residual)
+    return Stop(u, status, steps, residual)

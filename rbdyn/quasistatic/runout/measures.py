@@ -1,4 +1,4 @@
-"""Runout of the path that a ring takes, and how much of the race errors comes through.
+"""Runout of the path that a ring takes.
 
 Three ways to put the radial motion into a number, none of which tells another:
 - ``indicator``: what a fixed indicator reads (its largest range over all directions). Class limits K_ia mean this. An
@@ -104,15 +104,3 @@ def error_motion(angle: Array, reading: Array) -> float:
         method="highs",
     )
     return scale * float(np.ptp(level - wave @ found.x[:2]))
-
-
-def homogenisation(runout: float, inner_error: float, outer_error: float) -> float:
-    """Runout over the sum of the errors of both races, all in m (Zhou et al. 2024, eqs 23-26).
-
-    Radial runout over roundness errors, or axial runout over side-sways or groove-shape errors; below one the bearing
-    runs truer than its races are made. Raises ValueError unless the sum is positive.
-    """
-    both = abs(inner_error) + abs(outer_error)
-    if not both > 0.0:
-        raise ValueError("races without errors have no homogenisation coefficient; give one of them an error")
-    return abs(runout) / both

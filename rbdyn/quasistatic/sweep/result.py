@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.quasistatic.result import ball_columns, ball_records
-from rbdyn.records.record import plain
+from rbdyn.records.record import finite, plain
 from rbdyn.result import read_record, versions, write_json
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ class SweepResult:
     def points(self) -> list[dict[str, Any]]:
         """A record a point, None where a figure is infinite or was not found."""
         places, names = self._places(), list(self.columns)
-        values = [[_json(value) for value in self.columns[name].tolist()] for name in names]
+        values = [[finite(value) for value in self.columns[name].tolist()] for name in names]
         keys = [column.tolist() for column in places.values()]
         return [
             {
@@ -178,10 +178,6 @@ class SweepResult:
         """Values of the keys at every point, a column a key."""
         grids = np.meshgrid(*(np.array(values) for values in self.keys.values()), indexing="ij")
         return {key: grid.ravel() for key, grid in zip(self.keys, grids, strict=True)}
-
-
-def _json(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _number(point: dict[str, Any], name: str) -> float:
