@@ -1,7 +1,5 @@
 """Number types and helpers of input tables."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, Generic, TypeVar, cast
 

@@ -1,7 +1,5 @@
 """Which study ``rbdyn accuracy`` runs: one at a time, and one of this kind of bearing."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rbdyn.accuracy import BALL_STUDIES

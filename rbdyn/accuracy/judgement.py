@@ -10,8 +10,6 @@ Half-widths fall as one over the root of the counted turns; with replicates Stud
 follow the turns or the replicates that would decide.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Literal, NamedTuple

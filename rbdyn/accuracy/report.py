@@ -1,7 +1,5 @@
 """What a study hands over: one record, tables to print, sheets and pictures to write."""
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields

@@ -1,7 +1,5 @@
 """The command ``rbdyn ball``. Physics is imported inside it, so that help comes at once."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

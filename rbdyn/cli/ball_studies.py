@@ -1,7 +1,5 @@
 """Studies of a ball bearing beside its equilibrium: runout over a turn, preload, clearance, limits of race errors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What goes into the scene of a catalogue bearing: its estimated interior, a usual cage, its oil, its operating point."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Lists of numbers as they are typed on a command line."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

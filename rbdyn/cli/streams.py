@@ -4,8 +4,6 @@ What is written to a pipe whose reader has gone, or to a stream that is closed, 
 on, so that its files stand whole and its exit code is the usual one. A device that takes no more is told once.
 """
 
-from __future__ import annotations
-
 import codecs
 import errno
 import io

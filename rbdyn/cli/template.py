@@ -1,7 +1,5 @@
 """Commented TOML from a template whose comments stand behind the keys."""
 
-from __future__ import annotations
-
 import string
 from collections.abc import Mapping
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """What the commands share: exit codes, messages, JSON, progress. Knows no physics."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

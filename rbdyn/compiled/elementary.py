@@ -5,8 +5,6 @@ Range reduction by the bits of the double and a polynomial short enough to stay 
 with equal results to that error.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

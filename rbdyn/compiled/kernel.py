@@ -8,8 +8,6 @@
   never bring back stale code.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import os

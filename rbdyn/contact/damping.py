@@ -1,7 +1,5 @@
 """Normal damping: the load of a contact that closes or opens. It never pulls."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

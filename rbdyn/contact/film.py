@@ -1,7 +1,5 @@
 """Lubricant film of a guide land: the short journal bearing."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

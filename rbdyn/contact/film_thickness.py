@@ -4,8 +4,6 @@ Plain functions of floats or arrays, for setting up laws and for reports; none i
 With U = eta u/(E' R), G = alpha E', W = Q/(l E' R), where u is the mean speed of the two surfaces.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ A whole roller takes one of the plain laws. A roller with a profile, or between 
 of which carries its share of a plain law at its own approach. Plain laws differ by 7 % at most between 50 and 800 N.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -11,8 +11,6 @@ curvatures over their sum. Plain functions for setting up rows of balls and for 
 many.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -18,8 +18,6 @@ the sliding acts on film and streamers: sqrt(2) eta U l sqrt(R/h) S, with S betw
 2 u times the rolling force plus V times the push, the integral of h^3 (dp/dx)^2/(12 eta): it is never negative.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

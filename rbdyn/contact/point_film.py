@@ -6,8 +6,6 @@ Chang, Hu and Cao 2024, eq 14, print two exponents wrong (0.69 for 0.67, 0.061 f
 is the derivative of the right form. Roughness and film meet in ``film_thickness.lambda_ratio``.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

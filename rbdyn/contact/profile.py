@@ -3,8 +3,6 @@
 A drop is a positive radial distance [m]; every function takes positions from the roller's middle [m].
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ A rheology gives the shear stress at a pressure, for a slip across a film. Every
 shape that broadcast, and runs while a scene is set up; ``contact.traction`` holds what the simulation reads.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol

@@ -3,8 +3,6 @@
 The oil is squeezed into the inlet; what drives it shears both surfaces with F_R each, and the power lost is 2 F_R u.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Pressure that leaves a permanent dent of 1e-4 of a rolling element's diameter (ISO 76)."""
 
-from __future__ import annotations
-
 BALLS, ROLLERS = 4200e6, 4000e6  # [Pa]
 
 

@@ -1,7 +1,5 @@
 """Traction coefficient against sliding speed and load."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple

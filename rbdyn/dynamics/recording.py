@@ -1,7 +1,5 @@
 """One replicate recorded in equal batches of about a shaft turn, from its start as far as it goes."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Sequence

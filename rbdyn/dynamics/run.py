@@ -1,7 +1,5 @@
 """One replicate under way: integrator, memory and where it stands."""
 
-from __future__ import annotations
-
 import math
 import time
 from typing import Any

@@ -6,8 +6,6 @@ the turns asked for, and each time the last half counts. Companions run just as 
 the number of threads.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Replicates of a scene, gathered with error bars."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any

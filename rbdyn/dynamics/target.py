@@ -8,8 +8,6 @@ in right-hand sides, not seconds: equal scenes choose equally on any machine. Th
 together, pilots and earlier runs included.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections import Counter

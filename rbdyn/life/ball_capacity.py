@@ -6,8 +6,6 @@ rating is worked out from its definition (4200 MPa) instead of read from f_0.
 Lengths in m, angles in rad.
 """
 
-from __future__ import annotations
-
 import math
 
 from rbdyn.contact.hertz_point import PointContact, peak_pressure

@@ -5,8 +5,6 @@ the equivalent of its loads; races combine by a Weibull slope of 10/9 (Sensors 2
 Lubrication, cleanliness and the fatigue limit (a_ISO) are left out.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

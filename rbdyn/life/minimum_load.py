@@ -1,7 +1,5 @@
 """Radial loads below which makers of cylindrical roller bearings expect the rollers to skid."""
 
-from __future__ import annotations
-
 from rbdyn.fields import RPM
 
 # Reference speed times pitch diameter [mm/min] of 170 sizes of a catalogue (NU, series 10, 2, 22, 3, 23), within 9 %.

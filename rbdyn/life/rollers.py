@@ -6,8 +6,6 @@ f_c and b_m follow ISO 281 as it is commonly cited and were not checked against 
 Lubrication, cleanliness and the fatigue limit (a_ISO) are left out: this is the reference life L10r.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Life of a bearing in turns of one ring against the other, as time, and what of its races it rests on."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

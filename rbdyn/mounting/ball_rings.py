@@ -1,7 +1,5 @@
 """From a scene to the growth of its races: rotation alone, or fits, temperatures and rotation of a mounted bearing."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from rbdyn.fields import RPM

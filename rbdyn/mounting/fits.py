@@ -1,7 +1,5 @@
 """From the mounting table of a scene to rings, fits and the clearance in operation."""
 
-from __future__ import annotations
-
 from rbdyn.mounting.rings import MountedClearance, MountedRings, Ring, mounted_clearance
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import Bearing, Materials

@@ -9,8 +9,6 @@ comparison. It overstates the growth, as pitch circles lie outside inner races, 
 eq 18 lacks that of the middle ring's inner race.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Rings are thick cylinders of one length in plane stress, shaft and housing too: 
 Radii are of the drawing; growths are radial, clearances and interferences diametral [m].
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

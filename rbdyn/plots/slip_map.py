@@ -1,7 +1,5 @@
 """Cage slip over speed and load."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How every picture looks: colours told apart by all eyes, axes, saving. matplotlib is set up here."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from pathlib import Path

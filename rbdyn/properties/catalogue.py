@@ -12,8 +12,6 @@ Balls: read from the orders of the Timken catalogue's table A-9 (series 60, 62 a
 from BSF) and from C and C0 of NSK's 72 and 73 with 40 degrees (11 sizes, by ISO 281 and ISO 76).
 """
 
-from __future__ import annotations
-
 import math
 import re
 from typing import NamedTuple

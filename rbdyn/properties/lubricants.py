@@ -4,8 +4,6 @@ Formulas as published with ADORE-style oil data. MIL-L-7808 stands for ester jet
 4010 of Chen et al. 2022 is taken as one), MIL-L-23699 for the 5 cSt class.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Materials by name: elastic constants, density and thermal expansion at 20 C."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -5,8 +5,6 @@ one. Pressure coefficient: Gold et al. 2001, alpha = s nu^t. What a base oil has
 tells how far off it may be.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from typing import NamedTuple, Self

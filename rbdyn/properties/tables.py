@@ -1,7 +1,5 @@
 """Tables of numbers that stand beside this package as CSV."""
 
-from __future__ import annotations
-
 import csv
 import functools
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Fatigue life of the row of a scene: which ratings its drawing gives, and which ring turns against the load."""
 
-from __future__ import annotations
-
 from rbdyn.life.ball_capacity import dynamic_capacity
 from rbdyn.life.balls import rated_capacities, row_life
 from rbdyn.life.turns import Life, Turning

@@ -6,8 +6,6 @@ neighbours refines it. Neither needs to have one optimum only, or one inside the
 refined, and a sentence says when it lies at an end.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What to beware of at one equilibrium or at many: balls clear of a race, dents, steep angles, slip, a ring that tips."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple

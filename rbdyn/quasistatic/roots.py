@@ -1,7 +1,5 @@
 """Other equilibria of the same bearing under the same load: a raceway control other than outer may have several."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is reported of one row in equilibrium: angles, loads, stress, contacts, film, life."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -3,8 +3,6 @@
 A line is there whole or not at all: it begins with the SHA-256 of the rest, and what does not fit it is not read.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

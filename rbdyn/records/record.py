@@ -4,8 +4,6 @@ A field stands under its own name, unless it is ``keyed`` otherwise, ``spread`` 
 the others; one whose default is None is left out where it is None.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Mapping

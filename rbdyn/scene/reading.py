@@ -1,7 +1,5 @@
 """How a scene file is read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from copy import deepcopy
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Values that look like another unit: outside what is usual for the bearing, with what may have been meant."""
 
-from __future__ import annotations
-
 import math
 
 from rbdyn.scene.bearing import Bearing, Cage

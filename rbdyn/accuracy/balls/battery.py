@@ -4,8 +4,6 @@ The scene gives materials, gyroscopic moment, friction limit and light load shar
 first so many scenes. Times are of the second of two calls from Python, those of MINPACK's and the search's of one.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from operator import attrgetter

@@ -5,8 +5,6 @@ interference, standing and turning rings, every raceway control, tilt free and f
 file; ``posed`` builds from them what a solver takes, past the validation that a file goes through.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

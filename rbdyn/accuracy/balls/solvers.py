@@ -5,8 +5,6 @@ leave, over the largest force of the scene. Times are the shortest of several ru
 first that compiles. Then the load and the speed of the scene are perturbed at random, with a seed.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Methods beside each other on one compiled right-hand side: error against time, and how many times faster ours is."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace

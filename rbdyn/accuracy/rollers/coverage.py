@@ -6,8 +6,6 @@ of squares. Beside it the same of the statistical error alone, the mean half-wid
 always holds the truth is too wide.
 """
 
-from __future__ import annotations
-
 import math
 
 from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, record, records, tabled

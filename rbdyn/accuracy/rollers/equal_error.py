@@ -1,7 +1,5 @@
 """How many times faster one method is than another at equal error, from their work-precision curves."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

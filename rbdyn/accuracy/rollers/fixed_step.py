@@ -11,8 +11,6 @@ position of its own (spins, the clock) takes the v-formulas.
 Both keep a tally as our method does, at step ends: works by their own weights, largest loads, the cage's whirl.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

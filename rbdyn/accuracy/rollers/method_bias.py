@@ -4,8 +4,6 @@ The methods of fixed step run the same seeded replicates as ours does, discard a
 same tally; the reference is ours at a tight tolerance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ adaptive methods get the same absolute tolerance, a fraction ``setting`` of each
 one; they weigh it by norms of their own, so they are to be compared at equal error, never at equal setting.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass

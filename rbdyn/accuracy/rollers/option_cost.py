@@ -5,8 +5,6 @@ An option is a few assignments to the scene. Each is run in turn with the scene 
 machine; a median over replicates is taken of the processor time per right-hand side, the integrator's own work included.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict

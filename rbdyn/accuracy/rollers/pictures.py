@@ -1,7 +1,5 @@
 """Error against run time: error to the right, time upwards, both logarithmic; lower left is better."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ scatter of the whole pool (expected, not that of one lucky draw of n), and the t
 discards. Independent samples narrow it as one over the root of all counted turns; the slopes tell whether they do.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """The compiled right-hand side as a Python function dy/dt = f(t, y), for the integrators of others."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

@@ -5,8 +5,6 @@ bears the same, and the speed falls so that surface speeds stay; a turn then tak
 cut the same roller finer. Times are the least of several of a single-threaded run, taken in turns over the sizes, after everything was compiled.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Callable, Sequence

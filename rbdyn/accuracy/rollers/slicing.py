@@ -4,8 +4,6 @@ The load law is exact in itself: its error is measured at equal approach against
 up to twice the largest on the shaft. Statistics are compared with those of the finest slicing run.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

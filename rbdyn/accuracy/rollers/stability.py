@@ -4,8 +4,6 @@ A case is a few assignments to the scene. Each runs one replicate over few turns
 runs once more at a tenth of the tolerance, to see whether tightening mends it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

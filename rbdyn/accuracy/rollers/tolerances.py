@@ -5,8 +5,6 @@ means and its 95 % half-width allow to be said, ``judgement`` decides. Times are
 after everything was compiled.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

@@ -4,8 +4,6 @@ The motion is chaotic: two runs part about 500-fold a shaft turn, so a method ca
 turn only, and every span has its own floor below which the reference itself is not known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Error against run time of the time integration: of the statistics at each tolerance, and of the motion itself."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ The state holds the geometric centre x. With the centre of mass at x + e u(angle
 a = F/m - e d^2u/dt^2 and J d(speed)/dt = M - e u x F, where M is the moment of the forces about x.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from rbdyn.compiled.kernel import law

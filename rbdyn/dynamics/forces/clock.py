@@ -3,8 +3,6 @@
 Imported only for a scene that has one.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

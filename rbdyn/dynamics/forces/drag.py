@@ -1,7 +1,5 @@
 """Drag of the oil-air mixture on an orbiting roller."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """What turns the rings and loads the shaft, steadily; ``clock`` has the drive that changes with time."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from rbdyn.compiled.kernel import law

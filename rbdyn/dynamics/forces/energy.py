@@ -1,7 +1,5 @@
 """Mechanical energy of a state, against which the powers are balanced."""
 
-from __future__ import annotations
-
 import math
 
 from rbdyn.compiled.kernel import entry, kernel

@@ -4,8 +4,6 @@ Newton for rollers, cage and rings in Cartesian coordinates (Chen et al. 2022, e
 centrifugal terms because the frame does not turn), Euler for spins. The rings turn at prescribed speeds.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

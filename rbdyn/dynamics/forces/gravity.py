@@ -1,7 +1,5 @@
 """Gravity, or the steady part of a manoeuvre, on rollers, cage and rings."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from rbdyn.compiled.kernel import law

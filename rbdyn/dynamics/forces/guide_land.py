@@ -4,8 +4,6 @@ Whichever part runs inside the other is the journal: the cage under outer guidan
 guidance.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

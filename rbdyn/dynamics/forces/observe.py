@@ -1,7 +1,5 @@
 """What happens at every contact in recorded states: loads, slips, heat. Compiled only where a history is asked for."""
 
-from __future__ import annotations
-
 from rbdyn.compiled.kernel import entry, kernel
 from rbdyn.dynamics.forces.equations import motions, roller_pocket
 from rbdyn.dynamics.forces.guide_land import guide_forces

@@ -1,7 +1,5 @@
 """Roller against its cage pocket: front and rear wall, dry or with a film, and the lips that hold the cage radially."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Form of a raceway: round, or with waviness and out-of-round as harmonics of its radius."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

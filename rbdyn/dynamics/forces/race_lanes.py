@@ -4,8 +4,6 @@ Whole vectors of rollers go through the outer race straight from the state. The 
 the inner race, are picked out and, where both races follow the same laws, share vectors.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

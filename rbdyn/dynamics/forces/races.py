@@ -4,8 +4,6 @@ The wrench acts with opposite sign on roller and ring at the same point, so that
 exactly. ``side`` is +1 for the outer race (the ring encloses the roller) and -1 for the inner race.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Motion of the rings, with the outer one held still at the centre; ``support`` has the one that gives way."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from rbdyn.compiled.kernel import law

@@ -1,7 +1,5 @@
 """Quantities that are prescribed over time: constant, held steps, straight or smooth ramps."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

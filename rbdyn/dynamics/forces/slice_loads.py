@@ -1,7 +1,5 @@
 """How the load of a roller spreads over its slices: for contact pressure and life, outside the time integration."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

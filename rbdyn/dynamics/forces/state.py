@@ -3,8 +3,6 @@
 Each coordinate of the rollers stands contiguous, roller after roller; then come cage and inner ring, then what a scene adds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

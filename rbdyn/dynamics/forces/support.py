@@ -1,7 +1,5 @@
 """An outer ring on a flexible, damped support. Imported only for a scene that has one."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from rbdyn.dynamics.forces.gravity import add_weight, height_energy

@@ -1,7 +1,5 @@
 """The loop over steps, one for all methods: step control, booking and the search for peaks."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -8,8 +8,6 @@ Elimination takes the rollers first and leaves an m x m system for the bodies (G
 4.5): work and storage grow with the number of rollers, not with its cube.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What every method keeps of a step: samples of the cage's speed, and the largest pocket loads within it."""
 
-from __future__ import annotations
-
 import math
 
 from rbdyn.compiled.kernel import kernel, routine

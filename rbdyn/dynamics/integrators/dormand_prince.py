@@ -3,8 +3,6 @@
 Dormand and Prince 1980; continuous extension after Hairer, Norsett and Wanner, Solving ODEs I, II.6.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 A pair is a method as in ``method_laws``, and has h |eigenvalue| from which stability is said to hold a step, ``limit``.
 """
 
-from __future__ import annotations
-
 from rbdyn.compiled.elementary import fma
 from rbdyn.compiled.kernel import kernel, law
 

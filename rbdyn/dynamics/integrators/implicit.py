@@ -1,7 +1,5 @@
 """From a scene to what the linearly implicit method works on."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

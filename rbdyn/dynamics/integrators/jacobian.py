@@ -5,8 +5,6 @@ this roller: its land and other terms without the roller drop out of the differe
 sides of one roller and one full right-hand side a body coordinate.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ Kutta 1901; Hairer, Norsett and Wanner, Solving ODEs I, II.1 and II.4. A right-h
 cheaper one where that does. The dense output is the cubic through values and slopes at both ends, third-order accurate.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

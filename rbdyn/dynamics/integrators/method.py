@@ -4,8 +4,6 @@ A step of the second costs about nine of the first, so it pays only where it can
 copy of the run, over the same stretch, and counts right-hand sides; no clock is read, so that equal scenes choose alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

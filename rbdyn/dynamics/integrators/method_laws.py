@@ -5,8 +5,6 @@ A method is a NamedTuple: ``last``, the row of ``Carry.k`` at the end of the ste
 the one before in the control of the step, ``rejected`` that of the error of a step that is refused.
 """
 
-from __future__ import annotations
-
 from rbdyn.compiled.kernel import law
 
 

@@ -9,8 +9,6 @@ The frame stands in the fixed axes at the start of the step and has turned by ph
 tan(phi/2) = rate t/2: cosine, sine and speed of such a turn are rational, and it is as smooth.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from rbdyn.compiled.kernel import kernel

@@ -1,7 +1,5 @@
 """What an integration is given, carries along and keeps; one set of records for all methods."""
 
-from __future__ import annotations
-
 from enum import Enum
 from typing import Any, NamedTuple
 

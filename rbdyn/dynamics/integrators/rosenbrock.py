@@ -9,8 +9,6 @@ equations of the same method, w' = P(y): where a stiff slip makes the traction, 
 would close the power balance.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

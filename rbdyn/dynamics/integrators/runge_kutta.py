@@ -4,8 +4,6 @@ The pairs stand in modules of their own. Loss powers are integrated with the mai
 power balance tests the integrator too. The rollers are integrated in a frame that turns with them (``orbit_frame``).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ The error of a step is the Euclidean norm of all components, each over its own a
 over them: it is never smaller than that of the worst component, however many rollers there are.
 """
 
-from __future__ import annotations
-
 import math
 
 from rbdyn.compiled.kernel import kernel, routine

@@ -4,8 +4,6 @@ Two trajectories with repeated renormalisation (Benettin, Galgani, Giorgilli and
 small separation away, and every tenth of a turn the growth is noted and the separation drawn back to its size.
 """
 
-from __future__ import annotations
-
 import math
 import time
 

@@ -1,7 +1,5 @@
 """Rating life of a simulated bearing: ISO/TS 16281 with the loads that every roller saw instead of static ones."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the model leaves out, in one list: what each item would change, and how large it is by an estimate."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple

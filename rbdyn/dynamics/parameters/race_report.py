@@ -1,7 +1,5 @@
 """What a designer asks of each race: pressure, half-width and film at its largest load, and whether they are sound."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Layout of the state, and the sizes by which errors of its components are measured. SI."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

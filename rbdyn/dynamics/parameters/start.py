@@ -1,7 +1,5 @@
 """Where a run starts: static load share at epicyclic speed, rollers at seeded offsets in their pockets."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

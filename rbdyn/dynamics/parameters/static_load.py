@@ -1,7 +1,5 @@
 """Static load of the inner ring: how its rollers sit between the races, and how they share the load."""
 
-from __future__ import annotations
-
 import math
 
 from rbdyn.compiled.kernel import entry, kernel, routine

@@ -15,8 +15,6 @@ Student's over replicates. So it is from eight replicates on, which are independ
 short series is itself uncertain, and of the bearing of Chen et al. 2022 intervals by it held the impact in 90 of 100.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple

@@ -13,8 +13,6 @@ To the error of the power loss comes, likewise, what the power balance misses: i
 since integration errors act as one more loss that no law books and leave the input as it is.
 """
 
-from __future__ import annotations
-
 import math
 
 from rbdyn.dynamics.statistics.batch_means import Estimate

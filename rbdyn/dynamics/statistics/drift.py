@@ -16,8 +16,6 @@ how far it may be away is gauged by the stretch of two impact windows, of any re
 the mean of all. Their product counts too.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

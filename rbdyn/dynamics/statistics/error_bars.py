@@ -1,7 +1,5 @@
 """Figures of a scene with their error bars, and what is to be said about these."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

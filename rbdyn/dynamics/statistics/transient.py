@@ -7,8 +7,6 @@ stationary noise the rule would still drop a little; so a head counts as a trans
 of the rest beyond their scatter.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

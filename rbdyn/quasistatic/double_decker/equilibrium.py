@@ -10,8 +10,6 @@ Displacements count in three planes: P0 of the inner row's inner groove centres,
 row's inner ones. A displacement of the middle ring is that of P2. All small: moments act on the undisplaced grooves.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From a scene to the two rows of a double-decker bearing and its middle ring, and what is reported of that ring."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

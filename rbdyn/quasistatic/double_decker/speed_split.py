@@ -9,8 +9,6 @@ books. f0 of angular contact ball bearings: oil mist 1.7, grease 2, oil bath 3.3
 z = 0.001, y = 0.33 for angular contact and z = 0.0004 to 0.0006, y = 0.55 for deep groove.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal, NamedTuple
 

@@ -16,8 +16,6 @@ Rule a asks that all deflections end above 0. As printed it refuses equilibria i
 are lawful: a ball that only its centrifugal force holds, or none. They are accepted unless ``strict``.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -5,8 +5,6 @@ all in m; the residuals are in N: what each ball lacks, then the load less what 
 that knows nothing of their structure.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple

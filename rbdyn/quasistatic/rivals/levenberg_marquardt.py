@@ -8,8 +8,6 @@ our metres. b, w and the limits are not in the paper: they are those of the rout
 steps it prints.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """The convex solver stopped after so many Newton steps: how its residual falls, for comparison with its rivals."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ They begin where plain Newton begins and are judged by the same residual. Their 
 compiled forces and back.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 

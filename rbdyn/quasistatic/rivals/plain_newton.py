@@ -4,8 +4,6 @@ It converges from near enough and not otherwise. Harris (Rolling Bearing Analysi
 experience.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

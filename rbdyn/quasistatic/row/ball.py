@@ -9,8 +9,6 @@ on the ring: axial Q_i sin a_i - T_i cos a_i, radial Q_i cos a_i + T_i sin a_i, 
 the groove centre.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -11,8 +11,6 @@ the outer ring turns faster: with the inner ring turning M_g is negative, and th
 the other way than where the sign is dropped, as many texts do.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from rbdyn.compiled.kernel import kernel

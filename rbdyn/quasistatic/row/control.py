@@ -13,8 +13,6 @@ the gyroscopic moment are shared alike: lambda_i = 2 s, lambda_o = 2 (1 - s) wit
 One common cage speed with no gyroscopic moment is the hypothesis without any of this.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

@@ -1,7 +1,5 @@
 """Gauss elimination of a dense system."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rbdyn.compiled.kernel import routine

@@ -1,7 +1,5 @@
 """Equilibrium of one row of balls: what Python calls."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """From a scene to the parameters of the kernels: the only module here that knows both."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

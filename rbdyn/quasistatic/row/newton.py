@@ -6,8 +6,6 @@ full equations; where it fails the race control is brought in by and by. All wor
 where they end.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

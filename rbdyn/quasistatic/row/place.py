@@ -1,7 +1,5 @@
 """Places in the plane of a ball: the inner groove centre, a ball clear of the inner race, a ball at rest between both."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

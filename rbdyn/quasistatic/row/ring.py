@@ -5,8 +5,6 @@ are lengths, and the place X_j of each ball. The Jacobian is an arrow: 2 x 2 blo
 Eliminating the balls (Schur complement) leaves 5 x 5 and costs O(Z).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from rbdyn.compiled.kernel import kernel, routine

@@ -1,7 +1,5 @@
 """Geometry of one row of balls: what the equations of equilibrium need to know, in SI."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

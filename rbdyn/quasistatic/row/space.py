@@ -1,7 +1,5 @@
 """What a solve of one row is given, and the arrays that it works in."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

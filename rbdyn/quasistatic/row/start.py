@@ -1,7 +1,5 @@
 """First guess: how far the ring goes along its load, and where the balls then rest."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Limits of running accuracy by tolerance class of radial ball bearings (ISO 492); ``tolerance_classes.csv`` tells the sources."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, get_args
 

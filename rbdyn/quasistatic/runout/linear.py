@@ -5,8 +5,6 @@ the ring by e g_x along psi, by e g_z axially, and tilts it by e g_tilt about th
 Z equal balls all orders of a groove cancel but n = kZ +- 1, which shift and tilt, and n = kZ, which moves axially.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

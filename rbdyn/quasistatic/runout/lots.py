@@ -5,8 +5,6 @@ and balls with random diameters and sphericity. Only the orders that pass the ba
 each as one wave: a bearing's reading is the real part of a short sum, and a lot is a product of two matrices.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

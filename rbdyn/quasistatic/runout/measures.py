@@ -9,8 +9,6 @@ Three ways to put the radial motion into a number, none of which tells another:
 - ``error_motion``: range of a fixed indicator's reading less its best-fitting once-per-turn part, as of a spindle.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

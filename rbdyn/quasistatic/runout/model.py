@@ -1,7 +1,5 @@
 """From a scene with form errors to the path of its turning ring."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Circles about a set of points in a plane: least squares, and the minimum zone of ISO 1101; diameter of the set."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

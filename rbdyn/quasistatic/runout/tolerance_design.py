@@ -5,8 +5,6 @@ runout of a lot is linear in the limits and so is found for all of them at once;
 and the design is confirmed on a fresh lot, in proportion and in full.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Equilibrium at every step of a path of balls, each from the one before: the compiled loop."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rbdyn.compiled.kernel import entry

@@ -1,7 +1,5 @@
 """Figures of many equilibria at once: angles, loads, pressures, stiffnesses, lives, as columns with units in their names."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Equilibrium of one row at point after point of a sweep, each from the one before: the compiled loop."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

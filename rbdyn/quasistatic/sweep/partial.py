@@ -1,7 +1,5 @@
 """What an interrupted sweep leaves beside its results: the same sweep goes on from there, to the same bits."""
 
-from __future__ import annotations
-
 import functools
 import json
 import os

@@ -3,8 +3,6 @@
 Every point is validated as a scene read from a file is; the row then comes from the same ``row_of``.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

@@ -5,8 +5,6 @@ A single row goes through one compiled loop; a double-decker, another solver, or
 Where a row has several equilibria (see ``light_load_share``) a start from the neighbour may stay on another than a fresh start.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
