@@ -4,8 +4,6 @@ A key is described by the docstring under its field, which changes neither figur
 from the source only here: reading them whenever a scene is loaded would take a tenth of a second.
 """
 
-from __future__ import annotations
-
 import ast
 import functools
 import inspect
@@ -14,16 +12,14 @@ import sys
 import textwrap
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import typer
+from pydantic import BaseModel
 
 from rbdyn.cli.options import Json, flag
 from rbdyn.cli.terminal import guarded, print_json
 from rbdyn.faults import InputError
-
-if TYPE_CHECKING:
-    from pydantic import BaseModel
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 WIDTH = 100

@@ -1,16 +1,13 @@
 """Radii, masses and speeds of a roller bearing as it is mounted: worked out once a scene, in SI."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from rbdyn.scene import Scene
+from rbdyn.scene import Scene
 
 
 class Kinematics(NamedTuple):
