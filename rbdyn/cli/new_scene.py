@@ -52,7 +52,7 @@ class Asked(NamedTuple):
 
 def roller_values(named: Designation, sizes: Envelope, asked: Asked) -> dict[str, Any]:
     """Values of ``roller_scene.toml``. Raises ValueError for impossible dimensions or an unlisted clearance."""
-    from rbdyn.life.rollers import dynamic_capacity
+    from rbdyn.life.roller_capacity import dynamic_capacity
 
     inside = roller_interior(sizes, named.series == "10")
     diameter, pitch, listed = inside.roller_diameter, inside.pitch_diameter, sizes.dynamic_capacity

@@ -12,14 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.life.roller_capacity import LAMINA_EXPONENT, LOAD_LIFE, REDUCTION, WEIBULL
 from rbdyn.life.turns import Life, Turning
-
-# Life of a race falls with the fourth power of its load; 9/8 is the slope of the Weibull line.
-LOAD_LIFE = 4.0
-WEIBULL = 9.0 / 8.0
-LAMINA_EXPONENT = LOAD_LIFE * WEIBULL
-# lambda nu: what ISO 281 takes off for edge stress and uneven loads, which laminae describe themselves.
-REDUCTION = 0.83
 
 
 @dataclass(frozen=True)
@@ -27,43 +21,6 @@ class ReferenceLife(Life):
     """Reference rating life L10r; ``equivalent_load``: the radial load P_ref of equal life by ISO 281 [N]."""
 
     equivalent_load: float
-
-
-def capacity_factor(gamma: float) -> float:
-    """f_c of a radial roller bearing (ISO 281, in N and mm) at gamma = roller over pitch diameter.
-
-    Raises ValueError unless 0 < gamma < 1.
-    """
-    if not 0.0 < gamma < 1.0:
-        raise ValueError(f"gamma = {gamma:g}: the roller must be smaller than the pitch circle")
-    ratio = (1.0 - gamma) / (1.0 + gamma)
-    races = (1.0 + (1.04 * ratio ** (143.0 / 108.0)) ** LAMINA_EXPONENT) ** (-1.0 / LAMINA_EXPONENT)
-    shape = gamma ** (2.0 / 9.0) * (1.0 - gamma) ** (29.0 / 27.0) / (1.0 + gamma) ** 0.25
-    return 208.0 * REDUCTION * shape * races
-
-
-def dynamic_capacity(
-    rollers: int,
-    roller_diameter: float,
-    effective_length: float,
-    pitch_diameter: float,
-    rows: int = 1,
-    rating_factor: float = 1.1,
-) -> float:
-    """Basic dynamic radial load rating C_r [N] by ISO 281, for catalogues that give none; lengths in m.
-
-    C_r = b_m f_c (i L)^(7/9) Z^(3/4) D^(29/27) in N and mm; ``rating_factor`` b_m is 1.1 for machined cylindrical
-    roller bearings of contemporary steel. Raises ValueError as ``capacity_factor``.
-    """
-    factor = rating_factor * capacity_factor(roller_diameter / pitch_diameter)
-    sizes = (rows * effective_length * 1e3) ** (7.0 / 9.0) * (roller_diameter * 1e3) ** (29.0 / 27.0)
-    return factor * sizes * rollers**0.75
-
-
-def static_capacity(rollers: int, roller_diameter: float, effective_length: float, pitch_diameter: float) -> float:
-    """Basic static radial load rating C_0r [N] of one row by ISO 76, 44 (1 - D/d_m) Z L D in N and mm; lengths in m."""
-    gamma = roller_diameter / pitch_diameter
-    return 44e6 * (1.0 - gamma) * rollers * effective_length * roller_diameter
 
 
 def race_capacities(capacity: float, rollers: int, gamma: float, rows: int = 1) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import pytest
 from conftest import ROOT
 
 from rbdyn.cli.new_scene import Asked, ball_values, roller_values
-from rbdyn.life.rollers import dynamic_capacity, static_capacity
+from rbdyn.life.roller_capacity import dynamic_capacity, static_capacity
 from rbdyn.properties.catalogue import (
     Envelope,
     ball_interior,

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from rbdyn.dynamics.forces.slice_loads import slice_loads
 from rbdyn.dynamics.parameters.model import race_contact_law
-from rbdyn.life.rollers import ReferenceLife, dynamic_capacity, reference_life
+from rbdyn.life.roller_capacity import dynamic_capacity
+from rbdyn.life.rollers import ReferenceLife, reference_life
 from rbdyn.life.turns import Turning
 from rbdyn.scene import Scene
 
