@@ -171,20 +171,20 @@ def set_key(data: dict[str, Any], assignment: str) -> None:
     Raises InputError when the assignment has no ``=``, its path runs through a plain value, or it is not one value.
     """
     path, found, text = assignment.partition("=")
-    keys, told = [key.strip() for key in path.split(".")], f"--set {one_line(assignment, 2 * LONGEST_NAME)}"
+    keys, source = [key.strip() for key in path.split(".")], f"--set {one_line(assignment, 2 * LONGEST_NAME)}"
     if not found or not all(keys) or len(keys) > DEEPEST:
-        raise InputError([f"{told}: write it as key.path=value"])
+        raise InputError([f"{source}: write it as key.path=value"])
     try:
-        given = _parsed(f"value = {text}", told)
+        given = _parsed(f"value = {text}", source)
     except tomllib.TOMLDecodeError:
         given = {"value": text.strip()}
     if len(given) > 1:
-        raise InputError([f"{told}: more than one value; give each its own --set"])
+        raise InputError([f"{source}: more than one value; give each its own --set"])
     table = data
     for key in keys[:-1]:
         table = table.setdefault(key, {})
         if not isinstance(table, dict):
-            raise InputError([f"{told}: {one_line(key, LONGEST_NAME)} is a value, not a table; check the key path"])
+            raise InputError([f"{source}: {one_line(key, LONGEST_NAME)} is a value, not a table; check the key path"])
     table[keys[-1]] = given["value"]
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.faults import InputError, bounded, read_text
-from rbdyn.records.record import Record, derived, keyed, told
+from rbdyn.records.record import Record, derived, json_fields, keyed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -106,7 +106,7 @@ class SimulationResult(SavedRecord):
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 
-        figures = ((path[0], getattr(self, one.name)) for one, path in told(self))
+        figures = ((path[0], getattr(self, one.name)) for one, path in json_fields(self))
         rows = {key: figure.as_dict() for key, figure in figures if isinstance(figure, Quantity)}
         return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
 

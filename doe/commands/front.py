@@ -39,14 +39,14 @@ def front(
 ) -> None:
     """Find the Pareto front on the response surfaces."""
     with guarded(as_json), keeping_runs(out):
-        from doe.report.steps.front import asked_point_record, front_record, print_front
+        from doe.report.steps.front import front_record, given_point_record, print_front
         from doe.study.front import find_front
         from doe.study.goals import check_goals
         from doe.study_file import Study
 
-        asked = Study.load(path)
-        check_goals(asked)
-        values = None if point is None else _point(asked, point)
+        study = Study.load(path)
+        check_goals(study)
+        values = None if point is None else _point(study, point)
         effort = Effort(out, workers, scheduler, retry, quiet or as_json)
         loaded, surfaces = fitted(path, data, effort)
         found = find_front(loaded, surfaces)
@@ -54,7 +54,7 @@ def front(
         if values is not None:
             import numpy as np
 
-            record["point"] = asked_point_record(loaded, surfaces, found, np.array(values))
+            record["point"] = given_point_record(loaded, surfaces, found, np.array(values))
         if direct:
             from doe.report.steps.confirmation import direct_record
 

@@ -64,7 +64,7 @@ def evaluate(
     points = np.asarray(coded, float)
     runs = len(points)
     groups = np.zeros(runs, dtype=np.intp) if block is None else np.unique(block, return_inverse=True)[1]
-    lost = untold_terms(points, terms, groups)
+    lost = lost_terms(points, terms, groups)
     if lost:
         raise ValueError(f"the {runs} runs cannot tell {', '.join(lost)} from the other terms")
     region, reach = _where(points, region, reach)
@@ -137,7 +137,7 @@ def _precision(points: Array, terms: Sequence[str], covariance: Array, region: R
     }
 
 
-def untold_terms(coded: Array, terms: Sequence[str], block: Rows | None = None) -> list[str]:
+def lost_terms(coded: Array, terms: Sequence[str], block: Rows | None = None) -> list[str]:
     """Terms that the runs cannot tell from blocks and the terms before them."""
     groups = np.zeros(len(coded), dtype=np.intp) if block is None else block
     columns = np.column_stack([block_contrasts(groups), model_matrix(coded, terms)])

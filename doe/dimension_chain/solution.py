@@ -24,7 +24,7 @@ from doe.dimension_chain.yields import (
     standard_error,
 )
 from rbdyn.faults import InputError
-from rbdyn.records.record import Record, derived, keyed, unsaid
+from rbdyn.records.record import Record, derived, keyed, outside_json
 
 # Shares below the quantiles: the median, 95 %, and the 99.73 % of plus and minus three standard deviations.
 QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
@@ -84,7 +84,7 @@ class ChainResult(Record):
     selective: SelectiveAssembly | None = keyed("selective_assembly")
     samples: int
     seed: int
-    allocation: tuple[Part, ...] = unsaid()
+    allocation: tuple[Part, ...] = outside_json()
 
     @property
     def refused(self) -> bool:

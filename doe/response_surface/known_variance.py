@@ -17,7 +17,7 @@ from doe.arrays import Array, Whole
 from doe.response_surface.anova import AnovaRow, ratio, sum_within
 from doe.response_surface.diagnostics import p_text
 from doe.response_surface.least_squares import LeastSquares
-from rbdyn.records.record import Record, derived, keyed, unsaid
+from rbdyn.records.record import Record, derived, keyed, outside_json
 
 
 class KnownVariance(Record):
@@ -38,7 +38,7 @@ class KnownVariance(Record):
     dof: float | None = keyed("variance_dof")
     standard_errors: Array = derived(lambda self: np.sqrt(np.diag(self.covariance)))
     covariance: Array
-    pure_error: AnovaRow = unsaid()
+    pure_error: AnovaRow = outside_json()
 
 
 def compare(

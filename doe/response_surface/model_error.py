@@ -21,7 +21,7 @@ from doe.arrays import Array, Whole
 from doe.response_surface.anova import AnovaRow, find
 from doe.response_surface.known_variance import KnownVariance
 from doe.response_surface.least_squares import LeastSquares
-from rbdyn.records.record import Record, derived
+from rbdyn.records.record import Record, derived, keyed
 
 Source = Literal["repeats", "known variance"]
 
@@ -30,11 +30,11 @@ REACH = 1.0  # coded units within which what a surface misses stays alike: half 
 
 
 class ModelError(Record):
-    """Variance of what a surface misses anywhere, on the scale of the fit and ``dof`` degrees of freedom; what told it."""
+    """Variance of what a surface misses anywhere, on the scale of the fit and ``dof`` degrees of freedom; ``source``: what shows it."""
 
     variance: float
     dof: int
-    told_by: Source
+    source: Source = keyed("told_by")
     standard_deviation: float = derived(lambda self: math.sqrt(self.variance))
 
 

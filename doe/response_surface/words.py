@@ -67,7 +67,7 @@ def _model_error(surface: Surface) -> str:
         return ""
     return (
         f"{surface.name}: the 95 % intervals of its mean join the error of the coefficients with what the model misses, a "
-        f"standard deviation of {error.variance**0.5:.3g} told by {error.told_by} ({error.dof} degrees of freedom)."
+        f"standard deviation of {error.variance**0.5:.3g} told by {error.source} ({error.dof} degrees of freedom)."
     )
 
 

@@ -44,7 +44,7 @@ class Database:
     def __init__(self, path: Path, read_only: bool) -> None:
         self.path = path
         self._lock = threading.RLock()
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         if path.is_dir():
             raise InputError([f"{path}: is a folder where a file of runs belongs; move it away or name another folder"])
         with self._faults():
@@ -95,8 +95,8 @@ class Database:
 
     def _tell(self, things: Sequence[str], sentence: str) -> None:
         """Say it of things on standard error, unless it was said of all of them."""
-        if not self._told.issuperset(things):
-            self._told.update(things)
+        if not self._reported.issuperset(things):
+            self._reported.update(things)
             print(f"{self.path}: {sentence}", file=sys.stderr)
 
     @contextmanager

@@ -55,9 +55,9 @@ class Conditioned:
     def __call__(self, coded: Array, stated: Array) -> tuple[Array, Array]:
         """Mean (n,) and standard deviation (n,) of the error at coded points (n, k) of ``stated`` standard errors (n,)."""
         link = self._scale**2 * correlation(coded, self._missed.points) * np.outer(stated, self._missed.stated)
-        told = link @ self._solve
-        left = (self._scale * stated) ** 2 - (told * link).sum(axis=1)
-        return told @ self._missed.misses, np.sqrt(left.clip(0.0))
+        projected = link @ self._solve
+        left = (self._scale * stated) ** 2 - (projected * link).sum(axis=1)
+        return projected @ self._missed.misses, np.sqrt(left.clip(0.0))
 
 
 def surfaces_doubt(

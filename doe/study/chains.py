@@ -18,8 +18,8 @@ def check_chains(study: Study) -> None:
 
     One whose half width is still to be found is tried with the widest that the region allows.
     """
-    found_later = study.file.tolerances is not None
-    half_widths = region_of(study) * study.step if found_later else np.full(study.step.size, np.nan)
+    computed_later = study.file.tolerances is not None
+    half_widths = region_of(study) * study.step if computed_later else np.full(study.step.size, np.nan)
     numbers = range(len(study.file.chain))
     check_all(partial(_chain, study, number, study.centre, half_widths) for number in numbers)
 

@@ -14,7 +14,7 @@ from doe.study.goals import goals_of
 from doe.study.predicted import verdict
 from doe.study_file import Study
 from rbdyn.faults import RunError
-from rbdyn.records.record import Record, derived, keyed, unsaid
+from rbdyn.records.record import Record, derived, keyed, outside_json
 from rbdyn.result import SimulationResult
 
 
@@ -56,7 +56,7 @@ class Gain(Record):
     ``verdict``: whether the change is larger than its error.
     """
 
-    response: str = unsaid()
+    response: str = outside_json()
     percent: float
     error: float = keyed("error_percent")
     verdict: str = derived(lambda self: verdict(self.percent, self.error))
@@ -114,14 +114,14 @@ def statement(gains: Sequence[Gain]) -> str:
     so that together they hold with 95 % (Bonferroni).
     """
     wider = float(special.ndtri(1.0 - 0.025 / len(gains)) / special.ndtri(0.975))
-    told = {
+    by_words = {
         "real, more than its error": [gain for gain in gains if gain.percent > wider * gain.error],
         "a real loss, more than its error": [gain for gain in gains if -gain.percent > wider * gain.error],
         "inside its own noise: no gain is shown": [gain for gain in gains if abs(gain.percent) <= wider * gain.error],
     }
     parts = [
         f"{', '.join(f'{each.response} {each.percent:+.2f} ± {wider * each.error:.2f} %' for each in group)}: {words}"
-        for words, group in told.items()
+        for words, group in by_words.items()
         if group
     ]
     together = f" (intervals that hold for all {len(gains)} together)" if len(gains) > 1 else ""

@@ -36,7 +36,7 @@ def _design(text: str, factors: int) -> Design:
 
 def check_runs(study: Study, design: Design) -> None:
     """Raises InputError with every response whose model the runs do not suffice for."""
-    from doe.designs.evaluation import untold_terms
+    from doe.designs.evaluation import lost_terms
 
     runs, factors = design.coded.shape
     faults = []
@@ -50,7 +50,7 @@ def check_runs(study: Study, design: Design) -> None:
                 f"{where}: the {runs} runs of the design are too few; it needs {needed} ({what} and one to "
                 "judge the fit): enlarge the design or choose a simpler model"
             )
-        elif lost := untold_terms(design.coded, terms, design.block):
+        elif lost := lost_terms(design.coded, terms, design.block):
             faults.append(
                 f"{where}: the runs of the design cannot tell {', '.join(lost)} from the other terms; add "
                 "levels or centre points, or choose a simpler model"

@@ -16,7 +16,7 @@ from doe.study.drawn import jacobian
 from doe.study.goals import goals_of, region_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
-from rbdyn.records.record import Record, derived, keyed, unsaid
+from rbdyn.records.record import Record, derived, keyed, outside_json
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
@@ -32,13 +32,13 @@ class Outward(Record):
     "surfaces" or "simulation".
     """
 
-    factor: str = unsaid()
+    factor: str = outside_json()
     side: str
     bound: float
     unit: str = keyed("per")
     source: str
-    gains: Mapping[str, tuple[float, float]] = unsaid()
-    told: dict[str, dict[str, float | None]] = derived(
+    gains: Mapping[str, tuple[float, float]] = outside_json()
+    gains_beyond: dict[str, dict[str, float | None]] = derived(
         lambda self: {name: {"value": gain, "error": or_none(error)} for name, (gain, error) in self.gains.items()},
         "gains",
     )
@@ -46,10 +46,10 @@ class Outward(Record):
     @property
     def sentence(self) -> str:
         """In words."""
-        told = ", ".join(f"{name} {gain:+.2g} ± {error:.2g}" for name, (gain, error) in self.gains.items())
+        listed = ", ".join(f"{name} {gain:+.2g} ± {error:.2g}" for name, (gain, error) in self.gains.items())
         return (
             f"{self.factor} lies at the {self.side} bound of the region, {self.bound:.4g}; gain to be had per {self.unit} "
-            f"beyond it by {self.source}: {told}"
+            f"beyond it by {self.source}: {listed}"
         )
 
 
@@ -59,7 +59,7 @@ class Edge(Record):
     ``sentence`` is all of it in words.
     """
 
-    outward: tuple[Outward, ...] = unsaid()
+    outward: tuple[Outward, ...] = outside_json()
     factors: dict[str, Outward] = derived(lambda self: {each.factor: each for each in self.outward})
     front_share: float
     direct_share: float | None = keyed("direct_front_share")
@@ -92,10 +92,10 @@ def edge_of(
     """Where the pick and the fronts' points (n, k) lie; beyond the bounds ``simulations`` tell, else the surfaces."""
     sides = _sides(study, pick.point[None])[0]
     names = [(index, side) for index, side in enumerate(sides.tolist()) if side]
-    told = {} if simulations is None else _simulated(study, pick, names, simulations)
+    gains_beyond = {} if simulations is None else _simulated(study, pick, names, simulations)
     outward = []
     for index, side in names:
-        gains, source = told.get(index), "simulation"
+        gains, source = gains_beyond.get(index), "simulation"
         if gains is None:
             gains, source = _on_surfaces(study, surfaces, pick.point, index, side), "the surfaces"
         unit, scale = _unit(study, index)
@@ -170,15 +170,15 @@ def _simulated(
     labels = [f"beyond the bound of {study.factors[index]}" for index, _ in kept]
     results = simulations.run(scenes, labels, simulations.progress("beyond the region")) if kept else []
     goals = goals_of(study)
-    told = {}
+    gains_beyond = {}
     for (index, point), result in zip(kept, results, strict=True):
         if isinstance(result, Failure):
             continue
         there = confirmed_from(study, Choice(point, ""), result)
         gain = (goals.costs(pick.values) - goals.costs(there.values)) / (AHEAD * study.step[index])
         joint = np.hypot(*(np.nan_to_num(each.error[goals.objectives]) for each in (pick, there)))
-        told[index] = {
+        gains_beyond[index] = {
             study.responses[response]: (float(g), float(e))
             for response, g, e in zip(goals.objectives, gain, joint / (AHEAD * study.step[index]), strict=True)
         }
-    return told
+    return gains_beyond

@@ -13,7 +13,7 @@ from doe.response_surface.model_error import correlation
 from doe.study.drawn import jacobian, predict_all
 from doe.study.goals import goals_of
 from doe.study_file import Study
-from rbdyn.records.record import Record, derived, keyed, unsaid
+from rbdyn.records.record import Record, derived, keyed, outside_json
 
 
 def verdict(percent: float, error: float | None) -> str:
@@ -33,9 +33,9 @@ class PredictedGain(Record):
     the replicates), and ``within_scatter`` whether the gain is no more. Either is None where the runs do not tell it.
     """
 
-    response: str = unsaid()
-    baseline: float = unsaid()
-    value: float = unsaid()
+    response: str = outside_json()
+    baseline: float = outside_json()
+    value: float = outside_json()
     percent: float
     error: float | None = keyed("error_percent")
     verdict: str = derived(lambda self: verdict(self.percent, self.error))

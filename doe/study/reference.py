@@ -10,7 +10,7 @@ from doe.study.runs import Runs, design_points, read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError
-from rbdyn.records.record import Record, derived, keyed, unsaid
+from rbdyn.records.record import Record, derived, keyed, outside_json
 
 
 class Effect(Record):
@@ -19,8 +19,8 @@ class Effect(Record):
     ours: float
     theirs: float
     same_sign: bool = derived(lambda self: self.ours * self.theirs > 0.0)
-    ours_significant: bool = unsaid()
-    theirs_significant: bool = unsaid()
+    ours_significant: bool = outside_json()
+    theirs_significant: bool = outside_json()
 
 
 class Beside(Record):
@@ -30,7 +30,7 @@ class Beside(Record):
     ``verdict`` a sentence: level, signs of the effects that the published table shows, ranks.
     """
 
-    response: str = unsaid()
+    response: str = outside_json()
     our_range: tuple[float, float, float] = keyed("ours_min_mean_max")
     their_range: tuple[float, float, float] = keyed("theirs_min_mean_max")
     effects: dict[str, Effect] = keyed("linear_effects")

@@ -97,12 +97,12 @@ def run_design(
 
     Runs that fail are left out. Raises InputError, KeyboardInterrupt, and RunError when too few are left.
     """
-    asked = ordered_runs(study)
-    design, coded, actual = asked.design, asked.design.coded, asked.actual
+    ordered = ordered_runs(study)
+    design, coded, actual = ordered.design, ordered.design.coded, ordered.actual
     check_runs(study, design)
     with Store(folder / STORE, study.path.stem) as store:
         simulations = clearance.Simulations(store, workers, scheduler, retry, lambda title: progress)
-        results = simulations.run(asked.scenes, asked.labels, progress, asked.factors)
+        results = simulations.run(ordered.scenes, ordered.labels, progress, ordered.factors)
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
     if failures and len(left) < (needed := fewest_runs(study, design)):
@@ -111,7 +111,7 @@ def run_design(
             f"{sentence(failures)}"
         )
     found = [result for result in results if not isinstance(result, Failure)]
-    notes = _told_once(note for result in found for note in result.notes)
+    notes = _each_once(note for result in found for note in result.notes)
     if failures:
         notes.append(f"{len(failures)} design runs failed and are left out: {sentence(failures)}")
     values, errors, independent = clearance.responses(study, found)
@@ -119,7 +119,7 @@ def run_design(
     return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)
 
 
-def _told_once(notes: Iterable[str]) -> list[str]:
+def _each_once(notes: Iterable[str]) -> list[str]:
     """Notes of all runs; of those that differ in their numbers only the first, and how many there are."""
     return [
         group[0] if len(set(group)) == 1 else f"{group[0]} (so or similarly {len(group)} runs)"

@@ -17,8 +17,8 @@ FORMAT = "doe.status/1"
 
 def study_status(study: Study, folder: Path) -> dict[str, Any]:
     """Record of ``doe status``. Changes nothing, not even while the study runs. Raises InputError."""
-    asked = ordered_runs(study)
-    points = clearance.points_of(asked.scenes, asked.labels, asked.factors)
+    ordered = ordered_runs(study)
+    points = clearance.points_of(ordered.scenes, ordered.labels, ordered.factors)
     if not (folder / STORE).exists():
         return _record(study, folder, points, {}, [], [])
     with Store(folder / STORE, read_only=True) as store:

@@ -107,8 +107,8 @@ def _fields(path: Path) -> tuple[list[str], list[list[str]]]:
 def _numbers(name: str, texts: Sequence[str], optional: bool) -> tuple[Array, list[str]]:
     """Numbers of a column (NaN where an ``optional`` one is unknown), and what is wrong with them by row."""
     values = [float(text) if NUMBER.fullmatch(text) else math.nan for text in texts]
-    told = [row for row, text in enumerate(texts, 1) if not (optional and text.lower() in ("", "nan"))]
-    wrong = (_wrong(name, values[row - 1], texts[row - 1], row, optional) for row in told)
+    filled = [row for row, text in enumerate(texts, 1) if not (optional and text.lower() in ("", "nan"))]
+    wrong = (_wrong(name, values[row - 1], texts[row - 1], row, optional) for row in filled)
     return np.array(values), [fault for fault in wrong if fault]
 
 

@@ -305,8 +305,8 @@ def show(
     with guarded(as_json):
         from rbdyn.cli import show as motion
 
-        asked = motion.ask(result, turns, replicate)
-        folder = output_folder(out or asked.path.parent / "show", "rbdyn show", asked.path)
+        request = motion.request_of(result, turns, replicate)
+        folder = output_folder(out or request.path.parent / "show", "rbdyn show", request.path)
         with progress_bar("showing", quiet or as_json) as progress:
-            record = motion.write(asked, folder, animate, lyapunov, progress)
+            record = motion.write(request, folder, animate, lyapunov, progress)
         hand_over(lambda: record, as_json, lambda: motion.print_record(record, quiet, verbose), folder, record["files"])

@@ -48,8 +48,8 @@ def ball(
 
         loaded = balls_only(Scene.load(scene, assignments or []))
         studies = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
-        asked = {name: value for name, value in studies.items() if value is not None}
-        flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *asked)]
+        requested = {name: value for name, value in studies.items() if value is not None}
+        flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *requested)]
         if len(flags) > 1:
             raise InputError([f"{' and '.join(flags)}: are studies of their own; choose one"])
         if wanted is not None and race_limits is None:
@@ -58,7 +58,7 @@ def ball(
             from rbdyn.cli.ball_sweep import run as run_sweep
 
             raise typer.Exit(run_sweep(loaded, sweeps, out, scene, as_json, quiet))
-        for name, value in asked.items():
+        for name, value in requested.items():
             from rbdyn.cli.ball_studies import run as run_study
 
             share = 0.95 if wanted is None else wanted

@@ -33,7 +33,11 @@ SWEPT = {
     "wear": (over_wear, "um", 1e-6),
 }
 # What its record tells of a point, by column of the table.
-TOLD = {"inner_stress_MPa": "inner_pressure_MPa", "outer_stress_MPa": "outer_pressure_MPa", "L10_Mrev": "L10_Mrev"}
+SWEPT_FIGURES = {
+    "inner_stress_MPa": "inner_pressure_MPa",
+    "outer_stress_MPa": "outer_pressure_MPa",
+    "L10_Mrev": "L10_Mrev",
+}
 # Bearings of a lot that are solved in full to size the limits of race errors.
 SOLVED = 100
 
@@ -56,7 +60,7 @@ def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tupl
     except ValueError as error:
         raise InputError([f"--{swept}: {error}"]) from None
     table = _table(scene, f"{swept}_{unit}", values, found)
-    names = {"value": f"{swept}_{unit}", **TOLD, "status": "status"}
+    names = {"value": f"{swept}_{unit}", **SWEPT_FIGURES, "status": "status"}
     points = [{name: point[column] for name, column in names.items() if column in point} for point in table.points()]
     return {
         "swept": f"{swept}_{unit}",

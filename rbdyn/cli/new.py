@@ -63,11 +63,11 @@ def new(
         assert lubricant is not None and named is not None
         rollers = named.kind == "cylindrical_roller"
         refuse(_misfits(named, speed, preload, clearance))
-        told = re.search(r"\bC[234]\b", named.suffix)
-        wanted = clearance.upper() if clearance else told.group() if told else CLEARANCE
-        asked = new_scene.Asked(speed, load, preload, lubricant, temperature, wanted)
+        of_suffix = re.search(r"\bC[234]\b", named.suffix)
+        wanted = clearance.upper() if clearance else of_suffix.group() if of_suffix else CLEARANCE
+        point = new_scene.OperatingPoint(speed, load, preload, lubricant, temperature, wanted)
         fill = new_scene.roller_values if rollers else new_scene.ball_values
-        values = _read(lambda text: fill(named, _envelope(named, sizes), asked), "DESIGNATION", words, faults)
+        values = _read(lambda text: fill(named, _envelope(named, sizes), point), "DESIGNATION", words, faults)
         refuse(faults)
         template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
         text = filled(template.read_text(encoding="utf-8"), values)

@@ -39,7 +39,7 @@ BALL_SPEEDS = {"deep_groove_ball": 1.0e6, "angular_contact_ball": 6.3e5}
 USUAL_SPEED, USUAL_LOAD, USUAL_PRELOAD = 0.5, 0.1, 0.01
 
 
-class Asked(NamedTuple):
+class OperatingPoint(NamedTuple):
     """What the user asks for; None where it is left to this module."""
 
     speed: float | None
@@ -50,7 +50,7 @@ class Asked(NamedTuple):
     clearance: str
 
 
-def roller_values(named: Designation, sizes: Envelope, asked: Asked) -> dict[str, Any]:
+def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> dict[str, Any]:
     """Values of ``roller_scene.toml``. Raises ValueError for impossible dimensions or an unlisted clearance."""
     from rbdyn.life.roller_capacity import dynamic_capacity
 
@@ -59,43 +59,45 @@ def roller_values(named: Designation, sizes: Envelope, asked: Asked) -> dict[str
     by_iso = dynamic_capacity(inside.rollers, diameter * 1e-3, inside.effective_length * 1e-3, pitch * 1e-3)
     volume = math.pi / 4.0 * (pitch - diameter) ** 2 * sizes.outside
     ratings = "" if listed is None else f", C = {1e-3 * listed:g} kN, C0 = {1e-3 * (sizes.static_capacity or 0.0):g} kN"
-    common = _common(named, sizes, asked, REFERENCE_SPEED_FACTOR / pitch, listed or by_iso)
-    grease = asked.oil.grease
+    common = _common(named, sizes, point, REFERENCE_SPEED_FACTOR / pitch, listed or by_iso)
+    grease = point.oil.grease
     return {
         **inside._asdict(),
         **common,
-        **_clearance(sizes.bore, asked.clearance, named.kind),
+        **_clearance(sizes.bore, point.clearance, named.kind),
         **_cage(named, sizes.width, inside.roller_length, inside.rollers, diameter, pitch),
         "ratings": ratings,
         "ring_mass": 1e-9 * MATERIALS["bearing_steel"].density * volume,
         "listed_capacity": listed,
         "capacity_share": by_iso / (listed or by_iso),
         "oil_fraction": GREASE_FRACTION if grease else OIL_FRACTION,
-        "starvation": _grease_factor(sizes, common["speed"], asked) if grease else None,
+        "starvation": _grease_factor(sizes, common["speed"], point) if grease else None,
         "starvation_by": "estimated: SKF's starvation by grease at this speed, x 0.5 to 1.5",
     }
 
 
-def ball_values(named: Designation, sizes: Envelope, asked: Asked) -> dict[str, Any]:
+def ball_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> dict[str, Any]:
     """Values of ``ball_scene.toml``. Raises ValueError as ``roller_values``."""
     from rbdyn.life.ball_capacity import dynamic_capacity
 
     inside = ball_interior(sizes, named)
     deep, angle = inside.contact_angle is None, math.radians(inside.contact_angle or 0.0)
     capacity = dynamic_capacity(inside.balls, inside.ball_diameter * 1e-3, inside.pitch_diameter * 1e-3, angle)
-    common = _common(named, sizes, asked, BALL_SPEEDS[named.kind] / inside.pitch_diameter, capacity)
-    preload, why = asked.preload, ""
+    common = _common(named, sizes, point, BALL_SPEEDS[named.kind] / inside.pitch_diameter, capacity)
+    preload, why = point.preload, ""
     if preload is None and not deep:
         preload = float(f"{max(USUAL_PRELOAD * capacity, HALF_LOADED * common['load'] * math.tan(angle)):.2g}")
         why = "not told: loads half of the balls, 1.216 F_r tan(contact angle), or 0.01 C"
-    told = _clearance(sizes.bore, asked.clearance, named.kind) if deep else dict.fromkeys(CLEARANCE_VALUES)
-    return {**inside._asdict(), **common, **told, "preload": preload, "preload_by": why}
+    known = _clearance(sizes.bore, point.clearance, named.kind) if deep else dict.fromkeys(CLEARANCE_VALUES)
+    return {**inside._asdict(), **common, **known, "preload": preload, "preload_by": why}
 
 
-def _common(named: Designation, sizes: Envelope, asked: Asked, reference: float, capacity: float) -> dict[str, Any]:
+def _common(
+    named: Designation, sizes: Envelope, point: OperatingPoint, reference: float, capacity: float
+) -> dict[str, Any]:
     """What both kinds of bearing have: name, boundary dimensions, oil, speed [rpm] and load [N]."""
-    oil, base, grease = asked.oil
-    speed, load = asked.speed, asked.load
+    oil, base, grease = point.oil
+    speed, load = point.speed, point.load
     speed = float(f"{USUAL_SPEED * reference:.2g}") if speed is None else speed
     load = float(f"{USUAL_LOAD * capacity:.2g}") if load is None else load
     return {
@@ -108,12 +110,12 @@ def _common(named: Designation, sizes: Envelope, asked: Asked, reference: float,
         "oil_by": "base oil of the grease" if grease else "",
         "base_oil": (base or "mineral") if oil.startswith("ISO VG") else None,
         "base_oil_by": "" if base else "not told; or naphthenic, PAO, ester, PAG",
-        "temperature": asked.temperature,
+        "temperature": point.temperature,
         "speed": speed,
-        "speed_by": "not told, half of the " if asked.speed is None else "",
+        "speed_by": "not told, half of the " if point.speed is None else "",
         "reference": round(reference, -2),
         "load": load,
-        "load_by": "not told: " if asked.load is None else "",
+        "load_by": "not told: " if point.load is None else "",
         "load_share": load / capacity,
     }
 
@@ -151,12 +153,12 @@ def _cage(
     }
 
 
-def _grease_factor(sizes: Envelope, speed: float, asked: Asked) -> float:
+def _grease_factor(sizes: Envelope, speed: float, point: OperatingPoint) -> float:
     """exp(-K_rs nu n (d + D) sqrt(K_Z/(2 (D - d)))) of SKF's friction model, nu in mm^2/s, n in rpm."""
     from rbdyn.scene.lubricant import Lubricant
 
-    told = {"oil": asked.oil.oil, "base_oil": asked.oil.base_oil, "temperature_C": asked.temperature}
-    oil = Lubricant.model_validate(told).in_service
+    known = {"oil": point.oil.oil, "base_oil": point.oil.base_oil, "temperature_C": point.temperature}
+    oil = Lubricant.model_validate(known).in_service
     shape = (sizes.bore + sizes.outside) * math.sqrt(ROLLER_GEOMETRY / (2.0 * (sizes.outside - sizes.bore)))
     kinematic = 1e6 * oil.viscosity / oil.density
     return round(max(math.exp(-GREASE_STARVATION * kinematic * abs(speed) * shape), 0.01), 3)

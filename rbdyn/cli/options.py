@@ -31,8 +31,8 @@ def count_option(least: int, says: str) -> Any:
     return typer.Option(min=least, max=100_000, metavar="N", help=says)
 
 
-def _tell_version(asked: bool) -> None:
-    if asked:
+def _tell_version(wanted: bool) -> None:
+    if wanted:
         from importlib.metadata import version
 
         print(f"rbdyn {version('rbdyn')}")

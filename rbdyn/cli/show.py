@@ -29,7 +29,7 @@ PEAKS = 5
 
 
 @dataclass(frozen=True)
-class Asked:
+class Request:
     """What is to be shown: the result, its file, its scene, and how many turns of which replicate, from 0."""
 
     result: SimulationResult
@@ -50,7 +50,7 @@ class Asked:
         return [f"this motion may differ from that of the result, which was computed with other versions: {change}"]
 
 
-def ask(path: Path, turns: float | None, replicate: int) -> Asked:
+def request_of(path: Path, turns: float | None, replicate: int) -> Request:
     """Read a result.json, or that of a folder. Raises InputError with every fault."""
     if path.is_dir():
         path = path / "result.json"
@@ -69,19 +69,19 @@ def ask(path: Path, turns: float | None, replicate: int) -> Asked:
     if not 1 <= replicate <= numerics.replicates:
         faults.append(f"--replicate {replicate}: the result has {numerics.replicates}; count from 1 to that")
     refuse(faults)
-    return Asked(result, path, scene, chosen, replicate - 1)
+    return Request(result, path, scene, chosen, replicate - 1)
 
 
 def write(
-    asked: Asked, folder: Path, animate: bool, lyapunov: bool, progress: Callable[[int, int], None]
+    request: Request, folder: Path, animate: bool, lyapunov: bool, progress: Callable[[int, int], None]
 ) -> dict[str, Any]:
     """Compute the motion, write everything into ``folder``; returns the record that is also in orbit.json."""
     from rbdyn.dynamics.motion.history import history
 
-    motion = history(asked.scene, asked.turns, asked.replicate)
+    motion = history(request.scene, request.turns, request.replicate)
     tasks: dict[str, Callable[[Path], object]] = {
         "history.csv": partial(motion.table().to_csv, index=False, float_format="%.6g"),
-        **_pictures(asked, motion),
+        **_pictures(request, motion),
     }
     steps = 1 + len(tasks) + animate + lyapunov
     files: list[str] = []
@@ -92,23 +92,23 @@ def write(
     if animate:
         progress(len(tasks) + 1, steps)
         files += _animation(motion, folder)
-    record = {**_record(asked, motion), "notes": asked.notes, "versions": versions()}
+    record = {**_record(request, motion), "notes": request.notes, "versions": versions()}
     if lyapunov:
         from rbdyn.dynamics.motion.lyapunov import lyapunov_exponent
 
         progress(steps - 1, steps)
-        turns = min(LYAPUNOV_TURNS, asked.scene.numerics.turns)
-        record["lyapunov"] = lyapunov_exponent(asked.scene, turns, asked.replicate).as_dict()
+        turns = min(LYAPUNOV_TURNS, request.scene.numerics.turns)
+        record["lyapunov"] = lyapunov_exponent(request.scene, turns, request.replicate).as_dict()
     record["files"] = ["orbit.json", *files]
     write_json(folder / "orbit.json", record)
     progress(steps, steps)
     return record
 
 
-def _pictures(asked: Asked, motion: History) -> dict[str, Callable[[Path], object]]:
+def _pictures(request: Request, motion: History) -> dict[str, Callable[[Path], object]]:
     from rbdyn import plots
 
-    title = f"{asked.turns:g} counted shaft turns, replicate {asked.replicate + 1}"
+    title = f"{request.turns:g} counted shaft turns, replicate {request.replicate + 1}"
     return {
         "cage_orbit.png": partial(plots.cage_orbit, {title: motion}),
         "forces.png": partial(plots.forces, motion),
@@ -117,7 +117,7 @@ def _pictures(asked: Asked, motion: History) -> dict[str, Callable[[Path], objec
         "spectra.png": partial(plots.spectra, motion),
         "roller_loads.png": partial(plots.roller_loads, motion),
         "sliding.png": partial(plots.sliding, motion),
-        "power.png": partial(plots.power_by_loss, asked.result.power_terms),
+        "power.png": partial(plots.power_by_loss, request.result.power_terms),
     }
 
 
@@ -130,7 +130,7 @@ def _animation(motion: History, folder: Path) -> list[str]:
     return [film.name, "bearing.html"]
 
 
-def _record(asked: Asked, motion: History) -> dict[str, Any]:
+def _record(request: Request, motion: History) -> dict[str, Any]:
     import numpy as np
 
     from rbdyn.dynamics.motion import orbit
@@ -141,8 +141,8 @@ def _record(asked: Asked, motion: History) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "status": "ok",
-        "turns": asked.turns,
-        "replicate": asked.replicate + 1,
+        "turns": request.turns,
+        "replicate": request.replicate + 1,
         "seed": motion.scene.numerics.seed,
         "cage_speed_rpm": orbit.mean_cage_speed(motion) * 30.0 / np.pi,
         "whirl_ratio": orbit.whirl_ratio(motion),
@@ -182,7 +182,7 @@ def _life(motion: History) -> dict[str, float | str | None]:
     """Of the contact loads shown; None where nothing is loaded or nothing turns."""
     life = motion.life()
     return {
-        **life.told(*motion.scene.operation.speeds),
+        **life.as_record(*motion.scene.operation.speeds),
         "equivalent_load_N": life.equivalent_load,
         "method": "ISO/TS 16281 reference life from the contact loads over time",
     }

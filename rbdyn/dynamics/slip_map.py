@@ -21,7 +21,7 @@ from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.bias import companion_tolerance
-from rbdyn.dynamics.statistics.error_bars import quantities, settled
+from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError
 from rbdyn.records.kept import Kept, code_version, run_key
@@ -161,6 +161,6 @@ def _point(scene: Scene, runs: list[Replicate], companions: list[Replicate], cau
     speed, load = scene.operation.inner_speed_rpm, scene.operation.radial_load_N
     if cause is not None:
         return Point(speed, load, f"failed: {cause}", {}, None)
-    runs, companions, _ = settled(scene, runs, companions)
+    runs, companions, _ = after_transient(scene, runs, companions)
     found = quantities(scene, runs, companions)
     return Point(speed, load, "ok", {name: found[name] for name in FIGURES}, max(run.power_gap for run in runs))

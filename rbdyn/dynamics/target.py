@@ -24,7 +24,7 @@ from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.bias import bias_scale, companion_tolerance
-from rbdyn.dynamics.statistics.error_bars import FIGURES, settled
+from rbdyn.dynamics.statistics.error_bars import FIGURES, after_transient
 from rbdyn.dynamics.statistics.metrics import Replicate, mean_gap, work_done
 from rbdyn.faults import InputError
 from rbdyn.result import Quantity, SimulationResult
@@ -190,7 +190,7 @@ def measure(
         **work_done([run for runs in series for run in runs]),
         "turns": per_turn * len(LADDER),
     }
-    series = [settled(pilot, runs, [])[0] for runs in series]
+    series = [after_transient(pilot, runs, [])[0] for runs in series]
     scatter = {name: _scatter(name, series, scene) for name in AIMED}
     model = Model(
         scatter=scatter,

@@ -25,7 +25,7 @@ class Life:
     inner_capacity: float
     outer_capacity: float
 
-    def told(self, inner_speed: float, outer_speed: float) -> dict[str, float | None]:
+    def as_record(self, inner_speed: float, outer_speed: float) -> dict[str, float | None]:
         """What a report tells of it, hours at ring speeds [rad/s]; None where nothing is loaded, or nothing turns."""
         return {"L10_Mrev": finite(self.million_turns), "L10_h": finite(self.hours(inner_speed, outer_speed))}
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rbdyn.quasistatic.remarks import Rating
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
-from rbdyn.records.record import Record, spread, unsaid
+from rbdyn.records.record import Record, outside_json, spread
 from rbdyn.result import SavedRecord
 
 if TYPE_CHECKING:
@@ -76,8 +76,8 @@ class BallResult(SavedRecord, kw_only=True):
     versions: dict[str, str]
     scene: dict[str, Any]
     runout: dict[str, float] | None = None
-    rows: tuple[Solution, ...] = unsaid(default=())
-    ratings: tuple[Rating, ...] = unsaid(default=())
+    rows: tuple[Solution, ...] = outside_json(default=())
+    ratings: tuple[Rating, ...] = outside_json(default=())
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:

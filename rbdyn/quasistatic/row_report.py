@@ -87,4 +87,4 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
 def life_record(rating: Rating, solution: Solution) -> dict[str, Any]:
     """Reference life by ISO/TS 16281; None where nothing is loaded, in hours also where nothing turns."""
     life = solution_life(solution, rating.capacities, turning_rings(*rating.speeds))
-    return {**life.told(*rating.speeds), "method": "ISO/TS 16281"}
+    return {**life.as_record(*rating.speeds), "method": "ISO/TS 16281"}

@@ -1,6 +1,6 @@
 """Records: frozen dataclasses whose fields, listed once, are the keys of their JSON form, in this order.
 
-A field stands under its own name, unless it is ``keyed`` otherwise, ``spread`` or ``unsaid``; ``derived`` ones follow from
+A field stands under its own name, unless it is ``keyed`` otherwise, ``spread`` or ``outside_json``; ``derived`` ones follow from
 the others; one whose default is None is left out where it is None.
 """
 
@@ -36,12 +36,12 @@ def shown(heading: str, form: str = "", **options: Any) -> Any:
     return field(metadata={"column": (heading, form)}, **options)
 
 
-def unsaid(**options: Any) -> Any:
+def outside_json(**options: Any) -> Any:
     """A field of which JSON does not tell."""
     return field(metadata={"path": None}, **options)
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, unsaid))
+@dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, outside_json))
 @dataclass(frozen=True)
 class Record:
     """Base of all records, which makes frozen dataclasses of them; ``kw_only``: with named arguments only."""
@@ -57,7 +57,7 @@ class Record:
     def as_dict(self) -> dict[str, Any]:
         """JSON form, which shares nothing with the record: plain numbers, lists and tables, units in the names."""
         found: dict[str, Any] = {}
-        for one, path in told(self):
+        for one, path in json_fields(self):
             value = plain(getattr(self, one.name))
             if value is None and one.default is None:
                 continue
@@ -70,9 +70,9 @@ class Record:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Inverse of ``as_dict``. Raises KeyError or TypeError for anything else."""
-        taken = {key for _, path in told(cls) for key in path[:1]}
+        taken = {key for _, path in json_fields(cls) for key in path[:1]}
         found: dict[str, Any] = {}
-        for one, path in told(cls):
+        for one, path in json_fields(cls):
             if not one.init or (path and one.default is None and path[0] not in data):
                 continue
             value: Any = data if path else {key: value for key, value in data.items() if key not in taken}
@@ -83,7 +83,7 @@ class Record:
         return cls(**found)
 
 
-def told(record: Record | type[Record]) -> list[tuple[Field[Any], tuple[str, ...]]]:
+def json_fields(record: Record | type[Record]) -> list[tuple[Field[Any], tuple[str, ...]]]:
     """Fields of which JSON tells, each with its keys there from the outermost in; one that is spread has none of its own."""
     paths = ((one, one.metadata.get("path", (one.name,))) for one in fields(record))
     return [(one, path) for one, path in paths if path is not None]

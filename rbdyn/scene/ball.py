@@ -293,14 +293,14 @@ def _mounted_faults(scene: BallScene) -> list[str]:
     mounting = scene.mounting
     inner, outer = scene.outermost_rows
     found = mounting_faults(mounting, scene.bearing)
-    for key, told, row in (
+    for key, mounted, row in (
         ("bore_mm", mounting.bore_mm, inner),
         ("outside_diameter_mm", mounting.outside_diameter_mm, outer),
     ):
         drawn = getattr(row, key)
-        if drawn is not None and drawn != told:
+        if drawn is not None and drawn != mounted:
             found.append(
-                f"mounting.{key} = {told:g} and the bearing's {key} = {drawn:g} contradict each other: leave the bearing's out"
+                f"mounting.{key} = {mounted:g} and the bearing's {key} = {drawn:g} contradict each other: leave the bearing's out"
             )
     for row in {id(row): row for row in (inner, outer)}.values():
         if row.clearance_change_um != 0.0:

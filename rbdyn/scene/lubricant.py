@@ -129,19 +129,19 @@ class Lubricant(Strict):
             return ("lubricant: MIL-L-85734 is taken as MIL-L-23699, of whose class it is",)
         if self.oil in OILS:
             return ()
-        oil, told, graded = self.in_service, [], self.oil.startswith(GRADE)
+        oil, parts, graded = self.in_service, [], self.oil.startswith(GRADE)
         base = "ester" if self.oil in TURBINE_OILS else self.base_oil or "mineral"
         if self.viscosity_mPas is None:
             index = BASE_OILS[base].viscosity_index if self.viscosity_index is None else self.viscosity_index
             by_index = f" and its viscosity index of {index:g} (D2270)" if graded else ""
-            told.append(f"{1e3 * oil.viscosity:.3g} mPa s by ASTM D341{by_index}")
+            parts.append(f"{1e3 * oil.viscosity:.3g} mPa s by ASTM D341{by_index}")
         if self.pressure_coefficient_1_GPa is None:
             alpha = f"{1e9 * oil.pressure_coefficient:.3g} 1/GPa"
-            told.append(f"pressure coefficient {alpha} by Gold, within {100.0 * GOLD_SPREAD:g} %")
+            parts.append(f"pressure coefficient {alpha} by Gold, within {100.0 * GOLD_SPREAD:g} %")
         if graded and self.density_kg_m3 is None:
-            told.append(f"density {oil.density:.3g} kg/m^3 within 3 %")
-        told.append(f"conductivity {oil.conductivity:.2g} W/(m K) and traction by base oil")
-        return (f"lubricant: {self.oil} ({base}) is estimated at {self.temperature_C:g} C: {', '.join(told)}",)
+            parts.append(f"density {oil.density:.3g} kg/m^3 within 3 %")
+        parts.append(f"conductivity {oil.conductivity:.2g} W/(m K) and traction by base oil")
+        return (f"lubricant: {self.oil} ({base}) is estimated at {self.temperature_C:g} C: {', '.join(parts)}",)
 
     @property
     def in_service(self) -> Oil:

@@ -81,10 +81,10 @@ def test_keys_are_those_of_a_scene_that_gives_all():
     for table in tables:
         of_table = {name.split(".")[1].removesuffix("[]") for name in listed if name.startswith(f"{table}.")}
         # A scene saves what tells its oil only where it is given.
-        unsaid = (
+        outside_json = (
             {"base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3"} if table == "lubricant" else set()
         )
-        assert of_table - unsaid == set(scene[table]) - unsaid
+        assert of_table - outside_json == set(scene[table]) - outside_json
 
 
 def test_a_word_is_looked_up_in_names_and_descriptions():

@@ -8,7 +8,7 @@ import math
 import pytest
 from conftest import ROOT
 
-from rbdyn.cli.new_scene import Asked, ball_values, roller_values
+from rbdyn.cli.new_scene import OperatingPoint, ball_values, roller_values
 from rbdyn.life.roller_capacity import dynamic_capacity, static_capacity
 from rbdyn.properties.catalogue import (
     Envelope,
@@ -76,7 +76,7 @@ def test_literature_every_roller_bearing_of_the_catalogue(size):
     assert static == pytest.approx(sizes.static_capacity, rel=1e-3)
     # 1.00 of the classic ratings, 0.87 of those raised by 15 %; up to 1.12 where the catalogue lists one raceway only.
     assert 0.85 < dynamic / sizes.dynamic_capacity < 1.13
-    values = roller_values(named, sizes, Asked(None, None, None, oil_named("VG 68"), 70.0, "CN"))
+    values = roller_values(named, sizes, OperatingPoint(None, None, None, oil_named("VG 68"), 70.0, "CN"))
     assert Scene.from_dict(data_of("roller_scene.toml", values)).unit_notes == ()
 
 
@@ -142,7 +142,7 @@ def test_unit_every_listed_ball_bearing_gives_a_scene(series):
     """Unit: each bore of each series gives a scene that validates."""
     for code in ("00", "01", "02", "03", *(f"{number:02d}" for number in range(4, 21))):
         named = read_designation(series + code)
-        values = ball_values(named, envelope(named), Asked(3000.0, None, None, oil_named("VG 68"), 70.0, "CN"))
+        values = ball_values(named, envelope(named), OperatingPoint(3000.0, None, None, oil_named("VG 68"), 70.0, "CN"))
         Scene.from_dict(data_of("ball_scene.toml", values))
 
 

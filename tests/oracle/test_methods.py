@@ -17,7 +17,7 @@ from rbdyn.accuracy.rollers.equal_error import front, times_faster
 from rbdyn.accuracy.rollers.fixed_step import runge_kutta_4, steps_of, velocity_of
 from rbdyn.accuracy.rollers.methods import METHODS, OURS, RUNGE_KUTTA_4, SCIPY_RK45, VELOCITY_VERLET, Method, fixed_step
 from rbdyn.accuracy.rollers.right_hand_side import BudgetSpent, RightHandSide
-from rbdyn.accuracy.rollers.trajectory import Error, Reference, difference, end_of, reference, settled
+from rbdyn.accuracy.rollers.trajectory import Error, Reference, difference, end_of, reference, starts_after_transient
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.integrators.records import empty_tally
@@ -32,7 +32,7 @@ CVODE = [method for method in METHODS if method.name.startswith("CVODE")]
 @pytest.fixture(scope="module")
 def stretches(outer):
     """Two settled quarters of a turn."""
-    return settled(outer, 0.25, 2)
+    return starts_after_transient(outer, 0.25, 2)
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from scipy.stats import qmc
 from statsmodels.stats.outliers_influence import variance_inflation_factor
 
 from doe.designs import box_behnken, central_composite, full_factorial, latin_hypercube, sobol
-from doe.designs.evaluation import evaluate, untold_terms
+from doe.designs.evaluation import evaluate, lost_terms
 from doe.designs.model import model_matrix, model_terms
 from doe.designs.region import moment_matrix, sample
 from doe.response_surface import fit
@@ -116,7 +116,7 @@ def test_record_is_plain_json_without_residual_degrees_of_freedom_too():
 
 def test_terms_that_cannot_be_told_are_named():
     two_levels = full_factorial(3, levels=2, centre_replicates=2).coded
-    assert untold_terms(two_levels, QUADRATIC) == ["B^2", "C^2"]
+    assert lost_terms(two_levels, QUADRATIC) == ["B^2", "C^2"]
     with pytest.raises(ValueError, match=r"cannot tell B\^2, C\^2 from"):
         evaluate(two_levels, QUADRATIC)
 

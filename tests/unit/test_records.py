@@ -12,7 +12,7 @@ import pytest
 from doe.dimension_chain import read_chain, solve
 from rbdyn import BallResult, BallScene, InputError, SimulationResult, equilibrium
 from rbdyn.dynamics.slip_map import Point
-from rbdyn.records.record import Record, derived, keyed, spread, unsaid
+from rbdyn.records.record import Record, derived, keyed, outside_json, spread
 from rbdyn.result import Quantity
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -32,7 +32,7 @@ class Whole(Record, kw_only=True):
     twice: float = derived(lambda self: 2.0 * self.first, "sums", "twice")
     first: float = keyed("sums", "first")
     part: Part
-    hidden: Any = unsaid(default=None)
+    hidden: Any = outside_json(default=None)
     table: dict[str, Part] = spread()
     note: str | None = None
     values: Any = keyed("array")

@@ -117,7 +117,7 @@ def _yields(chains: Record) -> str:
     return " ".join(said)
 
 
-def asked(summary: Record, motion: Mapping[str, Any]) -> Section | None:
+def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Factors, responses and scene as they were given."""
     record = part(summary, "asked")
     if not record:

@@ -12,7 +12,7 @@ from doe.report.words import quantity
 
 CHAPTERS = (
     answer.answer,
-    answer.asked,
+    answer.settings,
     experiments.design,
     fits.surfaces,
     fits.diagnostics,
@@ -64,6 +64,6 @@ def _readable(block: Block, words: Mapping[str, str]) -> Block:
 
 def title(summary: Record) -> str:
     """What the study was called, or the name of its file in words."""
-    asked = summary.get("asked") or {}
-    stem = PurePath(asked.get("study_file") or "clearance study").stem.replace("_", " ")
-    return asked.get("title") or stem[:1].upper() + stem[1:]
+    settings = summary.get("asked") or {}
+    stem = PurePath(settings.get("study_file") or "clearance study").stem.replace("_", " ")
+    return settings.get("title") or stem[:1].upper() + stem[1:]

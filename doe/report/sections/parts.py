@@ -11,7 +11,7 @@ from doe.report.sections.record import Record, part
 from doe.report.words import dimension, label, shown
 
 # Keys of a chain that have a place of their own.
-TOLD = {"closing_link", "yield", "contributions", "allocation", "status"}
+SHOWN_KEYS = {"closing_link", "yield", "contributions", "allocation", "status"}
 WIDE, ROW, LEFT, COLOURS = 640.0, 34.0, 92.0, 8
 KINDS = (("variance_percent", "variance"), ("worst_case_percent", "worst case"))
 
@@ -57,7 +57,7 @@ def _chain(name: str, chain: Record) -> list[Block]:
         ]
         note = f"Share of assemblies within the limits, standard error {shown(error, 1)}." if error else ""
         blocks.append(Table("Yield", ("distribution of the parts", "yield"), rows, note))
-    rest = {key: value for key, value in chain.items() if key not in TOLD}
+    rest = {key: value for key, value in chain.items() if key not in SHOWN_KEYS}
     blocks.append(record_table("Further figures of the chain", rest, folded=True))
     return blocks
 

@@ -59,18 +59,18 @@ class Factor:
 
 def factors(summary: Record) -> list[Factor]:
     """Factors in the study's order."""
-    asked = part(summary, "asked", "factors")
-    if asked:
-        return [Factor(**{key: each.get(key) for key in Factor.__dataclass_fields__}) for each in asked]
+    given = part(summary, "asked", "factors")
+    if given:
+        return [Factor(**{key: each.get(key) for key in Factor.__dataclass_fields__}) for each in given]
     names = part(summary, "design", "factors") or list(part(summary, "pick") or {})
     return [Factor(name, "ABCDEFGH"[place]) for place, name in enumerate(names)]
 
 
 def responses(summary: Record) -> list[dict[str, Any]]:
     """Responses in the study's order: name, goal and what else was asked of them."""
-    asked = part(summary, "asked", "responses")
-    if asked:
-        return [dict(each) for each in asked]
+    given = part(summary, "asked", "responses")
+    if given:
+        return [dict(each) for each in given]
     return [{"name": name} for name in part(summary, "design", "responses") or part(summary, "gains") or []]
 
 

@@ -82,9 +82,9 @@ def _print_evaluation(found: dict[str, Any], verbose: bool) -> None:
         ["largest leverage", f"{max(found['leverage']):.3f}"],
     ]
     if found["blocks"] is not None:
-        told = "orthogonal" if found["blocks"]["orthogonal"] else "not orthogonal"
+        relation = "orthogonal" if found["blocks"]["orthogonal"] else "not orthogonal"
         cosine = found["blocks"]["largest_cosine"]
-        rows.append(["blocks", f"{told} to the terms (largest cosine {cosine:.3f})"])
+        rows.append(["blocks", f"{relation} to the terms (largest cosine {cosine:.3f})"])
     title = f"{found['model']} model, {len(found['terms'])} terms, over the {region['shape']} of {size} (coded)"
     print_table(title, ["", "value"], rows)
     terms = [

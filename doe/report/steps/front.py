@@ -72,7 +72,7 @@ def predicted_record(study: Study, surfaces: list[Surface], point: Array) -> dic
     return point_record(study, point, values, half_widths(surfaces, errors))
 
 
-def asked_point_record(study: Study, surfaces: list[Surface], front: ParetoFront, point: Array) -> dict[str, Any]:
+def given_point_record(study: Study, surfaces: list[Surface], front: ParetoFront, point: Array) -> dict[str, Any]:
     """A point that was asked for: its gains over the baseline, and what the front makes of it."""
     gains = predicted_gains(study, surfaces, point)
     coded = study.coded(point)
@@ -127,11 +127,11 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
     if "tolerance_aware" in record:
         print_tolerance_aware(record["tolerance_aware"])
     if "point" in record:
-        asked = record["point"]
-        _print_gains("the point asked for", asked["predicted_gains"])
-        for sentence in [*asked["sentences"], asked["statement"]]:
+        point = record["point"]
+        _print_gains("the point asked for", point["predicted_gains"])
+        for sentence in [*point["sentences"], point["statement"]]:
             print(sentence)
-        print(f"{asked['dominated_by']} of the {len(record['front'])} points of the front dominate it")
+        print(f"{point['dominated_by']} of the {len(record['front'])} points of the front dominate it")
 
 
 def _print_convergence(record: dict[str, Any]) -> None:

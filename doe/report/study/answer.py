@@ -75,8 +75,8 @@ def _print_limits(outcome: StudyResult) -> None:
     rows = []
     for limit in outcome.limits:
         base = next(each for each in limits_of(outcome.study, outcome.baseline) if each.response == limit.response)
-        told = [(f"{each.value:.5g} ± {each.error:.2g}", each.verdict) for each in (base, limit)]
-        rows.append((f"{limit.response} {limit.sense} {limit.bound:g}", *told[0], *told[1]))
+        values = [(f"{each.value:.5g} ± {each.error:.2g}", each.verdict) for each in (base, limit)]
+        rows.append((f"{limit.response} {limit.sense} {limit.bound:g}", *values[0], *values[1]))
     if rows:
         header = ("", "baseline", "verdict", "pick", "verdict")
         print_table("limits judged by simulation", header, rows)

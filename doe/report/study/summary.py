@@ -31,7 +31,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "limits_sentence": outcome.limits_sentence,
         "tried": outcome.tried,
         "edge": outcome.edge.as_dict(),
-        "asked": asked_record(study),
+        "asked": settings_record(study),
         "design": design_record(outcome),
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),
@@ -69,7 +69,7 @@ def _chosen_record(pick: DirectPick) -> dict[str, Any]:
     }
 
 
-def asked_record(study: Study) -> dict[str, Any]:
+def settings_record(study: Study) -> dict[str, Any]:
     """Scene, factors with their ranges, responses with their goals."""
     reach, known = region_of(study), known_tolerances(study)
     low, high = (study.actual(side * reach) for side in (-1.0, 1.0))

@@ -21,7 +21,7 @@ from rbdyn.accuracy.rollers.trajectory import (
     agreement_table,
     difference,
     reference,
-    settled,
+    starts_after_transient,
     worst,
 )
 from rbdyn.dynamics.run import prepare
@@ -77,7 +77,7 @@ def study(
 
 def trajectories(scene: Scene, progress: Reporter | None, turns: float, methods: Sequence[Method]) -> Report:
     """Error and time of every method at every setting. Raises as ``study``."""
-    stretches = settled(scene, turns)
+    stretches = starts_after_transient(scene, turns)
     compile_s = compiling(stretches[0], methods)
     counted = Progress(progress, STARTS + sum(len(method.settings) for method in methods))
     known = reference(stretches, counted.step)

@@ -18,7 +18,7 @@ from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
 from rbdyn.faults import InputError, set_key
-from rbdyn.records.record import Record, derived, unsaid
+from rbdyn.records.record import Record, derived, outside_json
 from rbdyn.scene import Scene
 
 FORMAT = "rbdyn.options/1"
@@ -80,8 +80,8 @@ class OptionCost(Record):
         spread=True,
     )
     modules: tuple[str, ...]
-    holds: Footprint = unsaid()
-    plain_holds: Footprint = unsaid()
+    holds: Footprint = outside_json()
+    plain_holds: Footprint = outside_json()
 
 
 def _added(size: str) -> Callable[[OptionCost], str]:

@@ -51,7 +51,7 @@ class Reference(Record):
         return RESOLVED * next(e.position_m for span, e in self.agreement.items() if span >= turns)
 
 
-def settled(scene: Scene, turns: float = DEFAULT_TURNS, starts: int = STARTS) -> list[Stretch]:
+def starts_after_transient(scene: Scene, turns: float = DEFAULT_TURNS, starts: int = STARTS) -> list[Stretch]:
     """Stretches of so many shaft turns, each from where a replicate of its own has settled.
 
     Raises InputError for turns outside (0, 1], RunError.

@@ -16,7 +16,7 @@ from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import absolute_tolerance
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_half_width
-from rbdyn.records.record import Record, derived, keyed, unsaid
+from rbdyn.records.record import Record, derived, keyed, outside_json
 from rbdyn.scene import Scene
 
 Array = NDArray[np.float64]
@@ -48,8 +48,8 @@ class LyapunovExponent(Record):
     separation: float
     rtol: float
     cost: dict[str, float]
-    turn_s: float = unsaid()
-    blocks: Array = unsaid()
+    turn_s: float = outside_json()
+    blocks: Array = outside_json()
 
 
 def lyapunov_exponent(

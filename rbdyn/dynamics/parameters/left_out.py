@@ -14,7 +14,7 @@ from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
 
 # Share of the power loss from which a result speaks of power that was left out.
-TOLD_SHARE = 0.03
+NOTED_SHARE = 0.03
 # Bronze and steel cages have 100 GPa and more, polymers and laminates up to 20.
 SOFT_CAGE = 20e9  # [Pa]
 # An oil jet carried 1.4 kW off a 35 mm ball bearing at 72 000 rpm with seats, pi B (D + d), of 4270 mm^2 (NASA TP-2275) [W/m^2];
@@ -153,7 +153,7 @@ def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
     for item in LEFT_OUT:
         if item.power is not None:
             power = item.power(scene)
-            if power > TOLD_SHARE * power_loss > 0.0:
+            if power > NOTED_SHARE * power_loss > 0.0:
                 notes.append(
                     f"left out: {item.name}, by an estimate {power:.2g} W ({100.0 * power / power_loss:.2g} % of the power "
                     f"loss); {item.changes}"
@@ -176,11 +176,11 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
     missed = sum(load < least for least in rules.values())
     if not missed:
         return ()
-    told = ", ".join(
+    listed = ", ".join(
         f"{1e-3 * least:.2g} kN ({rule})" for rule, least in sorted(rules.items(), key=lambda item: item[1])
     )
     return (
-        f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {told}; no rule is safe, "
+        f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {listed}; no rule is safe, "
         "cage_slip tells",
     )
 

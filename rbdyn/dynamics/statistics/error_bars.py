@@ -41,7 +41,7 @@ LARGE, NOTICEABLE = 0.05, 0.01
 RULES = 3.0
 
 
-def settled(
+def after_transient(
     scene: Scene, runs: Sequence[Replicate], companions: Sequence[Replicate]
 ) -> tuple[list[Replicate], list[Replicate], Start]:
     """Replicates and companions counted from where the scene asks, and where that is."""
@@ -77,10 +77,10 @@ def error_notes(scene: Scene, figures: dict[str, Quantity], fault: str | None) -
     notes = [] if fault is None else [f"numerical error: not estimated; {fault}"]
     few = {name: figures[name].effective_samples for name in JUDGED if not _enough(figures[name])}
     if few:
-        told = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
+        listed = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
         notes.append(
             f"statistical error: uncertain where fewer than {FEW_SAMPLES:.0f} effective samples stand behind it "
-            f"({told}); raise numerics.turns or numerics.replicates"
+            f"({listed}); raise numerics.turns or numerics.replicates"
         )
     return notes + [note for name in JUDGED if (note := _numerical_note(scene, JUDGED[name], figures[name]))]
 

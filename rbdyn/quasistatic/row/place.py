@@ -92,7 +92,7 @@ def wedge(row: Any, j: int, a_axial: float, a_radial: float) -> tuple[float, flo
 
 
 @kernel
-def settle(row: Any, j: int, a_axial: float, a_radial: float, settled: float, balls: Any) -> None:
+def settle(row: Any, j: int, a_axial: float, a_radial: float, share: float, balls: Any) -> None:
     """Put ball j where its energy is least for a fixed ring, orbiting with the cage: guarded Newton in two unknowns.
 
     Until no more than the share ``settled`` of its contact loads is out of balance.
@@ -115,7 +115,7 @@ def settle(row: Any, j: int, a_axial: float, a_radial: float, settled: float, ba
     damping = 0.0
     for _ in range(SETTLING_STEPS):
         lacking = abs(fa) + abs(fr)
-        if lacking < settled * held:
+        if lacking < share * held:
             break
         one = 1.0 / ((aa + damping) * (rr + damping) - ar * ar)
         da = ((rr + damping) * fa - ar * fr) * one

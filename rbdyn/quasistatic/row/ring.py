@@ -22,7 +22,7 @@ AXIAL, RADIAL, INNER_DEPTH, OUTER_DEPTH, BALL = range(5)
 ENERGY, UNBALANCE, WORST, LARGEST, TAKEN = range(5)
 SUMS = TAKEN + RING
 # Residual over the contact loads of a ball that counts as settled.
-SETTLED = 1e-11
+BALANCE = 1e-11
 # A Newton step leaves at least this share of a depth.
 LEFT = 0.2
 
@@ -36,7 +36,7 @@ def measure(row: Any, j: int, a_axial: float, a_radial: float, balls: Any) -> No
 
 
 @kernel
-def astray(convex: bool, forces: Any) -> bool:
+def diverging(convex: bool, forces: Any) -> bool:
     """Whether a ball is so far from balance that it is better settled by itself: Newton's step would tell nothing."""
     (ra, rr), (fa, fr, _) = forces[0], forces[1]
     lacking, held = max(abs(ra), abs(rr)), max(abs(fa), abs(fr))
@@ -185,14 +185,14 @@ def assemble(task: Any, strength: float, mixed: bool, at: Any) -> None:
             sums[ENERGY] += row.rest_energy
             continue
         if work[j, LOADED] == 0.0:
-            settle(row, j, a_axial, a_radial, SETTLED, balls)
+            settle(row, j, a_axial, a_radial, BALANCE, balls)
             work[j, LOADED] = 1.0
             measure(row, j, a_axial, a_radial, balls)
         elif not mixed:
             measure(row, j, a_axial, a_radial, balls)
         forces = forces_on(control, strength, row, j, a_axial, a_radial, balls)
-        if astray(strength == 0.0, forces):
-            settle(row, j, a_axial, a_radial, SETTLED, balls)
+        if diverging(strength == 0.0, forces):
+            settle(row, j, a_axial, a_radial, BALANCE, balls)
             measure(row, j, a_axial, a_radial, balls)
             forces = forces_on(control, strength, row, j, a_axial, a_radial, balls)
         springs = spring(balls[j, INNER_DEPTH], row.inner_stiffness), spring(balls[j, OUTER_DEPTH], row.outer_stiffness)

@@ -10,7 +10,7 @@ from rbdyn.quasistatic.row.ring import LOADED, RING, measure
 FIRST_STEP = 1e-6  # [m]
 LONGEST_STEP = 1.0  # [m]
 # Residual over the contact loads of a ball that is good enough to start from.
-SETTLED = 1e-2
+START_BALANCE = 1e-2
 # The start need only be of the right size.
 START_ERROR = 0.1
 
@@ -75,5 +75,5 @@ def settle_all(row: Any, at: Any) -> None:
     at.work[:, LOADED] = 1.0
     for j in range(row.cosine.size):
         a_axial, a_radial = groove_centre(row, q, j)
-        settle(row, j, a_axial, a_radial, SETTLED, balls)
+        settle(row, j, a_axial, a_radial, START_BALANCE, balls)
         measure(row, j, a_axial, a_radial, balls)
