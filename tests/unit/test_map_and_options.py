@@ -152,8 +152,10 @@ def test_command_line_killed_map_resumes(command, tmp_path):
     assert command(*arguments, "--out", out).returncode == 0
     one, two = (json.loads((folder / "map.json").read_text()) for folder in (tmp_path / "whole", out))
     assert one["points"] == two["points"] and lines(out / POINTS) == 6
+    # Long enough to be under way when the signal comes, however fast the machine.
+    long = [{"60": "20000"}.get(each, each) for each in arguments]
     stopped = subprocess.Popen(
-        [sys.executable, "-m", "rbdyn", *arguments, "--json"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        [sys.executable, "-m", "rbdyn", *long, "--json"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
     time.sleep(5.0)
