@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import EXAMPLE, SHORT
 
-from rbdyn.cli.show import ask
+from rbdyn.cli.show import request_of
 from rbdyn.faults import InputError
 
 QUICK = [part for assignment in SHORT for part in ("--set", assignment)]
@@ -146,20 +146,20 @@ def test_show_bad_input(command, saved, tmp_path):
         assert (done.returncode, done.stdout) == (2, "")
         assert words in done.stderr and len(done.stderr.splitlines()) == 1
     with pytest.raises(InputError) as refused:
-        ask(saved, 5.0, 3)
+        request_of(saved, 5.0, 3)
     turns, replicate = refused.value.faults
     assert "--turns 5: the result counted 4 turns" in turns
     assert "--replicate 3: the result has 2" in replicate
     with pytest.raises(InputError, match=r"--turns 0\.01:"):
-        ask(saved, 0.01, 1)
+        request_of(saved, 0.01, 1)
     assert json.loads(command("show", tmp_path, "--json").stdout)["status"] == "refused"
 
 
 def test_show_other_versions(saved, tmp_path):
     """Show: a result of other versions is shown with a warning."""
     record = json.loads((saved / "result.json").read_text())
-    assert ask(saved, None, 1).notes == []
+    assert request_of(saved, None, 1).notes == []
     record["versions"]["numba"] = "0.1"
     (tmp_path / "result.json").write_text(json.dumps(record))
-    (note,) = ask(tmp_path, None, 1).notes
+    (note,) = request_of(tmp_path, None, 1).notes
     assert "numba 0.1 then and" in note
