@@ -23,6 +23,7 @@ def study(*arguments):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("arguments", "cage_rpm"), [(NU_210, 2532.0), (NU_1010, 3981.0)], ids=["NU 210", "NU 1010"])
 def test_command_line_from_a_designation_to_a_run(command, tmp_path, arguments, cage_rpm):
     """Command line: a designation, an oil and an operating point give a scene that runs, its cage near the epicyclic speed."""
