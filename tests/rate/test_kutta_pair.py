@@ -6,7 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from test_runge_kutta import one_step, orders_of, run_of, slope_of, vibrating
+from smooth_runs import run_of, vibrating
+from test_runge_kutta import one_step, orders_of, slope_of
 
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import SHAFT
@@ -82,14 +83,13 @@ def test_rate_order_four(make_scene, conservative):
     """Rate: the error over a smooth stretch falls with the fourth power of the step; a fit between 3.6 and 6: in the frame of the
     rollers the fourth-order term may be small beside the fifth.
     """
-    scene = conservative.model_copy(update={"numerics": make_scene(RK43).numerics})
-    for order in orders_of(scene):
+    for order in orders_of(conservative, "rk43"):
         assert 3.6 < order < 6.0
 
 
 def test_rate_dense_output(conservative, evaluate):
     """Rate: inside a step the cubic has local order four; values at its ends are those of the step (round-off)."""
-    run = vibrating(conservative)
+    run = vibrating(conservative, "rk43")
     y, steps = run.carry.y.copy(), np.array([4e-6, 2.8e-6, 2e-6, 1.4e-6])
 
     def inside(h, theta):
@@ -113,7 +113,7 @@ def test_invariant_power_balance(make_scene):
     """Invariant: shaft work = losses + change of energy, to 0.1 % at the default tolerance, shrinking with it."""
     scene, gaps = make_scene(RK43), []
     for rtol in scene.numerics.rtol * np.array([10.0, 1.0, 0.1, 0.01]):
-        run = run_of(scene, rtol)
+        run = run_of(scene, rtol, "rk43")
         start = sum(mechanical_energy(run.bearing, run.carry.y))
         run.to(4.0)
         change = sum(mechanical_energy(run.bearing, run.carry.y)) - start
@@ -147,7 +147,7 @@ def test_invariant_workers_change_nothing(make_scene):
 
 def test_unit_peak_is_never_below_a_step_end(make_scene):
     """Unit: looking inside a step spoils none of its rows, and the kept largest force is at least that of its end."""
-    run, plain = run_of(make_scene(RK43), 1e-3), run_of(make_scene(RK43), 1e-3)
+    run, plain = run_of(make_scene(RK43), 1e-3, "rk43"), run_of(make_scene(RK43), 1e-3, "rk43")
     plain.tally.largest[:] = np.inf
     for end in np.linspace(0.01, 1.0, 100):
         run.to(float(end))
@@ -160,4 +160,4 @@ def test_unit_peak_is_never_below_a_step_end(make_scene):
 def test_unit_step_budget_names_the_other_method(make_scene):
     """Unit: a used-up budget says that another method may do."""
     with pytest.raises(RunError, match=r"take numerics\.method = auto"):
-        run_of(make_scene(RK43, "numerics.step_budget_per_turn=100"), 1e-4).to(6.0)
+        run_of(make_scene(RK43, "numerics.step_budget_per_turn=100"), 1e-4, "rk43").to(6.0)

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from smooth_runs import fixed_step, run_of, vibrating
 
 from rbdyn.compiled.kernel import entry
 from rbdyn.dynamics.ensemble import Stop
@@ -20,23 +21,15 @@ from rbdyn.dynamics.integrators.arrow_matrix import arrow_matrix, factor, shifte
 from rbdyn.dynamics.integrators.implicit import differences, rodas
 from rbdyn.dynamics.integrators.jacobian import jacobian
 from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
-from rbdyn.dynamics.integrators.runge_kutta import DormandPrince
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of, scales, slip_scale
 from rbdyn.dynamics.recording import run_replicate
-from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 
 STEEP = ("traction.constants=[-0.05,5.0,100.0,0.05]",)
 # A slope of 40 s/m, where the implicit method is the cheaper one.
 STEEPER = ("traction.constants=[-0.05,20.0,400.0,0.05]",)
-
-
-def run_of(scene, rtol, method, replicate=0):
-    numerics = scene.numerics.model_copy(update={"method": method})
-    scene = scene.model_copy(update={"numerics": numerics})
-    return Run(scene, roller_bearing(scene), replicate, rtol, Stop())
 
 
 def dense(matrix):
@@ -165,28 +158,12 @@ def test_rate_dense_output_and_step():
     assert np.polyfit(np.log(steps), np.log(inside), 1)[0] > 3.6
 
 
-def vibrating(scene):
-    """A start whose loaded contacts vibrate but neither open nor close within 1e-4 s: a smooth problem."""
-    run = run_of(scene, 1e-6, "rosenbrock")
-    run.carry.y[58:60] += 0.05
-    return run
-
-
-def fixed_step(scene, step, duration):
-    """State after ``duration`` in steps of exactly ``step``: no error is ever too large."""
-    run = vibrating(scene)
-    control = run.control._replace(inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step)
-    run.carry.clock[at.STEP] = step
-    assert advance(run.bearing, control, run.carry, run.tally, duration, 1.0) == at.FINISHED
-    return run.carry.y
-
-
 def test_rate_order_four(outer):
     """Rate: the error over a smooth stretch falls with the fourth power of the step (3.6 leaves room for the fit)."""
     duration = 3.2e-5
     steps = duration / np.array([16, 24, 32, 48])
-    reference = fixed_step(outer, duration / 512, duration)
-    errors = np.array([np.abs(fixed_step(outer, h, duration) - reference)[20:40].max() for h in steps])
+    reference = fixed_step(outer, duration / 512, duration, "rosenbrock")
+    errors = np.array([np.abs(fixed_step(outer, h, duration, "rosenbrock") - reference)[20:40].max() for h in steps])
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] > 3.6
 
 
@@ -195,13 +172,12 @@ def test_invariant_stable_where_explicit_steps_are_not(outer):
     step = 2.4e-5
     still = run_of(outer, 1e-6, "rosenbrock")
     still.to(0.05)
-    implicit = fixed_step(outer, step, 0.05 * outer.turn_s)
+    implicit = fixed_step(outer, step, 0.05 * outer.turn_s, "rosenbrock")
     assert np.abs(implicit - still.carry.y)[20:40].max() < 0.1
-    run = vibrating(outer)
+    run = vibrating(outer, "rk45")
     control = run.control._replace(inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step)
     run.carry.clock[at.STEP] = step
-    carry = run.carry._replace(method=DormandPrince())
-    advance(run.bearing, control, carry, run.tally, 0.05 * outer.turn_s, 1.0)
+    advance(run.bearing, control, run.carry, run.tally, 0.05 * outer.turn_s, 1.0)
     explicit = np.abs(run.carry.y - still.carry.y)[20:40].max()
     assert not explicit < 10.0
 

@@ -8,43 +8,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from smooth_runs import fixed_step, run_of, vibrating
 
-from rbdyn.dynamics.ensemble import CancelledError, Stop
+from rbdyn.dynamics.ensemble import CancelledError
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import POWERS, SHAFT
 from rbdyn.dynamics.integrators import dormand_prince as dp
 from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators.advance import advance, refine_peak
 from rbdyn.dynamics.integrators.method_laws import interpolate
-from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import scales
-from rbdyn.dynamics.run import Run
 from rbdyn.faults import RunError
 
 PAIR = dp.DormandPrince()
-
-
-def run_of(scene, rtol, replicate=0):
-    numerics = scene.numerics.model_copy(update={"method": "rk45"})
-    scene = scene.model_copy(update={"numerics": numerics})
-    return Run(scene, roller_bearing(scene), replicate, rtol, Stop())
-
-
-def vibrating(scene):
-    """A start whose loaded contacts vibrate but neither open nor close within 1e-4 s: a smooth problem."""
-    run = run_of(scene, 1e-6)
-    run.carry.y[58:60] += 0.05
-    return run
-
-
-def fixed_step(scene, step, duration):
-    """State after ``duration`` in steps of exactly ``step``: no error is ever too large."""
-    run = vibrating(scene)
-    control = run.control._replace(inverse_tolerance=np.zeros_like(run.control.inverse_tolerance), largest_step=step)
-    run.carry.clock[at.STEP] = step
-    assert advance(run.bearing, control, run.carry, run.tally, duration, 1.0) == at.FINISHED
-    assert run.carry.counts[at.ACCEPTED] == pytest.approx(duration / step, abs=1.1)
-    return run.carry.y
 
 
 def slope_of(steps, errors):
@@ -56,15 +32,15 @@ def test_rate_order_five(conservative):
 
     A fit between 4.6 and 6.2: in the frame of the rollers the fifth-order term is small beside the sixth.
     """
-    for order in orders_of(conservative):
+    for order in orders_of(conservative, "rk45"):
         assert 4.6 < order < 6.2
 
 
-def orders_of(scene):
+def orders_of(scene, method):
     """Orders in which the errors of positions and of velocities fall with the step over a smooth stretch."""
     duration, steps = 3.2e-5, np.array([3.2e-5 / n for n in (32, 48, 64, 96)])
-    reference = fixed_step(scene, duration / 1024, duration)
-    errors = np.array([np.abs(fixed_step(scene, h, duration) - reference) for h in steps])
+    reference = fixed_step(scene, duration / 1024, duration, method)
+    errors = np.array([np.abs(fixed_step(scene, h, duration, method) - reference) for h in steps])
     return [slope_of(steps, errors[:, kind].max(axis=1)) for kind in (slice(0, 20), slice(20, 40))]
 
 
@@ -80,7 +56,7 @@ def one_step(bearing, y, h, evaluate, table=dp.A):
 
 def test_rate_dense_output(conservative, evaluate):
     """Rate: inside a step the continuous extension has local order five, that is fourth-order accuracy."""
-    run = vibrating(conservative)
+    run = vibrating(conservative, "rk45")
     bearing, y = run.bearing, run.carry.y.copy()
     steps = np.array([4e-6, 2.8e-6, 2e-6, 1.4e-6])
     for theta in (0.25, 0.6, 0.9):
@@ -148,7 +124,7 @@ def test_oracle_quarter_turn(outer, evaluate):
 
     Longer trajectories part by chaos; here errors grow by about e^1.
     """
-    run = run_of(outer, 1e-9)
+    run = run_of(outer, 1e-9, "rk45")
     bearing, start = run.bearing, run.carry.y.copy()
     duration, n = 0.25 * outer.turn_s, start.size
     tolerance = 1e-11 / (run.control.inverse_tolerance * 1e-9)
@@ -180,7 +156,7 @@ def test_invariant_energy_without_friction(conservative, replicate):
     """
     drift = {}
     for rtol in (1e-5, 1e-6, 1e-7):
-        run = run_of(conservative, rtol, replicate)
+        run = run_of(conservative, rtol, "rk45", replicate)
         kinetic, elastic, potential = mechanical_energy(run.bearing, run.carry.y)
         start, worst = kinetic + elastic + potential, 0.0
         for turn in range(10):
@@ -199,7 +175,7 @@ def test_invariant_power_balance(fixture, request):
     scene = request.getfixturevalue(fixture)
     gaps: list[float] = []
     for rtol in scene.numerics.rtol * np.array([10.0, 1.0, 0.1, 0.01]):
-        run = run_of(scene, rtol)
+        run = run_of(scene, rtol, "rk45")
         start = sum(mechanical_energy(run.bearing, run.carry.y))
         run.to(4.0)
         change = sum(mechanical_energy(run.bearing, run.carry.y)) - start
@@ -211,7 +187,7 @@ def test_invariant_power_balance(fixture, request):
 
 def test_unit_chunks_change_nothing(outer):
     """Unit: stopping at chunk ends gives the same samples, and the same figures to the tolerance of the steps."""
-    whole, parts = run_of(outer, 1e-8), run_of(outer, 1e-8)
+    whole, parts = run_of(outer, 1e-8, "rk45"), run_of(outer, 1e-8, "rk45")
     whole.to(0.5)
     for end in np.linspace(0.05, 0.5, 10):
         parts.to(float(end))
@@ -226,7 +202,7 @@ def test_unit_chunks_change_nothing(outer):
 
 def test_unit_peak_is_never_below_a_step_end(outer):
     """Unit: the kept largest force is at least that of every step end, and its time lies inside the run."""
-    run = run_of(outer, 1e-4)
+    run = run_of(outer, 1e-4, "rk45")
     seen = 0.0
     for end in np.linspace(0.001, 1.0, 1000):
         run.to(float(end))
@@ -239,7 +215,7 @@ def test_unit_peak_is_never_below_a_step_end(outer):
 
 def test_oracle_peak_is_the_true_peak(outer):
     """Oracle: up to the first impacts, the peak of long steps is that of steps a hundred times shorter, to 0.5 %."""
-    coarse, fine = run_of(outer, 1e-4), run_of(outer, 1e-10)
+    coarse, fine = run_of(outer, 1e-4, "rk45"), run_of(outer, 1e-10, "rk45")
     for run in (coarse, fine):
         run.to(0.5)
     assert fine.tally.largest[0] > 1.0
@@ -253,7 +229,7 @@ def test_oracle_peak_inside_one_step(conservative, evaluate):
 
     Points stand a ninth of a step apart, so the best of them may miss 1 % of the peak; the parabola errs by 0.03 %.
     """
-    run = run_of(conservative, 1e-4)
+    run = run_of(conservative, 1e-4, "rk45")
     carry, h, speed = run.carry, 2e-5, 1.0
     y = carry.y
     # The whole bearing turned back until the first pocket stands at angle 0.
@@ -280,7 +256,7 @@ def test_oracle_peak_inside_one_step(conservative, evaluate):
 
 def test_unit_nan_is_refused(outer):
     """Unit: a state that is not finite stops the run and names what it touches."""
-    run = run_of(outer, 1e-4)
+    run = run_of(outer, 1e-4, "rk45")
     run.carry.y[4] = np.nan
     with pytest.raises(RunError, match=r"replicate 1 \(seed 1\) stopped at t = 0 s.*roller 5 .* is not finite"):
         run.to(1.0)
@@ -288,7 +264,7 @@ def test_unit_nan_is_refused(outer):
 
 def test_unit_overflowing_trial_step_is_rejected(outer):
     """Unit: a trial step into infinity is shrunk, never accepted; the budget then ends the run with a sentence."""
-    run = run_of(outer, 1e-4)
+    run = run_of(outer, 1e-4, "rk45")
     run.control = run.control._replace(step_budget=1000)
     run.carry.clock[at.STEP] = 1e200
     status = advance(run.bearing, run.control, run.carry, run.tally, 1e201, 1.0)
@@ -300,7 +276,7 @@ def test_unit_overflowing_trial_step_is_rejected(outer):
 
 def test_unit_step_underflow_names_component_and_mend(outer):
     """Unit: a step that may not shrink ends the run; the sentence names place, component and remedy."""
-    run = run_of(outer, 1e-4)
+    run = run_of(outer, 1e-4, "rk45")
     run.control = run.control._replace(smallest_step=1e-4)
     run.carry.clock[at.STEP] = 1e-3
     with pytest.raises(RunError, match=r"the step fell below 0.0001 s because of .*(roller|cage|ring).*numerics\.rtol"):
@@ -310,7 +286,7 @@ def test_unit_step_underflow_names_component_and_mend(outer):
 def test_unit_step_budget_names_time_and_mend(make_scene):
     """Unit: a used-up step budget says when, how small the steps were, and what to change."""
     scene = make_scene("numerics.step_budget_per_turn=100")
-    run = run_of(scene, 1e-4)
+    run = run_of(scene, 1e-4, "rk45")
     with pytest.raises(RunError) as caught:
         run.to(6.0)
     sentence = str(caught.value)
@@ -320,7 +296,7 @@ def test_unit_step_budget_names_time_and_mend(make_scene):
 
 def test_unit_stop_is_heard(outer):
     """Unit: a wish to stop ends a run at the next chunk."""
-    run = run_of(outer, 1e-4)
+    run = run_of(outer, 1e-4, "rk45")
     run.stop.event.set()
     with pytest.raises(CancelledError):
         run.to(1.0)
