@@ -5,6 +5,7 @@ one. Pressure coefficient: Gold et al. 2001, alpha = s nu^t. What a base oil has
 tells how far off it may be.
 """
 
+import functools
 import math
 import re
 from typing import NamedTuple, Self
@@ -138,6 +139,7 @@ def viscosity_at_100(at_40: float, index: float) -> float:
     return high
 
 
+@functools.cache
 def grade_oil(grade: float, base: BaseOil, index: float | None = None) -> Fluid:
     """An oil of an ISO viscosity grade; its index is the base oil's unless given. Raises ValueError."""
     at_100 = viscosity_at_100(grade, base.viscosity_index if index is None else index)
