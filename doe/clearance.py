@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
 
 
+# What simulates a run: its code decides whether a stored one is still good.
+SIMULATION = "rbdyn.dynamics.simulate"
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
 # Confirmation runs use seeds that no design run has.
 CONFIRMATION_SEEDS = 1_000_000
@@ -184,7 +186,7 @@ def points_of(
     scenes: Sequence[Scene], labels: Sequence[str], factors: Sequence[Mapping[str, float]] | None = None
 ) -> list[Point]:
     """Scenes as points of the store; those with factors are design runs, numbered from 1."""
-    version = code_version()
+    version = code_version(SIMULATION)
     places: list[tuple[int | None, Mapping[str, float]]] = (
         [(None, {})] * len(scenes) if factors is None else list(enumerate(factors, start=1))
     )
@@ -241,7 +243,7 @@ def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point
         taken.extend(take(points))
         return [texts[point.key] for point in taken]
 
-    work = partial(attempt_text, version=code_version())
+    work = partial(attempt_text, version=code_version(SIMULATION))
     run_on_cluster(scheduler, work, tasks, lambda place, ran: give(taken[place], ran))
 
 
@@ -266,7 +268,7 @@ def attempt(scene: Scene, stop: Stop | None = None) -> Ran:
 def attempt_text(text: str, version: str) -> Ran:
     """The same on a worker of a cluster, of a scene in JSON. Raises InputError where the worker runs other code."""
     host, pid = socket.gethostname(), os.getpid()
-    if code_version() != version:
+    if code_version(SIMULATION) != version:
         raise InputError(
             [f"worker {host}, process {pid}: runs another version of rbdyn or of its sources; install the same"]
         )

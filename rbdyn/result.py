@@ -7,7 +7,8 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
@@ -134,9 +135,16 @@ def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[
 
 def write_json(path: Path | str, data: dict[str, Any]) -> None:
     """Write JSON so that an interruption, or another process, leaves the old file or the new one, never half of it."""
+    with whole_file(path) as new:
+        new.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+@contextmanager
+def whole_file(path: Path | str) -> Iterator[Path]:
+    """A file to write, which then takes the place of ``path``: whoever reads that finds the old one or the new one."""
     path = Path(path)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    yield partial
     os.replace(partial, path)
 
 

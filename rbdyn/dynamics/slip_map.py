@@ -106,7 +106,7 @@ def slip_map(
     if (count := len(speeds_rpm) * len(loads_N)) > MOST_VALUES:
         raise InputError([f"--speed, --load: {count} points are more than the {MOST_VALUES} kept at once; take fewer"])
     scenes = [_at(scene, speed, load) for load in loads_N for speed in speeds_rpm]
-    kept, version = Kept(kept_in), code_version(__name__)
+    kept, version = Kept(kept_in), code_version("rbdyn.dynamics.simulate", __name__)
     keys = [run_key(point.model_dump(mode="json"), version) for point in scenes]
     points = {place: Point.from_dict(record) for place, key in enumerate(keys) if (record := kept.get(key))}
     bearings = {place: roller_bearing(point) for place, point in enumerate(scenes) if place not in points}

@@ -47,9 +47,9 @@ def run_key(scene: dict[str, Any], version: str) -> str:
 
 
 def code_version(*modules: str) -> str:
-    """Version of all that the bits of a run depend on, the code that simulates it and these modules included."""
+    """Version of all that the bits of a run depend on: packages, and the code that these modules run."""
     packages = {name: version for name, version in versions().items() if name != "python"}
-    return json.dumps({**packages, "sources": source_digest("rbdyn.dynamics.simulate", *modules)}, sort_keys=True)
+    return json.dumps({**packages, "sources": source_digest(*modules)}, sort_keys=True)
 
 
 def digest_of(content: str | bytes) -> str:

@@ -2,7 +2,6 @@
 
 import functools
 import json
-import os
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from rbdyn.quasistatic.remarks import Remark
 from rbdyn.quasistatic.row.equilibrium import Solution
+from rbdyn.result import whole_file
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -38,10 +38,8 @@ class Partial(NamedTuple):
         """Keep arrays in place of those before, whole or not at all. Raises OSError."""
         if self.path is None:
             return
-        new = self.path.with_name(f"{self.path.name}.new")
-        with new.open("wb") as file:
+        with whole_file(self.path) as new, new.open("wb") as file:
             np.savez(file, key=self.key, **arrays)
-        os.replace(new, self.path)
 
     def remove(self) -> None:
         """Remove the file: the sweep is done."""

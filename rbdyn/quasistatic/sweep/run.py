@@ -254,11 +254,8 @@ def _one_by_one(
 
 def _solve(scene: BallScene, before: tuple[Solution, ...]) -> Solved:
     """One point, started from the rows before it where these have as many balls and lead there."""
-    rows = (
-        {"row": scene.bearing}
-        if isinstance(scene, SingleRowScene)
-        else dict(zip(("inner", "outer"), scene.outermost_rows, strict=True))
-    )
+    names = ("row",) if isinstance(scene, SingleRowScene) else ("inner", "outer")
+    rows = dict(zip(names, scene.outermost_rows, strict=False))  # a single row is both of the outermost ones
     sizes = [row.balls for row in rows.values()]
     started = [len(row.balls) for row in before] == sizes
     result = equilibrium(scene, before if started else ())
