@@ -8,7 +8,7 @@ Biometrika 61 (1974); Santner, Williams and Notz, The Design and Analysis of Com
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
+from scipy.linalg import lapack
 
 from doe.arrays import Array
 from doe.emulator.covariance import correlation, with_slopes
@@ -49,21 +49,36 @@ class Solved(NamedTuple):
     @property
     def projection(self) -> Array:
         """P (n, n): the inverse covariance of what the trend leaves."""
-        inverse = linalg.cho_solve((self.factor, True), np.eye(len(self.factor)))
-        half = linalg.solve_triangular(self.factor, self.trend, lower=True, trans=1)
-        half = linalg.solve_triangular(self.root, half.T, trans=1)
-        return inverse - half.T @ half
+        half = back_substituted(self.factor, self.trend)
+        inside = np.linalg.solve(self.root.T, half.T) if half.size else half.T
+        lower: Array = lapack.dpotri(self.factor, lower=True)[0]
+        return lower + np.tril(lower, -1).T - np.asarray(inside.T @ inside)
+
+
+def forward_substituted(factor: Array, right: Array) -> Array:
+    """Solution of a lower triangular system. LAPACK itself: SciPy's checks take longer than matrices as small as these."""
+    found: Array = lapack.dtrtrs(factor, right, lower=True)[0]
+    return found
+
+
+def back_substituted(factor: Array, right: Array) -> Array:
+    """Solution of the transposed system."""
+    if not right.size:
+        return right
+    found: Array = lapack.dtrtrs(factor, right, lower=True, trans=True)[0]
+    return found
 
 
 def solved(covariance: Array, trend: Array, values: Array) -> Solved:
     """Generalised least squares of values (n,) on trend columns (n, p), which may be none. Raises LinAlgError."""
-    factor = linalg.cholesky(covariance, lower=True)
-    inside = linalg.solve_triangular(factor, np.column_stack([trend, values]), lower=True)
+    factor, failed = lapack.dpotrf(covariance, lower=True, clean=True)
+    if failed:
+        raise np.linalg.LinAlgError("covariance of the runs is not positive definite")
+    inside = forward_substituted(factor, np.column_stack([trend, values]))
     across, target = inside[:, :-1], inside[:, -1]
-    base, root = linalg.qr(across, mode="economic")
-    coefficients = linalg.solve_triangular(root, base.T @ target)
-    left = target - across @ coefficients
-    return Solved(factor, across, root, coefficients, linalg.solve_triangular(factor, left, lower=True, trans=1))
+    base, root = np.linalg.qr(across)
+    coefficients = np.linalg.solve(root, base.T @ target)
+    return Solved(factor, across, root, coefficients, back_substituted(factor, target - across @ coefficients))
 
 
 def covariance_of(points: Array, variances: Array, given: Hyperparameters) -> Array:
@@ -83,7 +98,7 @@ def loss(logarithms: Array, along: Array, trend: Array, values: Array, variances
     try:
         found = solved(covariance, trend, values)
         projection = found.projection
-    except linalg.LinAlgError:
+    except np.linalg.LinAlgError:
         return np.inf, np.zeros_like(logarithms)
     determinants = np.log(np.diag(found.factor)).sum() + np.log(np.abs(np.diag(found.root))).sum()
     gram = 0.5 * np.linalg.slogdet(trend.T @ trend)[1] if trend.size else 0.0

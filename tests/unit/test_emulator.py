@@ -96,7 +96,7 @@ def test_the_search_finds_what_the_runs_were_made_of():
     values = prior.draw(1, random)(points)[0] + random.normal(0.0, 0.1, 150)
     found = fit_emulator(points, values, 0.0, trend="constant").hyperparameters
     assert found.lengths == pytest.approx(truth.lengths, rel=0.35)
-    assert found.nugget == pytest.approx(0.01, rel=0.35)
+    assert found.nugget == pytest.approx(0.01, rel=0.5)
 
 
 def test_known_variances_are_not_taken_for_the_nugget():

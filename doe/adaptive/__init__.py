@@ -1,0 +1,12 @@
+"""The front of a noisy simulator in few runs: emulators learn it, and each run goes where it is expected to gain most.
+
+- ``emulators``: an emulator a response, and what they say of goals and limits
+- ``improvement``: the expected gain in hypervolume as an integral over what is not yet dominated
+- ``candidates``: points that are worth asking about
+- ``settling``: when to stop
+- ``search``: design, batches, fresh runs; ``result``: what came out
+"""
+
+from doe.adaptive.result import AdaptiveFront, Batch
+from doe.adaptive.runs import Evaluate, Runs
+from doe.adaptive.search import Plan, adaptive_front

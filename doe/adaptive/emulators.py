@@ -1,0 +1,84 @@
+"""An emulator for each response, and what they say together of costs and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from doe.adaptive.runs import Runs
+from doe.arrays import Array
+from doe.emulator import Emulator, fit_emulator, pooled_variances
+from doe.pareto.goals import Goals
+
+LEAST_DEVIATION = 1e-12  # of a response's scale: what is known exactly still has a side of a level
+
+
+@dataclass(frozen=True, eq=False)
+class Emulators:
+    """Emulators of m responses from runs that went well."""
+
+    goals: Goals
+    runs: Runs
+    each: Sequence[Emulator]
+
+    def predict(self, points: Array) -> tuple[Array, Array]:
+        """Means and standard deviations (n, m) of the responses without scatter at points (n, k)."""
+        means, deviations = zip(*(one.predict(points) for one in self.each), strict=True)
+        floor = LEAST_DEVIATION * np.maximum(np.abs(self.runs.values).max(axis=0), 1e-300)
+        return np.column_stack(means), np.maximum(np.column_stack(deviations), floor)
+
+    def scatter(self, points: Array) -> Array:
+        """Variances (n, m) of single replicates at points (n, k)."""
+        return _pooled(self.runs, points)
+
+    def nuggets(self) -> Array:
+        """Variances (m,) that the replicates of a run share and do not show."""
+        return np.array([one.hyperparameters.nugget for one in self.each])
+
+    def draws(self, count: int, random: np.random.Generator) -> Callable[[Array], Array]:
+        """Functions of points (n, k) drawn from the emulators, with responses (s, n, m)."""
+        drawn = [one.draw(count, random) for one in self.each]
+        return lambda points: np.stack([function(points) for function in drawn], axis=-1)
+
+    def kept(self, means: Array, deviations: Array) -> Array:
+        """Probability (n,) that a point keeps all limits, the responses as independent."""
+        chance = np.ones(len(means))
+        for index, sense, limit in self.goals.limited:
+            sign = 1.0 if sense == "<=" else -1.0
+            chance = chance * special.ndtr(sign * (limit - means[:, index]) / deviations[:, index])
+        return chance
+
+    def below(self, means: Array, deviations: Array, levels: Array) -> Array:
+        """Probability (n, u) that a point's costs are all below the ``levels`` (u, q), the responses as independent."""
+        chance = np.ones((len(means), len(levels)))
+        for column, index in enumerate(self.goals.objectives.tolist()):
+            mean, deviation, level = means[:, index, None], deviations[:, index, None], levels[None, :, column]
+            if self.goals.kinds[index] == "min":
+                chance *= special.ndtr((level - mean) / deviation)
+            elif self.goals.kinds[index] == "max":
+                chance *= special.ndtr((mean + level) / deviation)
+            else:
+                off = mean - self.goals.target[index]
+                ends = (special.ndtr((side * level - off) / deviation) for side in (1.0, -1.0))
+                chance *= np.subtract(*ends).clip(0.0)
+        return chance
+
+
+def fit_emulators(goals: Goals, runs: Runs, known: Emulators | None = None) -> Emulators:
+    """Emulators of all responses; ``known`` of nearly the same runs shorten the search for their hyperparameters."""
+    good = runs.rows(runs.good)
+    variances = _pooled(good, good.points) / good.replicates[:, None]
+    starts = [None] * good.values.shape[1] if known is None else [one.hyperparameters for one in known.each]
+    columns = zip(good.values.T, variances.T, starts, strict=True)
+    return Emulators(
+        goals, good, [fit_emulator(good.points, value, variance, start=start) for value, variance, start in columns]
+    )
+
+
+def _pooled(runs: Runs, points: Array) -> Array:
+    single = runs.errors**2 * runs.replicates[:, None]
+    columns = zip(single.T, runs.freedom.T, strict=True)
+    return np.column_stack([pooled_variances(runs.points, each, behind, points) for each, behind in columns])

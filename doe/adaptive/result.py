@@ -1,0 +1,54 @@
+"""What an adaptive search gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from doe.adaptive.emulators import Emulators
+from doe.arrays import Array, Whole
+from doe.pareto.direct import DirectFront
+
+
+@dataclass(frozen=True)
+class Batch:
+    """State of the search after ``runs`` runs that went well, those of the design included.
+
+    ``hypervolume`` of the front foretold and its standard deviation over the functions drawn from the emulators; ``gained``
+    by the last batch (NaN before the first); ``left`` to be gained if all were known. All on the scale of the front foretold
+    at that time; ``reached`` is the hypervolume of that front by the last emulators, on the scale of the last front. ``why``
+    the next batch was made: "improvement", or "check" of the front foretold; "" after the last.
+    """
+
+    runs: int
+    hypervolume: float
+    deviation: float
+    gained: float
+    left: float
+    why: str
+    reached: float = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptiveFront:
+    """A front found by emulators and confirmed by fresh runs.
+
+    ``front``: its finalists in factor units with their fresh runs alone, and all runs of the search. ``archive`` (a, k) is the
+    whole front that the emulators foretell, with its ``foretold`` responses (a, m) and their ``deviations`` (a, m).
+    ``history``: state after every batch; ``spent`` (n,) replicates of each run of the search, those of the design first.
+    ``bias`` and ``spread`` (m,): mean, and root mean square about it, of what the fresh runs at the finalists missed the
+    emulators by, in standard deviations. ``fresh``: number of the fresh runs. ``stopped``: why the search ended. ``seconds``
+    of the emulators and of the choice of runs.
+    """
+
+    front: DirectFront
+    archive: Array
+    foretold: Array
+    deviations: Array
+    emulators: Emulators
+    history: tuple[Batch, ...]
+    spent: Whole
+    bias: Array
+    spread: Array
+    fresh: int
+    stopped: str
+    seconds: float

@@ -1,0 +1,83 @@
+"""Noisy problems with known fronts for searches in few runs, and a search on them.
+
+Sources: Zitzler, Deb and Thiele, Comparison of multiobjective evolutionary algorithms (2000), ZDT1; Deb, Thiele, Laumanns and
+Zitzler, Scalable test problems for evolutionary multiobjective optimization (2005), DTLZ2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import qmc
+
+from doe.adaptive import Plan, Runs, adaptive_front
+from doe.adaptive.candidates import Region
+from doe.pareto.archive import spread
+from doe.pareto.goals import Goals
+from doe.pareto.indicators import hypervolume
+
+FACTORS, NOISE = 4, 0.02  # of the ranges of the fronts, which are 0 to 1
+
+
+def zdt1(points):
+    """Two costs of coded points; the front is 1 - sqrt(x), where all factors but the first are lowest."""
+    x = (points + 1.0) / 2.0
+    rest = 1.0 + 9.0 * x[:, 1:].mean(axis=1)
+    return np.column_stack([x[:, 0], rest * (1.0 - np.sqrt(x[:, 0] / rest))])
+
+
+def dtlz2(points):
+    """Three costs of coded points; the front is an eighth of the unit sphere, where the last two factors are 0.5."""
+    x = (points + 1.0) / 2.0
+    radius = 1.0 + ((x[:, 2:] - 0.5) ** 2).sum(axis=1)
+    a, b = 0.5 * np.pi * x[:, 0], 0.5 * np.pi * x[:, 1]
+    return radius[:, None] * np.column_stack([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
+
+
+def true_front(problem, count):
+    """So many points spread over the front."""
+    if problem is zdt1:
+        x = np.linspace(0.0, 1.0, 2001)
+        front = np.column_stack([x, 1.0 - np.sqrt(x)])
+    else:
+        even = qmc.Sobol(2, seed=1).random_base2(12) * 2.0 - 1.0
+        front = np.vstack([dtlz2(np.column_stack([even, np.zeros_like(even)])), np.eye(3)])
+    return front[spread(front, count)]
+
+
+def noisy(function, seed, noise=NOISE):
+    """Runs of a function with normal noise, every row a run of its own, and their true standard error."""
+    random = np.random.default_rng(seed)
+
+    def evaluate(points, replicates):
+        values = function(points)
+        values = values + noise * random.standard_normal(values.shape)
+        return values, np.full(values.shape, noise), np.full(values.shape, 50)
+
+    return evaluate
+
+
+def box(factors):
+    """The region from -1 to 1 without a drawing."""
+    return Region(-np.ones(factors), np.ones(factors), lambda points: points, np.full(factors, 0.01))
+
+
+def first_runs(evaluate, factors, count, seed):
+    """Runs at the first points of a Sobol sequence."""
+    points, ones = qmc.Sobol(factors, seed=seed).random_base2(7)[:count] * 2.0 - 1.0, np.ones(count, dtype=np.int64)
+    return Runs(points, *evaluate(points, ones), ones)
+
+
+def search(function, seed, budget=80, first=16, goals=None, factors=FACTORS, noise=NOISE, **plan):
+    """An adaptive search from so many ``first`` runs."""
+    evaluate = noisy(function, seed, noise)
+    design, zero, one = first_runs(evaluate, factors, first, seed), np.zeros(factors), np.ones(factors)
+    goals = goals or Goals.of(["min"] * design.values.shape[1])
+    settings = Plan(budget, **{"seed": seed, "least": 1, "most": 1, "usual": 1, **plan})
+    return adaptive_front(evaluate, zero, one, box(factors), design, goals, settings, zero)
+
+
+def share(problem, points):
+    """Hypervolume of the true costs of points over that of as many points of the true front."""
+    front = true_front(problem, len(points))
+    ends = np.zeros(front.shape[1]), np.ones(front.shape[1])
+    return hypervolume(problem(points), *ends) / hypervolume(front, *ends)
