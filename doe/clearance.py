@@ -40,6 +40,8 @@ RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_sp
 CONFIRMATION_SEEDS = 1_000_000
 # So do the evaluations of a direct front, one each.
 DIRECT_SEEDS = 2_000_000
+# And the runs of an adaptive search.
+ADAPTIVE_SEEDS = 4_000_000
 # Of a motion that goes into a report.
 ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
@@ -116,6 +118,21 @@ def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
     return [
         scene_at(study, data, point, direct.seed + DIRECT_SEEDS + number, overrides)
         for number, point in enumerate(points, first)
+    ]
+
+
+def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], first: int) -> list[Scene]:
+    """A scene a run of an adaptive search (n, k), numbered from ``first``: a design run with replicates and a seed of its own."""
+    data, adaptive = read_scene(study), study.file.adaptive
+    return [
+        scene_at(
+            study,
+            data,
+            point,
+            adaptive.seed + ADAPTIVE_SEEDS + number,
+            [*study.file.scene.set, f"numerics.replicates={count}", "numerics.companion=false", *adaptive.set],
+        )
+        for number, (point, count) in enumerate(zip(points, replicates, strict=True), first)
     ]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -21,13 +20,21 @@ LIKELY = 0.5  # chance of keeping all limits at which a point counts as allowed
 
 
 class Region(NamedTuple):
-    """The box from ``low`` to ``high`` (k,) in coded units, with ``snap``, which brings points (n, k) in it to the
-    resolution of the drawing, and ``apart`` (k,), by which points must differ in some factor lest they be twins."""
+    """The box from ``low`` to ``high`` (k,) in coded units. A drawing has the values ``origin`` and whole numbers of ``finest``
+    (k,) from it (NaN: any); points are twins unless they are more than ``apart`` (k,) from each other in some factor."""
 
     low: Array
     high: Array
-    snap: Callable[[Array], Array]
+    origin: Array
+    finest: Array
     apart: Array
+
+    def snap(self, points: Array) -> Array:
+        """Points (n, k) as they can be drawn within the box."""
+        ends = (self.low - self.origin) / self.finest, (self.high - self.origin) / self.finest
+        steps = np.round((points - self.origin) / self.finest).clip(np.ceil(ends[0] - 1e-6), np.floor(ends[1] + 1e-6))
+        free = points.clip(self.low, self.high)
+        return np.where(np.isnan(self.finest), free, self.origin + steps * self.finest)
 
     def twins(self, points: Array, others: Array) -> Mask:
         """Whether each of points (n, k) is a twin of any of the others (o, k)."""
@@ -45,8 +52,11 @@ def front_rows(emulators: Emulators, points: Array) -> tuple[Rows, Array]:
     return _front(emulators, *emulators.predict(points))
 
 
-def candidates(emulators: Emulators, region: Region, random: np.random.Generator, rounds: int = 1) -> Array:
-    """Points (n, k) of the region, none a twin of a run; the children of fronts foretold and of fronts drawn.
+def candidates(
+    emulators: Emulators, region: Region, random: np.random.Generator, avoid: Array, rounds: int = 1
+) -> Array:
+    """Points (n, k) of the region, none a twin of those to ``avoid`` (a, k); the children of fronts foretold and of fronts
+    drawn.
 
     ``rounds``: how often the children of each distance are made.
     """
@@ -67,10 +77,8 @@ def candidates(emulators: Emulators, region: Region, random: np.random.Generator
         parents = pool[np.concatenate([random.choice(rows, CHILDREN // 2) for rows in (sure, possible)])]
         moved = random.random(parents.shape) < MOVED
         new = (parents + reach * span * moved * random.standard_normal(parents.shape)).clip(region.low, region.high)
-    pool = np.vstack([pool, new])
-    inside = ((pool >= region.low) & (pool <= region.high)).all(axis=1)
-    found = np.unique(region.snap(pool[inside]), axis=0)
-    return found[~region.twins(found, emulators.runs.points)]
+    found = np.unique(region.snap(np.vstack([pool, new])), axis=0)
+    return found[~region.twins(found, avoid)]
 
 
 def _front(emulators: Emulators, means: Array, deviations: Array) -> tuple[Rows, Array]:

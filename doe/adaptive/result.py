@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from doe.adaptive.candidates import Region
 from doe.adaptive.emulators import Emulators
 from doe.arrays import Array, Whole
-from doe.pareto.direct import DirectFront
+from doe.pareto.direct import DirectFront, Samples
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,8 @@ class AdaptiveFront:
 
     ``front``: its finalists in factor units with their fresh runs alone, and all runs of the search. ``archive`` (a, k) is the
     whole front that the emulators foretell, with its ``foretold`` responses (a, m) and their ``deviations`` (a, m).
-    ``history``: state after every batch; ``spent`` (n,) replicates of each run of the search, those of the design first.
+    ``region`` that was searched in the end. ``history``: state after every batch; ``searched`` (n,) are all runs of design and search, in factor units,
+    ``why`` each was made ("design", "improvement", "check", "extension") and the replicates ``spent`` on it (n,); ``moves`` of the edges.
     ``bias`` and ``spread`` (m,): mean, and root mean square about it, of what the fresh runs at the finalists missed the
     emulators by, in standard deviations. ``fresh``: number of the fresh runs. ``stopped``: why the search ended. ``seconds``
     of the emulators and of the choice of runs.
@@ -45,7 +48,11 @@ class AdaptiveFront:
     foretold: Array
     deviations: Array
     emulators: Emulators
+    region: Region
     history: tuple[Batch, ...]
+    moves: tuple[Mapping[str, float], ...]
+    searched: Samples
+    why: tuple[str, ...]
     spent: Whole
     bias: Array
     spread: Array

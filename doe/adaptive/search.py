@@ -7,7 +7,7 @@ made afresh at the finalists and alone are reported, as at the end of `doe.paret
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -76,19 +76,22 @@ def adaptive_front(
     Raises ValueError where the budget has no room for the design, a batch and the fresh runs, or too few runs go well;
     InfeasibleError where no run comes near to keeping the limits.
     """
-    if len(design.points) + plan.batch > plan.budget - plan.fresh:
-        raise ValueError(
-            f"budget = {plan.budget}: {len(design.points)} runs of the design, a batch of {plan.batch} and {plan.fresh} fresh runs "
-            f"at the end do not fit; give at least {_least_budget(len(design.points) + plan.batch)}"
-        )
+    check_budget(plan, len(design.points))
     with THREADS.limit(limits=1):
-        search = _Search(evaluate, centre, step, region, goals, plan, design, tell)
+        search = _Search(evaluate, centre, step, region, goals, plan, design, tell, why=["design"] * len(design.points))
         stopped = search.spend()
         return search.finish(baseline, stopped)
 
 
-def _least_budget(searched: int) -> int:
-    return next(budget for budget in range(searched, 4 * searched + 8) if budget - round(FRESH * budget) >= searched)
+def check_budget(plan: Plan, design: int) -> None:
+    """Raises ValueError where the budget has no room for the runs of the design, a batch and the fresh runs."""
+    searched = design + plan.batch
+    if searched > plan.budget - plan.fresh:
+        least = next(budget for budget in range(searched, 4 * searched) if budget - round(FRESH * budget) >= searched)
+        raise ValueError(
+            f"budget = {plan.budget}: {design} runs of the design, a batch of {plan.batch} and {plan.fresh} fresh runs at the end "
+            f"do not fit; give at least {least}"
+        )
 
 
 @dataclass(eq=False)
@@ -105,6 +108,8 @@ class _Search:
     tell: Tell
     history: list[Batch] = field(default_factory=list)
     fronts: list[Array] = field(default_factory=list)
+    why: list[str] = field(default_factory=list)
+    moves: list[Mapping[str, float]] = field(default_factory=list)
     emulators: Emulators | None = None
     seconds: float = 0.0
 
@@ -115,7 +120,7 @@ class _Search:
             started = time.perf_counter()
             emulators = self._fit()
             random = np.random.default_rng([self.plan.seed, len(self.history)])
-            points = candidates(emulators, self._beside_failures(), random)
+            points = candidates(emulators, self.region, random, self.runs.points)
             levels, left, state = self._state(emulators, points, random)
             count = min(self.plan.batch, room - len(self.runs.points))
             rows, _ = batch(emulators, points, levels, left, count, self.region.apart)
@@ -131,7 +136,7 @@ class _Search:
             if not rows:
                 return "the budget is spent" if count <= 0 else "no point is left that may gain"
             fresh = self._run(chosen, replicates)
-            self.runs = self.runs.plus(fresh)
+            self.runs, self.why = self.runs.plus(fresh), [*self.why, *[why] * len(rows)]
             if check:
                 if as_foretold(emulators, fresh):
                     return "batches gained nothing more and fresh runs on the front were as foretold"
@@ -143,12 +148,6 @@ class _Search:
             raise ValueError(f"only {good} runs went well; emulators need {2 + len(self.centre)}")
         self.emulators = fit_emulators(self.goals, self.runs, self.emulators)
         return self.emulators
-
-    def _beside_failures(self) -> Region:
-        """The region without the twins of failed runs."""
-        failed = self.runs.points[~self.runs.good]
-        region = self.region
-        return region._replace(snap=lambda points: (snapped := region.snap(points))[~region.twins(snapped, failed)])
 
     def _state(self, emulators: Emulators, points: Array, random: np.random.Generator) -> tuple[Levels, Array, Batch]:
         """Levels, the probability that each is still to be gained (u,), and where the search stands.
@@ -194,8 +193,8 @@ class _Search:
         started = time.perf_counter()
         emulators = self._fit()
         random = np.random.default_rng([self.plan.seed, len(self.history), 1])
-        points = np.vstack([candidates(emulators, self._beside_failures(), random, 3), emulators.runs.points])
-        points = points[((points >= self.region.low) & (points <= self.region.high)).all(axis=1)]
+        failed = self.runs.points[~self.runs.good]
+        points = candidates(emulators, self.region, random, failed, 3)
         rows, costs = front_rows(emulators, points)
         self._check_limits(emulators, points)
         archive = points[rows]
@@ -217,7 +216,11 @@ class _Search:
             foretold=foretold,
             deviations=deviations,
             emulators=emulators,
-            history=tuple(self._on_one_scale(costs[rows])),
+            region=self.region,
+            history=tuple(self._on_one_scale(emulators, costs[rows])),
+            moves=tuple(self.moves),
+            searched=Samples(self.centre + self.step * self.runs.points, self.runs.values, self.runs.errors),
+            why=tuple(self.why),
             spent=self.runs.replicates,
             bias=off.mean(axis=0),
             spread=off.std(axis=0, ddof=1 if len(off) > 1 else 0),
@@ -226,11 +229,10 @@ class _Search:
             seconds=self.seconds,
         )
 
-    def _on_one_scale(self, front: Array) -> list[Batch]:
+    def _on_one_scale(self, emulators: Emulators, front: Array) -> list[Batch]:
         """The history with the hypervolumes of all fronts foretold, by the last emulators, on the scale of the last front
         (f, q)."""
         ideal, nadir = front.min(axis=0), front.max(axis=0)
-        emulators = self._fit()
         reached = [hypervolume(self.goals.costs(emulators.predict(each)[0]), ideal, nadir) for each in self.fronts]
         return [replace(each, reached=value) for each, value in zip(self.history, reached, strict=True)]
 

@@ -7,10 +7,11 @@ from typing import Any
 
 import typer
 
-from doe.commands.options import Direct, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
+from doe.commands.options import Adaptive, Direct, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
 from doe.commands.steps import keeping_runs
 from rbdyn.cli.options import Json
 from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json, progress_bar
+from rbdyn.faults import InputError
 
 
 def study(
@@ -20,6 +21,7 @@ def study(
     scheduler: Scheduler = None,
     retry: Retry = False,
     direct: Direct = False,
+    adaptive: Adaptive = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -29,11 +31,13 @@ def study(
     with guarded(as_json), keeping_runs(folder), ExitStack() as bars:
         from doe.study_file import Study
 
+        if direct and adaptive:
+            raise InputError(["--direct, --adaptive: the pick can follow one front only; give one of them"])
         loaded = Study.load(path)
         output_folder(folder, "doe", path)
         from doe.study.finished import finished, inputs_digest
 
-        if not (verbose or retry) and (record := finished(folder, inputs_digest(loaded, direct))):
+        if not (verbose or retry) and (record := finished(folder, inputs_digest(loaded, direct, adaptive))):
             if not as_json:
                 print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
                 print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
@@ -42,17 +46,15 @@ def study(
         from doe.report.steps.fit import print_fit
         from doe.report.study.answer import print_outcome, print_verdict
         from doe.report.study.files import write
+        from doe.running.runner import Progress
         from doe.study.whole import run_study
 
-        outcome = run_study(
-            loaded,
-            folder,
-            workers,
-            lambda title: bars.enter_context(progress_bar(title, quiet or as_json)),
-            scheduler,
-            retry,
-            direct,
-        )
+        def progress(title: str) -> Progress:
+            # One bar at a time.
+            bars.close()
+            return bars.enter_context(progress_bar(title, quiet or as_json))
+
+        outcome = run_study(loaded, folder, workers, progress, scheduler, retry, direct, adaptive)
         bars.close()
         record = write(outcome, folder)
         if not as_json:

@@ -11,8 +11,8 @@ from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.response_surface import Surface
 from doe.running.failure import Failure
+from doe.study.adaptive import Searched
 from doe.study.confirmation import Choice, Confirmed, confirm
-from doe.study.direct import Direct
 from doe.study.direct_pick import DirectPick, direct_pick
 from doe.study.front import find_front
 from doe.study.goals import rounded_within
@@ -37,7 +37,7 @@ class Chosen:
 
 
 def choose(
-    study: Study, surfaces: Sequence[Surface], found: ParetoFront, direct: Direct | None, simulations: Simulations
+    study: Study, surfaces: Sequence[Surface], found: ParetoFront, direct: Searched | None, simulations: Simulations
 ) -> Chosen:
     """Simulate the pick; while a limit is not kept, back off by what was missed and simulate the next best point.
 
@@ -86,7 +86,7 @@ def _badness(limits: Sequence[Limit]) -> tuple[int, float]:
 
 
 def choices(
-    study: Study, front: ParetoFront, direct: Direct | None, chosen: DirectPick | None = None
+    study: Study, front: ParetoFront, direct: Searched | None, chosen: DirectPick | None = None
 ) -> dict[str, Choice]:
     """The pick, then the picks by the other rules and of the direct front, by name.
 
@@ -106,7 +106,7 @@ def choices(
 
 
 def _candidates(
-    study: Study, front: ParetoFront, direct: Direct | None, chosen: DirectPick | None
+    study: Study, front: ParetoFront, direct: Searched | None, chosen: DirectPick | None
 ) -> Iterator[tuple[str, Array, str]]:
     aware, name = front.tolerance_aware, "pick"
     if direct is not None and chosen is not None:
@@ -121,4 +121,4 @@ def _candidates(
     for rule, row in front.picks.items():
         yield rule, front.points[row], f"the pick by {rule}"
     if direct is not None:
-        yield "direct", direct.front.points[direct.front.pick], "the pick of the direct front"
+        yield direct.name, direct.front.points[direct.front.pick], f"the pick of the {direct.name} front"

@@ -3,11 +3,12 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from doe import clearance
-from doe.arrays import Array
+from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.pareto.archive import spread
@@ -19,6 +20,7 @@ from doe.study.goals import goals_of, region_of
 from doe.study.surfaces import standard_errors
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError
+from rbdyn.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +32,7 @@ class Direct:
     search and of the comparison.
     """
 
+    name: ClassVar[str] = "direct"
     front: DirectFront
     surrogate_points: Array
     surrogate_values: Array
@@ -53,18 +56,22 @@ class Evaluator:
 
     def __call__(self, points: Array) -> tuple[Array, Array]:
         """Responses (n, m) and their standard errors (n, m) at points (n, k) in factor units; NaN where a run failed."""
-        scenes = clearance.direct_scenes(self._study, points, self.done)
-        labels = [f"direct run {self.done + row}" for row in range(1, len(points) + 1)]
+        values, errors, samples = self.run(clearance.direct_scenes(self._study, points, self.done), "direct run")
+        return values, standard_errors(errors, samples)
+
+    def run(self, scenes: list[Scene], label: str) -> tuple[Array, Array, Whole]:
+        """Responses (n, m) of scenes, 95 % half-widths (n, m) and how many values are behind these (n, m)."""
+        labels = [f"{label} {self.done + row}" for row in range(1, len(scenes) + 1)]
         results = self._simulations.run(scenes, labels, self._watch)
-        self.done += len(points)
-        values = np.full((len(points), len(self._study.responses)), np.nan)
+        self.done += len(scenes)
+        values = np.full((len(scenes), len(self._study.responses)), np.nan)
         errors, samples = values.copy(), np.zeros(values.shape, dtype=np.int64)
         for row, result in enumerate(results):
             if isinstance(result, Failure):
                 self.failures.append(result)
             else:
                 (values[row],), (errors[row],), (samples[row],) = clearance.responses(self._study, [result])
-        return values, standard_errors(errors, samples)
+        return values, errors, samples
 
     def _watch(self, done: int, total: int) -> None:
         self._progress(self.done + done, max(self._total, self.done + total))

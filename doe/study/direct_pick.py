@@ -9,9 +9,9 @@ from scipy import special
 from doe.arrays import Array
 from doe.pareto.direct_tolerance import DirectAware, Neighbourhood, direct_aware, pick_among
 from doe.response_surface import Surface
+from doe.study.adaptive import Searched
 from doe.study.back_off import Conditioned, Missed, standard_errors_of
 from doe.study.confirmation import Confirmed
-from doe.study.direct import Direct
 from doe.study.drawn import quadratics
 from doe.study.goals import goals_of, rounded_within, tolerance_box
 from doe.study_file import Study
@@ -27,7 +27,7 @@ class DirectPick:
 
 
 def direct_pick(
-    study: Study, surfaces: Sequence[Surface], direct: Direct, simulated: Sequence[Confirmed] = (), failed: int = 0
+    study: Study, surfaces: Sequence[Surface], direct: Searched, simulated: Sequence[Confirmed] = (), failed: int = 0
 ) -> DirectPick:
     """The point of the direct front by the study's rule, of what tolerances leave where the study asks for that.
 
@@ -65,7 +65,7 @@ def direct_pick(
     )
     rows = np.flatnonzero(fresh) if fresh.any() else np.arange(len(front.points))
     row, reason = pick_among(costs[rows], violations[rows], goals, baselines, study.file.front.pick)
-    words = f"{reason.replace('front points', 'points of the direct front')}{after}"
+    words = f"{reason.replace('front points', f'points of the {direct.name} front')}{after}"
     return DirectPick(int(rows[row]), words, aware)
 
 
@@ -81,7 +81,9 @@ class Local:
     baseline: Array
 
 
-def local_of(study: Study, surfaces: Sequence[Surface], direct: Direct, pick: Confirmed, baseline: Confirmed) -> Local:
+def local_of(
+    study: Study, surfaces: Sequence[Surface], direct: Searched, pick: Confirmed, baseline: Confirmed
+) -> Local:
     """About the simulated pick of a direct front."""
     coded = study.coded(pick.point)
     here = _neighbourhood(study, surfaces, direct, coded[None], pick.values[None])
@@ -89,7 +91,7 @@ def local_of(study: Study, surfaces: Sequence[Surface], direct: Direct, pick: Co
 
 
 def _neighbourhood(
-    study: Study, surfaces: Sequence[Surface], direct: Direct, coded: Array, values: Array
+    study: Study, surfaces: Sequence[Surface], direct: Searched, coded: Array, values: Array
 ) -> Neighbourhood:
     """About coded points (n, k) of known responses (n, m)."""
     forms, searched = quadratics(surfaces, len(study.factors)), direct.front.searched
@@ -97,7 +99,7 @@ def _neighbourhood(
     return Neighbourhood.of(forms, coded, values, runs, searched.values)
 
 
-def _doubt(study: Study, direct: Direct, coded: Array, simulated: Sequence[Confirmed]) -> tuple[Array, Array]:
+def _doubt(study: Study, direct: Searched, coded: Array, simulated: Sequence[Confirmed]) -> tuple[Array, Array]:
     """Mean and standard deviation (f, m) of what the front's fresh runs err by, given what they missed at the points
     simulated, each beside its nearest row."""
     front = direct.front

@@ -63,12 +63,12 @@ def find_front(
             doubt=lambda points: doubt(share)(study.coded(points)),
         )
 
-    with _named(study, goals, lambda point: point, ""):
+    with named_faults(study, goals, lambda point: point, ""):
         found = _backed_off(study, plain, failed)
     found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
     if box is None:
         return found
-    with _named(study, goals, study.actual, " after manufacture"):
+    with named_faults(study, goals, study.actual, " after manufacture"):
         aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt(share)), failed)
     return replace(found, tolerance_aware=aware)
 
@@ -135,7 +135,7 @@ def _tolerance_aware(
 
 
 @contextmanager
-def _named(study: Study, goals: Goals, actual: Callable[[Array], Array], after: str) -> Iterator[None]:
+def named_faults(study: Study, goals: Goals, actual: Callable[[Array], Array], after: str) -> Iterator[None]:
     """Turns a search that finds nothing into a sentence; ``actual`` gives its points in factor units."""
     try:
         yield

@@ -15,6 +15,7 @@ from doe.response_surface import Surface
 from doe.running.failure import Failure
 from doe.running.runner import Progress
 from doe.running.store import Store
+from doe.study.adaptive import Adaptive, Searched, advice, find_adaptive
 from doe.study.chains import solve_chains
 from doe.study.checked import check_study
 from doe.study.chosen import choose
@@ -40,7 +41,7 @@ class StudyResult:
 
     ``inputs`` is the hash of all it follows from. ``confirmed`` and ``gains`` by name of the point, "baseline" (without
     gains) and "pick" first; ``tried`` counts the points simulated as the pick until one kept its limits. ``tolerances`` is
-    None where the study asks for none, ``direct`` and ``direct_pick`` unless it was run.
+    None where the study asks for none, ``direct``, ``adaptive`` and ``direct_pick``, of either, unless it was run.
     """
 
     study: Study
@@ -50,6 +51,7 @@ class StudyResult:
     surfaces: list[Surface]
     front: ParetoFront
     direct: Direct | None
+    adaptive: Adaptive | None
     direct_pick: DirectPick | None
     edge: Edge
     tried: int
@@ -97,16 +99,18 @@ def run_study(
     scheduler: str | None = None,
     retry: bool = False,
     direct: bool = False,
+    adaptive: bool = False,
 ) -> StudyResult:
     """All of it; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster to run on.
 
-    ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself. Raises
+    ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself,
+    ``adaptive``: in few runs. Raises
     InputError, RunError, KeyboardInterrupt.
     """
     clock = _Clock()
-    inputs = inputs_digest(study, direct)
+    inputs = inputs_digest(study, direct, adaptive)
     check_goals(study)
-    reference = check_study(study)
+    reference = check_study(study, adaptive)
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry)
     clock.lap("design_s")
     surfaces = with_rivals(fit_surfaces(study, runs))
@@ -115,11 +119,13 @@ def run_study(
     clock.lap("front_s")
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress)
-        searched = find_direct(study, found, simulations) if direct else None
-        clock.lap("direct_s")
+        searched: Searched | None = None
+        if direct or adaptive:
+            searched = find_direct(study, found, simulations) if direct else find_adaptive(study, runs, simulations)
+        clock.lap("adaptive_s" if adaptive else "direct_s")
         chosen = choose(study, surfaces, found, searched, simulations)
         confirmed, at = chosen.confirmed, None if searched is None else searched.front.points
-        edge = edge_of(study, surfaces, confirmed["pick"], chosen.front.points, at, simulations if direct else None)
+        edge = edge_of(study, surfaces, confirmed["pick"], chosen.front.points, at, simulations if searched else None)
         clock.lap("confirmation_s")
     pick = confirmed["pick"].point
     local = None if searched is None else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])
@@ -137,7 +143,8 @@ def run_study(
         runs=runs,
         surfaces=surfaces,
         front=chosen.front,
-        direct=searched,
+        direct=searched if isinstance(searched, Direct) else None,
+        adaptive=searched if isinstance(searched, Adaptive) else None,
         direct_pick=chosen.direct,
         edge=edge,
         tried=chosen.tried,
@@ -150,7 +157,7 @@ def run_study(
         beside=[] if reference is None else beside(study, runs, reference),
         reference_values=None if reference is None else reference.values,
         failures=(*runs.failures, *lost, *chosen.failures),
-        notes=(*runs.notes, *notes),
+        notes=(*runs.notes, *notes, *(() if searched else advice(study, surfaces))),
         cost=clock.total(),
     )
 

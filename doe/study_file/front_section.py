@@ -100,6 +100,21 @@ class Direct(Strict):
         return self
 
 
+class Adaptive(Strict):
+    """The search with emulators, from the runs of the design on."""
+
+    budget: Annotated[int, Field(ge=10, le=10000)] = 100
+    """Runs, those of the design and the last 30 %, fresh ones at the points of the front, included."""
+    batch: Annotated[int, Field(ge=1, le=1000)] = 8
+    """Runs chosen at once, so that many workers have work; the search knows a little less of each than one by one."""
+    extend: bool = True
+    """Whether the region grows where the front lies at its edge, as far as the factors' "allowed" permit."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of the search and its runs."""
+    set: list[str] = []
+    """Keys of the scene that are replaced, as "key=value"."""
+
+
 class Tolerances(Strict):
     """Widest tolerances of the factors about the pick."""
 

@@ -12,7 +12,7 @@ from doe.arrays import Array
 from doe.designs.coding import to_actual, to_coded
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Design, Factor, Name
-from doe.study_file.front_section import Direct, Front, Goal, Tolerances
+from doe.study_file.front_section import Adaptive, Direct, Front, Goal, Tolerances
 from doe.study_file.table import COUNT, LABELS, Table, read_table
 from rbdyn.faults import Strict, read_toml, validated
 from rbdyn.fields import or_refuse
@@ -86,6 +86,8 @@ class StudyFile(Strict):
     """The search on the surfaces."""
     direct: Direct = Direct()
     """The search on the simulator, with --direct."""
+    adaptive: Adaptive = Adaptive()
+    """The search with emulators, with --adaptive."""
     tolerances: Tolerances | None = None
     """The widest tolerances of the factors about the pick; none where left out."""
     confirmation: Confirmation = Confirmation()

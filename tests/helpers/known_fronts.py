@@ -58,7 +58,9 @@ def noisy(function, seed, noise=NOISE):
 
 def box(factors):
     """The region from -1 to 1 without a drawing."""
-    return Region(-np.ones(factors), np.ones(factors), lambda points: points, np.full(factors, 0.01))
+    return Region(
+        -np.ones(factors), np.ones(factors), np.zeros(factors), np.full(factors, np.nan), np.full(factors, 0.01)
+    )
 
 
 def first_runs(evaluate, factors, count, seed):

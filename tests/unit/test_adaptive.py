@@ -85,14 +85,12 @@ def test_a_batch_shares_out_the_levels_and_refuses_twins():
 
 def test_candidates_are_on_the_drawing_inside_and_no_run_again():
     found, random = emulators(), np.random.default_rng(1)
-    region = box(2)._replace(
-        snap=lambda points: np.round(points, 1), low=np.array([-0.5, -0.5]), apart=np.full(2, 0.05)
-    )
-    found = replace(found, runs=found.runs._replace(points=np.round(found.runs.points, 1)))
-    points = candidates(found, region, random)
-    assert np.array_equal(points, np.round(points, 1))
+    region = box(2)._replace(finest=np.full(2, 0.1), low=np.array([-0.5, -0.5]), apart=np.full(2, 0.05))
+    runs = np.round(found.runs.points, 1)
+    points = candidates(found, region, random, runs)
+    assert points == pytest.approx(np.round(points, 1), abs=1e-12)
     assert points.min() >= -0.5
-    assert not region.twins(points, found.runs.points).any()
+    assert not region.twins(points, runs).any()
     assert len(points) > 100
 
 

@@ -73,7 +73,7 @@ def test_points_that_a_drawing_cannot_tell_apart_are_confirmed_once(tmp_path):
     assert {"without_tolerances", "desirability", "weights"} <= set(chosen) and "knee" not in chosen
     points = [tuple(choice.point) for choice in chosen.values()]
     assert len(set(points)) == len(points)
-    twin = SimpleNamespace(front=SimpleNamespace(points=front.points, pick=front.picks["weights"]))
+    twin = SimpleNamespace(name="direct", front=SimpleNamespace(points=front.points, pick=front.picks["weights"]))
     assert "direct front" in choices(study, front, twin)["weights"].reason
 
 

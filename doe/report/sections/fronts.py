@@ -29,6 +29,7 @@ def fronts(summary: Record) -> list[Front]:
         ("front", "on the surfaces", part(summary, "front", "front")),
         ("robust", "with tolerances", part(summary, "front", "tolerance_aware", "front")),
         ("direct", "on the simulator", part(summary, "direct", "front")),
+        ("direct", "found in few runs, simulated", part(summary, "adaptive", "front")),
         ("surrogate", "of the surfaces, simulated", part(summary, "direct", "surrogate_front")),
     ):
         whole = [point for point in points or [] if complete(point, summary)]
@@ -159,6 +160,8 @@ def _beside(summary: Record) -> list[Block]:
         blocks += _with_tolerances(aware, [each["name"] for each in responses(summary)])
     if direct := part(summary, "direct"):
         blocks += _on_the_simulator(direct)
+    if adaptive := part(summary, "adaptive"):
+        blocks += _in_few_runs(adaptive)
     return blocks
 
 
@@ -176,6 +179,19 @@ def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
     blocks.append(Table("What manufacture leaves of the responses", ["point", *map(label, names)], rows))
     costs = {key: aware.get(key) for key in ("survival", "nominal_loss_percent", "robust_gain_percent")}
     blocks.append(record_table("What the tolerances cost", costs))
+    return blocks
+
+
+def _in_few_runs(adaptive: Record) -> list[Block]:
+    blocks: list[Block] = [Words(str(adaptive["sentence"]))] if adaptive.get("sentence") else []
+    history = adaptive.get("history") or []
+    rows = [
+        (shown(each["runs"]), shown(each["hypervolume"]), with_error(each["left"], each["deviation"]), each["why"])
+        for each in history
+        if {"runs", "hypervolume", "left", "deviation", "why"} <= set(each)
+    ]
+    header = ("runs", "hypervolume", "still to gain", "next runs for")
+    blocks.append(Table("Adaptive search, batch by batch", header, rows, text_columns=(3,)))
     return blocks
 
 

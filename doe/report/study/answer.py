@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from doe.clearance import direct_run
+from doe.report.steps.adaptive import adaptive_sentence
 from doe.report.steps.chain import print_chain
 from doe.report.words import rounded_down
 from doe.running.failure import grouped
@@ -52,6 +53,8 @@ def _print_answer(outcome: StudyResult) -> None:
             f"{direct.loss.sentence}"
         )
         print(f"a run of the direct search: {direct_run(study)}")
+    if outcome.adaptive is not None:
+        print(adaptive_sentence(study, outcome.adaptive))
     _print_clearances(outcome)
     rows = []
     for gain in outcome.gains["pick"]:

@@ -7,6 +7,7 @@ from doe import clearance
 from doe.dimension_chain.solution import ALLOCATED
 from doe.report.html import html_report
 from doe.report.markdown import markdown_report
+from doe.report.steps.adaptive import archive_table
 from doe.report.steps.fit import fit_tables
 from doe.report.study.answer import answer_text
 from doe.report.study.summary import summary
@@ -31,7 +32,9 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     tables = {
         "design_runs.csv": _runs_table(record),
         **fit_tables(outcome.surfaces),
-        "front.csv": [{**point["factors"], **point["responses"]} for point in record["front"]["front"]],
+        "front.csv": [{**point["factors"], **point["responses"]} for point in record["front"]["front"]]
+        if outcome.adaptive is None
+        else archive_table(study, outcome.adaptive),
         "confirmation.csv": _confirmation_table(outcome, record),
         "part_dimensions.csv": [
             {"chain": name, "part": part.name, **{key: getattr(part, key) for key in ALLOCATED}}

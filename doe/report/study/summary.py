@@ -5,6 +5,7 @@ from typing import Any
 
 from doe import clearance
 from doe.arrays import or_none
+from doe.report.steps.adaptive import adaptive_record
 from doe.report.steps.confirmation import confirmation_record, direct_record, gains_record, limits_record
 from doe.report.steps.design import runs_record
 from doe.report.steps.fit import fit_record
@@ -47,12 +48,19 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "cost": dict(outcome.cost),
         "versions": versions(),
         "inputs": outcome.inputs,
-        "seeds": {"design": study.file.design.seed, "front": study.file.front.seed, "direct": study.file.direct.seed},
+        "seeds": {
+            "design": study.file.design.seed,
+            "front": study.file.front.seed,
+            "direct": study.file.direct.seed,
+            "adaptive": study.file.adaptive.seed,
+        },
     }
     if outcome.direct is not None:
         record["direct"] = direct_record(study, outcome.direct)
+    if outcome.adaptive is not None:
+        record["adaptive"] = adaptive_record(study, outcome.adaptive)
     if outcome.direct_pick is not None:
-        record["direct"]["chosen"] = _chosen_record(outcome.direct_pick)
+        record["direct" if outcome.adaptive is None else "adaptive"]["chosen"] = _chosen_record(outcome.direct_pick)
     if outcome.tolerances is not None:
         record["tolerances"] = outcome.tolerances.as_dict(study.factors)
         record["tolerances_sentence"] = outcome.tolerances.sentence

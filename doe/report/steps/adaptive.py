@@ -1,0 +1,85 @@
+"""The front found in few runs, as plain numbers and in words."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from doe.arrays import or_none
+from doe.pareto.surrogate_loss import noisy_hypervolume
+from doe.report.steps.confirmation import point_record
+from doe.study.adaptive import Adaptive
+from doe.study_file import Study
+
+
+def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
+    """``front``: finalists by their fresh runs, with 95 % half widths; ``runs`` of design and search, ``fresh`` ones apart;
+    ``hypervolume`` of the front foretold, on the scale of its own ideal and nadir; ``points``: every run of design and search
+    with its replicates and why it was made."""
+    found, front = adaptive.found, adaptive.front
+    rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
+    points = [point_record(study, *row) for row in rows]
+    costs = front.goals.costs(found.foretold)
+    fresh = noisy_hypervolume(front.costs, front.cost_errors, costs.min(axis=0), costs.max(axis=0), seed=front.seed)
+    return {
+        "front": points,
+        "pick": {**points[front.pick], "reason": front.pick_reason},
+        "runs": len(found.spent),
+        "fresh": found.fresh,
+        "hypervolume": found.history[-1].reached,
+        "hypervolume_fresh": fresh[0],
+        "hypervolume_fresh_error": 1.96 * fresh[1],
+        "history": [
+            {
+                "runs": each.runs,
+                "hypervolume": each.reached,
+                "deviation": each.deviation,
+                "gained": or_none(each.gained),
+                "left": each.left,
+                "why": each.why,
+            }
+            for each in found.history
+        ],
+        "stopped": found.stopped,
+        "extended": [dict(move) for move in found.moves],
+        "region": {name: ends for name, ends in zip(study.factors, adaptive.edges.tolist(), strict=True)},
+        "points": [
+            {"factors": study.by_factor(point), "replicates": int(count), "why": why}
+            for point, count, why in zip(found.searched.points, found.spent, found.why, strict=True)
+        ],
+        "foretold_points": len(found.archive),
+        "missed": {
+            name: {"bias": float(bias), "spread": float(spread)}
+            for name, bias, spread in zip(study.responses, found.bias, found.spread, strict=True)
+        },
+        "failed": len(adaptive.failures),
+        "seed": front.seed,
+        "seconds": adaptive.seconds,
+        "emulator_seconds": found.seconds,
+        "sentence": adaptive_sentence(study, adaptive),
+    }
+
+
+def adaptive_sentence(study: Study, adaptive: Adaptive) -> str:
+    """What the search spent, why it ended, and whether its emulators were right."""
+    found = adaptive.found
+    last = found.history[-1]
+    left = 100.0 * last.left / last.hypervolume if last.hypervolume > 0.0 else math.nan
+    off = ", ".join(
+        f"{name} {bias:+.1f} (scatter {spread:.1f})"
+        for name, bias, spread in zip(study.responses, found.bias, found.spread, strict=True)
+    )
+    return (
+        f"adaptive front: {len(found.spent)} runs of design and search and {found.fresh} fresh ones at its points in "
+        f"{adaptive.seconds:.0f} s; it ended because {found.stopped}, with at most {left:.1f} % of its hypervolume to gain. "
+        f"What the fresh runs missed the emulators by, in standard deviations: {off}."
+    )
+
+
+def archive_table(study: Study, adaptive: Adaptive) -> list[dict[str, float]]:
+    """The whole front that the emulators foretell, with 95 % half widths."""
+    found = adaptive.found
+    errors = [f"{name}_error" for name in study.responses]
+    names = [*study.factors, *study.responses, *errors]
+    table = np.hstack([found.archive, found.foretold, 1.96 * found.deviations])
+    return [dict(zip(names, row, strict=True)) for row in table.tolist()]

@@ -1,0 +1,156 @@
+"""The study that follows the front found in few runs: files, the same bits however it runs, faults, advice."""
+
+from __future__ import annotations
+
+import csv
+import sqlite3
+
+import numpy as np
+import pytest
+from doe_command import doe
+from instant_runs import instantly
+from short_studies import SHORT, short_study, silent
+
+from doe import clearance
+from doe.clearance import Simulations
+from doe.report.study.files import write
+from doe.running.store import Store
+from doe.study.adaptive import advice, find_adaptive, region_in_units
+from doe.study.runs import STORE, run_design
+from doe.study.surfaces import fit_surfaces
+from doe.study.whole import run_study
+from doe.study_file import Study
+from rbdyn.faults import InputError
+
+GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '
+
+
+def written(folder, *replacements, budget=44):
+    """The example, short, with a trade-off between whirl and the rest; one run of the design fails where asked."""
+    folder.mkdir(exist_ok=True)
+    path = short_study(folder, SHORT, (f'{GOAL}"min"', f'{GOAL}"max"'))
+    text = path.read_text(encoding="utf-8").replace("population = 100", "population = 24")
+    text += f"\n[adaptive]\nbudget = {budget}\nbatch = 6\n"
+    for old, new in replacements:
+        assert old in text, old
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def search(path, folder, workers):
+    folder.mkdir(exist_ok=True)
+    study = Study.load(path)
+    runs = run_design(study, folder, workers, silent)
+    with Store(folder / STORE) as store:
+        return find_adaptive(study, runs, Simulations(store, workers, None, False, lambda title: silent))
+
+
+def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
+    instantly(monkeypatch.setattr)
+    monkeypatch.setattr(clearance, "histories", lambda *rest: {})
+    monkeypatch.setattr(clearance, "draw_motion", lambda *rest: [])
+    told = []
+    study = Study.load(written(tmp_path))
+    outcome = run_study(study, tmp_path, 1, lambda title: told.append(title) or silent, adaptive=True)
+    chosen, front = outcome.direct_pick, outcome.adaptive.front
+    assert outcome.pick.point == pytest.approx(front.points[chosen.row], abs=6e-4)
+    assert "adaptive front" in outcome.pick.reason and "tolerances leave" in outcome.pick.reason
+    assert "pick_of_surfaces" in outcome.confirmed
+    assert any("% to gain" in title for title in told)
+    record = write(outcome, tmp_path)
+    found = record["adaptive"]
+    keys = {"front", "runs", "hypervolume", "history", "stopped", "extended"}
+    assert keys <= set(found)
+    assert {"factors", "responses", "errors"} == set(found["front"][0])
+    assert found["runs"] + found["fresh"] <= 44
+    assert found["history"][0]["runs"] == 20
+    assert {each["why"] for each in found["points"]} <= {"design", "improvement", "check"}
+    assert found["chosen"]["row"] == chosen.row
+    assert "direct" not in record
+    assert not any("--adaptive" in note for note in record["notes"])
+    with (tmp_path / "front.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == found["foretold_points"]
+    assert {"radial_clearance_mm", "power_loss_W", "power_loss_W_error"} <= set(rows[0])
+    assert "in few runs" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "adaptive front:" in (tmp_path / "answer.txt").read_text(encoding="utf-8")
+
+
+def test_invariant_same_bits_for_any_number_of_workers_and_after_an_interruption(tmp_path, monkeypatch):
+    """Invariant: one thread, three threads, and three that begin with every second run of the store."""
+    ran = instantly(monkeypatch.setattr)
+    path = written(tmp_path / "study")
+    one, three = (search(path, tmp_path / name, workers) for name, workers in (("one", 1), ("three", 3)))
+    before = len(ran)
+    again = search(path, tmp_path / "three", 2)
+    assert len(ran) == before, "what is stored is not run again"
+    connection = sqlite3.connect(tmp_path / "three" / STORE)
+    with connection:
+        connection.execute("DELETE FROM runs WHERE rowid % 2 = 0")
+    connection.close()
+    half = search(path, tmp_path / "three", 3)
+    assert before < len(ran) < 1.5 * before
+    for other in (three, again, half):
+        assert np.array_equal(one.front.points, other.front.points)
+        assert np.array_equal(one.front.values, other.front.values)
+        assert repr(one.found.history) == repr(other.found.history)
+
+
+def test_runs_that_fail_are_told_and_left_out(tmp_path, monkeypatch):
+    instantly(monkeypatch.setattr, faulty=[4_000_001, 4_000_005])
+    found = search(written(tmp_path), tmp_path, 1)
+    assert len(found.failures) == 2
+    assert "adaptive run 1" in str(found.failures[0])
+    assert np.isfinite(found.front.values).all()
+
+
+def test_points_are_on_the_drawing_and_inside():
+    from pareto_cases import EXAMPLES
+
+    study = Study.load(EXAMPLES / "clearance_study.toml")
+    region = region_in_units(study)
+    points = region.snap(np.random.default_rng(1).uniform(-1.1, 1.1, (200, 3)))
+    assert np.abs(points).max() <= 1.0
+    actual = study.centre + points * 1.681792830507429 * study.step
+    assert actual == pytest.approx(np.round(actual, 3), abs=1e-12)
+    assert actual[:, 0].min() == pytest.approx(0.012)
+    assert region.apart * 1.681792830507429 * study.step == pytest.approx([0.001] * 3)
+
+
+def test_faults_are_one_sentence_each(tmp_path, monkeypatch):
+    instantly(monkeypatch.setattr)
+    for folder, more, words in (
+        (
+            "small",
+            [],
+            "adaptive.budget = 30: 20 runs of the design, a batch of 6 and 9 fresh runs at the end do not fit; give at",
+        ),
+        ("both", ["--direct"], "--direct, --adaptive: the pick can follow one front only; give one of them"),
+    ):
+        path = written(tmp_path / folder, budget=30)
+        ended = doe("study", str(path), "--adaptive", *more, "--out", str(tmp_path / folder / "out"))
+        assert ended.returncode == 2 and words in ended.stderr and ended.stderr.count("\n") == 1
+    limit = (
+        'name = "power_loss_W"\nmodel = "quadratic"\n',
+        'name = "power_loss_W"\nmodel = "quadratic"\nupper = -5.0\n',
+    )
+    with pytest.raises(
+        InputError, match=r"no point of the region keeps all limits; the closest .* misses power_loss_W <= -5"
+    ):
+        search(written(tmp_path / "limit", limit), tmp_path / "limit", 1)
+
+
+def test_advice_where_surfaces_miss_more_than_noise():
+    from pareto_cases import EXAMPLES
+
+    study = Study.load(EXAMPLES / "clearance_study.toml")
+    from doe.study.runs import read_runs
+
+    runs = read_runs(study, EXAMPLES / "ccd_table4.csv")
+    bent = runs.values + 1e3 * np.sin(3.0 * runs.coded[:, :1])
+    (sentence,) = advice(study, fit_surfaces(study, type(runs)(runs.coded, runs.actual, bent, runs.errors)))
+    assert "lack of fit is significant for impact_force_N" in sentence
+    assert "in 80 runs beyond the 20 of the design" in sentence
+    smooth = 5.0 + runs.coded @ np.ones((3, 3)) + np.random.default_rng(1).normal(0.0, 0.1, runs.values.shape)
+    assert advice(study, fit_surfaces(study, type(runs)(runs.coded, runs.actual, smooth, runs.errors))) == []
