@@ -18,17 +18,27 @@ LEAST_DEVIATION = 1e-12  # of a response's scale: what is known exactly still ha
 
 @dataclass(frozen=True, eq=False)
 class Emulators:
-    """Emulators of m responses from runs that went well."""
+    """Emulators of m responses from runs that went well.
+
+    Their deviations are stretched by ``stretch`` (m,), at least 1, so that runs left out one at a time lie within them.
+    """
 
     goals: Goals
     runs: Runs
     each: Sequence[Emulator]
+    stretch: Array
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations (n, m) of the responses without scatter at points (n, k)."""
         means, deviations = zip(*(one.predict(points) for one in self.each), strict=True)
+        stretched = np.column_stack(deviations) * self.stretch
         floor = LEAST_DEVIATION * np.maximum(np.abs(self.runs.values).max(axis=0), 1e-300)
-        return np.column_stack(means), np.maximum(np.column_stack(deviations), floor)
+        return np.column_stack(means), np.maximum(stretched, floor)
+
+    def covariance(self, points: Array, point: Array) -> Array:
+        """Covariances (n, m) of what is not known of each response at points (n, k) and at one point (k,)."""
+        columns = [one.covariance(points, point[None])[:, 0] for one in self.each]
+        return np.column_stack(columns) * self.stretch**2
 
     def scatter(self, points: Array) -> Array:
         """Variances (n, m) of single replicates at points (n, k)."""
@@ -73,9 +83,14 @@ def fit_emulators(goals: Goals, runs: Runs, known: Emulators | None = None) -> E
     variances = _pooled(good, good.points) / good.replicates[:, None]
     starts = [None] * good.values.shape[1] if known is None else [one.hyperparameters for one in known.each]
     columns = zip(good.values.T, variances.T, starts, strict=True)
-    return Emulators(
-        goals, good, [fit_emulator(good.points, value, variance, start=start) for value, variance, start in columns]
-    )
+    each = [fit_emulator(good.points, value, variance, start=start) for value, variance, start in columns]
+    return Emulators(goals, good, each, np.array([_stretch(one) for one in each]))
+
+
+def _stretch(emulator: Emulator) -> float:
+    """Root mean square of what runs left out one at a time miss the others' forecast by, in standard deviations; at least 1."""
+    foretold, deviation = emulator.leave_one_out()
+    return max(float(np.sqrt(np.mean(((emulator.values - foretold) / deviation) ** 2))), 1.0)
 
 
 def _pooled(runs: Runs, points: Array) -> Array:

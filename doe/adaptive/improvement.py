@@ -12,6 +12,7 @@ improvement (2021).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.stats import qmc
@@ -23,6 +24,8 @@ from doe.pareto.indicators import REFERENCE
 LEVELS = 13  # 2^13 levels, of which only those count that something may still gain
 MOST_LEVELS = 1500  # of those
 DRAWS = 32  # fronts drawn
+WORTH = 0.25  # of an emulator's variance: as small the scatter of a run is to be
+NOTICED, SURE = 0.97, 1e-3  # changes of a deviation that are followed, and the least that is left of it
 BEYOND = 1.0  # of the range of a cost: as far below the best foretold a level may lie
 
 
@@ -103,14 +106,19 @@ def batch(
     """Rows of ``candidates`` (n, k) that together are expected to gain most, one after the other, and their gains.
 
     ``left`` (u,) is the probability that a level is still to be gained. Candidates within ``apart`` (k,) of one taken are
-    its twins, and refused. There are fewer rows than ``count`` where nothing else is left to gain.
+    its twins, and refused. Each is taken to turn out as foretold (Ginsbourger, Le Riche and Carraro's kriging believer). There are fewer rows than ``count`` where nothing else is left to gain.
     """
     means, deviations = emulators.predict(candidates)
     # The first of a Sobol sequence are even; every second one is not.
     still = np.flatnonzero(left > 0.0)
     still, share = still[:MOST_LEVELS], levels.volume * len(still) / len(left) / max(min(len(still), MOST_LEVELS), 1)
-    chance = emulators.below(means, deviations, levels.at[still]) * emulators.kept(means, deviations)[:, None]
-    free, left = np.ones(len(candidates), dtype=bool), left[still]
+    at, free, left = levels.at[still], np.ones(len(candidates), dtype=bool), left[still]
+
+    def chances(some: Any) -> Array:
+        kept = emulators.kept(means[some], deviations[some])
+        return emulators.below(means[some], deviations[some], at) * kept[:, None]
+
+    chance, used, learnt = chances(slice(None)), deviations.copy(), np.empty((0, *means.shape))
     rows: list[int] = []
     gains: list[float] = []
     while len(rows) < count:
@@ -122,4 +130,11 @@ def batch(
         gains.append(share * float(expected[row]))
         left *= 1.0 - chance[row]
         free &= ~(np.abs(candidates - candidates[row]) <= apart).all(axis=1)
+        # What the run will tell of its neighbours: they are not other chances of the same luck.
+        shared = emulators.covariance(candidates, candidates[row]) - np.einsum("rnm,rm->nm", learnt, learnt[:, row])
+        new = shared / np.sqrt((1.0 + WORTH) * deviations[row] ** 2)
+        learnt = np.concatenate([learnt, new[None]])
+        deviations = np.maximum(np.sqrt((deviations**2 - new**2).clip(0.0)), SURE * used)
+        changed = np.flatnonzero((deviations < NOTICED * used).any(axis=1))
+        chance[changed], used[changed] = chances(changed), deviations[changed]
     return rows, np.array(gains)

@@ -14,7 +14,7 @@ import numpy as np
 
 from doe.adaptive.candidates import Region, candidates, front_rows
 from doe.adaptive.emulators import Emulators, fit_emulators
-from doe.adaptive.improvement import DRAWS, Levels, batch, known_of, levels_of
+from doe.adaptive.improvement import DRAWS, WORTH, Levels, batch, known_of, levels_of
 from doe.adaptive.result import AdaptiveFront, Batch
 from doe.adaptive.runs import Evaluate, Runs
 from doe.adaptive.settling import CHECKS, as_foretold, missed, nothing_gained
@@ -29,7 +29,6 @@ from doe.pareto.picks import NAMES, Rule, pick_all
 
 FRESH = 0.3  # of the budget: fresh runs at the finalists, as in a direct search
 SHOWN, FEW = 200, 2048  # points of a front foretold, and levels, by which its hypervolume is told
-WORTH = 0.25  # of an emulator's variance: as small the scatter of a run is to be
 
 
 @dataclass(frozen=True)

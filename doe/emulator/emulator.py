@@ -67,11 +67,25 @@ class Emulator:
         """Mean and standard deviation (n,) of the response without scatter at points (n, k)."""
         at, given, runs = np.asarray(points, float), self.hyperparameters, self.solution
         columns, across = model_matrix(at, self.terms), given.variance * correlation(at, self.points, given.lengths)
-        mean = columns @ runs.coefficients + across @ runs.weights
-        inside = forward_substituted(runs.factor, across.T)
-        left = np.linalg.solve(runs.root.T, (columns - inside.T @ runs.trend).T)
+        inside, left = self._explained(columns, across)
         variance = given.variance - (inside**2).sum(axis=0) + (left**2).sum(axis=0)
-        return mean, np.sqrt(variance.clip(0.0))
+        return columns @ runs.coefficients + across @ runs.weights, np.sqrt(variance.clip(0.0))
+
+    def covariance(self, points: ArrayLike, other: ArrayLike) -> Array:
+        """Covariance (n, m) of what is not known of the response at points (n, k) and (m, k)."""
+        first, second, given = np.asarray(points, float), np.asarray(other, float), self.hyperparameters
+        (inside, left), (inside_other, left_other) = (
+            self._explained(model_matrix(at, self.terms), given.variance * correlation(at, self.points, given.lengths))
+            for at in (first, second)
+        )
+        between = given.variance * correlation(first, second, given.lengths)
+        return between - inside.T @ inside_other + left.T @ left_other
+
+    def _explained(self, columns: Array, across: Array) -> tuple[Array, Array]:
+        """What the runs explain (n, m) and what the trend leaves open (p, m) at m points, as square roots."""
+        inside = forward_substituted(self.solution.factor, across.T)
+        left = np.linalg.solve(self.solution.root.T, (columns - inside.T @ self.solution.trend).T)
+        return inside, np.asarray(left)
 
     def leave_one_out(self) -> tuple[Array, Array]:
         """What every run would be foretold by the others: mean and standard deviation (n,), its own scatter included."""

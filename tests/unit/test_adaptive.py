@@ -46,7 +46,7 @@ def test_expected_gain_of_one_point_is_the_product_of_two_expected_gains():
     improvement has it (Jones, Schonlau and Welch 1998)."""
     found, at = emulators(), np.array([[0.1, -0.2]])
     means = found.predict(at)[0]
-    wide = replace(found, each=[_Certain(means[0, j], 0.2) for j in range(2)])
+    wide = replace(found, each=[_Certain(means[0, j], 0.2) for j in range(2)], stretch=np.ones(2))
     levels = levels_of(np.array([[0.0, 2.0], [2.0, 0.0]]), np.array([-2.0, -2.0]), np.random.default_rng(1))
     _, gains = batch(wide, at, levels, np.ones(len(levels.at)), 1, np.zeros(2))
     z = (levels.high - means[0]) / 0.2
@@ -60,6 +60,9 @@ class _Certain:
 
     def predict(self, points):
         return np.full(len(points), self.mean), np.full(len(points), self.deviation)
+
+    def covariance(self, points, other):
+        return np.full((len(points), len(other)), self.deviation**2)
 
 
 @pytest.mark.parametrize(("kind", "target"), [("min", None), ("max", None), ("target", 0.4)])

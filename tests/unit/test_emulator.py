@@ -86,6 +86,9 @@ def test_draws_are_correlated_as_the_posterior():
     found = np.corrcoef(draws.T)
     assert found[0, 1] > 0.97
     assert abs(found[0, 2]) < 0.5
+    covariance = emulator.covariance(near, near)
+    assert np.sqrt(np.diag(covariance)) == pytest.approx(emulator.predict(near)[1], rel=1e-9)
+    assert found == pytest.approx(covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance))), abs=0.1)
 
 
 def test_the_search_finds_what_the_runs_were_made_of():
