@@ -3,10 +3,11 @@
 - ``emulators``: an emulator a response, and what they say of goals and limits
 - ``improvement``: the expected gain in hypervolume as an integral over what is not yet dominated
 - ``candidates``: points that are worth asking about
+- ``border``: when to go beyond the region
 - ``settling``: when to stop
 - ``search``: design, batches, fresh runs; ``result``: what came out
 """
 
 from doe.adaptive.result import AdaptiveFront, Batch
-from doe.adaptive.runs import Evaluate, Runs
+from doe.adaptive.runs import Border, Evaluate, Runs
 from doe.adaptive.search import Plan, adaptive_front

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from doe.adaptive.candidates import Region
 from doe.adaptive.emulators import Emulators
+from doe.adaptive.runs import Face
 from doe.arrays import Array, Whole
 from doe.pareto.direct import DirectFront, Samples
 
@@ -37,7 +37,8 @@ class AdaptiveFront:
     ``front``: its finalists in factor units with their fresh runs alone, and all runs of the search. ``archive`` (a, k) is the
     whole front that the emulators foretell, with its ``foretold`` responses (a, m) and their ``deviations`` (a, m).
     ``region`` that was searched in the end. ``history``: state after every batch; ``searched`` (n,) are all runs of design and search, in factor units,
-    ``why`` each was made ("design", "improvement", "check", "extension") and the replicates ``spent`` on it (n,); ``moves`` of the edges.
+    ``why`` each was made ("design", "improvement", "check", "extension") and the replicates ``spent`` on it (n,); ``moves``: faces moved
+    and where to (coded); ``faces`` that the pick lies at in the end.
     ``bias`` and ``spread`` (m,): mean, and root mean square about it, of what the fresh runs at the finalists missed the
     emulators by, in standard deviations. ``fresh``: number of the fresh runs. ``stopped``: why the search ended. ``seconds``
     of the emulators and of the choice of runs.
@@ -50,7 +51,8 @@ class AdaptiveFront:
     emulators: Emulators
     region: Region
     history: tuple[Batch, ...]
-    moves: tuple[Mapping[str, float], ...]
+    moves: tuple[tuple[Face, float], ...]
+    faces: tuple[Face, ...]
     searched: Samples
     why: tuple[str, ...]
     spent: Whole

@@ -37,5 +37,26 @@ class Runs(NamedTuple):
         return Runs(*(np.concatenate(both) for both in zip(self, more, strict=True)))
 
 
+class Border(NamedTuple):
+    """How far the faces of a region may be moved: to ``low`` and ``high`` (k,) in coded units, as long as runs are ``possible``
+    at all corners (c, k) of it."""
+
+    low: Array
+    high: Array
+    possible: Callable[[Array], bool]
+
+
+class Face(NamedTuple):
+    """A face that the pick lies ``at`` (coded): of a ``factor``, upper (``side`` 1) or lower (-1); ``better`` is the chance that
+    the front goes on beyond. ``held`` by "allowed", "scene" (no run is possible beyond), "moves" (no more are made) or, "",
+    by that chance alone."""
+
+    factor: int
+    side: int
+    at: float
+    better: float
+    held: str
+
+
 # Runs points (n, k) in factor units with (n,) replicates each, every row with a seed of its own: values, errors, freedom.
 Evaluate = Callable[[Array, Whole], tuple[Array, Array, Whole]]

@@ -7,16 +7,18 @@ made afresh at the finalists and alone are reported, as at the end of `doe.paret
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.stats import qmc
 
+from doe.adaptive.border import Place, faces, grown, outermost
 from doe.adaptive.candidates import Region, candidates, front_rows
 from doe.adaptive.emulators import Emulators, fit_emulators
 from doe.adaptive.improvement import DRAWS, WORTH, Levels, batch, known_of, levels_of
 from doe.adaptive.result import AdaptiveFront, Batch
-from doe.adaptive.runs import Evaluate, Runs
+from doe.adaptive.runs import Border, Evaluate, Face, Runs
 from doe.adaptive.settling import CHECKS, as_foretold, missed, nothing_gained
 from doe.arrays import Array, Whole
 from doe.emulator.emulator import THREADS
@@ -66,18 +68,21 @@ def adaptive_front(
     plan: Plan,
     baseline: Array,
     tell: Tell = lambda state, done, total: None,
+    border: Border | None = None,
 ) -> AdaptiveFront:
     """Find the front; the same seed and the same runs give the same bits.
 
     ``centre`` and ``step`` (k,) turn coded units into those of the factors, in which ``evaluate`` is asked and the
-    ``baseline`` is given. ``design`` are the first runs.
+    ``baseline`` is given. ``design`` are the first runs. The region may grow as far as the ``border``, not at all without one.
 
     Raises ValueError where the budget has no room for the design, a batch and the fresh runs, or too few runs go well;
     InfeasibleError where no run comes near to keeping the limits.
     """
     check_budget(plan, len(design.points))
     with THREADS.limit(limits=1):
-        search = _Search(evaluate, centre, step, region, goals, plan, design, tell, why=["design"] * len(design.points))
+        search = _Search(
+            evaluate, centre, step, region, goals, plan, design, tell, border, why=["design"] * len(design.points)
+        )
         stopped = search.spend()
         return search.finish(baseline, stopped)
 
@@ -105,10 +110,11 @@ class _Search:
     plan: Plan
     runs: Runs
     tell: Tell
+    border: Border | None
     history: list[Batch] = field(default_factory=list)
     fronts: list[Array] = field(default_factory=list)
     why: list[str] = field(default_factory=list)
-    moves: list[Mapping[str, float]] = field(default_factory=list)
+    moves: list[tuple[Face, float]] = field(default_factory=list)
     emulators: Emulators | None = None
     seconds: float = 0.0
 
@@ -126,16 +132,17 @@ class _Search:
             check = nothing_gained(self.history, since) and count >= CHECKS
             if check:
                 rows = self._check(emulators, points, levels)
-            why = "" if not rows else "check" if check else "improvement"
+            chosen, why = points[rows], "" if not rows else "check" if check else "improvement"
+            if self.history and rows and (beyond := self._beyond(emulators, points, count, random)) is not None:
+                chosen, why, check, since = beyond, "extension", False, len(self.history)
             self.history.append(replace(state, why=why))
             self.tell(self.history[-1], len(self.runs.points), self.plan.budget)
-            chosen = points[rows]
             replicates = self._replicates(emulators, chosen)
             self.seconds += time.perf_counter() - started
             if not rows:
                 return "the budget is spent" if count <= 0 else "no point is left that may gain"
             fresh = self._run(chosen, replicates)
-            self.runs, self.why = self.runs.plus(fresh), [*self.why, *[why] * len(rows)]
+            self.runs, self.why = self.runs.plus(fresh), [*self.why, *[why] * len(chosen)]
             if check:
                 if as_foretold(emulators, fresh):
                     return "batches gained nothing more and fresh runs on the front were as foretold"
@@ -169,6 +176,23 @@ class _Search:
             len(emulators.runs.points), float(at.mean()), float(at.std()), gained, float((best - at).mean()), ""
         )
         return levels, known.left, state
+
+    def _faces(self, emulators: Emulators, points: Array, random: np.random.Generator) -> list[Face]:
+        """Faces that the pick foretold lies at."""
+        place = Place(emulators, self.region, points, len(self.moves))
+        border = self.border or Border(self.region.low, self.region.high, lambda corners: False)
+        return faces(place, border, self.plan.pick, random)
+
+    def _beyond(self, emulators: Emulators, points: Array, count: int, random: np.random.Generator) -> Array | None:
+        """Move the face that is worth it, and give points (n, k) all over what is new; None where no face is."""
+        if self.border is None or (face := outermost(self._faces(emulators, points, random))) is None:
+            return None
+        self.region = grown(self.border, self.region, face.factor, face.side)
+        low, high = self.region.low.copy(), self.region.high.copy()
+        self.moves.append((face, float((high if face.side > 0 else low)[face.factor])))
+        (low if face.side > 0 else high)[face.factor] = face.at
+        even = qmc.Sobol(low.size, seed=random).random_base2(count.bit_length())[:count]
+        return self.region.snap(low + (high - low) * even)
 
     def _check(self, emulators: Emulators, points: Array, levels: Levels) -> list[int]:
         """Rows of points spread over the front foretold."""
@@ -218,6 +242,7 @@ class _Search:
             region=self.region,
             history=tuple(self._on_one_scale(emulators, costs[rows])),
             moves=tuple(self.moves),
+            faces=tuple(self._faces(emulators, points, random)),
             searched=Samples(self.centre + self.step * self.runs.points, self.runs.values, self.runs.errors),
             why=tuple(self.why),
             spent=self.runs.replicates,

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from doe import clearance
-from doe.adaptive import AdaptiveFront, Batch, Plan, adaptive_front
+from doe.adaptive import AdaptiveFront, Batch, Border, Plan, adaptive_front
 from doe.adaptive import Runs as Known
 from doe.adaptive.candidates import Region
 from doe.adaptive.search import check_budget
@@ -25,7 +25,7 @@ from doe.study.goals import goals_of, region_of
 from doe.study.runs import Runs
 from doe.study.surfaces import independent_values, standard_errors
 from doe.study_file import Study
-from rbdyn.faults import InputError, RunError
+from rbdyn.faults import InputError, RunError, refuse
 
 SIGNIFICANT = 0.05
 # Where a drawing has no resolution, points are twins within this share of the half range of the region.
@@ -54,6 +54,7 @@ Searched = Direct | Adaptive
 
 def check_adaptive(study: Study) -> None:
     """Raises InputError where the budget has no room for the design."""
+    border_of(study)
     try:
         check_budget(plan_of(study), len(design_of(study).coded))
     except ValueError as error:
@@ -88,6 +89,7 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
                 plan,
                 study.baseline,
                 evaluate.tell,
+                border_of(study),
             )
         except InfeasibleError:
             raise
@@ -107,6 +109,32 @@ def region_in_units(study: Study) -> Region:
     finest = np.array([factor.resolution or np.nan for factor in study.file.factor]) / half
     apart = np.where(np.isnan(finest), ALIKE, finest * (1.0 + 1e-9))
     return Region(-np.ones(half.size), np.ones(half.size), -study.centre / half, finest, apart)
+
+
+def border_of(study: Study) -> Border | None:
+    """How far the region may grow; None where it may not at all. Raises InputError where it would have to shrink."""
+    reach = region_of(study) * study.step
+    inside = np.column_stack([study.centre - reach, study.centre + reach])
+    ends = np.array([factor.allowed or own for factor, own in zip(study.file.factor, inside.tolist(), strict=True)])
+    slack = 1e-9 * reach
+    refuse(
+        f"{study.path}: factor.allowed of {name} = {given.tolist()}: must reach over the region of the design, {own[0]:.6g} to "
+        f"{own[1]:.6g}; widen it or narrow the design"
+        for name, given, own, off in zip(study.factors, ends, inside, slack, strict=True)
+        if given[0] > own[0] + off or given[1] < own[1] - off
+    )
+    if not study.file.adaptive.extend or all(factor.allowed is None for factor in study.file.factor):
+        return None
+
+    def possible(corners: Array) -> bool:
+        try:
+            clearance.adaptive_scenes(study, study.centre + reach * corners, [2] * len(corners), 0)
+        except InputError:
+            return False
+        return True
+
+    low, high = (ends - study.centre[:, None]).T / reach
+    return Border(low, high, possible)
 
 
 def advice(study: Study, surfaces: list[Surface]) -> list[str]:

@@ -78,7 +78,8 @@ class Edge(Record):
 
 def share_at_edge(study: Study, points: Array) -> float:
     """Share of points (n, k) in factor units within `NEAR` of a bound of the region."""
-    return float(_sides(study, points).any(axis=1).mean())
+    reach = region_of(study) * study.step
+    return float(_sides(points, np.column_stack([study.centre - reach, study.centre + reach])).any(axis=1).mean())
 
 
 def edge_of(
@@ -88,9 +89,15 @@ def edge_of(
     front: Array,
     direct: Array | None,
     simulations: Simulations | None,
+    ends: Array | None = None,
 ) -> Edge:
-    """Where the pick and the fronts' points (n, k) lie; beyond the bounds ``simulations`` tell, else the surfaces."""
-    sides = _sides(study, pick.point[None])[0]
+    """Where the pick and the fronts' points (n, k) lie; beyond the bounds ``simulations`` tell, else the surfaces.
+
+    ``ends`` (k, 2), in factor units, of the region that the pick was searched in, where that has grown.
+    """
+    reach = region_of(study) * study.step
+    ends = np.column_stack([study.centre - reach, study.centre + reach]) if ends is None else ends
+    sides = _sides(pick.point[None], ends)[0]
     names = [(index, side) for index, side in enumerate(sides.tolist()) if side]
     gains_beyond = {} if simulations is None else _simulated(study, pick, names, simulations)
     outward = []
@@ -99,26 +106,25 @@ def edge_of(
         if gains is None:
             gains, source = _on_surfaces(study, surfaces, pick.point, index, side), "the surfaces"
         unit, scale = _unit(study, index)
-        reach = region_of(study)[index] * study.step[index]
         outward.append(
             Outward(
                 study.factors[index],
                 "upper" if side > 0 else "lower",
-                float(study.centre[index] + side * reach),
+                float(ends[index, int(side > 0)]),
                 unit,
                 source,
                 {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()},
             )
         )
-    far = None if direct is None else share_at_edge(study, direct)
+    far = None if direct is None else float(_sides(direct, ends).any(axis=1).mean())
     return Edge(tuple(outward), share_at_edge(study, front), far)
 
 
-def _sides(study: Study, points: Array) -> Whole:
-    """-1 at a lower bound, 1 at an upper one, else 0, for points (n, k)."""
-    coded, reach = study.coded(points), region_of(study)
-    near = np.abs(coded) >= reach * (1.0 - 2.0 * NEAR)
-    return np.where(near, np.sign(coded), 0.0).astype(np.int64)
+def _sides(points: Array, ends: Array) -> Whole:
+    """-1 at a lower bound, 1 at an upper one, else 0, for points (n, k) in a region with ``ends`` (k, 2)."""
+    half = 0.5 * (ends[:, 1] - ends[:, 0])
+    off = (points - ends.mean(axis=1)) / half
+    return np.where(np.abs(off) >= 1.0 - 2.0 * NEAR, np.sign(off), 0.0).astype(np.int64)
 
 
 def _unit(study: Study, index: int) -> tuple[str, float]:

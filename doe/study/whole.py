@@ -125,7 +125,8 @@ def run_study(
         clock.lap("adaptive_s" if adaptive else "direct_s")
         chosen = choose(study, surfaces, found, searched, simulations)
         confirmed, at = chosen.confirmed, None if searched is None else searched.front.points
-        edge = edge_of(study, surfaces, confirmed["pick"], chosen.front.points, at, simulations if searched else None)
+        ends, ask = getattr(searched, "edges", None), simulations if searched else None
+        edge = edge_of(study, surfaces, confirmed["pick"], chosen.front.points, at, ask, ends)
         clock.lap("confirmation_s")
     pick = confirmed["pick"].point
     local = None if searched is None else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])

@@ -28,6 +28,8 @@ class Factor(Strict):
     """Smallest step that a drawing makes, to which the pick is rounded; not rounded where left out."""
     tolerance: Positive | None = None
     """Half width of what manufacture makes of it."""
+    allowed: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    """Ends as far as an adaptive search may go beyond the region of the design; not at all where left out."""
 
     @model_validator(mode="after")
     def _levels_differ(self) -> Self:

@@ -9,7 +9,7 @@ import pytest
 from known_fronts import box, dtlz2, first_runs, noisy, search, share, zdt1
 from scipy import special
 
-from doe.adaptive import Batch, Plan
+from doe.adaptive import Batch, Border, Plan, adaptive_front
 from doe.adaptive.candidates import candidates, worth_it
 from doe.adaptive.emulators import fit_emulators
 from doe.adaptive.improvement import Known, batch, dominated, levels_of
@@ -206,8 +206,6 @@ def test_replicates_are_made_where_they_matter():
         values, errors, freedom = noisy(bowls, 1, 0.05)(points, replicates)
         return values, errors, freedom
 
-    from doe.adaptive import adaptive_front
-
     design = first_runs(evaluate, 2, 12, 1)
     plan = Plan(60, least=2, most=16, usual=5)
     adaptive_front(evaluate, np.zeros(2), np.ones(2), box(2), design, TWO, plan, np.zeros(2))
@@ -216,6 +214,43 @@ def test_replicates_are_made_where_they_matter():
     assert spent.max() == 16
     assert np.mean(asked[1]) < np.mean(asked[-2])
     assert set(asked[-1]) == {5}
+
+
+def shifted(points):
+    """Squared distances to two points outside the region."""
+    return np.column_stack([((points - end) ** 2).sum(axis=1) for end in ([1.9, 0.4], [1.9, -0.4])])
+
+
+def beyond(border):
+    evaluate = noisy(shifted, 1, 0.02)
+    design, plan = first_runs(evaluate, 2, 12, 1), Plan(70, least=1, most=1, usual=1)
+    zero, one = np.zeros(2), np.ones(2)
+    return adaptive_front(evaluate, zero, one, box(2), design, TWO, plan, zero, border=border)
+
+
+def test_the_region_grows_where_the_front_goes_on_and_no_farther_than_allowed():
+    asked = []
+    wide = beyond(Border(np.array([-1.0, -1.0]), np.array([2.5, 1.0]), lambda corners: asked.append(corners) or True))
+    face = wide.moves[0][0]
+    assert (face.factor, face.side, face.at) == (0, 1, 1.0)
+    assert wide.moves[0][1] == 2.0, "half of the range"
+    assert asked[0].tolist() == [[-1.0, -1.0], [-1.0, 1.0], [2.0, -1.0], [2.0, 1.0]]
+    assert 2.0 <= wide.region.high[0] <= 2.5 and wide.region.low.tolist() == [-1.0, -1.0]
+    assert wide.why.count("extension") == 8 * len(wide.moves)
+    assert wide.front.points[:, 0].mean() == pytest.approx(1.9, abs=0.1)
+    close = beyond(Border(np.array([-1.0, -1.0]), np.array([1.3, 1.0]), lambda corners: True))
+    assert close.front.points[:, 0].max() <= 1.3
+    assert {face.held for face in close.faces} <= {"allowed"}
+
+
+@pytest.mark.parametrize(
+    ("border", "held"), [(None, "allowed"), (Border(-np.ones(2), np.full(2, 3.0), lambda corners: False), "scene")]
+)
+def test_what_holds_the_pick_is_told(border, held):
+    found = beyond(border)
+    assert not found.moves and found.region.high.tolist() == [1.0, 1.0]
+    face = next(face for face in found.faces if face.factor == 0)
+    assert (face.side, face.held) == (1, held) and face.better > 0.9
 
 
 @pytest.mark.slow

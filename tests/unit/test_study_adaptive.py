@@ -13,9 +13,10 @@ from short_studies import SHORT, short_study, silent
 
 from doe import clearance
 from doe.clearance import Simulations
+from doe.report.steps.adaptive import adaptive_record
 from doe.report.study.files import write
 from doe.running.store import Store
-from doe.study.adaptive import advice, find_adaptive, region_in_units
+from doe.study.adaptive import advice, check_adaptive, find_adaptive, region_in_units
 from doe.study.runs import STORE, run_design
 from doe.study.surfaces import fit_surfaces
 from doe.study.whole import run_study
@@ -116,6 +117,25 @@ def test_points_are_on_the_drawing_and_inside():
     assert actual == pytest.approx(np.round(actual, 3), abs=1e-12)
     assert actual[:, 0].min() == pytest.approx(0.012)
     assert region.apart * 1.681792830507429 * study.step == pytest.approx([0.001] * 3)
+
+
+def test_the_region_grows_within_what_is_allowed(tmp_path, monkeypatch):
+    """Responses that are planes: the pick goes as far as it may, and the record says what holds it."""
+    instantly(monkeypatch.setattr)
+    pocket = 'key = "cage.pocket_clearance_mm"\n'
+    path = written(tmp_path, (pocket, f"{pocket}allowed = [0.15, 0.40]\n"), budget=60)
+    found = search(path, tmp_path, 1)
+    study = Study.load(path)
+    record = adaptive_record(study, found)
+    assert {move["factor"] for move in record["extended"]} == {"pocket_clearance_mm"}
+    assert 0.15 <= found.edges[2, 0] < 0.2159 or found.edges[2, 1] > 0.3841
+    assert found.front.points[:, 2].min() >= 0.15 and found.front.points[:, 2].max() <= 0.40
+    assert "The pick foretold" in record["sentence"]
+    narrow = written(tmp_path / "narrow", (pocket, f"{pocket}allowed = [0.25, 0.40]\n"))
+    with pytest.raises(
+        InputError, match=r"factor.allowed of pocket_clearance_mm = \[0.25, 0.4\]: must reach over the region"
+    ):
+        check_adaptive(Study.load(narrow))
 
 
 def test_faults_are_one_sentence_each(tmp_path, monkeypatch):

@@ -9,6 +9,7 @@ from doe.arrays import or_none
 from doe.pareto.surrogate_loss import noisy_hypervolume
 from doe.report.steps.confirmation import point_record
 from doe.study.adaptive import Adaptive
+from doe.study.goals import region_of
 from doe.study_file import Study
 
 
@@ -41,7 +42,16 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
             for each in found.history
         ],
         "stopped": found.stopped,
-        "extended": [dict(move) for move in found.moves],
+        "extended": [
+            {
+                "factor": study.factors[face.factor],
+                "side": "upper" if face.side > 0 else "lower",
+                "from": _actual(study, face.factor, face.at),
+                "to": _actual(study, face.factor, to),
+            }
+            for face, to in found.moves
+        ],
+        "held": held_sentence(study, adaptive),
         "region": {name: ends for name, ends in zip(study.factors, adaptive.edges.tolist(), strict=True)},
         "points": [
             {"factors": study.by_factor(point), "replicates": int(count), "why": why}
@@ -72,8 +82,32 @@ def adaptive_sentence(study: Study, adaptive: Adaptive) -> str:
     return (
         f"adaptive front: {len(found.spent)} runs of design and search and {found.fresh} fresh ones at its points in "
         f"{adaptive.seconds:.0f} s; it ended because {found.stopped}, with at most {left:.1f} % of its hypervolume to gain. "
-        f"What the fresh runs missed the emulators by, in standard deviations: {off}."
+        f"What the fresh runs missed the emulators by, in standard deviations: {off}. {held_sentence(study, adaptive)}"
     )
+
+
+def held_sentence(study: Study, adaptive: Adaptive) -> str:
+    """What holds the pick foretold at the edges of the region that was searched in the end."""
+    words = {
+        "allowed": "by what is allowed there",
+        "scene": "because no bearing is possible beyond",
+        "moves": "because the region is not moved more often",
+        "": "because the responses turn there",
+    }
+    held = [
+        f"{study.factors[face.factor]} at {_actual(study, face.factor, face.at):.4g} {words[face.held]} (the front goes on beyond "
+        f"with a probability of {face.better:.2f})"
+        for face in adaptive.found.faces
+    ]
+    return (
+        f"The pick foretold is held in {'; '.join(held)}."
+        if held
+        else "The pick foretold lies inside the region searched."
+    )
+
+
+def _actual(study: Study, factor: int, coded: float) -> float:
+    return float(study.centre[factor] + region_of(study)[factor] * study.step[factor] * coded)
 
 
 def archive_table(study: Study, adaptive: Adaptive) -> list[dict[str, float]]:
