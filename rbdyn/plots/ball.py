@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.plots.style import GREY, INNER, OUTER, Axes, plain, plt, save
 
 if TYPE_CHECKING:
     from rbdyn.quasistatic.result import BallResult
 
 Balls = Sequence[Mapping[str, float]]
-Vector = NDArray[np.float64]
 # How far the grooves are drawn to either side of the radial line [rad]; shoulders are not part of a scene.
 GROOVE = math.radians(62.0)
 RING_FILL = "#E4E4E4"
@@ -39,12 +38,12 @@ def pictures(result: BallResult, folder: Path) -> list[str]:
     return ["loads.png", "angles.png", "section.png"]
 
 
-def column(balls: Balls, name: str) -> Vector:
+def column(balls: Balls, name: str) -> Array:
     """One figure of all balls."""
     return np.array([ball[name] for ball in balls])
 
 
-def closed(balls: Balls, name: str) -> Vector:
+def closed(balls: Balls, name: str) -> Array:
     """The same, the first ball once more at the end."""
     values = column(balls, name)
     return np.append(values, values[0])
@@ -145,12 +144,12 @@ def _section_on(axis: Axes, ball: Mapping[str, float], drawing: Mapping[str, Any
     axis.set_axis_off()
 
 
-def _along(angle: float) -> Vector:
+def _along(angle: float) -> Array:
     """Unit vector (axial, radial) at an angle from the radial direction."""
     return np.array([math.sin(angle), math.cos(angle)])
 
 
-def _groove(axis: Axes, centre: Vector, radius: float, side: float) -> None:
+def _groove(axis: Axes, centre: Array, radius: float, side: float) -> None:
     """A ring's section beyond its groove: ``side`` 1 above, -1 below."""
     turn = np.linspace(-GROOVE, GROOVE, 120)
     x, y = centre[0] + radius * np.sin(turn), centre[1] + side * radius * np.cos(turn)

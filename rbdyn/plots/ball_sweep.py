@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.plots.ball import angles_on
 from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Line2D, plain, plt, save
 
@@ -180,13 +180,13 @@ def _rows(result: SweepResult) -> dict[str, str]:
     return {f"{name} row": f"{name}_row_" for name in ("inner", "outer")}
 
 
-def _lines(result: SweepResult) -> list[tuple[NDArray[np.float64], Any, str, Callable[[str], NDArray[np.float64]]]]:
+def _lines(result: SweepResult) -> list[tuple[Array, Any, str, Callable[[str], Array]]]:
     """The last key's values, and for each value of the first of two: style, name, and what picks a column."""
     keys = list(result.keys.items())
     x = np.array(keys[-1][1], dtype=np.float64)
 
-    def picker(index: int | None) -> Callable[[str], NDArray[np.float64]]:
-        def pick(column: str) -> NDArray[np.float64]:
+    def picker(index: int | None) -> Callable[[str], Array]:
+        def pick(column: str) -> Array:
             grid = result.grid(column)
             shown = grid if index is None else grid[index]
             return np.where(np.isfinite(shown), shown, np.nan)
@@ -206,7 +206,7 @@ def _once(axis: Axes, name: str) -> str:
     return "" if name in axis.get_legend_handles_labels()[1] else name
 
 
-def _dot(axis: Axes, x: NDArray[np.float64], values: NDArray[np.float64], least: bool) -> None:
+def _dot(axis: Axes, x: Array, values: Array, least: bool) -> None:
     """Mark the best point, where there is one inside the range."""
     if not np.isfinite(values).any():
         return
@@ -220,7 +220,7 @@ def _dot(axis: Axes, x: NDArray[np.float64], values: NDArray[np.float64], least:
         )  # fmt: skip
 
 
-def _wide(values: NDArray[np.float64]) -> bool:
+def _wide(values: Array) -> bool:
     """Whether values span more than a factor of thirty."""
     good = values[np.isfinite(values) & (values > 0.0)]
     return bool(good.size and good.max() > 30.0 * good.min())

@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.motion.orbit import largest
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
 
-Array = NDArray[np.float64]
 
 # Of the true roller radius, and of the drawn one.
 ROLLER_SHARE, CAGE_SHARE, RING_SHARE = 0.62, 0.4, 0.45

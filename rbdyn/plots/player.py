@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
 
 if TYPE_CHECKING:
@@ -67,12 +67,12 @@ def motion_record(history: History, d: Drawing) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _numbers(values: NDArray[np.float64], decimals: int) -> list[float]:
+def _numbers(values: Array, decimals: int) -> list[float]:
     """Flat, frame after frame; whole numbers without a point."""
     return [int(x) if x == int(x) else x for x in np.round(values, decimals).ravel().tolist()]
 
 
-def _digits(loads: NDArray[np.float64]) -> list[float]:
+def _digits(loads: Array) -> list[float]:
     """To a ten-thousandth of the largest: finer than a line is wide."""
     largest = float(np.abs(loads).max())
     return _numbers(loads, 3 - int(np.floor(np.log10(largest))) if largest > 0.0 else 0)

@@ -7,7 +7,8 @@ from typing import Literal
 
 import matplotlib
 import numpy as np
-from numpy.typing import NDArray
+
+from rbdyn.arrays import Array
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -66,7 +67,7 @@ def label_ends(axis: Axes, lines: Sequence[tuple[Sequence[tuple[float, float]], 
         taken.append(box)
 
 
-def _along(line: Line2D) -> NDArray[np.float64]:
+def _along(line: Line2D) -> Array:
     """Points all along a line, in pixels."""
     corners = line.get_transform().transform(line.get_xydata())
     share = np.linspace(0.0, 1.0, 40)[:, np.newaxis]

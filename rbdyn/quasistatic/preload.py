@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from rbdyn.arrays import Array
 from rbdyn.faults import validated
 from rbdyn.quasistatic.fatigue import reference_capacities, solution_life, turning_rings
 from rbdyn.quasistatic.remarks import Rating, pressures
@@ -34,8 +34,8 @@ class Case(NamedTuple):
     """One bearing under one load, ready to be solved."""
 
     rating: Rating
-    load: NDArray[np.float64]
-    given: NDArray[np.float64]
+    load: Array
+    given: Array
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
 from rbdyn.contact.static_limit import BALLS, dent_sentence
 from rbdyn.quasistatic.row.control import FixedShare, FrictionShare
@@ -21,8 +22,6 @@ STEEPEST = math.radians(80.0)
 OILED_FRICTION = 0.07
 # Makers allow angular contact bearings about this misalignment, deep groove ones up to three times as much [rad].
 TIPPED = 1e-3
-
-Vector = NDArray[np.float64]
 
 
 class Rating(NamedTuple):
@@ -47,7 +46,7 @@ class Remark(NamedTuple):
         return self.row + self.say(place)
 
 
-def pressures(balls: Vector, ratings: Sequence[Rating]) -> dict[str, Vector]:
+def pressures(balls: Array, ratings: Sequence[Rating]) -> dict[str, Array]:
     """Largest Hertz pressure (n,) on each race [Pa] of ``balls`` (n, Z, FIGURES)."""
     found = {}
     for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
@@ -56,7 +55,7 @@ def pressures(balls: Vector, ratings: Sequence[Rating]) -> dict[str, Vector]:
     return found
 
 
-def overloads(balls: Vector, ratings: Sequence[Rating]) -> dict[int, str]:
+def overloads(balls: Array, ratings: Sequence[Rating]) -> dict[int, str]:
     """Points whose loads no contact can carry, and why: an ellipse as long as its groove is deep."""
     found: dict[int, str] = {}
     for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
@@ -72,7 +71,7 @@ def overloads(balls: Vector, ratings: Sequence[Rating]) -> dict[int, str]:
     return found
 
 
-def needed_friction(balls: Vector, ratings: Sequence[Rating]) -> Vector:
+def needed_friction(balls: Array, ratings: Sequence[Rating]) -> Array:
     """Largest friction coefficient (n,) that a contact needs to hold its part of the gyroscopic moment, 2 s M_g/(D Q)."""
     inner, outer = balls[:, :, INNER_LOAD], balls[:, :, OUTER_LOAD]
     controls = [rating.model.control for rating in ratings]
@@ -93,7 +92,7 @@ def needed_friction(balls: Vector, ratings: Sequence[Rating]) -> Vector:
     return np.where((inner > 0.0) & (outer > 0.0), needed, 0.0).max(axis=1)
 
 
-def remarks(balls: Vector, ratings: Sequence[Rating], name: str = "") -> list[Remark]:
+def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Remark]:
     """Remarks on n equilibria of a row, ``balls`` (n, Z, FIGURES); ``name`` of the row, where there are two."""
     row = f"{name} row: " if name else ""
     touching, angle = balls[:, :, INNER_LOAD] > 0.0, np.degrees(balls[:, :, INNER_ANGLE])
@@ -125,7 +124,7 @@ def remarks(balls: Vector, ratings: Sequence[Rating], name: str = "") -> list[Re
     return [Remark(row + word, where, say, row) for word, where, say in found]
 
 
-def tipping(tilts: Vector, scene: BallScene) -> Remark:
+def tipping(tilts: Array, scene: BallScene) -> Remark:
     """Remark on a ring that is free to tilt and does, from ``tilts`` (n, 2) [rad]."""
     held = np.array([value is not None for value in scene.operation.given[3:]])
     tilt = np.hypot(*np.where(held, 0.0, tilts).T)

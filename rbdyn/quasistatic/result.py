@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.remarks import Rating
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.records.record import Record, outside_json, spread
@@ -93,7 +93,7 @@ class BallResult(SavedRecord, kw_only=True):
         return self.status == "ok"
 
     @property
-    def displacement(self) -> NDArray[np.float64]:
+    def displacement(self) -> Array:
         """(x, y, z [m], theta_x, theta_y [rad]) of the inner ring. Raises ValueError where there is no equilibrium."""
         report = self.reached
         place, tilt = report.displacement_mm, report.tilt_mrad
@@ -120,13 +120,13 @@ class BallResult(SavedRecord, kw_only=True):
         return layers[""] if "" in layers else pd.concat(layers, names=["row", "ball"]).reset_index()
 
 
-def displacement_record(displacement: NDArray[np.float64]) -> dict[str, Any]:
+def displacement_record(displacement: Array) -> dict[str, Any]:
     """Displacement of a ring in mm and mrad."""
     x, y, z, tilt_x, tilt_y = (1e3 * float(value) for value in displacement)
     return {"displacement_mm": {"x": x, "y": y, "z": z}, "tilt_mrad": {"x": tilt_x, "y": tilt_y}}
 
 
-def ball_columns(balls: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+def ball_columns(balls: Array) -> dict[str, Array]:
     """A value a ball, (n, Z) each, named as ``BallResult.table`` names them."""
     size = balls.shape[1]
     return {
@@ -140,13 +140,13 @@ def ball_columns(balls: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def ball_records(figures: NDArray[np.float64]) -> list[dict[str, float]]:
+def ball_records(figures: Array) -> list[dict[str, float]]:
     """One record a ball, from the figures (Z, FIGURES) of ``solve_row``."""
     columns = ball_columns(figures[np.newaxis])
     return [{name: float(values[0, j]) for name, values in columns.items()} for j in range(len(figures))]
 
 
-def stiffness_record(stiffness: NDArray[np.float64]) -> dict[str, Any]:
+def stiffness_record(stiffness: Array) -> dict[str, Any]:
     """Diagonal stiffnesses and the whole matrix."""
     across, tilt = (np.diag(stiffness)[:3] * 1e-6).tolist(), (np.diag(stiffness)[3:] * 1e-3).tolist()
     return {

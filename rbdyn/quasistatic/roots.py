@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.row.control import Control, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.row import Row
@@ -16,9 +16,7 @@ SPEEDS = (0.7, 1.4)
 SAME = 1e-4
 
 
-def other_roots(
-    row: Row, control: Control, load: NDArray[np.float64], given: NDArray[np.float64], known: Solution
-) -> tuple[Solution, ...]:
+def other_roots(row: Row, control: Control, load: Array, given: Array, known: Solution) -> tuple[Solution, ...]:
     """Equilibria besides ``known``, found from those of other raceway controls and of slower and faster rings.
 
     A search, not a proof: an empty answer says that none of these starts leads elsewhere. None under one common cage speed,
@@ -34,9 +32,7 @@ def other_roots(
     return tuple(found[1:])
 
 
-def _starts(
-    row: Row, control: FixedShare | FrictionShare, load: NDArray[np.float64], given: NDArray[np.float64]
-) -> Sequence[Solution]:
+def _starts(row: Row, control: FixedShare | FrictionShare, load: Array, given: Array) -> Sequence[Solution]:
     neighbours: list[tuple[Row, Control]] = [(row, FixedShare(share, control.spinning)) for share in SHARES]
     for factor in SPEEDS:
         neighbours.append((row, control._replace(spinning=_turning(control.spinning, factor))))

@@ -9,8 +9,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.model import row_model
@@ -57,8 +57,8 @@ class Problem(NamedTuple):
 
     row: Row
     control: Control
-    load: NDArray[np.float64]
-    given: NDArray[np.float64]
+    load: Array
+    given: Array
 
 
 def cases(count: int = SCENES, seed: int = SEED, **model: Any) -> list[Case]:

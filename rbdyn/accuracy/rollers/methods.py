@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbdyn.accuracy.rollers.fixed_step import runge_kutta_4, steps_of, velocity_of, velocity_verlet
 from rbdyn.accuracy.rollers.right_hand_side import BudgetSpent, RightHandSide
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, NOW
@@ -22,8 +22,6 @@ from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
-
-Array = NDArray[np.float64]
 
 # Right-hand sides a turn past which a method counts as failed.
 BUDGET_PER_TURN = 4_000_000
@@ -37,9 +35,9 @@ class Stretch:
 
     scene: Scene
     bearing: RollerBearing
-    start: NDArray[np.float64]
+    start: Array
     turns: float
-    scale: NDArray[np.float64]
+    scale: Array
 
     @property
     def duration(self) -> float:

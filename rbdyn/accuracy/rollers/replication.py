@@ -11,11 +11,11 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbdyn.accuracy.judgement import NORMAL, SOUGHT, about, percent
 from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, record, records, tabled
 from rbdyn.accuracy.rollers.tolerances import OUTPUTS
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
@@ -96,7 +96,7 @@ def study(
 
 def pool_of_runs(
     scene: Scene, turns: Sequence[float], pool: int, progress: Reporter | None = None
-) -> tuple[dict[float, dict[str, NDArray[np.float64]]], dict[float, float]]:
+) -> tuple[dict[float, dict[str, Array]], dict[float, float]]:
     """Per length the outputs of every replicate, and the mean processor time of one [s], discarded turns included.
 
     The window of the impact force is the shortest length throughout: over another the force would be another figure.
@@ -114,7 +114,7 @@ def pool_of_runs(
 
 
 def replication_rows(
-    values: dict[float, dict[str, NDArray[np.float64]]], cpu_s: dict[float, float], counts: Sequence[int]
+    values: dict[float, dict[str, Array]], cpu_s: dict[float, float], counts: Sequence[int]
 ) -> list[Row]:
     """Expected half-widths of means over each number of replicates of each length."""
     return [
@@ -129,13 +129,13 @@ def replication_rows(
     ]
 
 
-def expected_half_width(sample: NDArray[np.float64], count: int) -> float:
+def expected_half_width(sample: Array, count: int) -> float:
     """Half-width for ``count`` replicates that scatter as the whole sample does, over the sample's mean."""
     relative = float(sample.std(ddof=1) / (abs(sample.mean()) or 1.0))
     return student_factor(count - 1) * relative / math.sqrt(count)
 
 
-def slope(turns: Sequence[float], samples: Sequence[NDArray[np.float64]]) -> Slope:
+def slope(turns: Sequence[float], samples: Sequence[Array]) -> Slope:
     """Least squares of log scatter over log turns; ln s scatters by 1/sqrt(2 (n - 1)) for n normal values.
 
     The lengths share their beginnings, so their scatters do not err independently and the half-width is a rough one.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rbdyn.accuracy.report import Table
 from rbdyn.accuracy.rollers.methods import DOP853, OURS, Method, Stretch
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
@@ -20,8 +21,6 @@ from rbdyn.dynamics.run import Run
 from rbdyn.faults import InputError
 from rbdyn.records.record import Record
 from rbdyn.scene import Scene
-
-Array = NDArray[np.float64]
 
 DEFAULT_TURNS, LONGEST_TURNS = 0.25, 1.0
 SPANS = (0.25, 0.5, 1.0)  # shaft turns after which the two references are compared

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.observe import OBSERVED, observe
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from rbdyn.life.rollers import ReferenceLife
 
-Array = NDArray[np.float64]
 # Numbers of a history, 0.8 GB: with its table and pictures 2 GB. 1000 turns of 10 rollers at 512 samples are 0.7e8.
 MOST_NUMBERS = 1e8
 # Fields that are columns of cage and inner ring in the state, and those that are rows of ``observe``, in their order.

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.film_thickness import hertz_pressure
 from rbdyn.dynamics.parameters.race_traction import rolling_contacts
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
 
-Array = NDArray[np.float64]
 Race = Literal["outer", "inner"]
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

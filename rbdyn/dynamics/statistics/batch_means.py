@@ -20,9 +20,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rbdyn.arrays import Array
 
 # Joined batches are 1 + MEMORIES (tau - 1) batches long: independent batches stay as they are.
 MEMORIES = 8.0

@@ -21,7 +21,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.statistics.batch_means import estimate, student_factor
@@ -34,8 +33,6 @@ from rbdyn.dynamics.statistics.metrics import (
     Replicate,
     mean,
 )
-
-Array = NDArray[np.float64]
 
 # Replicates from which their differences are tested as such; fewer are tested by batch means.
 FEWEST_REPLICATES = 3

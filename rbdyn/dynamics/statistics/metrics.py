@@ -8,14 +8,12 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.forces.equations import LOAD, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.bias import companion_error
 from rbdyn.result import Quantity
-
-Array = NDArray[np.float64]
 
 SLOWEST_CAGE = 1e-6  # [rad/s]
 
@@ -46,7 +44,7 @@ class Replicate:
     derivatives: int
     cpu_s: float
     method: str = "rk45"
-    stiffness: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    stiffness: Array = field(default_factory=lambda: np.zeros(3))
 
     def counted_from(self, first: int) -> Replicate:
         """The same run, counted from another batch."""

@@ -12,14 +12,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.forces.equations import POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics.batch_means import autocorrelation_time
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
-
-Array = NDArray[np.float64]
 
 GROUP = 5
 # Means of five batches without which nothing can be said.

@@ -4,8 +4,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.hertz_point import PointContact
 from rbdyn.fields import RPM
 from rbdyn.life import ball_capacity
@@ -37,7 +37,7 @@ class DoubleDeckerModel(NamedTuple):
     stack: Stack
     inner: RowModel
     outer: RowModel
-    middle_given: NDArray[np.float64]
+    middle_given: Array
     split: SpeedSplit
     changes: tuple[GrooveChange, GrooveChange]
 
@@ -131,7 +131,7 @@ def middle_record(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> d
     }
 
 
-def load_record(load: NDArray[np.float64]) -> dict[str, Any]:
+def load_record(load: Array) -> dict[str, Any]:
     """Load (5,) on a ring."""
     force, moment = load[:3].tolist(), load[3:].tolist()
     return {"load_N": dict(zip("xyz", force, strict=True)), "moment_Nm": dict(zip("xy", moment, strict=True))}

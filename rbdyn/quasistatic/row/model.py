@@ -4,8 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.hertz_point import PointContact, ball_on_race
 from rbdyn.mounting.ball_rings import row_change
 from rbdyn.mounting.ring_growth import UNCHANGED, GrooveChange
@@ -123,11 +123,11 @@ def row_of(scene: SingleRowScene) -> RowModel:
     )
 
 
-def load_of(scene: BallScene) -> NDArray[np.float64]:
+def load_of(scene: BallScene) -> Array:
     """Load on the inner ring, (Fx, Fy, Fz [N], Mx, My [N m])."""
     return np.array([*scene.operation.load, *scene.operation.moment])
 
 
-def given_of(scene: BallScene) -> NDArray[np.float64]:
+def given_of(scene: BallScene) -> Array:
     """Prescribed displacements [m, rad], NaN where the load rules."""
     return np.array(scene.operation.given, float)

@@ -13,12 +13,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.runout.roundness import diameter, least_squares_circle, minimum_zone
 
-Array = NDArray[np.float64]
 # Places round the face where the axial indicator may stand.
 PLACES = 72
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rbdyn.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.row import Row
 from rbdyn.quasistatic.runout.linear import LinearResponse, linear_response
@@ -19,7 +19,6 @@ from rbdyn.quasistatic.runout.lots import RACES, Lot, Parts, Readings, bearing_e
 from rbdyn.quasistatic.runout.race_errors import Turning, ball_path
 from rbdyn.quasistatic.runout.turn import follow
 
-Array = NDArray[np.float64]
 # Bisections of a size: to a ten-thousandth.
 HALVINGS = 14
 REFINEMENTS = 3

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.faults import RunError
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.ring import RING
@@ -19,8 +19,6 @@ from rbdyn.quasistatic.runout.walk import FIGURES, LARGEST_LOAD, RESIDUAL, walk
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.remarks import Remark
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.result import whole_file
@@ -53,7 +54,7 @@ class Solved(NamedTuple):
 
     status: str
     figures: dict[str, float]
-    balls: dict[str, NDArray[np.float64]]
+    balls: dict[str, Array]
     remarks: list[Remark]
     rows: tuple[Solution, ...]
     cold: bool

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.result import ball_columns, ball_records
 from rbdyn.records.record import finite, plain
 from rbdyn.result import read_record, versions, write_json
@@ -33,12 +34,12 @@ class SweepResult:
     """
 
     keys: dict[str, tuple[float, ...]]
-    columns: dict[str, NDArray[np.float64]]
+    columns: dict[str, Array]
     statuses: tuple[str, ...]
     cold: int
     wall_s: float
     scene: dict[str, Any]
-    figures: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = field(default_factory=dict, repr=False)
+    figures: dict[str, list[tuple[NDArray[np.int64], Array]]] = field(default_factory=dict, repr=False)
     notes: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -74,7 +75,7 @@ class SweepResult:
         first = ", ".join(f"{key} = {value:g}" for key, value in self.at(places[0]).items())
         return f"{'1 point' if len(places) == 1 else f'{len(places)} points, the first'} at {first}"
 
-    def grid(self, column: str) -> NDArray[np.float64]:
+    def grid(self, column: str) -> Array:
         """A column over the grid, one axis a key. Raises KeyError for an unknown one."""
         return self.columns[column].reshape(self.shape)
 

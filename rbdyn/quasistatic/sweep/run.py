@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.remarks import Rating, Remark, overloads, remarks, tipping
@@ -44,8 +45,7 @@ LOAD_KEYS = (
 # Points between two reports of progress, and two looks for Ctrl-C.
 CHUNK = 2000
 Progress = Callable[[int, int], None]
-Vector = NDArray[np.float64]
-Group = tuple[NDArray[np.int64], Vector]
+Group = tuple[NDArray[np.int64], Array]
 
 
 class Walked(NamedTuple):
@@ -53,7 +53,7 @@ class Walked(NamedTuple):
 
     columns: Columns
     statuses: list[str]
-    balls: Mapping[str, Sequence[Vector] | Vector]
+    balls: Mapping[str, Sequence[Array] | Array]
     cold: int
     remarks: list[tuple[int, Remark]]
 
@@ -119,7 +119,7 @@ def grouped(
     return notes
 
 
-def _sorted(balls: Sequence[Vector] | Vector, back: NDArray[np.int64]) -> list[Group]:
+def _sorted(balls: Sequence[Array] | Array, back: NDArray[np.int64]) -> list[Group]:
     """Arrays (Z, 6) in the order of the table, those of equal Z together."""
     if isinstance(balls, np.ndarray):
         return [(np.arange(len(balls)), balls[back])]
@@ -209,14 +209,14 @@ def _packed(
     return made, points, list(ratings)
 
 
-def _units(numbers: Vector) -> Vector:
+def _units(numbers: Array) -> Array:
     """(n, 5): what tilts count over."""
     units = np.ones((len(numbers), RING))
     units[:, 3:] = numbers[:, [LEVER]]
     return units
 
 
-def _columns(points: Points, found: Found, ring: Sequence[Vector], balls: Vector, ratings: Sequence[Rating]) -> Columns:
+def _columns(points: Points, found: Found, ring: Sequence[Array], balls: Array, ratings: Sequence[Rating]) -> Columns:
     units, (displacement, taken, matrix) = _units(points.numbers), ring
     return {
         **ring_columns(displacement / units, taken * units, matrix * units[:, :, np.newaxis] * units[:, np.newaxis, :]),
@@ -269,7 +269,7 @@ def _solve(scene: BallScene, before: tuple[Solution, ...]) -> Solved:
     return Solved(result.status, figures, balls, [one for one in remarks if one.where[0]], result.rows, not started)
 
 
-def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Vector], list[Remark]]:
+def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Array], list[Remark]]:
     """Figures of one point, what is known of each ball by row, and remarks."""
     report = result.reached
     assert report.reaction is not None
