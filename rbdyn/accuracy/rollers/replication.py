@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rbdyn.accuracy.judgement import NORMAL, SOUGHT, about, percent
-from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, record, records, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, records, reported, tabled
 from rbdyn.accuracy.rollers.tolerances import OUTPUTS
 from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
@@ -24,7 +24,6 @@ from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.replicates/1"
 POOL = 32
 TURNS = (10.0, 20.0, 40.0, 80.0)
 COUNTS = (2, 4, 8, 16, 32)
@@ -76,21 +75,18 @@ def study(
     slopes = {name: slope(turns, [values[length][name] for length in turns]) for name in OUTPUTS}
     sentences = conclusion(rows, slopes, scene, pool, sought)
     written = records(rows)
-    return Report(
-        stem="replicates",
-        record=record(
-            FORMAT,
-            rows=written,
-            slopes={name: asdict(one) for name, one in slopes.items()},
-            conclusion=" ".join(sentences),
-            pool=pool,
-            sought=sought,
-            discard_turns=scene.numerics.warm_up_turns,
-        ),
-        tables=(tabled("95 % half-widths, relative", rows, COLUMNS),),
-        sentences=sentences,
-        sheets={"replicates": [flat(row, "half_width") for row in written]},
-        pictures={"replicates": lambda path: _draw(rows, path)},
+    return reported(
+        "replicates",
+        (tabled("95 % half-widths, relative", rows, COLUMNS),),
+        sentences,
+        [flat(row, "half_width") for row in written],
+        lambda path: _draw(rows, path),
+        rows=written,
+        slopes={name: asdict(one) for name, one in slopes.items()},
+        conclusion=" ".join(sentences),
+        pool=pool,
+        sought=sought,
+        discard_turns=scene.numerics.warm_up_turns,
     )
 
 

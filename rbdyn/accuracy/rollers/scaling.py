@@ -10,10 +10,11 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, record, records, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, records, reported, tabled
 from rbdyn.accuracy.rollers.footprint import printed
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
@@ -25,7 +26,6 @@ from rbdyn.faults import InputError
 from rbdyn.records.record import Record
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.scaling/1"
 ROLLERS = (10, 20, 30, 50, 70, 100)
 SLICES = (1, 11, 31, 61, 101, 201)
 MEMORY_TURNS = (40, 4000)
@@ -222,19 +222,12 @@ def report(found: Scaling) -> Report:
         f"{memory.turns} counted turns: at most {memory.peak_MiB:.1f} MiB in a process of its own"
         for memory in found.memory
     ]
-    points = {kind: records(sizes) for kind, sizes in found.points.items()}
-    return Report(
-        stem="scaling",
-        record=record(
-            FORMAT,
-            **points,
-            fits={kind: asdict(line) for kind, line in found.lines.items()},
-            memory=records(found.memory),
-        ),
-        tables=tables,
-        sentences=sentences,
-        sheets={"scaling": [{"of": kind, **point} for kind, sizes in points.items() for point in sizes]},
-        pictures={"scaling": lambda path: _draw(found, path)},
+    points: dict[str, Any] = {kind: records(sizes) for kind, sizes in found.points.items()}
+    fits = {kind: asdict(line) for kind, line in found.lines.items()}
+    sheet = [{"of": kind, **point} for kind, sizes in points.items() for point in sizes]
+    memory = records(found.memory)
+    return reported(
+        "scaling", tables, sentences, sheet, lambda path: _draw(found, path), **points, fits=fits, memory=memory
     )
 
 
