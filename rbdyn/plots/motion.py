@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,15 +24,14 @@ SHOWN_ORDERS = 30.0
 def _guide_circle(axis: Axes, history: History) -> None:
     clearance = history.scene.guide_clearance_m
     if clearance is not None:
-        angle = np.linspace(0.0, 2.0 * np.pi, 361)
-        x, y = clearance * 1e6 * np.cos(angle), clearance * 1e6 * np.sin(angle)
-        axis.plot(x, y, "--", color=GREY, linewidth=0.9, label="guide clearance")
+        angle, radius = np.linspace(0.0, 2.0 * np.pi, 361), clearance * 1e6
+        line: dict[str, Any] = {"color": GREY, "linewidth": 0.9, "label": "guide clearance"}
+        axis.plot(radius * np.cos(angle), radius * np.sin(angle), "--", **line)
 
 
 def _plane(axis: Axes) -> None:
     axis.set_aspect("equal", adjustable="datalim")
-    axis.set_xlabel("cage centre, along the load [µm]")
-    axis.set_ylabel("across [µm]")
+    axis.set(xlabel="cage centre, along the load [µm]", ylabel="across [µm]")
     plain(axis)
 
 
@@ -124,8 +123,7 @@ def whirl(history: History, path: Path) -> None:
     axis.axvline(quantiles[0.5], color=BLUE, linewidth=1.4, label=f"median {quantiles[0.5]:.3g}")
     mean = orbit.whirl_ratio(history)
     axis.axvline(mean, color=VERMILION, linewidth=1.4, linestyle="--", label=f"mean {mean:.3g}")
-    axis.set_xlabel("whirl speed of the cage centre over mean cage speed [-]")
-    axis.set_ylabel("probability density [-]")
+    axis.set(xlabel="whirl speed of the cage centre over mean cage speed [-]", ylabel="probability density [-]")
     plain(axis)
     axis.legend(fontsize=8)
     save(figure, path)
