@@ -29,7 +29,16 @@ from rbdyn.cli.options import (
     study_flag,
     verbose_flag,
 )
-from rbdyn.cli.terminal import FAILED, guarded, hand_over, keeping, output_folder, print_table, progress_bar
+from rbdyn.cli.terminal import (
+    FAILED,
+    guarded,
+    hand_over,
+    keeping,
+    output_folder,
+    print_notes,
+    print_table,
+    progress_bar,
+)
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -237,16 +246,19 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
         "cage speed [rpm]": result.cage_speed_rpm,
         "cage slip": result.cage_slip,
     }
-    header = ["figure", "value", "statistical error (95 %)", "numerical error (95 %)"]
+    header = ("figure", "value", "statistical error (95 %)", "numerical error (95 %)", "effective samples")
     rows = [
-        [label, f"{figure.value:.5g}", shown(figure.statistical_error), shown(figure.numerical_error)]
-        for label, figure in figures.items()
+        (
+            label,
+            f"{of.value:.5g}",
+            shown(of.statistical_error),
+            shown(of.numerical_error),
+            f"{of.effective_samples:.0f}",
+        )
+        for label, of in figures.items()
     ]
-    if verbose:
-        header.append("effective samples")
-        for row, figure in zip(rows, figures.values(), strict=True):
-            row.append(f"{figure.effective_samples:.0f}")
-    print_table("", header, rows)
+    columns = len(header) if verbose else -1
+    print_table("", header[:columns], [row[:columns] for row in rows])
     if result.target is not None:
         _print_target(result.target)
     print(
@@ -270,9 +282,7 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
         gap = result.power_gap * result.power_loss.value
         print_table(f"power lost, each to ± {gap:.2g} W (gap of the power balance)", ("term", "W"), terms)
         print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
-    if not quiet:
-        for note in result.notes:
-            print(f"note: {note}")
+    print_notes(result.notes, quiet)
 
 
 def _print_target(target: dict[str, Any]) -> None:

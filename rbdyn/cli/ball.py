@@ -48,12 +48,7 @@ def ball(
 
         loaded = balls_only(Scene.load(scene, assignments or []))
         studies = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
-        requested = {name: value for name, value in studies.items() if value is not None}
-        flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *requested)]
-        if len(flags) > 1:
-            raise InputError([f"{' and '.join(flags)}: are studies of their own; choose one"])
-        if wanted is not None and race_limits is None:
-            raise InputError([f"--yield {wanted:g}: is a share of --race-limits; add that or leave it out"])
+        requested = _requested(sweeps, wanted, studies)
         if sweeps:
             from rbdyn.cli.ball_sweep import run as run_sweep
 
@@ -72,3 +67,14 @@ def ball(
         hand_over(result.as_dict, as_json, lambda: print_result(result, quiet, verbose), folder, files)
     if not result.found:
         raise typer.Exit(FAILED)
+
+
+def _requested(sweeps: list[str] | None, wanted: float | None, studies: dict[str, str | None]) -> dict[str, str]:
+    """The study asked for, with its values. Raises InputError for two, and for a yield of none."""
+    requested = {name: value for name, value in studies.items() if value is not None}
+    flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *requested)]
+    if len(flags) > 1:
+        raise InputError([f"{' and '.join(flags)}: are studies of their own; choose one"])
+    if wanted is not None and studies["race_limits"] is None:
+        raise InputError([f"--yield {wanted:g}: is a share of --race-limits; add that or leave it out"])
+    return requested

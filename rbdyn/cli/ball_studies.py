@@ -9,7 +9,7 @@ import numpy as np
 
 from rbdyn.cli.ball_sweep import print_points
 from rbdyn.cli.ranges import axis_values
-from rbdyn.cli.terminal import hand_over, output_folder, print_table
+from rbdyn.cli.terminal import hand_over, output_folder, print_notes, print_table
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.remarks import remarks, tipping
@@ -33,11 +33,7 @@ SWEPT = {
     "wear": (over_wear, "um", 1e-6),
 }
 # What its record tells of a point, by column of the table.
-SWEPT_FIGURES = {
-    "inner_stress_MPa": "inner_pressure_MPa",
-    "outer_stress_MPa": "outer_pressure_MPa",
-    "L10_Mrev": "L10_Mrev",
-}
+SWEPT_FIGURES = {f"{race}_stress_MPa": f"{race}_pressure_MPa" for race in ("inner", "outer")} | {"L10_Mrev": "L10_Mrev"}
 # Bearings of a lot that are solved in full to size the limits of race errors.
 SOLVED = 100
 
@@ -75,10 +71,8 @@ def _table(scene: BallScene, key: str, values: Sequence[float], found: Sweep) ->
     """Figures, balls and notes of the points scanned."""
     points, places = found.points, np.arange(len(values))
     solutions, ratings = [point.solution for point in points], [point.rating for point in points]
-    balls = np.array([solution.figures for solution in solutions])
-    displacement = np.array([solution.displacement for solution in solutions])
-    reaction = np.array([solution.reaction for solution in solutions])
-    stiffness = np.array([solution.stiffness for solution in solutions])
+    told_of = ("figures", "displacement", "reaction", "stiffness")
+    balls, displacement, reaction, stiffness = (np.array([getattr(s, of) for s in solutions]) for of in told_of)
     statuses = tuple(solution.status for solution in solutions)
     columns = ring_columns(displacement, reaction, stiffness) | row_columns(balls, ratings)
     for column in columns.values():
@@ -108,15 +102,8 @@ def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int
         allowed = running_accuracy(cast(ToleranceClass, tolerance_class), 1e-3 * row.bearing.bore_mm)
         if allowed.axial is None:
             raise ValueError(f"class {tolerance_class} sets no limit on axial runout; choose P2, P4 or P5")
-        found = design(
-            bench_of(row),
-            Lot(),
-            radial_limit=allowed.radial,
-            axial_limit=allowed.axial,
-            wanted=wanted,
-            seed=seed,
-            solved=SOLVED,
-        )
+        limits: dict[str, Any] = {"radial_limit": allowed.radial, "axial_limit": allowed.axial, "wanted": wanted}
+        found = design(bench_of(row), Lot(), **limits, seed=seed, solved=SOLVED)
     except ValueError as error:
         raise InputError([f"--race-limits {tolerance_class}: {error}"]) from None
     return {"class": tolerance_class, "wanted": wanted, **_limits(found)}
@@ -172,8 +159,7 @@ def _print(record: dict[str, Any], table: SweepResult | None, quiet: bool) -> No
     for best, title in (("least_stress", "least stress"), ("longest_life", "longest life")):
         at = record[best]
         print(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
-    for note in record["notes"] if not quiet else ():
-        print(f"note: {note}")
+    print_notes(record["notes"], quiet)
 
 
 def _print_limits(record: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.cli.terminal import FAILED, hand_over, keeping, output_folder, print_table, progress_bar
+from rbdyn.cli.terminal import FAILED, hand_over, keeping, output_folder, print_notes, print_table, progress_bar
 from rbdyn.result import write_json
 
 if TYPE_CHECKING:
@@ -52,15 +52,15 @@ def show(found: SweepResult, quiet: bool) -> None:
     """Print the points, what they cost and the notes."""
     print_points(found)
     print(f"{len(found.statuses)} points in {found.wall_s:.3g} s, {found.cold} of them not started from a neighbour")
-    for note in found.notes if not quiet else ():
-        print(f"note: {found.where(note['points'])}: {note['note']}")
+    print_notes((f"{found.where(note['points'])}: {note['note']}" for note in found.notes), quiet)
 
 
 def print_points(found: SweepResult) -> None:
     """Print the points, of a long sweep the first and the last ones."""
     count = len(found.statuses)
-    rows = [_row(found, place) for place in range(count) if count <= 2 * SHOWN or _outer(place, count)]
-    if count > 2 * SHOWN:
+    ends = (*range(SHOWN), *range(count - SHOWN, count)) if count > 2 * SHOWN else range(count)
+    rows = [_row(found, place) for place in ends]
+    if len(ends) < count:
         rows.insert(SHOWN, ["..."] * len(rows[0]))
     units = [key.rpartition(".")[2] for key in found.keys]
     print_table("", [*units, *HEADER], rows)
@@ -73,10 +73,6 @@ def write(found: SweepResult, folder: Path) -> list[str]:
     write_json(folder / "sweep.json", found.as_dict())
     found.save(folder / "sweep.csv")
     return ["sweep.json", "sweep.csv", *pictures(found, folder)]
-
-
-def _outer(place: int, count: int) -> bool:
-    return place < SHOWN or place >= count - SHOWN
 
 
 def _row(found: SweepResult, place: int) -> list[str]:

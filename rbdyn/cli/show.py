@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from rbdyn.cli.terminal import print_table
+from rbdyn.cli.terminal import print_notes, print_table
 from rbdyn.faults import refuse
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
@@ -26,6 +26,8 @@ LYAPUNOV_TURNS = 100.0
 # Fewer samples show no motion.
 FEWEST_SAMPLES = 32
 PEAKS = 5
+# Loads of which the largest is told.
+LOADS = {"pocket": "pocket_load", "dry_land": "land_load", "outer_race": "outer_load", "inner_race": "inner_load"}
 
 
 @dataclass(frozen=True)
@@ -152,12 +154,7 @@ def _record(request: Request, motion: History) -> dict[str, Any]:
             "standard_deviation": float(eccentricity.std()) * 1e6,
             "guide_clearance": None if clearance is None else clearance * 1e6,
         },
-        "largest": {
-            "pocket": _largest(orbit.largest(motion, motion.pocket_load)),
-            "dry_land": _largest(orbit.largest(motion, motion.land_load)),
-            "outer_race": _largest(orbit.largest(motion, motion.outer_load)),
-            "inner_race": _largest(orbit.largest(motion, motion.inner_load)),
-        },
+        "largest": {name: _largest(orbit.largest(motion, getattr(motion, loads))) for name, loads in LOADS.items()},
         "races": {race: _race(motion, race) for race in get_args(orbit.Race)},
         "life": _life(motion),
         "spectra": {
@@ -223,12 +220,8 @@ def print_record(record: dict[str, Any], quiet: bool, verbose: bool) -> None:
         chaos = record["lyapunov"]
         width = chaos["per_turn_half_width"]
         error = "error not estimated" if width is None else f"± {width:.2g} (95 %)"
-        rows.append(
-            (
-                f"largest Lyapunov exponent a shaft turn, over {chaos['turns']:g} turns",
-                f"{chaos['per_turn']:.3g} {error}",
-            )
-        )
+        words = f"largest Lyapunov exponent a shaft turn, over {chaos['turns']:g} turns"
+        rows.append((words, f"{chaos['per_turn']:.3g} {error}"))
     title = f"{record['turns']:g} shaft turns of replicate {record['replicate']}, seed {record['seed']}"
     print_table(title, ("figure", "value"), rows)
     if verbose:
@@ -236,6 +229,4 @@ def print_record(record: dict[str, Any], quiet: bool, verbose: bool) -> None:
             words, _, unit = name.rpartition("_")
             cells = [(f"{peak['frequency_Hz']:.0f}", f"{peak['amplitude']:.3g}") for peak in peaks]
             print_table("", (f"{words.replace('_', ' ')}: peaks [Hz]", f"amplitude [{unit}]"), cells)
-    if not quiet:
-        for note in record["notes"]:
-            print(f"note: {note}")
+    print_notes(record["notes"], quiet)

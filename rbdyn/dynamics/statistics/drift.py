@@ -23,16 +23,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD
+from rbdyn.dynamics.statistics import metrics
 from rbdyn.dynamics.statistics.batch_means import estimate, student_factor
-from rbdyn.dynamics.statistics.metrics import (
-    CAGE_SLIP,
-    CAGE_SPEED,
-    POWER_LOSS,
-    WHIRL_DEVIATION_RATIO,
-    Figure,
-    Replicate,
-    mean,
-)
+from rbdyn.dynamics.statistics.metrics import Figure, Replicate, mean
 
 # Replicates from which their differences are tested as such; fewer are tested by batch means.
 FEWEST_REPLICATES = 3
@@ -57,10 +50,10 @@ WHIRL_SPEED = Figure(lambda run: run.whirl[run.first :, :2], mean)
 TESTED = {
     "impact_force_N": _largest(POCKET_LOAD),
     "impact_contact_force_N": _largest(POCKET_CONTACT_LOAD),
-    "whirl_deviation_ratio": WHIRL_DEVIATION_RATIO,
-    "power_loss_W": POWER_LOSS,
-    "cage_speed_rpm": CAGE_SPEED,
-    "cage_slip": CAGE_SLIP,
+    "whirl_deviation_ratio": metrics.WHIRL_DEVIATION_RATIO,
+    "power_loss_W": metrics.POWER_LOSS,
+    "cage_speed_rpm": metrics.CAGE_SPEED,
+    "cage_slip": metrics.CAGE_SLIP,
     "whirl speed": WHIRL_SPEED,
 }
 
