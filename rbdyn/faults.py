@@ -9,11 +9,11 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date, time
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from rbdyn.fields import InSI
+from rbdyn.fields import InSI, or_refuse
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -70,6 +70,14 @@ class Strict(BaseModel):
     """Base of all input tables: frozen, no unknown keys, no silent conversions, no NaN or infinity."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, ignored_types=(InSI,))
+
+    def faults(self) -> Iterable[str]:
+        """A sentence for each way in which valid keys of the table do not go together."""
+        return ()
+
+    @model_validator(mode="after")
+    def _without_faults(self) -> Self:
+        return or_refuse(self, self.faults())
 
 
 def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:

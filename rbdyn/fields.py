@@ -1,6 +1,7 @@
 """Number types and helpers of input tables."""
 
 import math
+from collections.abc import Iterable
 from typing import Annotated, Any, Generic, TypeVar, cast
 
 from pydantic import AfterValidator, Field
@@ -47,8 +48,8 @@ class InSI(Generic[N]):
 SI, OptionalSI = InSI[float], InSI[float | None]
 
 
-def or_refuse(table: Any, faults: list[str]) -> Any:
+def or_refuse(table: Any, faults: Iterable[str]) -> Any:
     """The table, or a ValueError with all its faults, one a line."""
-    if faults:
-        raise ValueError("\n".join(faults))
+    if lines := "\n".join(faults):
+        raise ValueError(lines)
     return table

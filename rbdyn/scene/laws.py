@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from rbdyn.faults import Strict
-from rbdyn.fields import SI, NonNegative, NotVanishing, Positive, or_refuse
+from rbdyn.fields import SI, NonNegative, NotVanishing, Positive
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
 AUTO_WARM_UP_TURNS = 20.0
@@ -90,19 +91,15 @@ class Laws(Strict):
         """Part of the damping engaged per approach [1/m]."""
         return 1e6 / self.race_damping_engagement_um
 
-    @model_validator(mode="after")
-    def _agrees(self) -> Laws:
-        faults = [
-            f"model.{part}_restitution and model.{part}_damping_alpha_s_m contradict each other: give one of them"
-            for part in ("pocket", "land")
-            if getattr(self, f"{part}_restitution") is not None
-            and getattr(self, f"{part}_damping_alpha_s_m") is not None
-        ]
+    def faults(self) -> Iterator[str]:
+        for part in ("pocket", "land"):
+            keys = f"{part}_restitution", f"{part}_damping_alpha_s_m"
+            if all(getattr(self, key) is not None for key in keys):
+                yield f"model.{keys[0]} and model.{keys[1]} contradict each other: give one of them"
         if self.pocket == "off" and self.pocket_film:
-            faults.append(
+            yield (
                 "model.pocket = 'off' and model.pocket_film = true contradict each other: drop the film or the 'off'"
             )
-        return or_refuse(self, faults)
 
     def alpha(self, part: str) -> float:
         """Hunt and Crossley's alpha [s/m] of 'pocket' or 'land', given or from its restitution."""
@@ -167,11 +164,9 @@ class Numerics(Strict):
         """Batches for which each replicate and companion has memory."""
         return MOST_KEPT // (self.replicates + self.companions)
 
-    @model_validator(mode="after")
-    def _fits_into_memory(self) -> Numerics:
+    def faults(self) -> Iterator[str]:
         if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > self.most_batches:
-            raise ValueError(
+            yield (
                 f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have memory for "
                 f"{self.most_batches} turns each, warm-up included; take fewer turns or replicates"
             )
-        return self

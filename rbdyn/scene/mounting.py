@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Protocol
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from rbdyn.faults import Strict
-from rbdyn.fields import SI, NonNegative, Positive, or_refuse
+from rbdyn.fields import SI, NonNegative, Positive
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
 
@@ -70,21 +71,19 @@ class Mounting(Strict):
     bore, outside_diameter, shaft_bore, housing_diameter = SI("mm"), SI("mm"), SI("mm"), SI("mm")
     inner_interference, outer_interference = SI("um"), SI("um")
 
-    @model_validator(mode="after")
-    def _nests(self) -> Mounting:
-        faults = []
+    def faults(self) -> Iterator[str]:
         if self.shaft_bore_mm >= self.bore_mm:
-            faults.append(
+            yield (
                 f"mounting.shaft_bore_mm = {self.shaft_bore_mm:g}: leaves no shaft in a bearing bore of "
                 f"{self.bore_mm:g} mm; make it smaller, 0 for a solid shaft"
             )
         if self.outside_diameter_mm <= self.bore_mm:
-            faults.append(
+            yield (
                 f"mounting.outside_diameter_mm = {self.outside_diameter_mm:g}: not above the bore of "
                 f"{self.bore_mm:g} mm; make it larger"
             )
         if self.housing_diameter_mm <= self.outside_diameter_mm:
-            faults.append(
+            yield (
                 f"mounting.housing_diameter_mm = {self.housing_diameter_mm:g}: leaves no housing around a bearing of "
                 f"{self.outside_diameter_mm:g} mm; make it larger"
             )
@@ -94,28 +93,25 @@ class Mounting(Strict):
         ):
             interference = getattr(self, key)
             if abs(interference) > LARGEST_FIT * diameter * 1e3:
-                faults.append(
+                yield (
                     f"mounting.{key} = {interference:g}: out of proportion to a fit of {diameter:g} mm; give "
                     f"micrometres, at most {LARGEST_FIT * diameter * 1e3:g}"
                 )
-        return or_refuse(self, faults)
 
 
-def faults(mounting: Mounting, bearing: Raceways) -> list[str]:
+def misfits(mounting: Mounting, bearing: Raceways) -> Iterator[str]:
     """One sentence for each way in which the mounting does not suit the bearing."""
     inner, outer = bearing.raceway_diameters_mm
-    found = []
     if mounting.bore_mm >= inner:
-        found.append(
+        yield (
             f"mounting.bore_mm = {mounting.bore_mm:g}: leaves no inner ring under a raceway of {inner:g} mm; "
             "make it smaller"
         )
     if mounting.outside_diameter_mm <= outer:
-        found.append(
+        yield (
             f"mounting.outside_diameter_mm = {mounting.outside_diameter_mm:g}: leaves no outer ring over a raceway of "
             f"{outer:g} mm; make it larger"
         )
-    return found
 
 
 def material_of(chosen: MaterialName | CustomMaterial) -> Material:
