@@ -206,7 +206,7 @@ def traction_surface(
     scale = _speed_scale(coefficient, largest_load, largest_slip)
     slips, loads = FEWEST_CELLS, FEWEST_CELLS
     while True:
-        grid = _Grid(coefficient, scale, largest_slip, smallest_load, largest_load, slips, loads)
+        grid = _Grid(coefficient, scale, largest_slip, (smallest_load, largest_load), (slips, loads))
         cells = _polynomials(grid.nodes())
         along, across = (grid.error(cells, *shift) for shift in ((0.5, 0.0), (0.0, 0.5)))
         error = max(along, across, grid.error(cells, 0.5, 0.5))
@@ -231,24 +231,22 @@ def _speed_scale(coefficient: Coefficient, load: float, largest_slip: float) -> 
 
 
 class _Grid:
-    """Nodes of a surface; positions i along the slip and j along the load count cells."""
+    """Nodes of a surface of ``size`` cells; positions i along the slip and j along the load count cells."""
 
     def __init__(
         self,
         coefficient: Coefficient,
         scale: float,
         largest_slip: float,
-        smallest_load: float,
-        largest_load: float,
-        slips: int,
-        loads: int,
+        loads: tuple[float, float],
+        size: tuple[int, int],
     ) -> None:
         self.coefficient, self.scale = coefficient, scale
-        self.slip_cell = math.log1p(largest_slip / scale) / slips
-        self.load_start = math.sqrt(smallest_load)
-        self.load_cell = (math.sqrt(largest_load) - self.load_start) / loads
-        self.i = np.arange(slips + 1.0)[:, np.newaxis]
-        self.j = np.arange(loads + 1.0)[np.newaxis, :]
+        self.slip_cell = math.log1p(largest_slip / scale) / size[0]
+        self.load_start = math.sqrt(loads[0])
+        self.load_cell = (math.sqrt(loads[1]) - self.load_start) / size[1]
+        self.i = np.arange(size[0] + 1.0)[:, np.newaxis]
+        self.j = np.arange(size[1] + 1.0)[np.newaxis, :]
 
     def exact(self, i: Any, j: Any) -> tuple[Any, Any]:
         """The coefficient and x/(1 + x) at positions."""

@@ -58,16 +58,15 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | tuple[Solution, ..
     nothing = _nothing(scene, solution.status, took)
     if not solution.found:
         return nothing
-    rating, table = row_rating(scene, model), solution.figures[np.newaxis]
+    rating = Rating(scene.bearing, model, reference_capacities(scene.bearing), scene.operation.speeds)
+    table = solution.figures[np.newaxis]
     if why := overloads(table, [rating]):
         return replace(nothing, status=why[0])
     film = film_record(scene, rating, solution, ("inner_ring", "outer_ring"))
     report = row_report(rating, solution, film, load_record(solution.reaction))
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
-    notes = [
-        *_oil_notes(scene),
-        *sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)]),
-    ]
+    notes = [] if scene.lubricant is None else list(scene.lubricant.estimates)
+    notes += sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
     others = _other_roots(scene, model, solution)
     if others:
         notes.append(
@@ -76,15 +75,6 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | tuple[Solution, ..
         )
     found = {"report": report, **grown, "other_roots": others, "notes": notes}
     return replace(nothing, **found, rows=(solution,), ratings=(rating,))
-
-
-def _oil_notes(scene: BallScene) -> list[str]:
-    return [] if scene.lubricant is None else list(scene.lubricant.estimates)
-
-
-def row_rating(scene: SingleRowScene, model: RowModel) -> Rating:
-    """What pressure, life and remarks need of a single row."""
-    return Rating(scene.bearing, model, reference_capacities(scene.bearing), scene.operation.speeds)
 
 
 def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[dict[str, Any]] | None:
@@ -112,7 +102,7 @@ def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> Ba
         Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed)),
     )
     layers: dict[str, RowReport] = {}
-    notes = _oil_notes(scene)
+    notes = [] if scene.lubricant is None else list(scene.lubricant.estimates)
     for name, rating, row in zip(rings, ratings, rows, strict=True):
         if why := overloads(row.figures[np.newaxis], [rating]):
             return replace(nothing, status=f"{name} row {why[0]}")
@@ -120,7 +110,7 @@ def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> Ba
         notes += sentences(remarks(row.figures[np.newaxis], [rating], name))
     notes += sentences([tipping(solution.displacement[np.newaxis, 3:], scene)])
     grown = growth_record(
-        scene, dict(zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True))
+        scene, {"inner_less_middle_bore": model.changes[0], "middle_less_outer_race": model.changes[1]}
     )
     report = DoubleDeckerReport(
         **displacement_record(solution.displacement),

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rbdyn.arrays import Array
-from rbdyn.quasistatic.row.control import Control, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.row.control import Control, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.row import Row
 
@@ -33,16 +33,13 @@ def other_roots(row: Row, control: Control, load: Array, given: Array, known: So
 
 
 def _starts(row: Row, control: FixedShare | FrictionShare, load: Array, given: Array) -> Sequence[Solution]:
-    neighbours: list[tuple[Row, Control]] = [(row, FixedShare(share, control.spinning)) for share in SHARES]
-    for factor in SPEEDS:
-        neighbours.append((row, control._replace(spinning=_turning(control.spinning, factor))))
+    usual = control.spinning
+    neighbours: list[Control] = [FixedShare(share, usual) for share in SHARES]
+    turning = [usual._replace(inner_speed=k * usual.inner_speed, outer_speed=k * usual.outer_speed) for k in SPEEDS]
     # The sign of the moment that many texts have leads to the other side.
-    neighbours.append((row, control._replace(spinning=control.spinning._replace(turning=-control.spinning.turning))))
-    return [start for start in (solve(a, b, load, given) for a, b in neighbours) if start.found]
-
-
-def _turning(spinning: Spinning, factor: float) -> Spinning:
-    return spinning._replace(inner_speed=factor * spinning.inner_speed, outer_speed=factor * spinning.outer_speed)
+    turning.append(usual._replace(turning=-usual.turning))
+    neighbours += [control._replace(spinning=each) for each in turning]
+    return [start for start in (solve(row, each, load, given) for each in neighbours) if start.found]
 
 
 def _differ(one: Solution, other: Solution) -> bool:

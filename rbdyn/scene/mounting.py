@@ -117,10 +117,6 @@ def misfits(mounting: Mounting, bearing: Raceways) -> Iterator[str]:
 def material_of(chosen: MaterialName | CustomMaterial) -> Material:
     """A material in SI, from its name or its numbers."""
     if isinstance(chosen, CustomMaterial):
-        return Material(
-            chosen.elastic_modulus_GPa * 1e9,
-            chosen.poisson_ratio,
-            chosen.density_kg_m3,
-            chosen.thermal_expansion_1e_6_K * 1e-6,
-        )
+        modulus, expansion = chosen.elastic_modulus_GPa * 1e9, chosen.thermal_expansion_1e_6_K * 1e-6
+        return Material(modulus, chosen.poisson_ratio, chosen.density_kg_m3, expansion)
     return MATERIALS[chosen]

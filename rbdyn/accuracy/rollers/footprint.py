@@ -93,13 +93,8 @@ def printed(function: Callable[[], None], data: Any, fault: str, **environment: 
         check=False,
     )
     if run.returncode != 0:
-        raise RunError(f"{fault}: {last_line(run.stderr)}")
+        raise RunError(f"{fault}: {next(reversed(run.stderr.strip().splitlines()), 'no reason given')}")
     return run.stdout
-
-
-def last_line(text: str) -> str:
-    """What a process that failed had to say at the end."""
-    return next(reversed(text.strip().splitlines()), "no reason given")
 
 
 def print_added_modules() -> None:

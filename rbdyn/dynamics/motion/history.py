@@ -87,12 +87,10 @@ class History:
             "inner_ring_y_um": self.ring_y * 1e6,
             "land_N": self.land_load,
         }
-        for name, unit in (("pocket_load", "N"), ("outer_load", "N"), ("inner_load", "N")):
+        for name in ("pocket_load", "outer_load", "inner_load", "outer_slip", "inner_slip"):
+            unit = "N" if name.endswith("_load") else "m_s"
             for j, values in enumerate(getattr(self, name).T):
                 columns[f"{name.removesuffix('_load')}_{j + 1}_{unit}"] = values
-        for name in ("outer_slip", "inner_slip"):
-            for j, values in enumerate(getattr(self, name).T):
-                columns[f"{name}_{j + 1}_m_s"] = values
         return pd.DataFrame(columns)
 
 

@@ -30,13 +30,6 @@ TAIL = 0.01
 SEGMENT_SHARE = 0.5
 
 
-def _guide_velocity(history: History) -> tuple[Array, Array]:
-    """Velocity of the centre of the guiding ring [m/s], by central differences: it is not among the samples."""
-    inner = history.scene.cage.guidance == "inner"
-    x, y = (history.ring_x, history.ring_y) if inner else (history.outer_x, history.outer_y)
-    return np.gradient(x, history.time), np.gradient(y, history.time)
-
-
 def eccentricity(history: History) -> Array:
     """Distance of the cage centre from that of its guide [m], (samples,)."""
     return np.hypot(*history.guide_eccentricity)
@@ -48,7 +41,10 @@ def whirl_speed(history: History) -> Array:
     Zero where the centres coincide. Close to the centre it grows without bound: take quantiles, not moments.
     """
     x, y = history.guide_eccentricity
-    guide_vx, guide_vy = _guide_velocity(history)
+    inner = history.scene.cage.guidance == "inner"
+    guide = (history.ring_x, history.ring_y) if inner else (history.outer_x, history.outer_y)
+    # Not among the samples: by central differences.
+    guide_vx, guide_vy = (np.gradient(place, history.time) for place in guide)
     moment = x * (history.cage_vy - guide_vy) - y * (history.cage_vx - guide_vx)
     square = x * x + y * y
     return np.divide(moment, square, out=np.zeros_like(square), where=square > 0.0)

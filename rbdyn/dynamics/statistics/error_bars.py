@@ -51,17 +51,11 @@ def quantities(
     """
     steady = scene.operation.schedule is None
     since = runs[0].first if since is None else since
-    return {
-        name: quantity(
-            figure,
-            runs,
-            companions,
-            scene.numerics.rtol,
-            slow_change(figure, TESTED.get(name, figure), runs, since, steady=steady),
-            unit,
-        )
-        for name, (figure, unit) in FIGURES.items()
-    }
+    told = {}
+    for name, (figure, unit) in FIGURES.items():
+        slow = slow_change(figure, TESTED.get(name, figure), runs, since, steady=steady)
+        told[name] = quantity(figure, runs, companions, scene.numerics.rtol, slow, unit)
+    return told
 
 
 def error_notes(scene: Scene, figures: dict[str, Quantity], fault: str | None) -> list[str]:

@@ -191,19 +191,10 @@ def work_done(runs: Sequence[Replicate]) -> dict[str, float]:
     }
 
 
-def missing_power(runs: Sequence[Replicate]) -> float:
-    """Power [W] that the balance misses on the mean of all replicates."""
-    return abs(sum(run.missing_work for run in runs)) / sum(run.duration for run in runs)
+Runs = Sequence[Replicate]
 
 
-def quantity(
-    figure: Figure,
-    runs: Sequence[Replicate],
-    companions: Sequence[Replicate],
-    rtol: float,
-    slow: float,
-    unit: float = 1.0,
-) -> Quantity:
+def quantity(figure: Figure, runs: Runs, companions: Runs, rtol: float, slow: float, unit: float = 1.0) -> Quantity:
     """A figure with its 95 % errors, times ``unit``.
 
     Statistical: batch means over all replicates (``rbdyn.dynamics.statistics.batch_means``) and, as root sum of squares, the
@@ -219,6 +210,7 @@ def quantity(
         times_fewer = sum(run.duration for run in runs) / sum(run.duration for run in companions)
         numerical = companion_error(ours, float(figure.of_sums(sums)), times_fewer, rtol)
     if figure is POWER_LOSS:
-        numerical = math.hypot(missing_power(runs), numerical or 0.0)
+        missing = abs(sum(run.missing_work for run in runs)) / sum(run.duration for run in runs)
+        numerical = math.hypot(missing, numerical or 0.0)
     statistical, numerical = (None if x is None else unit * x for x in (statistical, numerical))
     return Quantity(unit * ours.value, statistical, numerical, ours.effective_samples)

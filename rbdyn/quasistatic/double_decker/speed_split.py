@@ -14,6 +14,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from rbdyn.fields import RPM
+
 OIL_BATH = 3.3
 ANGULAR_CONTACT = (0.001, 0.33)
 # Y0 of P0 = 0.5 Fr + Y0 Fa for a single angular contact ball bearing (ISO 76), by contact angle [deg].
@@ -21,8 +23,6 @@ AXIAL_FACTORS = {15: 0.46, 20: 0.42, 25: 0.38, 30: 0.33, 35: 0.29, 40: 0.26, 45:
 # Below nu n = 2000 (mm^2/s rpm) the oil's torque no longer follows the speed.
 SLOWEST_TERM = 160.0
 HALVINGS = 200
-
-RPM = math.pi / 30.0
 Status = Literal["given", "shared", "inner layer stands", "outer layer stands", "undetermined", "no relative speed"]
 
 

@@ -24,28 +24,14 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.rivals.full_system import Stop, System, rival
-from rbdyn.quasistatic.rivals.levenberg_marquardt import (
-    CONVERGED,
-    EXHAUSTED,
-    NO_DESCENT,
-    NOT_FINITE,
-    STATIONARY,
-    Damping,
-    levenberg_marquardt,
-)
+from rbdyn.quasistatic.rivals.levenberg_marquardt import CONVERGED, EXHAUSTED, SENTENCES, Damping, levenberg_marquardt
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
 from rbdyn.quasistatic.row.place import groove_centre
 from rbdyn.quasistatic.row.row import Row
 
 UNLOADED_BALLS = 5  # besides the outcomes of Levenberg-Marquardt
-SENTENCES = {
-    STATIONARY: "stood at a least sum of squares that is no equilibrium",
-    NO_DESCENT: "found no step that lessens the residuals",
-    NOT_FINITE: "met forces that are not finite",
-    EXHAUSTED: "did not converge in its iterations",
-    UNLOADED_BALLS: "found unloaded balls, which rule a refuses",
-}
+ENDS = {**SENTENCES, UNLOADED_BALLS: "found unloaded balls, which rule a refuses"}
 
 
 class Search(NamedTuple):
@@ -144,5 +130,5 @@ def solve(
     u = np.zeros(system.size)
     most = damping.iterations * len(points) if limit is None else limit
     outcome, searches, iterations, residual = _search(control, system, damping, points, most, strict, u)
-    status = OK if outcome == CONVERGED else f"none of {searches} searches converged; the last {SENTENCES[outcome]}"
+    status = OK if outcome == CONVERGED else f"none of {searches} searches converged; the last {ENDS[outcome]}"
     return Stop(u, status, iterations, residual, searches)

@@ -112,15 +112,8 @@ def control_of(
 
 def row_of(scene: SingleRowScene) -> RowModel:
     """The row of a single-row scene, its rings grown as far as the scene asks for."""
-    return row_model(
-        scene.bearing,
-        scene.model,
-        scene.material("ball"),
-        scene.material("inner_ring"),
-        scene.material("outer_ring"),
-        *scene.operation.speeds,
-        row_change(scene),
-    )
+    ball, inner, outer = (scene.material(part) for part in ("ball", "inner_ring", "outer_ring"))
+    return row_model(scene.bearing, scene.model, ball, inner, outer, *scene.operation.speeds, row_change(scene))
 
 
 def load_of(scene: BallScene) -> Array:

@@ -62,9 +62,8 @@ class Solved(NamedTuple):
 
 def as_text(points: list[Solved]) -> str:
     """The points as JSON, every number with all its digits."""
-    return json.dumps(
-        [(*point[:3], [_said(one) for one in point.remarks], *point[4:]) for point in points], default=_list
-    )
+    told = [(*point[:3], [(one.word, one.sentence(0)) for one in point.remarks], *point[4:]) for point in points]
+    return json.dumps(told, default=np.ndarray.tolist)
 
 
 def from_text(text: str) -> list[Solved]:
@@ -74,21 +73,9 @@ def from_text(text: str) -> list[Solved]:
             status,
             figures,
             {name: np.array(values) for name, values in balls.items()},
-            [Remark(word, np.array([True]), functools.partial(_as_said, said)) for word, said in remarks],
+            [Remark(word, np.array([True]), functools.partial(lambda said, _: said, said)) for word, said in remarks],
             tuple(Solution._make(np.array(x) if isinstance(x, list) else x for x in row) for row in rows),
             cold,
         )
         for status, figures, balls, remarks, rows, cold in json.loads(text)
     ]
-
-
-def _said(remark: Remark) -> tuple[str, str]:
-    return remark.word, remark.sentence(0)
-
-
-def _as_said(sentence: str, _: int) -> str:
-    return sentence
-
-
-def _list(array: NDArray[Any]) -> Any:
-    return array.tolist()
