@@ -51,12 +51,7 @@ class LyapunovExponent(Record):
 
 
 def lyapunov_exponent(
-    scene: Scene,
-    turns: float = 100.0,
-    replicate: int = 0,
-    separation: float = SEPARATION,
-    rtol: float = RTOL,
-    stop: Stop | None = None,
+    scene: Scene, turns: float = 100.0, replicate: int = 0, separation: float = SEPARATION, rtol: float = RTOL
 ) -> LyapunovExponent:
     """Largest Lyapunov exponent over ``turns`` counted shaft turns, after the discarded ones. Raises RunError.
 
@@ -66,7 +61,7 @@ def lyapunov_exponent(
     """
     started = time.perf_counter()
     scene = with_numerics(scene, turns=turns + ALIGN_TURNS)
-    bearing, stop = roller_bearing(scene), stop or Stop()
+    bearing, stop = roller_bearing(scene), Stop()
     leader = Run(scene, bearing, replicate, rtol, stop)
     follower = Run(scene, bearing, replicate, rtol, stop)
     begin = scene.numerics.warm_up_turns

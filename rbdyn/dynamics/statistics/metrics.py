@@ -86,11 +86,6 @@ class Replicate:
         return self._figure(POWER_LOSS)
 
     @property
-    def cage_speed(self) -> float:
-        """Mean cage speed [rad/s]."""
-        return float(self.cage_angle[self.first :].sum()) / self.duration
-
-    @property
     def cage_slip(self) -> float:
         """1 - cage speed over kinematic cage speed."""
         return self._figure(CAGE_SLIP)

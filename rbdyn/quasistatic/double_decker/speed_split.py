@@ -76,14 +76,9 @@ def static_equivalent_load(radial_load: float, axial_load: float, contact_angle:
 
 
 def load_torque(
-    radial_load: float,
-    axial_load: float,
-    contact_angle: float,
-    pitch_diameter: float,
-    static_capacity: float,
-    factors: tuple[float, float] = ANGULAR_CONTACT,
+    radial_load: float, axial_load: float, contact_angle: float, pitch_diameter: float, static_capacity: float
 ) -> float:
-    """Palmgren's torque of the load M1 = f1 P1 dm [N m], f1 = z (P0/C0)^y with ``factors`` = (z, y).
+    """Palmgren's torque of the load M1 = f1 P1 dm [N m], f1 = z (P0/C0)^y of angular contact ball bearings.
 
     P1 = 0.9 Fa cot(alpha0) - 0.1 Fr, but not below Fr. Loads and capacity [N], angle [rad], diameter [m].
     Raises ValueError unless angle and capacity are positive.
@@ -94,7 +89,7 @@ def load_torque(
             "both must be greater than 0"
         )
     radial, axial = abs(radial_load), abs(axial_load)
-    scale, exponent = factors
+    scale, exponent = ANGULAR_CONTACT
     rating = static_equivalent_load(radial, axial, contact_angle) / static_capacity
     friction_load = max(0.9 * axial / math.tan(contact_angle) - 0.1 * radial, radial)
     return scale * rating**exponent * friction_load * pitch_diameter
