@@ -93,7 +93,11 @@ def write(
         files.append(name)
     if animate:
         progress(len(tasks) + 1, steps)
-        files += _animation(motion, folder)
+        from rbdyn.plots.animation import moving_bearing
+        from rbdyn.plots.player import player_html
+
+        files += [moving_bearing(motion, folder / "bearing").name, "bearing.html"]
+        (folder / "bearing.html").write_text(player_html(motion), encoding="utf-8")
     record = {**_record(request, motion), "notes": request.notes, "versions": versions()}
     if lyapunov:
         from rbdyn.dynamics.motion.lyapunov import lyapunov_exponent
@@ -123,15 +127,6 @@ def _pictures(request: Request, motion: History) -> dict[str, Callable[[Path], o
     }
 
 
-def _animation(motion: History, folder: Path) -> list[str]:
-    from rbdyn.plots.animation import moving_bearing
-    from rbdyn.plots.player import player_html
-
-    film = moving_bearing(motion, folder / "bearing")
-    (folder / "bearing.html").write_text(player_html(motion), encoding="utf-8")
-    return [film.name, "bearing.html"]
-
-
 def _record(request: Request, motion: History) -> dict[str, Any]:
     import numpy as np
 
@@ -158,8 +153,8 @@ def _record(request: Request, motion: History) -> dict[str, Any]:
         "races": {race: _race(motion, race) for race in get_args(orbit.Race)},
         "life": _life(motion),
         "spectra": {
-            "eccentricity_um": _peaks(orbit.eccentricity_spectrum(motion), 1e6),
-            "cage_speed_rpm": _peaks(orbit.cage_speed_spectrum(motion), 30.0 / np.pi),
+            "eccentricity_um": _peaks(orbit.spectrum(motion, eccentricity), 1e6),
+            "cage_speed_rpm": _peaks(orbit.spectrum(motion, motion.cage_speed), 30.0 / np.pi),
         },
     }
 
@@ -177,12 +172,9 @@ def _race(motion: History, race: Race) -> dict[str, float]:
 
 def _life(motion: History) -> dict[str, float | str | None]:
     """Of the contact loads shown; None where nothing is loaded or nothing turns."""
-    life = motion.life()
-    return {
-        **life.as_record(*motion.scene.operation.speeds),
-        "equivalent_load_N": life.equivalent_load,
-        "method": "ISO/TS 16281 reference life from the contact loads over time",
-    }
+    life, method = motion.life(), "ISO/TS 16281 reference life from the contact loads over time"
+    known = life.as_record(*motion.scene.operation.speeds)
+    return {**known, "equivalent_load_N": life.equivalent_load, "method": method}
 
 
 def _largest(hit: Largest) -> dict[str, float | int | None]:

@@ -151,8 +151,8 @@ def spectra(history: History, path: Path) -> None:
     lines = {"cage": cage, "shaft": 1.0 / history.scene.turn_s, "roller passing": passing}
     figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.2), sharex=True)
     signals = (
-        (orbit.eccentricity_spectrum(history), 1e6, "eccentricity of the cage", "µm"),
-        (orbit.cage_speed_spectrum(history), 30.0 / np.pi, "cage speed", "rpm"),
+        (orbit.spectrum(history, orbit.eccentricity(history)), 1e6, "eccentricity of the cage", "µm"),
+        (orbit.spectrum(history, history.cage_speed), 30.0 / np.pi, "cage speed", "rpm"),
     )
     reach = min(SHOWN_ORDERS * cage, float(signals[0][0].frequency[-1]))
     for axis, (spectrum, factor, name, unit) in zip(axes, signals, strict=True):

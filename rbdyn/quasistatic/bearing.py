@@ -8,23 +8,16 @@ from typing import Any
 import numpy as np
 
 from rbdyn.mounting.ball_rings import growth_record, row_change
+from rbdyn.quasistatic import result as told
 from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of, load_record, middle_record
 from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.remarks import Rating, overloads, remarks, sentences, tipping
-from rbdyn.quasistatic.result import (
-    BallResult,
-    DoubleDeckerReport,
-    RowReport,
-    ball_records,
-    displacement_record,
-    stiffness_record,
-)
+from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport, film_record, row_report
 from rbdyn.quasistatic.rivals import finite_search, plain_newton
 from rbdyn.quasistatic.roots import other_roots
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
-from rbdyn.quasistatic.row_report import film_record, row_report
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
@@ -82,7 +75,7 @@ def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> 
     if scene.model.raceway_control not in SEVERAL_ROOTS or scene.model.solver != "convex":
         return None
     found = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
-    return [{**displacement_record(root.displacement), "balls": ball_records(root.figures)} for root in found]
+    return [{**told.displacement_record(root.displacement), "balls": told.ball_records(root.figures)} for root in found]
 
 
 def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> BallResult:
@@ -113,8 +106,8 @@ def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> Ba
         scene, {"inner_less_middle_bore": model.changes[0], "middle_less_outer_race": model.changes[1]}
     )
     report = DoubleDeckerReport(
-        **displacement_record(solution.displacement),
-        stiffness=stiffness_record(solution.stiffness),
+        **told.displacement_record(solution.displacement),
+        stiffness=told.stiffness_record(solution.stiffness),
         reaction=load_record(solution.reaction),
         middle_ring=middle_record(model, solution),
         residual_N=solution.residual,

@@ -1,17 +1,24 @@
-"""What an equilibrium of a ball bearing reports, saves and loads."""
+"""What an equilibrium of a ball bearing reports, saves and loads: of a row its angles, loads, stress, contacts, film, life."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from rbdyn.arrays import Array
-from rbdyn.quasistatic.remarks import Rating
+from rbdyn.contact import point_film
+from rbdyn.contact.film_thickness import lambda_ratio
+from rbdyn.contact.hertz_point import PointContact, peak_pressure
+from rbdyn.properties.materials import equivalent_modulus
+from rbdyn.quasistatic.fatigue import solution_life, turning_rings
+from rbdyn.quasistatic.remarks import Rating, needed_friction
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.records.record import Record, outside_json, spread
 from rbdyn.result import SavedRecord
+from rbdyn.scene.ball import BallScene
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -154,3 +161,72 @@ def stiffness_record(stiffness: Array) -> dict[str, Any]:
         **{f"tilt_{axis}_Nm_per_mrad": value for axis, value in zip("xy", tilt, strict=True)},
         "matrix_SI": stiffness.tolist(),
     }
+
+
+def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reaction: dict[str, Any] | None) -> RowReport:
+    """Report of one row; ``film``: as ``film_record`` gives it."""
+    contacts = {"inner": rating.model.inner_contact, "outer": rating.model.outer_contact}
+    loads = {"inner": solution.inner_load, "outer": solution.outer_load}
+    life = solution_life(solution, rating.capacities, turning_rings(*rating.speeds))
+    return RowReport(
+        **displacement_record(solution.displacement),
+        balls=ball_records(solution.figures),
+        max_stress_MPa={race: 1e-6 * float(np.max(peak_pressure(contacts[race], loads[race]))) for race in contacts},
+        contacts={
+            race: {**contact_record(contacts[race], float(loads[race].max())), **film.get(race, {})}
+            for race in contacts
+        },
+        stiffness=stiffness_record(solution.stiffness),
+        life={**life.as_record(*rating.speeds), "method": "ISO/TS 16281"},
+        needed_friction=float(needed_friction(solution.figures[np.newaxis], [rating])[0]),
+        residual_N=solution.residual,
+        iterations=solution.steps,
+        searches=solution.searches,
+        reaction=reaction,
+    )
+
+
+def contact_record(contact: PointContact, load: float) -> dict[str, float]:
+    """Ellipse of a contact under a load [N]."""
+    grown = load ** (1.0 / 3.0)
+    semi_major, semi_minor = 1e3 * contact.semi_major * grown, 1e3 * contact.semi_minor * grown
+    return {
+        "load_N": load,
+        "semi_major_mm": semi_major,
+        "semi_minor_mm": semi_minor,
+        "area_mm2": math.pi * semi_major * semi_minor,
+    }
+
+
+def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[str, str]) -> dict[str, Any]:
+    """Film of each race at its largest load, the thermal factor included, between ``rings``, the names of the inner and outer one.
+
+    Empty where the scene tells no oil, and where nothing turns or bears.
+    """
+    if scene.lubricant is None:
+        return {}
+    lubricant, drawing, model = scene.lubricant, rating.drawing, rating.model
+    ball, inner, outer = (scene.material(part) for part in ("ball", *rings))
+    gamma = drawing.gamma
+    entrainment = point_film.entrainment_speed(drawing.pitch_diameter, gamma, *rating.speeds)
+    oil, found = lubricant.in_service, {}
+    for race, contact, ring, side, loads in (
+        ("inner", model.inner_contact, inner, gamma, solution.inner_load),
+        ("outer", model.outer_contact, outer, -gamma, solution.outer_load),
+    ):
+        load = float(loads.max())
+        if entrainment == 0.0 or load == 0.0:
+            continue
+        rolling = point_film.RollingBall(
+            contact, point_film.rolling_radius(drawing.ball_diameter, side), equivalent_modulus(ball, ring), entrainment
+        )
+        heat = float(point_film.thermal_factor(rolling, oil, load))
+        central = float(point_film.central_film(rolling, oil, load)) * heat
+        roughness = lubricant.roller_roughness, lubricant.race_roughness
+        found[race] = {
+            "central_film_um": 1e6 * central,
+            "minimum_film_um": 1e6 * float(point_film.minimum_film(rolling, oil, load)) * heat,
+            "lambda_ratio": float(lambda_ratio(central, *roughness)),
+            "film_stiffness_N_per_um": 1e-6 * float(point_film.film_stiffness(rolling, oil, load)),
+        }
+    return found

@@ -347,7 +347,7 @@ def test_unit_replicate_figures(outer):
         kinematic_angle=np.full(2, outer.geometry.motion.cage_speed),
     )
     assert (run.impact_force, run.power_loss) == (15.0, 2.0)
-    assert list(run.contact_windows) == [8.0, 3.0] and list(run.impact_windows) == [10.0, 20.0]
+    assert list(run.windows(POCKET_CONTACT_LOAD)) == [8.0, 3.0] and list(run.windows(POCKET_LOAD)) == [10.0, 20.0]
     assert run.power("outer_race_traction") == 1.5
     assert run.power_gap == pytest.approx(0.02)
     assert run.cage_slip == pytest.approx(0.5)

@@ -141,16 +141,6 @@ def spectrum(history: History, values: Array) -> Spectrum:
     return Spectrum(frequency, np.sqrt(2.0 * power))
 
 
-def eccentricity_spectrum(history: History) -> Spectrum:
-    """Amplitudes of the cage's eccentricity [m]."""
-    return spectrum(history, eccentricity(history))
-
-
-def cage_speed_spectrum(history: History) -> Spectrum:
-    """Amplitudes of the cage's speed [rad/s]."""
-    return spectrum(history, history.cage_speed)
-
-
 @dataclass(frozen=True)
 class Profile:
     """A quantity of all rollers against azimuth: mean, 5 % and 95 % quantile in each bin, (bins,); NaN in empty bins.

@@ -55,17 +55,8 @@ class Replicate:
         """Time counted [s]."""
         return float(self.durations[self.first :].sum())
 
-    @property
-    def impact_windows(self) -> Array:
-        """Largest force of a roller on a pocket wall, by contact and film, of each whole window [N]."""
-        return self._windows(POCKET_LOAD)
-
-    @property
-    def contact_windows(self) -> Array:
-        """Largest roller/cage contact load of each whole window [N]."""
-        return self._windows(POCKET_CONTACT_LOAD)
-
-    def _windows(self, force: int) -> Array:
+    def windows(self, force: int) -> Array:
+        """Largest load of each whole impact window [N], by its place in the load vector."""
         forces = self.largest[self.first :, force]
         whole = len(forces) // self.per_window
         return forces[: whole * self.per_window].reshape(whole, self.per_window).max(axis=1)
@@ -73,7 +64,7 @@ class Replicate:
     @property
     def impact_force(self) -> float:
         """Mean over the windows of the largest force on a pocket wall [N]."""
-        return float(self.impact_windows.mean())
+        return float(self.windows(POCKET_LOAD).mean())
 
     @property
     def whirl_deviation_ratio(self) -> float:
@@ -155,16 +146,16 @@ def _slip(sums: Array) -> Array:
     return np.where(known, 1.0 - turned / np.where(known, rolling, 1.0), 0.0)
 
 
-def _counted(windows: Array) -> Array:
-    return np.column_stack((np.ones(len(windows)), windows))
+def _windowed(force: int) -> Callable[[Replicate], Array]:
+    return lambda run: np.column_stack((np.ones(len(windows := run.windows(force))), windows))
 
 
 def _timed(values: Callable[[Replicate], Array]) -> Callable[[Replicate], Array]:
     return lambda run: np.column_stack((run.durations, values(run)))[run.first :]
 
 
-IMPACT_FORCE = Figure(lambda run: _counted(run.impact_windows), mean)
-IMPACT_CONTACT_FORCE = Figure(lambda run: _counted(run.contact_windows), mean)
+IMPACT_FORCE = Figure(_windowed(POCKET_LOAD), mean)
+IMPACT_CONTACT_FORCE = Figure(_windowed(POCKET_CONTACT_LOAD), mean)
 WHIRL_DEVIATION_RATIO = Figure(lambda run: run.whirl[run.first :], _deviation_ratio)
 POWER_LOSS = Figure(_timed(lambda run: run.work[:, :SHAFT].sum(axis=1)), mean)
 CAGE_SPEED = Figure(_timed(lambda run: run.cage_angle), mean)
