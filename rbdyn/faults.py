@@ -33,11 +33,11 @@ class InputError(Exception):
     """
 
     def __init__(self, faults: Iterable[str]) -> None:
-        found = list(faults)
-        if len(found) > MOST_FAULTS:
-            more = len(found) - MOST_FAULTS + 1
-            found = [*found[: MOST_FAULTS - 1], f"and {more} more faults; mend these first"]
-        self.faults = [one_line(fault) for fault in found]
+        listed = list(faults)
+        if len(listed) > MOST_FAULTS:
+            more = len(listed) - MOST_FAULTS + 1
+            listed = [*listed[: MOST_FAULTS - 1], f"and {more} more faults; mend these first"]
+        self.faults = [one_line(fault) for fault in listed]
         super().__init__("\n".join(self.faults))
 
     def __reduce__(self) -> tuple[type[InputError], tuple[list[str]]]:
@@ -47,8 +47,8 @@ class InputError(Exception):
 
 def refuse(faults: Iterable[str]) -> None:
     """Raises InputError if there are faults."""
-    if found := list(faults):
-        raise InputError(found)
+    if listed := list(faults):
+        raise InputError(listed)
 
 
 def check_all(checks: Iterable[Callable[[], object]]) -> None:
@@ -97,8 +97,8 @@ def read_text(path: Path) -> str:
         raise InputError([f"{path}: no such file; check the path"]) from None
     except UnicodeDecodeError as error:
         line, byte = error.object.count(b"\n", 0, error.start) + 1, error.object[error.start]
-        found = f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8)"
-        raise InputError([f"{found}; save the file as UTF-8"]) from None
+        sentence = f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8)"
+        raise InputError([f"{sentence}; save the file as UTF-8"]) from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise InputError([f"{path}: cannot be read ({why}); check the path"]) from None
@@ -118,15 +118,15 @@ def read_toml(path: Path | str) -> dict[str, Any]:
 
 def bounded(data: dict[str, Any], source: str) -> dict[str, Any]:
     """The data themselves. Raises InputError for tables nested too deep and for integers beyond 64 bits."""
-    found: list[tuple[tuple[int | str, ...], Any]] = [((), data)]
+    waiting: list[tuple[tuple[int | str, ...], Any]] = [((), data)]
     faults = []
-    for place, value in found:
+    for place, value in waiting:
         if len(place) > DEEPEST:
             raise InputError([f"{source}: {_dotted(place[:3])}...: nested more than {DEEPEST} deep; mend the brackets"])
         if isinstance(value, Mapping):
-            found += [((*place, key), each) for key, each in value.items()]
+            waiting += [((*place, key), each) for key, each in value.items()]
         elif isinstance(value, list):
-            found += [((*place, number), each) for number, each in enumerate(value)]
+            waiting += [((*place, number), each) for number, each in enumerate(value)]
         elif isinstance(value, int) and value.bit_length() > 63:
             faults.append(f"{source}: {_dotted(place)}: a whole number beyond 64 bits; take a smaller one")
     refuse(faults)
@@ -155,15 +155,15 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        found: Sequence[Any] = error.errors(include_url=False)
-    faults = _sentences(model, found, data, source)
+        errors: Sequence[Any] = error.errors(include_url=False)
+    faults = _sentences(model, errors, data, source)
     # A table with a bad key is not checked as a whole: without that key it may show more faults.
-    bad = {fault["loc"] for fault in found}
+    bad = {fault["loc"] for fault in errors}
     try:
         model.model_validate(_without(data, bad))
     except ValidationError as error:
         rest = [fault for fault in error.errors(include_url=False) if fault["type"] == "value_error"]
-        names = {str(place[-1]) for fault in found[:MOST_FAULTS] if (place := _place(fault, data))}
+        names = {str(place[-1]) for fault in errors[:MOST_FAULTS] if (place := _place(fault, data))}
         # What is bad was not left out, even if it is missed now.
         faults += [
             fault
@@ -178,9 +178,9 @@ def set_key(data: dict[str, Any], assignment: str) -> None:
 
     Raises InputError when the assignment has no ``=``, its path runs through a plain value, or it is not one value.
     """
-    path, found, text = assignment.partition("=")
+    path, sign, text = assignment.partition("=")
     keys, source = [key.strip() for key in path.split(".")], f"--set {one_line(assignment, 2 * LONGEST_NAME)}"
-    if not found or not all(keys) or len(keys) > DEEPEST:
+    if not sign or not all(keys) or len(keys) > DEEPEST:
         raise InputError([f"{source}: write it as key.path=value"])
     try:
         given = _parsed(f"value = {text}", source)
@@ -202,10 +202,10 @@ def _without(data: Any, bad: set[tuple[int | str, ...]], place: tuple[str, ...] 
     return {key: _without(each, bad, (*place, key)) for key, each in data.items() if (*place, key) not in bad}
 
 
-def _sentences(model: type[BaseModel], found: Sequence[Any], data: Any, source: str) -> list[str]:
+def _sentences(model: type[BaseModel], errors: Sequence[Any], data: Any, source: str) -> list[str]:
     sentences: list[str] = []
     mends: dict[str, list[str]] = {}
-    for fault in found:
+    for fault in errors:
         kind, value, place = fault["type"], fault["input"], _place(fault, data)
         # Where a key may be of several kinds, each kind complains: keep what fits the value given.
         alien = "model_type" if isinstance(value, str) else "literal_error" if isinstance(value, Mapping) else ""

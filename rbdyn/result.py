@@ -125,10 +125,10 @@ def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[
         data = json.loads(text)
     except (ValueError, RecursionError):
         data = None
-    found = data.get("format") if isinstance(data, dict) else None
-    if found != form:
-        old = f"format is {found}, not {form}; run the scene again"
-        raise InputError([f"{path}: {old if isinstance(found, str) else f'not a saved {what}; check the path'}"])
+    given = data.get("format") if isinstance(data, dict) else None
+    if given != form:
+        old = f"format is {given}, not {form}; run the scene again"
+        raise InputError([f"{path}: {old if isinstance(given, str) else f'not a saved {what}; check the path'}"])
     try:
         return restore(bounded(data, str(path)))
     except (AttributeError, KeyError, TypeError, ValueError):

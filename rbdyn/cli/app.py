@@ -145,24 +145,24 @@ def accuracy(
         raise typer.Exit(FAILED)
 
 
-def _print_map(found: SlipMap) -> None:
-    header = ("load [N]", *(f"{value:g} rpm" for value in found.speeds_rpm))
+def _print_map(mapped: SlipMap) -> None:
+    header = ("load [N]", *(f"{value:g} rpm" for value in mapped.speeds_rpm))
     rows = [
         (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
-        for value, row in zip(found.loads_N, found.grid("cage_slip"), strict=True)
+        for value, row in zip(mapped.loads_N, mapped.grid("cage_slip"), strict=True)
     ]
     print_table("cage slip", header, rows)
-    print(f"{len(found.points)} points in {found.wall_s:.1f} s, seed {found.seed}")
+    print(f"{len(mapped.points)} points in {mapped.wall_s:.1f} s, seed {mapped.seed}")
 
 
-def _write_map(found: SlipMap, folder: Path) -> list[str]:
+def _write_map(mapped: SlipMap, folder: Path) -> list[str]:
     """Write map.json, map.csv and map.png; returns the file names."""
     from rbdyn.plots.slip_map import draw
     from rbdyn.result import write_json
 
-    write_json(folder / "map.json", found.as_dict())
-    found.table().to_csv(folder / "map.csv", index=False)
-    draw(found, folder / "map.png")
+    write_json(folder / "map.json", mapped.as_dict())
+    mapped.table().to_csv(folder / "map.csv", index=False)
+    draw(mapped, folder / "map.png")
     return ["map.json", "map.csv", "map.png"]
 
 
@@ -192,12 +192,12 @@ def slip_map(
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
         points = folder / study.POINTS if folder else None
         with keeping(points), progress_bar("mapping", quiet or as_json) as progress:
-            found = study.slip_map(loaded, *axes, workers, progress, points)
-        files = _write_map(found, folder) if folder else []
-        hand_over(found.as_dict, as_json, lambda: _print_map(found), folder, files)
-        for point in found.failed:
+            mapped = study.slip_map(loaded, *axes, workers, progress, points)
+        files = _write_map(mapped, folder) if folder else []
+        hand_over(mapped.as_dict, as_json, lambda: _print_map(mapped), folder, files)
+        for point in mapped.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
-    if found.failed:
+    if mapped.failed:
         raise typer.Exit(FAILED)
 
 

@@ -52,24 +52,24 @@ def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tupl
     """
     run, unit, si = SWEPT[swept]
     try:
-        found = run(_single(scene, swept), [si * value for value in values])
+        scan = run(_single(scene, swept), [si * value for value in values])
     except ValueError as error:
         raise InputError([f"--{swept}: {error}"]) from None
-    table = _table(scene, f"{swept}_{unit}", values, found)
+    table = _table(scene, f"{swept}_{unit}", values, scan)
     names = {"value": f"{swept}_{unit}", **SWEPT_FIGURES, "status": "status"}
     points = [{name: point[column] for name, column in names.items() if column in point} for point in table.points()]
     return {
         "swept": f"{swept}_{unit}",
         "points": points,
-        "least_stress": _best(found, "least_stress", si),
-        "longest_life": _best(found, "longest_life", si),
-        "notes": [*found.notes, *(f"{table.where(note['points'])}: {note['note']}" for note in table.notes)],
+        "least_stress": _best(scan, "least_stress", si),
+        "longest_life": _best(scan, "longest_life", si),
+        "notes": [*scan.notes, *(f"{table.where(note['points'])}: {note['note']}" for note in table.notes)],
     }, table
 
 
-def _table(scene: BallScene, key: str, values: Sequence[float], found: Sweep) -> SweepResult:
+def _table(scene: BallScene, key: str, values: Sequence[float], scan: Sweep) -> SweepResult:
     """Figures, balls and notes of the points scanned."""
-    points, places = found.points, np.arange(len(values))
+    points, places = scan.points, np.arange(len(values))
     solutions, ratings = [point.solution for point in points], [point.rating for point in points]
     told_of = ("figures", "displacement", "reaction", "stiffness")
     balls, displacement, reaction, stiffness = (np.array([getattr(s, of) for s in solutions]) for of in told_of)
@@ -82,8 +82,8 @@ def _table(scene: BallScene, key: str, values: Sequence[float], found: Sweep) ->
     return SweepResult({key: tuple(values)}, columns, statuses, 0, 0.0, scene.model_dump(mode="json"), rows, notes)
 
 
-def _best(found: Sweep, which: str, si: float) -> dict[str, float]:
-    point = getattr(found, which)
+def _best(scan: Sweep, which: str, si: float) -> dict[str, float]:
+    point = getattr(scan, which)
     return {"value": point.value / si, "max_stress_MPa": 1e-6 * point.peak_pressure, "L10_Mrev": point.million_turns}
 
 
@@ -102,24 +102,24 @@ def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int
         allowed = running_accuracy(cast(ToleranceClass, tolerance_class), 1e-3 * row.bearing.bore_mm)
         if allowed.axial is None:
             raise ValueError(f"class {tolerance_class} sets no limit on axial runout; choose P2, P4 or P5")
-        limits: dict[str, Any] = {"radial_limit": allowed.radial, "axial_limit": allowed.axial, "wanted": wanted}
-        found = design(bench_of(row), Lot(), **limits, seed=seed, solved=SOLVED)
+        asked: dict[str, Any] = {"radial_limit": allowed.radial, "axial_limit": allowed.axial, "wanted": wanted}
+        limits = design(bench_of(row), Lot(), **asked, seed=seed, solved=SOLVED)
     except ValueError as error:
         raise InputError([f"--race-limits {tolerance_class}: {error}"]) from None
-    return {"class": tolerance_class, "wanted": wanted, **_limits(found)}
+    return {"class": tolerance_class, "wanted": wanted, **_limits(limits)}
 
 
-def _limits(found: RaceLimits) -> dict[str, Any]:
+def _limits(limits: RaceLimits) -> dict[str, Any]:
     lengths = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "radial_limit", "axial_limit")
     return {
-        **{f"{name}_um": 1e6 * getattr(found, name) for name in lengths},
-        "yield": found.yielded,
-        "standard_error": found.standard_error,
-        "yield_in_proportion": found.proportional,
-        "homogenisation": {"radial": found.homogenisation[0], "axial": found.homogenisation[1]},
-        "bearings": found.bearings,
+        **{f"{name}_um": 1e6 * getattr(limits, name) for name in lengths},
+        "yield": limits.yielded,
+        "standard_error": limits.standard_error,
+        "yield_in_proportion": limits.proportional,
+        "homogenisation": {"radial": limits.homogenisation[0], "axial": limits.homogenisation[1]},
+        "bearings": limits.bearings,
         "solved_in_full": SOLVED,
-        "seed": found.seed,
+        "seed": limits.seed,
     }
 
 

@@ -102,14 +102,14 @@ def _read(reader: Any, name: str, text: str, faults: list[str]) -> Any:
 
 def _misfits(named: Designation, speed: float | None, preload: float | None, clearance: str | None) -> list[str]:
     """Options that the bearing has no use for."""
-    found, rollers = [], named.kind == "cylindrical_roller"
+    faults, rollers = [], named.kind == "cylindrical_roller"
     if rollers and speed is not None and abs(speed) < 0.1:
-        found.append(f"--speed {speed:g}: a run is counted in shaft turns; give at least 0.1")
+        faults.append(f"--speed {speed:g}: a run is counted in shaft turns; give at least 0.1")
     if rollers and preload is not None:
-        found.append(f"--preload {preload:g}: is one of ball bearings; leave it out")
+        faults.append(f"--preload {preload:g}: is one of ball bearings; leave it out")
     if named.kind == "angular_contact_ball" and clearance is not None:
-        found.append(f"--clearance {clearance}: an angular contact bearing has a contact angle instead; leave it out")
-    return found
+        faults.append(f"--clearance {clearance}: an angular contact bearing has a contact angle instead; leave it out")
+    return faults
 
 
 def _envelope(named: Designation, sizes: dict[str, float | None]) -> Envelope:

@@ -96,9 +96,9 @@ def output_folder(path: Path, command: str, source: Path) -> Path:
         digest = digest_of(source.read_bytes())
         # From the folder on, so that both can be moved, or mounted elsewhere, together.
         own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
-        found = json.loads(mark.read_text(encoding="utf-8")) if mark.exists() and len(os.listdir(path)) > 1 else own
-        if found["command"] != command or (own["file"] != found["file"] and digest != found["sha256"]):
-            whose = f"what {found['command']} made of {os.path.normpath(path / found['file'])}"
+        marked = json.loads(mark.read_text(encoding="utf-8")) if mark.exists() and len(os.listdir(path)) > 1 else own
+        if marked["command"] != command or (own["file"] != marked["file"] and digest != marked["sha256"]):
+            whose = f"what {marked['command']} made of {os.path.normpath(path / marked['file'])}"
             raise InputError([f"--out {path}: holds {whose}; name another folder or remove this one"])
         write_json(mark, own)
     except OSError as error:

@@ -286,9 +286,9 @@ class _Grid:
     def error(self, cells: Array, x: float, y: float) -> float:
         """Largest error at (x, y) of every cell within the table, as a share of the largest coefficient."""
         inside = cells.reshape(self.i.size, self.j.size + 1, 4, 4)[:-1, 1:-1]
-        found = x ** np.arange(4) @ inside @ y ** np.arange(4)
+        fitted = x ** np.arange(4) @ inside @ y ** np.arange(4)
         exact, rise = self.exact(self.i[:-1] + x, self.j[:, :-1] + y)
-        return float(np.abs(rise * np.exp(found) - exact).max() / exact.max())
+        return float(np.abs(rise * np.exp(fitted) - exact).max() / exact.max())
 
     def surface(self, cells: Array) -> TractionSurface:
         """The law."""

@@ -116,8 +116,8 @@ def stiffness(result: SweepResult, path: Path) -> None:
 
 def azimuth(result: SweepResult, path: Path) -> None:
     """Contact angles of every ball at some values of the key: inner above, outer below."""
-    (key, values), found = next(iter(result.keys.items())), [status == "ok" for status in result.statuses]
-    places = [place for place, good in enumerate(found) if good]
+    (key, values), solved = next(iter(result.keys.items())), [status == "ok" for status in result.statuses]
+    places = [place for place, good in enumerate(solved) if good]
     shown = [places[i] for i in np.unique(np.linspace(0, len(places) - 1, MOST_LINES).round().astype(int))]
     balls = [result.balls_at(place) for place in shown]
     rows = _rows(result)

@@ -66,16 +66,16 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | tuple[Solution, ..
             f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load under this raceway control, see "
             "other_roots; this one is reached from one common cage speed"
         )
-    found = {"report": report, **grown, "other_roots": others, "notes": notes}
-    return replace(nothing, **found, rows=(solution,), ratings=(rating,))
+    figures = {"report": report, **grown, "other_roots": others, "notes": notes}
+    return replace(nothing, **figures, rows=(solution,), ratings=(rating,))
 
 
 def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[dict[str, Any]] | None:
     """Other equilibria, where the raceway control may have several; None where they are not looked for."""
     if scene.model.raceway_control not in SEVERAL_ROOTS or scene.model.solver != "convex":
         return None
-    found = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
-    return [{**told.displacement_record(root.displacement), "balls": told.ball_records(root.figures)} for root in found]
+    roots = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
+    return [{**told.displacement_record(root.displacement), "balls": told.ball_records(root.figures)} for root in roots]
 
 
 def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> BallResult:

@@ -48,16 +48,16 @@ class Remark(NamedTuple):
 
 def pressures(balls: Array, ratings: Sequence[Rating]) -> dict[str, Array]:
     """Largest Hertz pressure (n,) on each race [Pa] of ``balls`` (n, Z, FIGURES)."""
-    found = {}
+    peaks = {}
     for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
         contact = PointContact(*np.array([getattr(rating.model, f"{race}_contact") for rating in ratings]).T)
-        found[race] = peak_pressure(contact, balls[:, :, place].max(axis=1))
-    return found
+        peaks[race] = peak_pressure(contact, balls[:, :, place].max(axis=1))
+    return peaks
 
 
 def overloads(balls: Array, ratings: Sequence[Rating]) -> dict[int, str]:
     """Points whose loads no contact can carry, and why: an ellipse as long as its groove is deep."""
-    found: dict[int, str] = {}
+    causes: dict[int, str] = {}
     for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
         loads = balls[:, :, place]
         factor = np.array([getattr(rating.drawing, f"{race}_groove_factor") for rating in ratings])
@@ -67,8 +67,8 @@ def overloads(balls: Array, ratings: Sequence[Rating]) -> dict[int, str]:
         for k in np.flatnonzero(half > groove).tolist():
             ball = f"the ball at {360.0 * loads[k].argmax() / loads.shape[1]:.0f} deg would bear {loads[k].max():.4g} N"
             why = f"over {2e3 * half[k]:.3g} mm across a groove of {1e3 * groove[k]:.3g} mm radius, which no contact can; lessen the load"
-            found.setdefault(k, f"overloaded: {ball} on the {race} race, {why}")
-    return found
+            causes.setdefault(k, f"overloaded: {ball} on the {race} race, {why}")
+    return causes
 
 
 def needed_friction(balls: Array, ratings: Sequence[Rating]) -> Array:
@@ -104,7 +104,7 @@ def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Rem
     shouldered = np.array([rating.drawing.contact_angle > 0.0 for rating in ratings])
     needed, (inner, outer) = needed_friction(balls, ratings), pressures(balls, ratings).values()
     # fmt: off
-    found = [
+    listed = [
         ("unloaded", clear == size, lambda k:
             "no ball touches the inner race, so nothing tells where the ring is; load it or take away clearance"),
         ("clear balls", (clear > 0) & (clear < size), lambda k: f"{clear[k]} of {size} balls are clear of the inner race"),
@@ -121,7 +121,7 @@ def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Rem
             "about that axis; raise the load or lower the speed"),
     ]
     # fmt: on
-    return [Remark(row + word, where, say, row) for word, where, say in found]
+    return [Remark(row + word, where, say, row) for word, where, say in listed]
 
 
 def tipping(tilts: Array, scene: BallScene) -> Remark:
@@ -135,6 +135,6 @@ def tipping(tilts: Array, scene: BallScene) -> Remark:
     # fmt: on
 
 
-def sentences(found: Sequence[Remark]) -> list[str]:
+def sentences(given: Sequence[Remark]) -> list[str]:
     """What remarks say of the first equilibrium."""
-    return [remark.sentence(0) for remark in found if remark.where[0]]
+    return [remark.sentence(0) for remark in given if remark.where[0]]

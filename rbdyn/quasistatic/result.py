@@ -209,7 +209,7 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
     ball, inner, outer = (scene.material(part) for part in ("ball", *rings))
     gamma = drawing.gamma
     entrainment = point_film.entrainment_speed(drawing.pitch_diameter, gamma, *rating.speeds)
-    oil, found = lubricant.in_service, {}
+    oil, films = lubricant.in_service, {}
     for race, contact, ring, side, loads in (
         ("inner", model.inner_contact, inner, gamma, solution.inner_load),
         ("outer", model.outer_contact, outer, -gamma, solution.outer_load),
@@ -223,10 +223,10 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
         heat = float(point_film.thermal_factor(rolling, oil, load))
         central = float(point_film.central_film(rolling, oil, load)) * heat
         roughness = lubricant.roller_roughness, lubricant.race_roughness
-        found[race] = {
+        films[race] = {
             "central_film_um": 1e6 * central,
             "minimum_film_um": 1e6 * float(point_film.minimum_film(rolling, oil, load)) * heat,
             "lambda_ratio": float(lambda_ratio(central, *roughness)),
             "film_stiffness_N_per_um": 1e-6 * float(point_film.film_stiffness(rolling, oil, load)),
         }
-    return found
+    return films

@@ -24,12 +24,12 @@ def other_roots(row: Row, control: Control, load: Array, given: Array, known: So
     """
     if not isinstance(control, FixedShare | FrictionShare):
         return ()
-    found = [known]
+    roots = [known]
     for start in _starts(row, control, load, given):
         root = solve(row, control, load, given, start)
-        if root.found and all(_differ(root, other) for other in found):
-            found.append(root)
-    return tuple(found[1:])
+        if root.found and all(_differ(root, other) for other in roots):
+            roots.append(root)
+    return tuple(roots[1:])
 
 
 def _starts(row: Row, control: FixedShare | FrictionShare, load: Array, given: Array) -> Sequence[Solution]:

@@ -71,11 +71,11 @@ class Scene(SceneFile):
 
     def faults(self) -> list[str]:
         """What does not go together, each with a slip of the unit that may be its cause."""
-        found = list(self._misfits())
-        found += misfits(self.mounting, self.bearing) if self.mounting is not None else ()
-        found += self._overload_faults()
-        slips = {note.partition(" = ")[0]: note for note in (self.unit_notes if found else ())}
-        return ["; ".join([fault, *(slips[key] for key in slips if key in fault)]) for fault in found]
+        faults = list(self._misfits())
+        faults += misfits(self.mounting, self.bearing) if self.mounting is not None else ()
+        faults += self._overload_faults()
+        slips = {note.partition(" = ")[0]: note for note in (self.unit_notes if faults else ())}
+        return ["; ".join([fault, *(slips[key] for key in slips if key in fault)]) for fault in faults]
 
     def _misfits(self) -> Iterator[str]:
         bearing, cage, laws = self.bearing, self.cage, self.model

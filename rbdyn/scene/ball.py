@@ -224,9 +224,9 @@ class SingleRowScene(BallScene):
 
     def faults(self) -> Iterable[str]:
         """Those of both kinds, else those of form errors."""
-        row, found = self.bearing, list(super().faults())
-        if found or self.errors is None:
-            return found
+        row, faults = self.bearing, list(super().faults())
+        if faults or self.errors is None:
+            return faults
         return form_faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm)
 
 
@@ -238,8 +238,8 @@ class DoubleDeckerScene(BallScene):
 
     def faults(self) -> Iterator[str]:
         """Those of both kinds, else what is meant for one row."""
-        if found := list(super().faults()):
-            yield from found
+        if faults := list(super().faults()):
+            yield from faults
             return
         if self.errors is not None:
             yield "errors: form errors are followed for one row of balls only; take the table away"

@@ -51,8 +51,8 @@ def study(scene: BallScene, progress: Reporter | None = None, scenes: int = SCEN
     runs = {name: run(name, drawn[:size], problems, counted) for name, size in sizes.items()}
     ours = runs[OURS]
     by_control, by_load = _by_kind(ours, CONTROLS, _control), _by_kind(ours, LOADS, _load)
-    solvers = [_fared(name, found) for name, found in runs.items()]
-    others = {name: _elsewhere(found, ours) for name, found in runs.items() if name != OURS}
+    solvers = [_fared(name, series) for name, series in runs.items()]
+    others = {name: _elsewhere(series, ours) for name, series in runs.items() if name != OURS}
     refused = _refused_by_rule_a(runs["finite search"], problems)
     fewer = [f"{name} on the first {size}" for name, size in sizes.items() if size < scenes]
     slow, sentence = f" ({', '.join(fewer)}: too slow for all)" if fewer else "", conclusion(solvers)
@@ -72,7 +72,7 @@ def study(scene: BallScene, progress: Reporter | None = None, scenes: int = SCEN
             f"rule a as printed refuses {refused} of the equilibria that the finite search found, for their unloaded balls",
             sentence,
         ),
-        [_flat(r) for found in runs.values() for r in found],
+        [_flat(r) for series in runs.values() for r in series],
         lambda path: _draw(runs, path),
         "rbdyn.accuracy.battery/1",
         scenes=scenes,
@@ -118,7 +118,7 @@ def _fared(name: str, runs: Sequence[Run]) -> Success:
 def _by_kind(runs: Sequence[Run], kinds: Sequence[str], kind_of: Callable[[Case], str]) -> list[Success]:
     """How the cases of each kind fared, of the kinds that were drawn."""
     groups = {kind: [r for r in runs if kind_of(r.case) == kind] for kind in kinds}
-    return [_fared(kind, found) for kind, found in groups.items() if found]
+    return [_fared(kind, series) for kind, series in groups.items() if series]
 
 
 def _elsewhere(runs: Sequence[Run], ours: Sequence[Run]) -> int:
@@ -156,11 +156,11 @@ def _steps_table(runs: Sequence[Run]) -> Table:
 def _share_table(title: str, kinds: Sequence[str], runs: dict[str, list[Run]], kind_of: Callable[[Case], str]) -> Table:
     """Share that each solver solves of the scenes of each kind."""
 
-    def share(found: list[Run], kind: str) -> str:
-        solved = [r.solution.found for r in found if kind_of(r.case) == kind]
+    def share(series: list[Run], kind: str) -> str:
+        solved = [r.solution.found for r in series if kind_of(r.case) == kind]
         return f"{100.0 * np.mean(solved):.1f} %" if solved else ""
 
-    return Table(title, ("", *runs), [[kind, *(share(found, kind) for found in runs.values())] for kind in kinds])
+    return Table(title, ("", *runs), [[kind, *(share(series, kind) for series in runs.values())] for kind in kinds])
 
 
 def _flat(of: Run) -> dict[str, Any]:
@@ -190,10 +190,10 @@ def _draw(runs: dict[str, list[Run]], path: Path) -> None:
     )
     plain(axis)
     ends: list[Named] = []
-    for (name, found), colour in zip(runs.items(), METHOD_COLOURS, strict=False):
-        solved = np.sort([run.solve_us for run in found if run.solution.found])
+    for (name, series), colour in zip(runs.items(), METHOD_COLOURS, strict=False):
+        solved = np.sort([run.solve_us for run in series if run.solution.found])
         if solved.size:
-            share = 100.0 * np.arange(1, solved.size + 1) / len(found)
+            share = 100.0 * np.arange(1, solved.size + 1) / len(series)
             axis.step(solved, share, where="post", color=colour, linewidth=2.0 if colour == "black" else 1.2)
             ends.append(([(float(solved[0]), float(share[0])), (float(solved[-1]), float(share[-1]))], name, colour))
     axis.margins(x=0.15)

@@ -134,21 +134,21 @@ def work_precision(problem: Problem, limits: Sequence[int], counted: Progress) -
     attempts = []
     for name, solver in LIMITED.items():
         for limit in limits:
-            found, took = timed(solver, problem, REPEATS, limit=limit)
-            attempts.append(Attempt(name, limit, found.residual / scale, took, found.status))
+            solution, took = timed(solver, problem, REPEATS, limit=limit)
+            attempts.append(Attempt(name, limit, solution.residual / scale, took, solution.status))
             counted.step()
     return attempts
 
 
 def timed(solver: Solver, problem: Problem, repeats: int, **options: Any) -> tuple[Solution, float]:
     """Solution and shortest time [us] of ``repeats`` calls after a first."""
-    found = solver(*problem, **options)
+    solution = solver(*problem, **options)
     shortest = float("inf")
     for _ in range(repeats):
         began = time.perf_counter()
         solver(*problem, **options)
         shortest = min(shortest, time.perf_counter() - began)
-    return found, 1e6 * shortest
+    return solution, 1e6 * shortest
 
 
 def perturbed(scene: SingleRowScene, count: int, seed: int = SEED) -> list[Problem]:
@@ -174,17 +174,17 @@ def perturbed(scene: SingleRowScene, count: int, seed: int = SEED) -> list[Probl
     return problems
 
 
-def fared(name: str, found: Sequence[Solution], took_us: Sequence[float]) -> Success:
+def fared(name: str, solutions: Sequence[Solution], took_us: Sequence[float]) -> Success:
     """Summary of many solutions and their times [us]."""
-    why = Counter(solution.status for solution in found if not solution.found)
+    why = Counter(solution.status for solution in solutions if not solution.found)
     return Success(
         name,
-        len(found),
-        sum(solution.found for solution in found) / len(found),
+        len(solutions),
+        sum(solution.found for solution in solutions) / len(solutions),
         float(np.median(took_us)),
         float(np.percentile(took_us, 99.0)),
         float(np.max(took_us)),
-        float(np.median([solution.steps for solution in found])),
+        float(np.median([solution.steps for solution in solutions])),
         dict(why.most_common()),
     )
 
@@ -222,13 +222,13 @@ def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
 
 
 def _fared(name: str, solver: Solver, problems: Sequence[Problem], counted: Progress) -> Success:
-    found, times = [], []
+    solutions, times = [], []
     for problem in problems:
         solution, took = timed(solver, problem, 1)
-        found.append(solution)
+        solutions.append(solution)
         times.append(took)
         counted.step()
-    return fared(name, found, times)
+    return fared(name, solutions, times)
 
 
 def _until_done(attempts: Sequence[Attempt]) -> list[Attempt]:

@@ -147,12 +147,12 @@ def by_scipy(name: str, function: Callable[[Stretch], Any] = compiled) -> Callab
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")
                 try:
-                    found = solve_ivp(right_hand_side, (0.0, stretch.duration), stretch.start, **options)
+                    solution = solve_ivp(right_hand_side, (0.0, stretch.duration), stretch.start, **options)
                 except (BudgetSpent, ValueError) as error:  # its LU refuses a Jacobian that is not finite
                     raise RunError(_why(error)) from None
-            if not found.success:
-                raise RunError(str(found.message))
-            return Arrived(found.y[:, -1], right_hand_side.calls)
+            if not solution.success:
+                raise RunError(str(solution.message))
+            return Arrived(solution.y[:, -1], right_hand_side.calls)
 
         return go
 
@@ -183,12 +183,12 @@ def by_cvode(name: str) -> Callable[..., Callable[[], Arrived]]:
 
         def go() -> Arrived:
             solver.init_step(0.0, stretch.start)
-            found = solver.step(stretch.duration, tstop=stretch.duration)
+            solution = solver.step(stretch.duration, tstop=stretch.duration)
             if spent:
                 raise RunError(_why(spent[0]))
-            if not found.success:
-                raise RunError(str(found.message))
-            return Arrived(found.y, right_hand_side.calls)
+            if not solution.success:
+                raise RunError(str(solution.message))
+            return Arrived(solution.y, right_hand_side.calls)
 
         return go
 

@@ -91,7 +91,7 @@ def option_costs(
                 run = run_replicate(one, parameters, replicate, one.numerics.rtol, Stop())
                 times[which].append(run.cpu_s / run.derivatives * 1e9)
                 gap = run.power_gap if which == 0 else gap
-        with_ns, without_ns = (float(np.median(found)) for found in times)
+        with_ns, without_ns = (float(np.median(series)) for series in times)
         holds = footprint(option, bearing)
         rows.append(OptionCost(name, with_ns, without_ns, gap, compile_s, needed, holds, plain_holds))
         counted.step()

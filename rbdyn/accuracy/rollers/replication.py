@@ -156,15 +156,15 @@ def conclusion(
     """Whether the error falls as it should, and what the scene's choice among the rows buys, as far as the scatter of
     ``pool`` replicates is known."""
     sentences = []
-    for name, found in slopes.items():
+    for name, fall in slopes.items():
         verdict = {
             True: "as independent turns do",
             False: "not as independent turns do (-0.5)",
-            None: f"undecided: errors of {found.half_width:.2g} hide a difference of {abs(found.power + 0.5):.2g}; a pool "
-            f"of about {about(1.0 + (pool - 1) * (found.half_width / SLOPE_ERROR) ** 2)} replicates tells",
-        }[found.as_expected]
+            None: f"undecided: errors of {fall.half_width:.2g} hide a difference of {abs(fall.power + 0.5):.2g}; a pool "
+            f"of about {about(1.0 + (pool - 1) * (fall.half_width / SLOPE_ERROR) ** 2)} replicates tells",
+        }[fall.as_expected]
         sentences.append(
-            f"{name}: scatter falls with counted turns to the power {found.power:.2f} ± {found.half_width:.2f}, {verdict}."
+            f"{name}: scatter falls with counted turns to the power {fall.power:.2f} ± {fall.half_width:.2f}, {verdict}."
         )
     sentences += [_choice(name, rows, scatter_error(pool), sought) for name in OUTPUTS]
     numerics = scene.numerics

@@ -155,12 +155,12 @@ def bias_of(runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Bias:
     return Bias(value, bias, bias_error)
 
 
-def table(found: StatisticsBias, sought: float = SOUGHT) -> Table:
+def table(biases: StatisticsBias, sought: float = SOUGHT) -> Table:
     """Table for the terminal; failed tolerances at the end."""
-    reference = found.rows[-1]
+    reference = biases.rows[-1]
     title = f"bias against rtol {reference.rtol:g}, 95 % errors"
-    ran = tabled(title, found.rows, {**columns_of(Row), **bias_columns(sought, reference)})
-    failed = [(f"{rtol:g}", "failed", *[""] * (len(ran.header) - 2)) for rtol in found.failures]
+    ran = tabled(title, biases.rows, {**columns_of(Row), **bias_columns(sought, reference)})
+    failed = [(f"{rtol:g}", "failed", *[""] * (len(ran.header) - 2)) for rtol in biases.failures]
     return ran._replace(cells=[*ran.cells, *failed])
 
 

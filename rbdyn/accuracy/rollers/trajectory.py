@@ -61,12 +61,12 @@ def starts_after_transient(scene: Scene, turns: float = DEFAULT_TURNS, starts: i
     scale = absolute_tolerance(scene, bearing, 1.0)
     # The clock runs exactly in every method; its scale only has to be a number.
     scale[~np.isfinite(scale)] = 1.0
-    found = []
+    stretches = []
     for replicate in range(starts):
         run = Run(scene, bearing, replicate, scene.numerics.rtol, Stop())
         run.to(SETTLE_TURNS)
-        found.append(Stretch(scene, bearing, run.carry.y.copy(), turns, scale))
-    return found
+        stretches.append(Stretch(scene, bearing, run.carry.y.copy(), turns, scale))
+    return stretches
 
 
 def positions(scene: Scene) -> NDArray[np.int64]:
@@ -108,9 +108,9 @@ def end_of(method: Method, stretch: Stretch, setting: float) -> Array:
     return method.ready(stretch, setting)().y
 
 
-def agreement_table(found: Reference) -> Table:
+def agreement_table(known: Reference) -> Table:
     """How far the references are apart after each span."""
-    cells = [(f"{span:g}", f"{e.position_m:.2g}", f"{e.scaled:.2g}") for span, e in found.agreement.items()]
+    cells = [(f"{span:g}", f"{e.position_m:.2g}", f"{e.scaled:.2g}") for span, e in known.agreement.items()]
     return Table(
         f"the two references: {OURS.name} at {OUR_REFERENCE_RTOL:g}, {DOP853.name} at {THEIR_REFERENCE_RTOL:g}",
         ("turns", "positions apart [m]", "worst component over its scale"),
@@ -118,9 +118,9 @@ def agreement_table(found: Reference) -> Table:
     )
 
 
-def agreement_record(found: Reference) -> dict[str, Any]:
+def agreement_record(known: Reference) -> dict[str, Any]:
     """JSON of the references."""
     return {
         "methods": {OURS.name: OUR_REFERENCE_RTOL, DOP853.name: THEIR_REFERENCE_RTOL},
-        "agreement": [{"turns": span, **asdict(error)} for span, error in found.agreement.items()],
+        "agreement": [{"turns": span, **asdict(error)} for span, error in known.agreement.items()],
     }

@@ -26,11 +26,11 @@ def study(
     Raises InputError, RunError where a reference fails, KeyboardInterrupt.
     """
     motion = comparison.trajectories(scene, progress, turns, COMPILED)
-    found = tolerances.statistics_bias(scene, rtols, progress)
-    chosen = tolerances.conclusion(found.rows, scene, sought)
-    numerics, rows = scene.numerics, records(found.rows)
+    biases = tolerances.statistics_bias(scene, rtols, progress)
+    chosen = tolerances.conclusion(biases.rows, scene, sought)
+    numerics, rows = scene.numerics, records(biases.rows)
     agreement, trajectories, _ = motion.tables
-    failures = {f"{rtol:g}": why for rtol, why in found.failures.items()}
+    failures = {f"{rtol:g}": why for rtol, why in biases.failures.items()}
     told = record(
         "rbdyn.accuracy/1",
         rows=rows,
@@ -45,10 +45,10 @@ def study(
     return Report(
         "accuracy",
         told,
-        (agreement, trajectories, tolerances.table(found, sought)),
+        (agreement, trajectories, tolerances.table(biases, sought)),
         (*sentences, f"{numerics.replicates} replicates of {numerics.turns:g} turns"),
         {"accuracy": [flat(row) for row in rows], "trajectory": motion.record["rows"]},
-        {"accuracy": lambda path: _draw(found.rows, path, sought), "trajectory": motion.pictures["methods"]},
+        {"accuracy": lambda path: _draw(biases.rows, path, sought), "trajectory": motion.pictures["methods"]},
     )
 
 

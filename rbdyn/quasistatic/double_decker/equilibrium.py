@@ -91,8 +91,8 @@ class DoubleDeckerSolution(NamedTuple):
         whole = (self.outer.stiffness + onto_by @ to_inner)[np.ix_(free, free)]
         follows = np.zeros((5, 5))
         follows[free] = np.linalg.lstsq(whole, onto_by[free], rcond=1e-12)[0]
-        found = self.inner.stiffness @ (np.eye(5) - to_inner @ follows)
-        return without_noise(found, np.abs(found).max())
+        joint = self.inner.stiffness @ (np.eye(5) - to_inner @ follows)
+        return without_noise(joint, np.abs(joint).max())
 
 
 def outer_friction(layer: Layer, solution: Solution) -> Array:
@@ -167,11 +167,11 @@ def solve_double_decker(
     best: DoubleDeckerSolution | None = None
     for first in starts:
         middle = np.where(free, first, middle_given)
-        found = _follow(stack, load, given, free, middle, start)
-        if found.found:
-            return found
-        if best is None or found.residual < best.residual:
-            best = found
+        reached = _follow(stack, load, given, free, middle, start)
+        if reached.found:
+            return reached
+        if best is None or reached.residual < best.residual:
+            best = reached
     assert best is not None
     return best
 

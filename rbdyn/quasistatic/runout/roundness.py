@@ -134,13 +134,13 @@ def _best_step(points: Array, zone: Zone, normal: Array, offset: Array, trust: f
     outside = np.hstack((directions, 0.0 * ones, ones))
     within = np.hstack((normal, np.zeros((len(normal), 2))))
     room = (offset - normal @ (zone.x, zone.y)) / scale
-    found = linprog(
+    optimum = linprog(
         [0.0, 0.0, 1.0, -1.0],
         A_ub=np.vstack((inside, outside, within)),
         b_ub=np.concatenate((-reading[:, 0], reading[:, 0], np.maximum(room, 0.0))),
         bounds=[(-trust / scale, trust / scale)] * 2 + [(None, None)] * 2,
         method="highs",
     )
-    if not found.success:
+    if not optimum.success:
         return np.zeros(2), zone.width
-    return scale * found.x[:2], float(scale * found.fun)
+    return scale * optimum.x[:2], float(scale * optimum.fun)

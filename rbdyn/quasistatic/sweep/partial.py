@@ -30,10 +30,10 @@ class Partial(NamedTuple):
             return {}
         try:
             with np.load(self.path, allow_pickle=False) as file:
-                found = dict(file)
+                arrays = dict(file)
         except (OSError, ValueError, zipfile.BadZipFile):
             return {}
-        return found if str(found.pop("key", "")) == self.key else {}
+        return arrays if str(arrays.pop("key", "")) == self.key else {}
 
     def write(self, arrays: Mapping[str, Any]) -> None:
         """Keep arrays in place of those before, whole or not at all. Raises OSError."""

@@ -101,15 +101,15 @@ class SweepResult:
             raise RuntimeError("a loaded sweep does not know its balls; run it again")
         frames = []
         places = self._places()
-        found = np.array([status == OK for status in self.statuses])
+        solved = np.array([status == OK for status in self.statuses])
         for name, groups in self.figures.items():
             for points, balls in groups:
-                kept = points[found[points]]
+                good = points[solved[points]]
                 size = balls.shape[1]
-                columns = {key: np.repeat(values[kept], size) for key, values in places.items()}
-                columns["row"] = np.full(kept.size * size, name)
-                columns["ball"] = np.tile(np.arange(1, size + 1), kept.size)
-                shown = ball_columns(balls[found[points]])
+                columns = {key: np.repeat(values[good], size) for key, values in places.items()}
+                columns["row"] = np.full(good.size * size, name)
+                columns["ball"] = np.tile(np.arange(1, size + 1), good.size)
+                shown = ball_columns(balls[solved[points]])
                 frames.append(pd.DataFrame(columns | {key: value.ravel() for key, value in shown.items()}))
         return pd.concat(frames, ignore_index=True)
 
@@ -117,10 +117,10 @@ class SweepResult:
         """Records of the balls of a point, by row; as those of ``BallResult``. Raises RuntimeError as ``balls``."""
         if not self.figures:
             raise RuntimeError("a loaded sweep does not know its balls; run it again")
-        found = {}
+        records = {}
         for name, groups in self.figures.items():
-            found[name] = ball_records(next(balls[points == place] for points, balls in groups if place in points)[0])
-        return found
+            records[name] = ball_records(next(balls[points == place] for points, balls in groups if place in points)[0])
+        return records
 
     def points(self) -> list[dict[str, Any]]:
         """A record a point, None where a figure is infinite or was not found."""

@@ -101,14 +101,14 @@ def sweep(
 
 
 def grouped(
-    found: Sequence[tuple[int, Remark]], visited: NDArray[np.int64], statuses: Sequence[str]
+    told: Sequence[tuple[int, Remark]], visited: NDArray[np.int64], statuses: Sequence[str]
 ) -> list[dict[str, Any]]:
     """Notes by what they are about: the sentence of the first point in the table, and the points, counted from 0.
 
-    ``found``: remarks, each with the place of its first point on the walk; ``visited``: the table's place of each point walked.
+    ``told``: remarks, each with the place of its first point on the walk; ``visited``: the table's place of each point walked.
     """
     groups: dict[str, list[tuple[int, int, Remark]]] = {}
-    for first, remark in found:
+    for first, remark in told:
         for k in np.flatnonzero(remark.where).tolist():
             if statuses[first + k] == OK:
                 groups.setdefault(remark.word, []).append((int(visited[first + k]), k, remark))
@@ -137,12 +137,12 @@ def _march(
     model, points, ratings = _packed(scene, axes, order)
     row, size, count = model.row, model.row.cosine.size, len(order)
     found, at, warm, done = empty(count, size), space(size), False, 0
-    if kept := partial.read():
+    if left := partial.read():
         for name, array in found._asdict().items():
-            array[: len(kept[name])] = kept[name]
+            array[: len(left[name])] = left[name]
         for name, array in at._asdict().items():
-            array[:] = kept[f"start_{name}"]
-        warm, done = bool(kept["warm"]), int(kept["done"])
+            array[:] = left[f"start_{name}"]
+        warm, done = bool(left["warm"]), int(left["done"])
     whole: dict[str, Any] = {"done": 0}
     try:
         for first in range(done, count, CHUNK):
@@ -230,8 +230,8 @@ def _one_by_one(
     scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress, partial: Partial
 ) -> Walked:
     """Any bearing, through ``rbdyn.equilibrium``."""
-    kept = partial.read()
-    solved = from_text(str(kept["points"])) if kept else []
+    left = partial.read()
+    solved = from_text(str(left["points"])) if left else []
     points = list(scenes(scene, axes, order))
     try:
         for place in range(len(solved), len(points)):
@@ -276,14 +276,14 @@ def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], di
     reaction = np.array([*report.reaction["load_N"].values(), *report.reaction["moment_Nm"].values()])
     stiffness = np.array(report.stiffness["matrix_SI"])
     columns = ring_columns(result.displacement[np.newaxis], reaction[np.newaxis], stiffness[np.newaxis])
-    balls, found = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
+    balls, notes = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
     names = ("row",) if len(result.rows) == 1 else ("inner", "outer")
     for name, rating, solution in zip(names, result.ratings, result.rows, strict=True):
         balls[name] = solution.figures
-        found += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
+        notes += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
         prefix = "" if name == "row" else f"{name}_row_"
         columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
     figures = {name: float(value[0]) for name, value in columns.items()}
     if isinstance(report, DoubleDeckerReport):
         figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]
-    return {**figures, "residual_N": report.residual_N, "iterations": float(report.iterations)}, balls, found
+    return {**figures, "residual_N": report.residual_N, "iterations": float(report.iterations)}, balls, notes
