@@ -21,6 +21,7 @@ LIGHTEST_RING_KG = 1e-6
 NotVanishing = AfterValidator(_not_vanishing)
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST), NotVanishing]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST)]
+Share = Annotated[float, Field(gt=0.0, le=1.0), NotVanishing]
 
 
 N = TypeVar("N")

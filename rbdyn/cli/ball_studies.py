@@ -17,7 +17,7 @@ from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.runout.classes import ToleranceClass, running_accuracy
 from rbdyn.quasistatic.runout.lots import Lot
 from rbdyn.quasistatic.runout.model import bench_of, follow_ring, single_row
-from rbdyn.quasistatic.runout.tolerance_design import RaceLimits, design
+from rbdyn.quasistatic.runout.tolerance_design import design
 from rbdyn.quasistatic.runout.turn import Followed
 from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
 from rbdyn.quasistatic.sweep.result import SweepResult
@@ -106,12 +106,10 @@ def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int
         limits = design(bench_of(row), Lot(), **asked, seed=seed, solved=SOLVED)
     except ValueError as error:
         raise InputError([f"--race-limits {tolerance_class}: {error}"]) from None
-    return {"class": tolerance_class, "wanted": wanted, **_limits(limits)}
-
-
-def _limits(limits: RaceLimits) -> dict[str, Any]:
     lengths = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "radial_limit", "axial_limit")
     return {
+        "class": tolerance_class,
+        "wanted": wanted,
         **{f"{name}_um": 1e6 * getattr(limits, name) for name in lengths},
         "yield": limits.yielded,
         "standard_error": limits.standard_error,

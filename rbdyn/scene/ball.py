@@ -1,8 +1,6 @@
 """One validated scene of a ball bearing: single row or double-decker, its load, its model."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self, cast
 
 from pydantic import Field
@@ -194,9 +192,22 @@ class BallScene(SceneFile):
     mounting: Mounting | None = None
     """Fits, temperatures, shaft and housing."""
 
-    def faults(self) -> Iterable[str]:
+    def faults(self) -> Iterator[str]:
         """One sentence for each diameter or oil that is missing, and for each that is told twice in different ways."""
-        return ring_faults(self)
+        yield from _unmounted_faults(self) if self.mounting is None else _mounted_faults(self.mounting, self)
+        inner, outer = self.outermost_rows
+        middle = None if inner is outer else self.bearing.middle  # type: ignore[union-attr]
+        if middle is not None and middle.speed_split == "torque_balance" and middle.speed_rpm is None:
+            if self.lubricant is None:
+                yield (
+                    "lubricant: missing; bearing.middle.speed_split = 'torque_balance' needs its viscosity, or set 'oil'"
+                )
+            for name, row in (("inner", inner), ("outer", outer)):
+                if row.contact_angle == 0.0:
+                    yield (
+                        f"bearing.{name}.contact_angle_deg = 0: has no load torque after Palmgren; set bearing.middle.speed_split"
+                        " = 'oil' or give bearing.middle.speed_rpm"
+                    )
 
     @property
     def outermost_rows(self) -> tuple[BallRow, BallRow]:
@@ -222,12 +233,12 @@ class SingleRowScene(BallScene):
     bearing: BallBearing
     """The drawing of a single row."""
 
-    def faults(self) -> Iterable[str]:
+    def faults(self) -> Iterator[str]:
         """Those of both kinds, else those of form errors."""
         row, faults = self.bearing, list(super().faults())
-        if faults or self.errors is None:
-            return faults
-        return form_faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm)
+        yield from faults
+        if not faults and self.errors is not None:
+            yield from form_faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm)
 
 
 class DoubleDeckerScene(BallScene):
@@ -238,41 +249,20 @@ class DoubleDeckerScene(BallScene):
 
     def faults(self) -> Iterator[str]:
         """Those of both kinds, else what is meant for one row."""
-        if faults := list(super().faults()):
-            yield from faults
-            return
-        if self.errors is not None:
+        faults = list(super().faults())
+        yield from faults
+        if not faults and self.errors is not None:
             yield "errors: form errors are followed for one row of balls only; take the table away"
-        if self.model.solver != "convex":
+        if not faults and self.model.solver != "convex":
             yield f"model.solver = {self.model.solver!r}: solves one row of balls only; leave it out for two"
-
-
-def ring_faults(scene: BallScene) -> Iterator[str]:
-    """``BallScene.faults``."""
-    yield from _unmounted_faults(scene) if scene.mounting is None else _mounted_faults(scene.mounting, scene)
-    inner, outer = scene.outermost_rows
-    middle = None if inner is outer else scene.bearing.middle  # type: ignore[union-attr]
-    if middle is not None and middle.speed_split == "torque_balance" and middle.speed_rpm is None:
-        if scene.lubricant is None:
-            yield (
-                "lubricant: missing; bearing.middle.speed_split = 'torque_balance' needs its viscosity, or set 'oil'"
-            )
-        for name, row in (("inner", inner), ("outer", outer)):
-            if row.contact_angle == 0.0:
-                yield (
-                    f"bearing.{name}.contact_angle_deg = 0: has no load torque after Palmgren; set bearing.middle.speed_split"
-                    " = 'oil' or give bearing.middle.speed_rpm"
-                )
 
 
 def _unmounted_faults(scene: BallScene) -> Iterator[str]:
     if not scene.model.ring_expansion:
         return
     inner, outer = scene.outermost_rows
-    turning, speed = (
-        scene.operation,
-        "turns; the growth of its ring needs it; add it, or set model.ring_expansion = false",
-    )
+    turning = scene.operation
+    speed = "turns; the growth of its ring needs it; add it, or set model.ring_expansion = false"
     prefix = ("bearing.", "bearing.") if inner is outer else ("bearing.inner.", "bearing.outer.")
     if turning.inner_speed_rpm != 0.0 and inner.bore_mm is None:
         yield f"{prefix[0]}bore_mm: missing; the inner ring {speed}"

@@ -1,7 +1,5 @@
 """Drawing of a ball bearing: its row of balls, or two rows with a ring between."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Annotated, Literal

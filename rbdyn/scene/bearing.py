@@ -1,7 +1,5 @@
 """Drawing of a roller bearing: bearing, cage, materials."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

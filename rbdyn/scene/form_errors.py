@@ -12,8 +12,7 @@ from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI
 from rbdyn.scene.bearing import Harmonic
 
 if TYPE_CHECKING:
-    from numpy import float64
-    from numpy.typing import NDArray
+    from rbdyn.arrays import Array
 
 Order = Annotated[int, Field(ge=1, le=2000)]
 # Beyond this share of the ball it is no form error but a slip of the unit.
@@ -111,7 +110,7 @@ class FormErrors(Strict):
                 f"wave; take at least {2 * highest + 1}"
             )
 
-    def ball_diameter_errors(self, normal: NDArray[float64]) -> NDArray[float64]:
+    def ball_diameter_errors(self, normal: Array) -> Array:
         """Each ball's diameter less the nominal one [m], as given or with the spread of standard ``normal`` numbers."""
         import numpy as np
 

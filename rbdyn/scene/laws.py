@@ -1,7 +1,5 @@
 """Laws of each interaction, and numerics."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -9,13 +7,12 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from rbdyn.faults import Strict
-from rbdyn.fields import SI, NonNegative, NotVanishing, Positive
+from rbdyn.fields import SI, NonNegative, NotVanishing, Positive, Share
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
 AUTO_WARM_UP_TURNS = 20.0
 # Batches of a turn that all replicates together may keep, 0.65 kB each; in one run they are longer where there would be more.
 MOST_KEPT, MOST_OF_A_RUN = 4_000_000, 20_000
-Restitution = Annotated[float, Field(gt=0.0, le=1.0), NotVanishing]
 
 
 class Laws(Strict):
@@ -28,7 +25,7 @@ class Laws(Strict):
     is one."""
     race_damping: Literal["viscous", "hunt_crossley", "off"] = "viscous"
     """Damping of the races: a share of the critical one, Hunt and Crossley's, or none."""
-    race_damping_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.05
+    race_damping_ratio: Share = 0.05
     """Share of critical damping, engaged over race_damping_engagement_um (ADORE-style input 0.05; 0.1 elsewhere)."""
     race_damping_engagement_um: Positive = 0.1
     """Approach over which viscous damping sets in: about half a film thickness."""
@@ -45,7 +42,7 @@ class Laws(Strict):
     pocket_damping_alpha_s_m: NonNegative | None = None
     """Hunt and Crossley's alpha of the pocket walls; 0.75 where left out (restitution 1 - alpha v: 0.5 to 0.7 for steel
     on wetted bronze at 0.5 m/s), 0 is undamped."""
-    pocket_restitution: Restitution | None = None
+    pocket_restitution: Share | None = None
     """Restitution of roller and pocket wall at pocket_restitution_speed_m_s, instead of pocket_damping_alpha_s_m."""
     pocket_restitution_speed_m_s: Positive = 0.5
     """Impact speed at which pocket_restitution holds."""
@@ -56,17 +53,17 @@ class Laws(Strict):
     its floor."""
     pocket_film_floor_um: Positive = 0.8
     """Film thickness at which the pocket wall touches: the critical pocket film of ADORE-style inputs is 0.8 um."""
-    pocket_fill: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 1.0
+    pocket_fill: Share = 1.0
     """Share of a pocket wall that has oil; 1 is flooded."""
     guide_land: Literal["film", "dry", "off"] = "film"
     """Force of the guide land on the cage: short journal bearing over dry contact, dry contact alone, or none."""
     land_film_floor_um: Positive = 3.0
     """Film thickness below which the land touches: the critical film of ADORE-style inputs."""
-    land_fill: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 1.0
+    land_fill: Share = 1.0
     """Share of the land that is full of oil; 1 is flooded."""
     land_damping_alpha_s_m: NonNegative | None = None
     """Hunt and Crossley's alpha of the land's dry contact; 0.75 where left out, 0 is undamped."""
-    land_restitution: Restitution | None = None
+    land_restitution: Share | None = None
     """Restitution of cage and land at land_restitution_speed_m_s, instead of land_damping_alpha_s_m."""
     land_restitution_speed_m_s: Positive = 0.5
     """Impact speed at which land_restitution holds."""
@@ -144,7 +141,7 @@ class Numerics(Strict):
     """Samples of the motion a shaft turn, for whirl and histories."""
     companion: bool = True
     """Repeat a share of the replicates at ten times the tolerance to estimate the numerical error."""
-    companion_share: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.25
+    companion_share: Share = 0.25
     """Share of the replicates that companion repeats."""
     step_budget_per_turn: Annotated[int, Field(ge=100)] = 100_000
     """Steps a shaft turn after which a run gives up, with where and why."""

@@ -1,7 +1,5 @@
 """The oil and the traction it gives."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -10,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
 from rbdyn.faults import Strict
-from rbdyn.fields import SI, Fraction, NonNegative, NotVanishing, Positive
+from rbdyn.fields import SI, Fraction, NonNegative, NotVanishing, Positive, Share
 from rbdyn.properties.lubricants import OILS, Oil, oil_at
 from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 
@@ -196,9 +194,9 @@ class Traction(Strict):
     oils that have none of their own."""
     eyring_stress_MPa: Positive = 5.0  # noqa: N815
     """Eyring stress: 3 to 10 MPa for mineral oils (Johnson and Tevaarwerk 1977)."""
-    limiting_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.07
+    limiting_shear_ratio: Share = 0.07
     """Shear stress over pressure at which limiting_shear yields: 0.05 to 0.10 (Bair and Winer 1979)."""
-    largest_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.1
+    largest_shear_ratio: Share = 0.1
     """Cap on shear stress over pressure of thermal_newtonian and eyring, whose stress grows without bound past 1.5 GPa.
     """
     friction: Literal["film", "mixed"] = "film"

@@ -1,7 +1,5 @@
 """How a bearing is mounted: fits, temperatures, shaft and housing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Protocol
 

@@ -1,7 +1,5 @@
 """Running conditions: speeds, loads, how they change over time, and the support of the outer ring."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise
