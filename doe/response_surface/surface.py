@@ -18,14 +18,13 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from doe.arrays import Array, Rows
+from doe.designs.design import replicate_groups
 from doe.designs.model import MODELS, Model, in_actual_units, model_matrix, model_terms, second_order
-from doe.designs.replicates import replicate_groups
-from doe.response_surface.anova import AnovaRow, anova, find, goodness, observation_variance
+from doe.response_surface.anova import AnovaRow, Removal, anova, eliminate, find, goodness, observation_variance
 from doe.response_surface.box_cox import BoxCox, backward, box_cox, check_positive, forward, slope
-from doe.response_surface.canonical import Canonical, StationaryPoint, canonical, stationary_point
+from doe.response_surface.canonical import Canonical, StationaryPoint, canonical
 from doe.response_surface.data import Data, check_errors, check_matrix, checked
 from doe.response_surface.diagnostics import Diagnostics, diagnose
-from doe.response_surface.elimination import Removal, eliminate
 from doe.response_surface.known_variance import KnownVariance, compare
 from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import ModelError, model_error
@@ -218,10 +217,8 @@ def _fit(
     terms = model_terms(data.points.shape[1], model)
     check_matrix(name, model, terms, _columns(data, terms))
     if not np.ptp(data.values):
-        raise ValueError(
-            f"{name}: all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit; "
-            "check the response or leave it out"
-        )
+        alike = f"all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit"
+        raise ValueError(f"{name}: {alike}; check the response or leave it out")
     exponent = _exponent(name, data, terms, transform)
     response, variances = _on_scale_of_fit(data, exponent)
     weights = 1.0 / variances if weighting == "replicates" and variances is not None else None
@@ -238,6 +235,7 @@ def _fit(
         known = compare(solution, matrix, response, variances, data.replicates, groups, count)
         table.insert(len(table) - 1, known.pure_error)
     coefficients = solution.coefficients[:count]
+    stationary, analysis = canonical(terms, coefficients, covariance, solution.dof, data)
     open_to_transform = exponent is None and (data.values > 0).all() and solution.mean_square != 0
     return Surface(
         name=name,
@@ -250,8 +248,8 @@ def _fit(
         residual_dof=solution.dof,
         anova=table,
         **goodness(solution, response, matrix[:, :count] @ coefficients, data.block),
-        stationary_point=stationary_point(terms, coefficients, data.centre, data.step),
-        canonical=canonical(terms, coefficients, covariance, solution.dof, data.points),
+        stationary_point=stationary,
+        canonical=analysis,
         vif=solution.inflation[:count],
         blocks=_block_effects(data, solution.coefficients[count:]),
         elimination=removed,

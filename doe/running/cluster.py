@@ -80,12 +80,11 @@ async def _knock(address: str) -> None:
 
 @contextmanager
 def _client(address: str) -> Iterator[Any]:
+    where = f"--scheduler {address}"
     try:
         import distributed
     except ImportError:
-        raise InputError(
-            [f"--scheduler {address}: needs the package distributed; pip install 'rbdyn[cluster]'"]
-        ) from None
+        raise InputError([f"{where}: needs the package distributed; pip install 'rbdyn[cluster]'"]) from None
     # What it would log is said here in a sentence.
     for name in logging.root.manager.loggerDict:
         if name.split(".")[0] == "distributed":
@@ -95,16 +94,13 @@ def _client(address: str) -> Iterator[Any]:
         client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
     # What answers there may be anything, and its words mean anything.
     except Exception:
-        raise InputError(
-            [f"--scheduler {address}: no dask scheduler answers there within {KNOCK_S:g} s; check the address"]
-        ) from None
+        silent = f"no dask scheduler answers there within {KNOCK_S:g} s"
+        raise InputError([f"{where}: {silent}; check the address"]) from None
     try:
         try:
             client.wait_for_workers(1, timeout=WORKERS_S)
         except TimeoutError:
-            raise InputError(
-                [f"--scheduler {address}: has no workers; start some with dask worker {address}"]
-            ) from None
+            raise InputError([f"{where}: has no workers; start some with dask worker {address}"]) from None
         yield client
     finally:
         client.close(timeout=CONNECT_S)
