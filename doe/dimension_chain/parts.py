@@ -52,14 +52,5 @@ def allocated_part(link: Link, tolerance: float, grade: str | None = None) -> Pa
 
 def _part(link: Link, nominal: float, lower: float, upper: float, mean: float | None, grade: str | None) -> Part:
     lower, upper = round(lower, DIGITS), round(upper, DIGITS)
-    return Part(
-        link.name,
-        link.coefficient,
-        nominal,
-        upper,
-        lower,
-        link.distribution,
-        (upper + lower) / 2 if mean is None else mean,
-        grade,
-        link.capability,
-    )
+    mean = (upper + lower) / 2 if mean is None else mean
+    return Part(link.name, link.coefficient, nominal, upper, lower, link.distribution, mean, grade, link.capability)

@@ -7,12 +7,13 @@ Source: Deb et al., A fast and elitist multiobjective genetic algorithm: NSGA-II
 """
 
 from collections.abc import Callable
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto.archive import Archive, archives
+from doe.pareto.archive import Archive, merged
 
 Objectives = Callable[[Array], Array]
 # How far below and above (n, m) what is foretold of points (n, k) their responses may be when limits are judged.
@@ -57,8 +58,9 @@ def search(
         violations = np.vstack([judged.violations for _, judged in history])
         closest = (violations / _scale(violations)).sum(axis=1).argmin()
         raise InfeasibleError(points[closest], violations[closest])
-    kept = [Archive(points[rows], judged.costs[rows]) for (points, judged), rows in zip(history, allowed, strict=True)]
-    return Search(archives(kept), count, sum(int(rows.sum()) for rows in allowed) / count)
+    good = [Archive(points[rows], judged.costs[rows]) for (points, judged), rows in zip(history, allowed, strict=True)]
+    archives = accumulate(good, merged, initial=Archive(*(part[:0] for part in good[0])))
+    return Search(list(archives)[1:], count, sum(int(rows.sum()) for rows in allowed) / count)
 
 
 def check_search(low: Array, high: Array, population: int, generations: int, keep: int) -> None:

@@ -60,8 +60,8 @@ def checked(
         raise ValueError(f"{name}: a coded factor is not a finite number; mend or leave out that run")
     bad = np.flatnonzero(~np.isfinite(response))
     if bad.size:
-        found = f"the value of run {bad[0] + 1} is {response[bad[0]]}"
-        raise ValueError(f"{name}: {found}; mend or leave out that run")
+        given = f"the value of run {bad[0] + 1} is {response[bad[0]]}"
+        raise ValueError(f"{name}: {given}; mend or leave out that run")
     errors = None if standard_errors is None else np.broadcast_to(standard_errors, response.shape)
     known = errors is not None and bool((np.isfinite(errors) & (errors > 0)).all())
     return Data(
@@ -92,8 +92,8 @@ def check_errors(name: str, standard_errors: ArrayLike | None) -> None:
     errors = np.atleast_1d(np.asarray(standard_errors, float))
     bad = np.flatnonzero(~(np.isfinite(errors) & (errors > 0)))
     if bad.size:
-        found = f"the error of run {bad[0] + 1} is {errors[bad[0]]:g}"
-        raise ValueError(f'{name}: {found}, but weighting = "replicates" needs positive ones; {mend}')
+        given = f"the error of run {bad[0] + 1} is {errors[bad[0]]:g}"
+        raise ValueError(f'{name}: {given}, but weighting = "replicates" needs positive ones; {mend}')
 
 
 def check_matrix(name: str, model: str, terms: tuple[str, ...], matrix: Array) -> None:
@@ -104,17 +104,12 @@ def check_matrix(name: str, model: str, terms: tuple[str, ...], matrix: Array) -
     runs, size = matrix.shape
     if runs <= size:
         blocks = f", {size - len(terms)} for the blocks" if size > len(terms) else ""
-        raise ValueError(
-            f"{name}: {runs} runs are too few for the {model} model; give at least {size + 1} "
-            f"({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
-        )
-    dependent = dependent_columns(matrix)
-    if dependent:
+        least = f"{size + 1} ({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
+        raise ValueError(f"{name}: {runs} runs are too few for the {model} model; give at least {least}")
+    if dependent := dependent_columns(matrix):
         names = dict.fromkeys(terms[column] if column < len(terms) else "the blocks" for column in dependent)
-        raise ValueError(
-            f"{name}: the runs cannot tell {', '.join(sorted(names))} from the other terms of the {model} model "
-            "(its matrix is singular); add design points or choose a simpler model"
-        )
+        what = f"{', '.join(sorted(names))} from the other terms of the {model} model (its matrix is singular)"
+        raise ValueError(f"{name}: the runs cannot tell {what}; add design points or choose a simpler model")
 
 
 def _whole(labels: ArrayLike | None, size: int) -> Whole:

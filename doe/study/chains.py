@@ -38,9 +38,8 @@ def solve_chains(
                 "the gains are kept as [tolerances] asks; narrow it, or keep less"
             )
         try:
-            solved[chain.name] = solve(
-                _chain(study, number, pick, half_widths), source=f"{study.path}: chain {chain.name}"
-            )
+            parts = _chain(study, number, pick, half_widths)
+            solved[chain.name] = solve(parts, source=f"{study.path}: chain {chain.name}")
         except InputError as error:
             notes += error.faults
     return solved, notes

@@ -47,10 +47,8 @@ class Outward(Record):
     def sentence(self) -> str:
         """In words."""
         listed = ", ".join(f"{name} {gain:+.2g} ± {error:.2g}" for name, (gain, error) in self.gains.items())
-        return (
-            f"{self.factor} lies at the {self.side} bound of the region, {self.bound:.4g}; gain to be had per {self.unit} "
-            f"beyond it by {self.source}: {listed}"
-        )
+        where = f"{self.factor} lies at the {self.side} bound of the region, {self.bound:.4g}"
+        return f"{where}; gain to be had per {self.unit} beyond it by {self.source}: {listed}"
 
 
 class Edge(Record):
@@ -100,16 +98,9 @@ def edge_of(
             gains, source = _on_surfaces(study, surfaces, pick.point, index, side), "the surfaces"
         unit, scale = _unit(study, index)
         reach = region_of(study)[index] * study.step[index]
-        outward.append(
-            Outward(
-                study.factors[index],
-                "upper" if side > 0 else "lower",
-                float(study.centre[index] + side * reach),
-                unit,
-                source,
-                {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()},
-            )
-        )
+        bound = float(study.centre[index] + side * reach)
+        per_unit = {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()}
+        outward.append(Outward(study.factors[index], "upper" if side > 0 else "lower", bound, unit, source, per_unit))
     far = None if direct is None else share_at_edge(study, direct)
     return Edge(tuple(outward), share_at_edge(study, front), far)
 
@@ -157,7 +148,7 @@ def _simulated(
     study: Study, pick: Confirmed, names: Sequence[tuple[int, int]], simulations: Simulations
 ) -> dict[int, dict[str, tuple[float, float]]]:
     """Gains a unit of each factor from runs beyond its bound, like those of the confirmation; none where a run fails."""
-    scenes, kept = [], []
+    scenes, reachable = [], []
     for index, side in names:
         point = pick.point.copy()
         point[index] += side * AHEAD * study.step[index]
@@ -166,19 +157,18 @@ def _simulated(
         except InputError:
             # A factor cannot go there: nothing lies beyond the bound.
             continue
-        kept.append((index, point))
-    labels = [f"beyond the bound of {study.factors[index]}" for index, _ in kept]
-    results = simulations.run(scenes, labels, simulations.progress("beyond the region")) if kept else []
+        reachable.append((index, point))
+    labels = [f"beyond the bound of {study.factors[index]}" for index, _ in reachable]
+    results = simulations.run(scenes, labels, simulations.progress("beyond the region")) if reachable else []
     goals = goals_of(study)
+    wanted = [study.responses[index] for index in goals.objectives]
     gains_beyond = {}
-    for (index, point), result in zip(kept, results, strict=True):
+    for (index, point), result in zip(reachable, results, strict=True):
         if isinstance(result, Failure):
             continue
         there = confirmed_from(study, Choice(point, ""), result)
         gain = (goals.costs(pick.values) - goals.costs(there.values)) / (AHEAD * study.step[index])
         joint = np.hypot(*(np.nan_to_num(each.error[goals.objectives]) for each in (pick, there)))
-        gains_beyond[index] = {
-            study.responses[response]: (float(g), float(e))
-            for response, g, e in zip(goals.objectives, gain, joint / (AHEAD * study.step[index]), strict=True)
-        }
+        figures = zip(gain.tolist(), (joint / (AHEAD * study.step[index])).tolist(), strict=True)
+        gains_beyond[index] = dict(zip(wanted, figures, strict=True))
     return gains_beyond

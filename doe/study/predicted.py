@@ -109,19 +109,19 @@ def _missed(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
     return math.sqrt(max(variance, 0.0))
 
 
+# What a verdict amounts to.
+AMOUNT = {
+    "better": "better beyond its error", "worse": "worse beyond its error",
+    "within error": "not told from noise", "without error": "of unknown error",
+}  # fmt: skip
+
+
 def statement(gains: Sequence[PredictedGain]) -> str:
     """What the gains amount to, in a sentence."""
-    words = {
-        "better": "better beyond its error",
-        "worse": "worse beyond its error",
-        "within error": "not told from noise",
-        "without error": "of unknown error",
-    }
-    parts = [
-        f"{said}: {', '.join(names)}"
-        for verdict, said in words.items()
-        if (names := [gain.response for gain in gains if gain.verdict == verdict])
-    ]
+    parts = []
+    for verdict, words in AMOUNT.items():
+        names = [gain.response for gain in gains if gain.verdict == verdict]
+        parts += [f"{words}: {', '.join(names)}"] if names else []
     hidden = [gain.response for gain in gains if gain.within_scatter]
     tail = f" One run each would not show: {', '.join(hidden)}." if hidden else ""
     return f"On the surfaces, {'; '.join(parts)}.{tail}"

@@ -111,24 +111,24 @@ def run_study(
     clock.lap("design_s")
     surfaces = with_rivals(fit_surfaces(study, runs))
     clock.lap("fit_s")
-    found = find_front(study, surfaces)
+    front = find_front(study, surfaces)
     clock.lap("front_s")
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress)
-        searched = find_direct(study, found, simulations) if direct else None
+        searched = find_direct(study, front, simulations) if direct else None
         clock.lap("direct_s")
-        chosen = choose(study, surfaces, found, searched, simulations)
+        chosen = choose(study, surfaces, front, searched, simulations)
         confirmed, at = chosen.confirmed, None if searched is None else searched.front.points
         edge = edge_of(study, surfaces, confirmed["pick"], chosen.front.points, at, simulations if direct else None)
         clock.lap("confirmation_s")
     pick = confirmed["pick"].point
     local = None if searched is None else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])
-    tolerances = (
-        None if study.file.tolerances is None else widest_of(study, surfaces, pick, study.file.tolerances, local)
-    )
+    wished = study.file.tolerances
+    tolerances = None if wished is None else widest_of(study, surfaces, pick, wished, local)
     chains, notes = solve_chains(study, pick, tolerances)
     if reference is not None:
         reference = reference.only(runs.places)
+    others = {name: each for name, each in confirmed.items() if name != "baseline"}
     lost = () if searched is None else searched.failures
     return StudyResult(
         study=study,
@@ -142,9 +142,7 @@ def run_study(
         edge=edge,
         tried=chosen.tried,
         confirmed=confirmed,
-        gains={
-            name: gains(study, confirmed["baseline"], each) for name, each in confirmed.items() if name != "baseline"
-        },
+        gains={name: gains(study, confirmed["baseline"], each) for name, each in others.items()},
         tolerances=tolerances,
         chains=chains,
         beside=[] if reference is None else beside(study, runs, reference),

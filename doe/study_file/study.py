@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from doe.arrays import Array
-from doe.designs.coding import to_actual, to_coded
+from doe.designs.design import to_actual, to_coded
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Design, Factor, Name
 from doe.study_file.front_section import Direct, Front, Goal, Tolerances
@@ -175,10 +175,9 @@ class Study:
 
     def rounded(self, point: Array) -> Array:
         """A point with every factor at its resolution."""
-        values = [
-            x if factor.resolution is None else round(round(x / factor.resolution) * factor.resolution, 12)
-            for factor, x in zip(self.file.factor, point.tolist(), strict=True)
-        ]
+        values = []
+        for fine, x in zip((factor.resolution for factor in self.file.factor), point.tolist(), strict=True):
+            values.append(x if fine is None else round(round(x / fine) * fine, 12))
         return np.array(values)
 
     def beside(self, name: str) -> Path:

@@ -88,11 +88,8 @@ def _fields(path: Path) -> tuple[list[str], list[list[str]]]:
     header, rows = [name.strip() for name in found[0]], found[1:]
     if len(header) == 1 and (marks := [mark for mark in ";\t|" if mark in header[0]]):
         raise InputError([f"{path}: has {marks[0]!r} between its fields; write commas there and points in numbers"])
-    faults = [
-        f"{path}: column {_cut(name)} comes {count} times; keep one"
-        for name, count in Counter(header).items()
-        if count > 1 and name
-    ]
+    several = {name: count for name, count in Counter(header).items() if count > 1 and name}
+    faults = [f"{path}: column {_cut(name)} comes {count} times; keep one" for name, count in several.items()]
     if not rows:
         faults.append(f"{path}: has a header and no rows; add a row a run")
     for number, row in enumerate(rows, 1):

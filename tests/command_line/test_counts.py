@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from conftest import EXAMPLE, ROOT
 
-from doe.designs.replicates import replicate_groups
+from doe.designs.design import replicate_groups
 
 EXAMPLES = ROOT / "examples"
 BALL = (f"{EXAMPLES}/angular_contact_ball.toml",)
