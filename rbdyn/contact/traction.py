@@ -231,8 +231,8 @@ def _speed_scale(coefficient: Coefficient, load: float, largest_slip: float) -> 
 
 
 class _Grid:
-    """Nodes of a surface of ``size`` cells up to a ``slip`` [m/s] and between ``loads`` [N]; positions i along the slip and j along
-    the load count cells."""
+    """Nodes of a surface of ``size`` cells up to a ``slip`` [m/s] and between ``loads`` [N]; positions i along the slip and
+    j along the load count cells."""
 
     def __init__(
         self, coefficient: Coefficient, scale: float, slip: float, loads: tuple[float, float], size: tuple[int, int]
