@@ -71,9 +71,13 @@ class Strict(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, ignored_types=(InSI,))
 
+
+class Consistent(Strict):
+    """A table whose keys must go together: built only where ``faults`` finds none."""
+
     def faults(self) -> Iterable[str]:
         """A sentence for each way in which valid keys of the table do not go together."""
-        return ()
+        raise NotImplementedError
 
     @model_validator(mode="after")
     def _without_faults(self) -> Self:

@@ -231,18 +231,14 @@ def _speed_scale(coefficient: Coefficient, load: float, largest_slip: float) -> 
 
 
 class _Grid:
-    """Nodes of a surface of ``size`` cells; positions i along the slip and j along the load count cells."""
+    """Nodes of a surface of ``size`` cells up to a ``slip`` [m/s] and between ``loads`` [N]; positions i along the slip and
+    j along the load count cells."""
 
     def __init__(
-        self,
-        coefficient: Coefficient,
-        scale: float,
-        largest_slip: float,
-        loads: tuple[float, float],
-        size: tuple[int, int],
+        self, coefficient: Coefficient, scale: float, slip: float, loads: tuple[float, float], size: tuple[int, int]
     ) -> None:
         self.coefficient, self.scale = coefficient, scale
-        self.slip_cell = math.log1p(largest_slip / scale) / size[0]
+        self.slip_cell = math.log1p(slip / scale) / size[0]
         self.load_start = math.sqrt(loads[0])
         self.load_cell = (math.sqrt(loads[1]) - self.load_start) / size[1]
         self.i = np.arange(size[0] + 1.0)[:, np.newaxis]

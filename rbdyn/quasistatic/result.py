@@ -1,4 +1,4 @@
-"""What an equilibrium of a ball bearing reports, saves and loads: of a row its angles, loads, stress, contacts, film, life."""
+"""What an equilibrium of a ball bearing reports, saves and loads: angles, loads, stress, contacts, film, life."""
 
 from __future__ import annotations
 

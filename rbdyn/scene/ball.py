@@ -1,11 +1,11 @@
 """One validated scene of a ball bearing: single row or double-decker, its load, its model."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal, Self, cast
 
 from pydantic import Field
 
-from rbdyn.faults import Strict
+from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import SI
 from rbdyn.properties.materials import Material
 from rbdyn.scene.ball_bearing import BallBearing, BallRow, DoubleDecker
@@ -48,7 +48,7 @@ class Prescribed(Strict):
 COMPONENTS = ("x", "y", "z", "tilt_x", "tilt_y")
 
 
-class BallOperation(Strict):
+class BallOperation(Consistent):
     """Speeds and load on the inner ring. x is radial, z axial; the outer ring is the reference."""
 
     inner_speed_rpm: Speed = 0.0
@@ -96,13 +96,12 @@ class BallOperation(Strict):
                     f"operation.preload_um = {self.preload_um:g} and operation.prescribed.z_mm = {self.prescribed.z_mm:g} "
                     "both prescribe the axial displacement; leave one out"
                 )
-        load = dict(zip(COMPONENTS, (*self.load, *self.moment), strict=True))
-        for name, value in zip(COMPONENTS, self.given, strict=True):
-            by_tilt = name.startswith("tilt") and self.tilt == "fixed"
-            by_nut = name == "z" and self.preload_um is not None
-            if value is not None and load[name] != 0.0 and not (by_tilt or by_nut):
+        for name, value, load in zip(COMPONENTS, self.given, (*self.load, *self.moment), strict=True):
+            if value is None or load == 0.0 or (name == "z" and self.preload_um is not None):
+                continue
+            if self.tilt == "free" or not name.startswith("tilt"):
                 yield (
-                    f"operation.prescribed: the {name} displacement is prescribed, so the load of {load[name]:g} along it would be "
+                    f"operation.prescribed: the {name} displacement is prescribed, so the load of {load:g} along it would be "
                     "lost; leave one out"
                 )
 
@@ -192,9 +191,12 @@ class BallScene(SceneFile):
     mounting: Mounting | None = None
     """Fits, temperatures, shaft and housing."""
 
-    def faults(self) -> Iterator[str]:
+    def faults(self) -> Iterable[str]:
         """One sentence for each diameter or oil that is missing, and for each that is told twice in different ways."""
-        yield from _unmounted_faults(self) if self.mounting is None else _mounted_faults(self.mounting, self)
+        if self.mounting is not None:
+            yield from _mounted_faults(self.mounting, self)
+        elif self.model.ring_expansion:
+            yield from _unmounted_faults(self)
         inner, outer = self.outermost_rows
         middle = None if inner is outer else self.bearing.middle  # type: ignore[union-attr]
         if middle is not None and middle.speed_split == "torque_balance" and middle.speed_rpm is None:
@@ -233,12 +235,12 @@ class SingleRowScene(BallScene):
     bearing: BallBearing
     """The drawing of a single row."""
 
-    def faults(self) -> Iterator[str]:
+    def faults(self) -> Iterable[str]:
         """Those of both kinds, else those of form errors."""
-        row, faults = self.bearing, list(super().faults())
-        yield from faults
-        if not faults and self.errors is not None:
-            yield from form_faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm)
+        row, faults = self.bearing, super().faults()
+        if self.errors is None:
+            return faults
+        return tuple(faults) or form_faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm)
 
 
 class DoubleDeckerScene(BallScene):
@@ -258,8 +260,6 @@ class DoubleDeckerScene(BallScene):
 
 
 def _unmounted_faults(scene: BallScene) -> Iterator[str]:
-    if not scene.model.ring_expansion:
-        return
     inner, outer = scene.outermost_rows
     turning = scene.operation
     speed = "turns; the growth of its ring needs it; add it, or set model.ring_expansion = false"

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rbdyn.faults import Strict
+from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import SI, OptionalSI, Positive
 from rbdyn.scene.operation import Speed
 
@@ -16,7 +16,7 @@ AGREED_DEG = 0.2
 GrooveFactor = Annotated[float, Field(gt=0.5, le=1.0)]
 
 
-class BallRow(Strict):
+class BallRow(Consistent):
     """Geometry of one row of balls. Of contact angle and clearance one is given, or both that agree."""
 
     balls: Annotated[int, Field(ge=3, le=500)]
@@ -165,7 +165,7 @@ class MiddleRing(Strict):
     speed, axial_offset = OptionalSI("rpm"), SI("mm")
 
 
-class DoubleDecker(Strict):
+class DoubleDecker(Consistent):
     """Two rows one inside the other; the ring between them floats."""
 
     kind: Literal["double_decker_ball"]

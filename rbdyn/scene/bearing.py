@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
 
-from rbdyn.faults import Strict
+from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive
 
 # Keys that belong to one roller profile each.
@@ -27,7 +27,7 @@ class Harmonic(Strict):
     amplitude, phase = SI("um"), SI("deg")
 
 
-class Bearing(Strict):
+class Bearing(Consistent):
     """Geometry of a cylindrical roller bearing. Clearances are diametral."""
 
     kind: Literal["cylindrical_roller"]
@@ -177,7 +177,7 @@ class Bearing(Strict):
             )
 
 
-class Cage(Strict):
+class Cage(Consistent):
     """Cage and guide land. Clearances are diametral."""
 
     guidance: Literal["outer", "inner", "roller"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from rbdyn.faults import Strict
+from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI
 from rbdyn.scene.bearing import Harmonic
 
@@ -47,7 +47,7 @@ class BallHarmonic(Strict):
     amplitude, phase = SI("um"), OptionalSI("deg")
 
 
-class FormErrors(Strict):
+class FormErrors(Consistent):
     """Form errors of grooves and balls, and how finely and how long the turning ring is followed.
 
     Each error of a groove is given by its harmonics, drawn at random, or both added.

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rbdyn.faults import Strict
+from rbdyn.faults import Consistent
 from rbdyn.fields import SI, NonNegative, NotVanishing, Positive, Share
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
@@ -15,7 +15,7 @@ AUTO_WARM_UP_TURNS = 20.0
 MOST_KEPT, MOST_OF_A_RUN = 4_000_000, 20_000
 
 
-class Laws(Strict):
+class Laws(Consistent):
     """The laws of each interaction and what they need. What is off is neither computed nor compiled."""
 
     line_contact: Literal["palmgren", "iso16281", "dowson_higginson", "houpert"] = "palmgren"
@@ -109,7 +109,7 @@ class Laws(Strict):
         return METAL_ON_METAL_ALPHA if given is None else float(given)
 
 
-class Numerics(Strict):
+class Numerics(Consistent):
     """Tolerance, length and replication of a run."""
 
     method: Literal["auto", "rk45", "rk43", "rosenbrock"] = "auto"

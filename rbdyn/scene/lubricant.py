@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
-from rbdyn.faults import Strict
+from rbdyn.faults import Consistent
 from rbdyn.fields import SI, Fraction, NonNegative, NotVanishing, Positive, Share
 from rbdyn.properties.lubricants import OILS, Oil, oil_at
 from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
@@ -41,7 +41,7 @@ def _four_numbers(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-class Lubricant(Strict):
+class Lubricant(Consistent):
     """The oil, its temperature and where it is."""
 
     oil: OilName
@@ -171,7 +171,7 @@ def with_traction_of_oil(scene: Any) -> Any:
     return {**scene, "traction": {**default, **traction}} if default else scene
 
 
-class Traction(Strict):
+class Traction(Consistent):
     """Traction of the races. The defaults are an ADORE-style set for a turbine-engine oil."""
 
     model: Literal["four_constant", "thermal_newtonian", "eyring", "limiting_shear", "coulomb", "off"] = "four_constant"

@@ -5,7 +5,7 @@ from typing import Annotated, Protocol
 
 from pydantic import Field
 
-from rbdyn.faults import Strict
+from rbdyn.faults import Consistent
 from rbdyn.fields import SI, NonNegative, Positive
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
@@ -29,7 +29,7 @@ def raceway_radii(bearing: Raceways) -> tuple[float, float]:
     return 0.5e-3 * inner, 0.5e-3 * outer
 
 
-class Mounting(Strict):
+class Mounting(Consistent):
     """Fits, temperatures, shaft and housing. With this table, bearing.radial_clearance_mm is that of the loose parts.
 
     Each temperature is that of a whole part.

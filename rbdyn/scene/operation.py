@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rbdyn.faults import Strict
+from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import LIGHTEST_RING_KG, SI, InSI, NonNegative, Positive
 
 Speed = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -15,7 +15,7 @@ Load = Annotated[float, Field(ge=0.0, le=1e7)]
 SLOWEST_RPM = 0.1
 
 
-class Schedule(Strict):
+class Schedule(Consistent):
     """Inner speed and radial load over time; before the first and after the last point values stay."""
 
     time_s: Annotated[list[NonNegative], Field(min_length=1)]
@@ -43,7 +43,7 @@ class Schedule(Strict):
             yield "operation.schedule: schedules nothing; give inner_speed_rpm or radial_load_N"
 
 
-class Operation(Strict):
+class Operation(Consistent):
     """Running conditions. The radial load acts on the inner ring along x.
 
     Shaft turns, in which runs are counted, are those at ``inner_speed_rpm`` (or ``outer_speed_rpm`` where the inner

@@ -5,12 +5,12 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any, Self, TypeVar, cast
 
-from rbdyn.faults import Strict, read_toml, set_key, validated
+from rbdyn.faults import Consistent, read_toml, set_key, validated
 
 T = TypeVar("T")
 
 
-class SceneFile(Strict):
+class SceneFile(Consistent):
     """A scene that is read from TOML. Equal scenes of equal seed and version give equal bits."""
 
     @classmethod

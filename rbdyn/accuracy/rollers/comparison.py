@@ -87,7 +87,7 @@ def trajectories(scene: Scene, progress: Reporter | None, turns: float, methods:
         conclusion=" ".join(sentences),
         turns=turns,
         starts=STARTS,
-        reference=trajectory.agreement_record(known),
+        reference=known.as_dict(),
         resolved_m=known.floor(turns),
         times_faster={name: asdict(ratio) for name, ratio in ratios.items()},
         compile_s=compile_s,

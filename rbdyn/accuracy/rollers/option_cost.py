@@ -1,8 +1,9 @@
 """What each option of a scene costs: nanoseconds a right-hand side with it and without it, the time to compile it, and
 what it adds to state, parameters, compiled code and loaded modules.
 
-An option is a few assignments to the scene (``variants.toml``). Each is run in turn with the scene as it is, so that both see the same
-machine; a median over replicates is taken of the processor time per right-hand side, the integrator's own work included.
+An option is a few assignments to the scene (``variants.toml``). Each is run in turn with the scene as it is, so that both
+see the same machine; a median over replicates is taken of the processor time per right-hand side, the integrator's own
+work included.
 """
 
 from collections.abc import Callable, Mapping, Sequence

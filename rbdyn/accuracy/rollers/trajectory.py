@@ -5,7 +5,7 @@ turn only, and every span has its own floor below which the reference itself is 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,11 @@ class Reference(Record):
 
     ends: Sequence[Array]
     agreement: dict[float, Error]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form: the methods, and how far they are apart."""
+        agreement = [{"turns": span, **error.as_dict()} for span, error in self.agreement.items()]
+        return {"methods": {OURS.name: OUR_REFERENCE_RTOL, DOP853.name: THEIR_REFERENCE_RTOL}, "agreement": agreement}
 
     def floor(self, turns: float) -> float:
         """Position error [m] below which a stretch of ``turns`` resolves nothing: that of the next longer span."""
@@ -116,11 +121,3 @@ def agreement_table(known: Reference) -> Table:
         ("turns", "positions apart [m]", "worst component over its scale"),
         cells,
     )
-
-
-def agreement_record(known: Reference) -> dict[str, Any]:
-    """JSON of the references."""
-    return {
-        "methods": {OURS.name: OUR_REFERENCE_RTOL, DOP853.name: THEIR_REFERENCE_RTOL},
-        "agreement": [{"turns": span, **asdict(error)} for span, error in known.agreement.items()],
-    }

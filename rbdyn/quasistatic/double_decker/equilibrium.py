@@ -30,6 +30,10 @@ DIFFERENCE = 1e-3
 LOST = "the middle ring found no equilibrium; give a displacement that the bearing can reach, or loads"
 
 
+# Inner and outer row nearby.
+Start = tuple[Solution, Solution] | None
+
+
 class Layer(NamedTuple):
     """One row of balls and its raceway control."""
 
@@ -136,11 +140,7 @@ def carried(arm: float) -> Array:
 
 
 def solve_double_decker(
-    stack: Stack,
-    load: Array,
-    given: Array | None = None,
-    middle_given: Array | None = None,
-    start: tuple[Solution, Solution] | None = None,
+    stack: Stack, load: Array, given: Array | None = None, middle_given: Array | None = None, start: Start = None
 ) -> DoubleDeckerSolution:
     """Equilibrium under ``load`` (5,) [N, N m] on the inner ring, at P0.
 
@@ -184,12 +184,7 @@ def _shared_out(stack: Stack, load: Array, given: Array, middle_given: Array, sh
 
 
 def _follow(
-    stack: Stack,
-    load: Array,
-    given: Array,
-    free: NDArray[np.bool_],
-    middle: Array,
-    start: tuple[Solution, Solution] | None,
+    stack: Stack, load: Array, given: Array, free: NDArray[np.bool_], middle: Array, start: Start
 ) -> DoubleDeckerSolution:
     """Newton on the free components of the middle ring's displacement, guarded by the length of what is left over."""
     to_inner = carried(stack.arm_0)

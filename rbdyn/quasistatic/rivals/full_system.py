@@ -52,13 +52,6 @@ def unknowns(system: System, q: Array, balls: Array) -> Array:
     return np.concatenate((balls[:, :2].ravel(), q[system.free]))
 
 
-def ring_of(system: System, u: Array) -> Array:
-    """Displacement (5,) of the ring [m] in the unknowns ``u``."""
-    q = system.held.copy()
-    q[system.free] = u[2 * system.row.cosine.size :]
-    return q
-
-
 @routine
 def forces(control: Any, system: Any, u: Any, residual: Any, jacobian: Any) -> tuple[float, float]:
     """Fill ``residual`` (n,) [N] and its derivative ``jacobian`` (n, n) [N/m] at ``u``.
@@ -150,7 +143,8 @@ def _solution_at(control: Control, system: System, stop: Stop) -> Solution:
     row, z, u = system.row, system.row.cosine.size, stop.u
     at, figures = space(z), np.zeros((z, FIGURES))
     at.counts[STEPS] = stop.steps
-    at.q[:], at.balls[:, :2] = ring_of(system, u), u[: 2 * z].reshape(z, 2)
+    at.q[:], at.balls[:, :2] = system.held, u[: 2 * z].reshape(z, 2)
+    at.q[system.free] = u[2 * z :]
     # Nothing is solved any more: which components are free does not matter.
     _finish(Task(control, row, system.load, np.ones_like(system.load)), at, figures)
     return solution_of(row, at, figures, stop.status, stop.residual, stop.searches)

@@ -7,7 +7,7 @@ import numpy as np
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 from rbdyn.quasistatic.runout import race_errors
-from rbdyn.quasistatic.runout.race_errors import PERFECT, RaceErrors, Turning, Waviness, waviness
+from rbdyn.quasistatic.runout.race_errors import PERFECT, RaceErrors, Waviness, waviness
 from rbdyn.quasistatic.runout.tolerance_design import Bench
 from rbdyn.quasistatic.runout.turn import Followed, follow
 from rbdyn.scene.ball import BallScene, SingleRowScene
@@ -42,9 +42,12 @@ def bench_of(scene: BallScene, face_radius: float | None = None, steps: int = 12
     Raises InputError for two rows.
     """
     row = single_row(scene)
-    model = row_of(row)
+    model, bearing, (inner, outer) = row_of(row), row.bearing, row.operation.speeds
+    sizes = bearing.ball_diameter, bearing.pitch_diameter, bearing.contact_angle
+    # Turns are those of the inner ring against the outer, which stands where neither turns.
+    turning = race_errors.rolling(*sizes, outer / (inner - outer) if inner != outer else 0.0)
     radius = model.row.lever - model.row.inner_groove_radius if face_radius is None else face_radius
-    return Bench(model.row, model.control, load_of(row), turning_of(row), radius, steps, turns, given_of(row))
+    return Bench(model.row, model.control, load_of(row), turning, radius, steps, turns, given_of(row))
 
 
 def single_row(scene: BallScene) -> SingleRowScene:
@@ -52,14 +55,6 @@ def single_row(scene: BallScene) -> SingleRowScene:
     if not isinstance(scene, SingleRowScene):
         raise InputError(["bearing.kind = 'double_decker_ball': runout is followed for one row of balls only"])
     return scene
-
-
-def turning_of(scene: SingleRowScene) -> Turning:
-    """Turns of the parts while the inner ring makes one against the outer; the outer ring stands where neither turns."""
-    bearing, (inner, outer) = scene.bearing, scene.operation.speeds
-    against = inner - outer
-    sizes = bearing.ball_diameter, bearing.pitch_diameter, bearing.contact_angle
-    return race_errors.rolling(*sizes, outer / against if against != 0.0 else 0.0)
 
 
 def errors_of(errors: FormErrors, balls: int) -> RaceErrors:

@@ -94,7 +94,9 @@ def minimum_zone(points: Array) -> Zone:
     size = float(np.ptp(points, axis=0).max())
     if len(corners) < 3:
         return zone_about(points, *corners.mean(axis=0))
-    normal, offset = _half_planes(corners)
+    along = np.roll(corners, -1, axis=0) - corners
+    normal = np.column_stack((along[:, 1], -along[:, 0])) / np.hypot(*along.T)[:, np.newaxis]
+    offset = (normal * corners).sum(axis=1)
     best = least_squares_circle(points)
     if np.any(normal @ (best.x, best.y) > offset):
         best = zone_about(points, *points.mean(axis=0))
@@ -112,12 +114,6 @@ def minimum_zone(points: Array) -> Zone:
         if trial.width < best.width:
             best = trial
     return best
-
-
-def _half_planes(corners: Array) -> tuple[Array, Array]:
-    along = np.roll(corners, -1, axis=0) - corners
-    normal = np.column_stack((along[:, 1], -along[:, 0])) / np.hypot(*along.T)[:, np.newaxis]
-    return normal, (normal * corners).sum(axis=1)
 
 
 def _best_step(points: Array, zone: Zone, normal: Array, offset: Array, trust: float) -> tuple[Array, float]:

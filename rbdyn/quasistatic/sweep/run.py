@@ -25,7 +25,7 @@ from rbdyn.quasistatic.row.newton import CONVERGED
 from rbdyn.quasistatic.row.ring import RING
 from rbdyn.quasistatic.row.space import space
 from rbdyn.quasistatic.sweep.figures import Columns, ring_columns, row_columns
-from rbdyn.quasistatic.sweep.march import LEVER, Found, Points, empty, leaves, march_through
+from rbdyn.quasistatic.sweep.march import LEVER, Points, empty, leaves, march_through
 from rbdyn.quasistatic.sweep.partial import Partial, Solved, as_text, from_text
 from rbdyn.quasistatic.sweep.points import Axis, axes_of, scenes, snake
 from rbdyn.quasistatic.sweep.result import SweepResult
@@ -158,14 +158,17 @@ def _march(
         if whole["done"]:
             partial.write(whole | {name: array[: whole["done"]] for name, array in found._asdict().items()})
         raise
-    *ring, balls = resolved(found.displacement, found.taken, found.matrix, found.figures, points.numbers[:, LEVER])
-    columns = _columns(points, found, ring, balls, ratings)
+    solved = resolved(found.displacement, found.taken, found.matrix, found.figures, points.numbers[:, LEVER])
+    (displacement, taken, matrix, balls), units = solved, _units(points.numbers)
+    displacement = displacement / units
+    stiffness = matrix * units[:, :, np.newaxis] * units[:, np.newaxis, :]
+    columns = ring_columns(displacement, taken * units, stiffness) | row_columns(balls, ratings)
+    columns |= {"residual_N": found.residual, "iterations": found.steps.astype(float)}
     statuses = [OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST) for outcome in found.outcome.tolist()]
     for k, why in overloads(balls, ratings).items():
         if statuses[k] == OK:
             statuses[k] = why
-    tilts = (ring[0] / _units(points.numbers))[:, 3:]
-    notes = [(0, remark) for remark in (*remarks(balls, ratings), tipping(tilts, scene))]
+    notes = [(0, remark) for remark in (*remarks(balls, ratings), tipping(displacement[:, 3:], scene))]
     return Walked(columns, statuses, {"row": balls}, int(found.cold.sum()), notes)
 
 
@@ -214,16 +217,6 @@ def _units(numbers: Array) -> Array:
     units = np.ones((len(numbers), RING))
     units[:, 3:] = numbers[:, [LEVER]]
     return units
-
-
-def _columns(points: Points, found: Found, ring: Sequence[Array], balls: Array, ratings: Sequence[Rating]) -> Columns:
-    units, (displacement, taken, matrix) = _units(points.numbers), ring
-    return {
-        **ring_columns(displacement / units, taken * units, matrix * units[:, :, np.newaxis] * units[:, np.newaxis, :]),
-        **row_columns(balls, ratings),
-        "residual_N": found.residual,
-        "iterations": found.steps.astype(float),
-    }
 
 
 def _one_by_one(
