@@ -172,3 +172,21 @@ def test_command_refuses_a_file_for_a_folder(tmp_path, command):
     ran = command("manual", "--out", tmp_path / "taken")
     assert ran.returncode == 2
     assert len(ran.stderr.splitlines()) == 1 and "check the path" in ran.stderr
+
+
+def test_readme_is_short_and_leads_somewhere():
+    """Report: at most 120 lines; one command each to run and to test; every link and every room of its map is there."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    for title in ("Run", "Test"):
+        section = text.split(f"\n## {title}\n")[1].split("\n## ")[0]
+        assert len(re.findall(r"^```sh\n[^\n]+\n```$", section, re.MULTILINE)) == section.count("```") / 2 == 1
+    links = re.findall(r"\]\(([^)]+)\)", text)
+    rooms = re.findall("`([a-z_/.]+)`", text.split("## Map of the house")[1].split("\n## ")[0])
+    for place in [*links, *(room for room in rooms if "/" in room)]:
+        assert (ROOT / place).exists(), place
+    for room in (room for room in rooms if "/" not in room):
+        assert [*ROOT.glob(f"*/{room}"), *ROOT.glob(f"*/*/{room}")], room
+    parts_named = re.findall(r"\| `([a-z]+)` \|$", text, re.MULTILINE)
+    page_parts = (ROOT / "examples" / "measured.md").read_text(encoding="utf-8")
+    assert len(parts_named) > 5 and all(f"<!-- {name} -->" in page_parts for name in parts_named)

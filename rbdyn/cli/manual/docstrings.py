@@ -92,10 +92,13 @@ def _home(trees: Trees, module: str, name: str) -> tuple[str, Named] | None:
 def _signature(node: Named) -> str:
     """What is called, as code; of a class its fields."""
     if isinstance(node, ast.FunctionDef):
-        gives = f" -> {ast.unparse(node.returns)}" if node.returns else ""
-        return f"```python\n{node.name}({ast.unparse(node.args)}){gives}\n```\n\n"
+        return f"```python\n{node.name}({ast.unparse(node.args)}){_gives(node)}\n```\n\n"
     fields = [ast.unparse(each) for each in node.body if isinstance(each, ast.AnnAssign)]
     return "```python\n{}\n```\n\n".format("\n".join((f"class {node.name}", *(f"    {each}" for each in fields))))
+
+
+def _gives(node: ast.FunctionDef) -> str:
+    return f" -> {ast.unparse(node.returns)}" if node.returns else ""
 
 
 def _text(node: Named) -> str:
@@ -112,6 +115,7 @@ def _members(trees: Trees, module: str, node: Named) -> Iterator[str]:
             for member in _public(each):
                 if member.name not in seen and isinstance(member, ast.FunctionDef):
                     seen.add(member.name)
-                    gives = f" -> {ast.unparse(member.returns)}" if member.returns else ""
+                    read = any("property" in ast.unparse(decorator) for decorator in member.decorator_list)
+                    call = member.name + ("" if read else f"({ast.unparse(member.args)})") + _gives(member)
                     says = _text(member).replace("\n", "\n  ")
-                    yield f"- `{member.name}({ast.unparse(member.args)}){gives}`: {says}"
+                    yield f"- `{call}`: {says}"
