@@ -15,6 +15,7 @@ from contextlib import AbstractContextManager
 from datetime import date
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from rbdyn.accuracy import study
@@ -37,32 +38,33 @@ def measure(
     repository. Raises InputError for a part that is none, KeyboardInterrupt.
     """
     whole = tomllib.loads(Path(__file__).with_name("measured.toml").read_text(encoding="utf-8"))
-    names = [part["name"] for part in whole["part"]]
-    if unknown := [name for name in wanted if name not in names]:
-        raise InputError([f"--part {name}: is none; the parts are {', '.join(names)}" for name in unknown])
+    commands = {part["name"]: part["commands"] for part in whole["part"]}
+    if unknown := [name for name in wanted if name not in commands]:
+        raise InputError([f"--part {name}: is none; the parts are {', '.join(commands)}" for name in unknown])
     old = path.read_text(encoding="utf-8") if path.exists() else ""
     today = date.today().isoformat()
-    blocks = {name: _kept(old, name, f"not run for the page of {today}") for name in names}
-    found: dict[str, dict[str, Any]] = {name: {"status": "kept"} for name in names}
-    for part in whole["part"]:
-        name = part["name"]
-        if wanted and name not in wanted:
-            continue
+    blocks = {name: _kept(old, name, f"not run for the page of {today}") for name in commands}
+    found: dict[str, dict[str, Any]] = {name: {"status": "kept"} for name in commands}
+    _write(path, whole, blocks)  # before hours of running, lest there be no such folder
+    for name in [name for name in commands if name in wanted or not wanted]:
         started = time.perf_counter()
         try:
-            with bar(name) as progress:
-                output = "\n\n".join(_run(line, progress) for line in part["commands"])
+            with bar(name) as progress, TemporaryDirectory() as folder:
+                output = "\n\n".join(_told(line, folder, progress) for line in commands[name])
         except (InputError, RunError, OSError) as error:
             found[name] = {"status": f"failed: {error}"}
             blocks[name] = _kept(old, name, f"failed on {today}: {error}")
         else:
-            seconds = time.perf_counter() - started
+            found[name] = {"status": "ok", "seconds": time.perf_counter() - started}
             on = ", ".join((processor(), *(f"{key} {value}" for key, value in versions().items())))
-            blocks[name] = f"*Measured {today} in {seconds:.0f} s, compiling included; {on}.*\n\n{output}\n"
-            found[name] = {"status": "ok", "seconds": seconds}
-        with whole_file(path) as new:
-            new.write_text(_page(whole, blocks), encoding="utf-8")
+            blocks[name] = f"*Measured {today}; times include compiling; {on}.*\n\n{output}\n"
+        _write(path, whole, blocks)
     return found
+
+
+def _write(path: Path, whole: Mapping[str, Any], blocks: Mapping[str, str]) -> None:
+    with whole_file(path) as new:
+        new.write_text(_page(whole, blocks), encoding="utf-8")
 
 
 def _page(whole: Mapping[str, Any], blocks: Mapping[str, str]) -> str:
@@ -83,6 +85,13 @@ def _kept(page: str, name: str, why: str) -> str:
     return f"{first}\n*Kept: {' '.join(why.split())}.*\n{rest}"
 
 
+def _told(line: str, folder: str, progress: Reporter) -> str:
+    """A command, how long it took and what it tells; ``TMP`` in it is the ``folder``."""
+    started = time.perf_counter()
+    output = _run(line.replace(" TMP", f" {folder}"), progress)
+    return f"`{line}`, {time.perf_counter() - started:.3g} s:\n\n{output}"
+
+
 def _run(line: str, progress: Reporter) -> str:
     """What a command tells, as Markdown: tables of a study, of any other command what it prints. Raises RunError where it
     fails, InputError.
@@ -92,12 +101,12 @@ def _run(line: str, progress: Reporter) -> str:
         sets = [value for option, value in pairwise(words) if option == "--set"]
         flags = {word[2:]: True for word in words if word.startswith("--") and word != "--set"}
         scene = Scene.load(words[1], sets)
-        return f"`{line}`\n\n{_markdown(study(chosen_study(flags, {}, scene), scene, progress))}"
+        return _markdown(study(chosen_study(flags, {}, scene), scene, progress))
     called = words if program == "python" else ["-m", program, *words]
     ended = subprocess.run([sys.executable, *called], capture_output=True, text=True, check=False)
     if ended.returncode:
         raise RunError(f"{line}: ended with {ended.returncode}, {(ended.stderr.splitlines() or [''])[-1]}")
-    return f"`{line}`\n\n```text\n{ended.stdout.rstrip()}\n```"
+    return f"```text\n{ended.stdout.rstrip()}\n```"
 
 
 def _markdown(report: Report) -> str:

@@ -41,7 +41,11 @@ def test_unit_parts_run_keep_or_fail(measured):
     """Unit: a new page says what was never measured; later a part that is not run, or fails, keeps its tables."""
     battery = next(part["commands"][0] for part in WHOLE["part"] if part["name"] == "battery")
     found, text = measured("battery", says="first")
-    assert found["battery"]["status"] == "ok" and found["methods"] == {"status": "kept"}
+    assert (
+        found["battery"]["status"] == "ok"
+        and found["battery"]["seconds"] >= 0.0
+        and found["methods"] == {"status": "kept"}
+    )
     assert f"first by {battery}" in text
     assert text.count(page.NEVER) == len(NAMES) - 1
     _, text = measured("methods", says="second")
@@ -51,6 +55,16 @@ def test_unit_parts_run_keep_or_fail(measured):
     found, text = measured("battery", says="fourth", bad=(battery,))
     assert found["battery"]["status"].startswith("failed: ")
     assert "first by" in text and "fourth by" not in text and "*Kept: failed on " in text
+
+
+def test_unit_folder_is_one_for_a_part(measured):
+    """Unit: commands of a part share an empty folder, which the page calls TMP."""
+    _, text = measured("experiments")
+    used = {
+        line.split(" --out ")[1].split()[0] for line in text.splitlines() if line.startswith("told") and "--out" in line
+    }
+    assert len(used) == 1 and "TMP" not in used
+    assert "`doe study examples/clearance_study.toml --out TMP --direct`, " in text
 
 
 def test_unit_unknown_part_is_refused(measured):
