@@ -5,14 +5,17 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from markdown_it import MarkdownIt
+from markdown_it.renderer import RendererProtocol
+from markdown_it.token import Token
 
 from rbdyn.cli.manual.docstrings import equations, library, trees_of
 from rbdyn.cli.manual.part import Part
 from rbdyn.cli.manual.reference import commands_of, keys_of
 
+OPTION = re.compile(r"(?<!\S)(--?[a-z][\w-]*)")
 MARK = re.compile(r"\{\{([A-Z]+)\}\}")
 # Headings deeper than this stand on the page and in the search, not in the contents.
 DEEPEST = 3
@@ -63,6 +66,7 @@ def chapters(parts: Sequence[Part]) -> Iterator[tuple[str, str]]:
 def rendered(text: str, chapter: str) -> tuple[list[Heading], str]:
     """Headings and HTML of a chapter; every heading has a key of its own, its first that of the chapter."""
     parser = MarkdownIt("commonmark", {"html": False}).enable("table").disable("lheading")
+    parser.add_render_rule("code_inline", _code)
     tokens = parser.parse(text)
     headings: list[Heading] = []
     keys: dict[str, int] = {}
@@ -80,6 +84,11 @@ def rendered(text: str, chapter: str) -> tuple[list[Heading], str]:
     html = parser.renderer.render(tokens, parser.options, {})
     # A table may be wider than a narrow screen.
     return headings, html.replace("<table>", '<div class="scroll"><table>').replace("</table>", "</table></div>")
+
+
+def _code(renderer: RendererProtocol, tokens: Sequence[Token], place: int, *_: Any) -> str:
+    """Code within a line, whose options a line never breaks."""
+    return "<code>{}</code>".format(OPTION.sub(r"<span>\1</span>", escape(tokens[place].content)))
 
 
 def _entry(headings: Sequence[Heading]) -> str:
