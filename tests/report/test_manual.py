@@ -114,7 +114,11 @@ def test_every_module_with_an_equation_is_there(manual):
             assert Read(rendered(f"# x\n\n{markdown(texts[''])}", "x")[1]).text.removeprefix("x") in manual.text
             told += 1
     assert told > 70
-    for words in ("(k^2+1) E - 2 K)/[(k^2-1) E] = F", "F_R/(E' R l) = 1.42 sqrt(U W)/(1 + r^10)^0.1"):
+    for words in (
+        "(k^2+1) E - 2 K)/[(k^2-1) E] = F",
+        "F_R/(E' R l) = 1.42 sqrt(U W)/(1 + r^10)^0.1",
+        "boundary: float # mu_b [-]",
+    ):
         assert words in manual.text
 
 

@@ -5,8 +5,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
-Trees = Mapping[str, ast.Module]
 Named = ast.ClassDef | ast.FunctionDef
 # An equation, its number, or the year of what it is from.
 EQUATION = re.compile(r"\S = \S|\beqs? \d|\bSources?: |\b(18|19|20)\d\d\b")
@@ -14,7 +14,17 @@ EQUATION = re.compile(r"\S = \S|\beqs? \d|\bSources?: |\b(18|19|20)\d\d\b")
 PARAMETER = re.compile(r"^(\w+(?:, \w+)*) : ", re.MULTILINE)
 
 
-def trees_of(packages: Iterable[str]) -> dict[str, ast.Module]:
+class Source(NamedTuple):
+    """A module: what it says, and its lines, for comments stand beside the fields of a class."""
+
+    tree: ast.Module
+    lines: list[str]
+
+
+Trees = Mapping[str, Source]
+
+
+def trees_of(packages: Iterable[str]) -> dict[str, Source]:
     """Every module of the packages by its dotted name, in order of the names."""
     found = {}
     for package in packages:
@@ -22,7 +32,8 @@ def trees_of(packages: Iterable[str]) -> dict[str, ast.Module]:
         for path in (each for each in root.rglob("*.py") if each.name != "__main__.py"):
             parts = (package, *path.relative_to(root).with_suffix("").parts)
             name = ".".join(part for part in parts if part != "__init__")
-            found[name] = ast.parse(path.read_text(encoding="utf-8"))
+            text = path.read_text(encoding="utf-8")
+            found[name] = Source(ast.parse(text), text.splitlines())
     return dict(sorted(found.items()))
 
 
@@ -36,7 +47,7 @@ def equations(trees: Trees, package: str) -> Iterator[str]:
         if told or EQUATION.search(whole):
             yield f"### `{name}`\n\n{markdown(whole)}"
             for each in sorted(told, key=lambda each: each.lineno):
-                yield f"#### `{each.name}`\n\n{_signature(each)}{_text(each)}"
+                yield f"#### `{each.name}`\n\n{_signature(each, trees[name].lines)}{_text(each)}"
 
 
 def library(trees: Trees, package: str) -> Iterator[str]:
@@ -50,7 +61,7 @@ def library(trees: Trees, package: str) -> Iterator[str]:
         if fresh:
             yield f"### `{name}`\n\n{markdown(ast.get_docstring(tree) or '')}"
             for module, node in fresh:
-                yield f"#### `{name}.{node.name}`\n\n{_signature(node)}{_text(node)}"
+                yield f"#### `{name}.{node.name}`\n\n{_signature(node, trees[module].lines)}{_text(node)}"
                 yield "\n".join(_members(trees, module, node))
 
 
@@ -60,7 +71,7 @@ def markdown(docstring: str) -> str:
 
 
 def _within(trees: Trees, package: str) -> Iterator[tuple[str, ast.Module]]:
-    return ((name, tree) for name, tree in trees.items() if f"{name}.".startswith(f"{package}."))
+    return ((name, source.tree) for name, source in trees.items() if f"{name}.".startswith(f"{package}."))
 
 
 def _public(node: ast.Module | ast.ClassDef) -> list[Named]:
@@ -81,7 +92,7 @@ def _handed_on(tree: ast.Module, package: str) -> list[str]:
 
 def _home(trees: Trees, module: str, name: str) -> tuple[str, Named] | None:
     """Where a name is defined that a module defines or imports; None outside the house, and for a plain value."""
-    for node in ast.walk(trees[module]) if module in trees else ():
+    for node in ast.walk(trees[module].tree) if module in trees else ():
         if isinstance(node, Named) and node.name == name:
             return module, node
         if isinstance(node, ast.ImportFrom) and name in (alias.name for alias in node.names):
@@ -89,12 +100,13 @@ def _home(trees: Trees, module: str, name: str) -> tuple[str, Named] | None:
     return None
 
 
-def _signature(node: Named) -> str:
-    """What is called, as code; of a class its fields."""
+def _signature(node: Named, lines: list[str]) -> str:
+    """What is called, as code; of a class its fields, with what stands beside them."""
     if isinstance(node, ast.FunctionDef):
         return f"```python\n{node.name}({ast.unparse(node.args)}){_gives(node)}\n```\n\n"
-    fields = [ast.unparse(each) for each in node.body if isinstance(each, ast.AnnAssign)]
-    return "```python\n{}\n```\n\n".format("\n".join((f"class {node.name}", *(f"    {each}" for each in fields))))
+    fields = (each for each in node.body if isinstance(each, ast.AnnAssign))
+    held = (line for each in fields for line in lines[each.lineno - 1 : each.end_lineno])
+    return "```python\n{}\n```\n\n".format("\n".join((f"class {node.name}", *held)))
 
 
 def _gives(node: ast.FunctionDef) -> str:
