@@ -148,27 +148,6 @@ def accuracy(
         raise typer.Exit(FAILED)
 
 
-def _measure(page: Path | None, parts: list[str], others: bool, as_json: bool, quiet: bool) -> None:
-    """Write the page of measured figures. Raises InputError where it is not named, or something else is asked for too."""
-    from rbdyn.accuracy.page import measure
-    from rbdyn.faults import InputError
-
-    if page is None:
-        known = "goes with --page FILE only" if parts else "is missing; name the scene to study, or --page FILE"
-        raise InputError([f"{'--part' if parts else 'SCENE.toml'}: {known}"])
-    if others:
-        raise InputError([f"--page {page}: lists its own commands; leave out the scene and all options but --part"])
-    found = measure(page, parts, lambda name: progress_bar(name, quiet or as_json))
-    failed = {name: each["status"] for name, each in found.items() if each["status"] not in ("ok", "kept")}
-    record = {"status": "failed" if failed else "ok", "page": str(page), "parts": found}
-    measured = [name for name, each in found.items() if each["status"] == "ok"]
-    hand_over(lambda: record, as_json, lambda: print(f"written to {page}: measured {', '.join(measured) or 'nothing'}"))
-    for name, status in failed.items():
-        print(f"{name} {status}", file=sys.stderr)
-    if failed:
-        raise typer.Exit(FAILED)
-
-
 def _print_map(found: SlipMap) -> None:
     header = ("load [N]", *(f"{value:g} rpm" for value in found.speeds_rpm))
     rows = [
@@ -241,6 +220,27 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     if turns is not None or replicates is not None:
         raise InputError([f"--target {target}: chooses turns and replicates itself; drop --turns and --replicates"])
     return target_of(target)
+
+
+def _measure(page: Path | None, parts: list[str], others: bool, as_json: bool, quiet: bool) -> None:
+    """Write the page of measured figures. Raises InputError where it is not named, or something else is asked for too."""
+    from rbdyn.accuracy.page import measure
+    from rbdyn.faults import InputError
+
+    if page is None:
+        known = "goes with --page FILE only" if parts else "is missing; name the scene to study, or --page FILE"
+        raise InputError([f"{'--part' if parts else 'SCENE.toml'}: {known}"])
+    if others:
+        raise InputError([f"--page {page}: lists its own commands; leave out the scene and all options but --part"])
+    found = measure(page, parts, lambda name: progress_bar(name, quiet or as_json))
+    failed = {name: each["status"] for name, each in found.items() if each["status"] not in ("ok", "kept")}
+    record = {"status": "failed" if failed else "ok", "page": str(page), "parts": found}
+    measured = [name for name, each in found.items() if each["status"] == "ok"]
+    hand_over(lambda: record, as_json, lambda: print(f"written to {page}: measured {', '.join(measured) or 'nothing'}"))
+    for name, status in failed.items():
+        print(f"{name} {status}", file=sys.stderr)
+    if failed:
+        raise typer.Exit(FAILED)
 
 
 def _write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:

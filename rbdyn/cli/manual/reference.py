@@ -20,8 +20,10 @@ def keys_of(part: Part) -> Iterator[str]:
             yield f"## {file.capitalize()}"
         yield f"### {file}, " + (f"table `{table}`" if table else "outside all tables")
         for key in found:
-            told = lines(key)[0].removeprefix(f"{key.key}: ")
-            yield f"#### `{key.key}`\n\n{plain(told)}\n\n{plain(key.description)}"
+            head = lines(key)[0].removeprefix(f"{key.key}: ")
+            # Its description, and what else a key says behind it.
+            told = (plain(each) for each in (head, *key[Key._fields.index("description") :]))
+            yield "\n\n".join((f"#### `{key.key}`", *told))
 
 
 def commands_of(part: Part) -> Iterator[str]:
