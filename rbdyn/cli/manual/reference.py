@@ -22,7 +22,7 @@ def keys_of(part: Part) -> Iterator[str]:
         for key in found:
             head = lines(key)[0].removeprefix(f"{key.key}: ")
             # Its description, and what else a key says behind it.
-            told = (plain(each) for each in (head, *key[Key._fields.index("description") :]))
+            told = (plain(str(each)) for each in (head, *key[Key._fields.index("description") :]))
             yield "\n\n".join((f"#### `{key.key}`", *told))
 
 
