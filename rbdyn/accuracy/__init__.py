@@ -2,7 +2,7 @@
 
 Studies, each a module with ``study(scene, progress) -> Report``; the command ``rbdyn accuracy`` runs them by name:
 ``rollers`` in time, ``balls`` in equilibrium. ``choice``: which study a command line means; ``judgement``: what errors
-allow to conclude; ``report``: tables, files.
+allow to conclude; ``report``: tables, files; ``page``: the parts of ``measured.toml`` on the shipped examples, as one page.
 
 A reference is a much tighter run that two methods agree on; an error and a time come from separate runs, the first
 call never counts; what fails stays in the table. From Python::

@@ -1,4 +1,4 @@
-"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball``, ``new`` and ``keys`` stand beside."""
+"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball``, ``new``, ``keys`` and ``manual`` stand beside."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 
 from rbdyn.cli.ball import ball
 from rbdyn.cli.keys import command as keys
+from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
 from rbdyn.cli.options import (
     Json,
@@ -53,6 +54,7 @@ TRACE_TURNS = 10.0
 app.command()(ball)
 app.command("keys")(keys)
 app.command()(new)
+app.command()(manual)
 
 
 @app.callback()
@@ -96,7 +98,7 @@ def simulate(
 
 @app.command()
 def accuracy(
-    scene: SceneFile,
+    scene: Annotated[Path | None, typer.Argument(metavar="SCENE.toml", help="Scene to study.")] = None,
     assignments: Set = None,
     out: Annotated[Path | None, folder_option("Write the study as JSON, CSV and pictures here.")] = None,
     methods: Annotated[bool, study_flag("--methods", "Other integrators beside ours")] = False,
@@ -116,6 +118,12 @@ def accuracy(
         float | None,
         typer.Option("--sought-percent", min=0.01, max=50.0, help="Bias of an output that counts; by default 1 %."),
     ] = None,
+    page: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Measure the shipped examples and write one page of Markdown.")
+    ] = None,
+    part: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="With --page, run this part only; repeatable.")
+    ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Annotated[bool, verbose_flag("Also versions.")] = False,
@@ -130,9 +138,13 @@ def accuracy(
             **{"methods": methods, "slices": slices, "replicates": replicates, "coverage": coverage},
             **{"options": options, "stability": stability, "scaling": scaling, "battery": battery},
         }
-        loaded = Scene.load(scene, assignments or [])
         typed = {"turns": trajectory, "scenes": scenes, "repeats": repeats, "sought": sought}
         limits = {key: value for key, value in typed.items() if value is not None}
+        if scene is None or page or part:
+            others = bool(scene or assignments or out or limits or any(flags.values()))
+            _measure(page, part or [], others, as_json, quiet)
+            return
+        loaded = Scene.load(scene, assignments or [])
         name = chosen_study(flags, limits, loaded)
         if "sought" in limits:
             limits["sought"] *= 0.01
@@ -217,6 +229,27 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     if turns is not None or replicates is not None:
         raise InputError([f"--target {target}: chooses turns and replicates itself; drop --turns and --replicates"])
     return target_of(target)
+
+
+def _measure(page: Path | None, parts: list[str], others: bool, as_json: bool, quiet: bool) -> None:
+    """Write the page of measured figures. Raises InputError where it is not named, or something else is asked for too."""
+    from rbdyn.accuracy.page import measure
+    from rbdyn.faults import InputError
+
+    if page is None:
+        known = "goes with --page FILE only" if parts else "is missing; name the scene to study, or --page FILE"
+        raise InputError([f"{'--part' if parts else 'SCENE.toml'}: {known}"])
+    if others:
+        raise InputError([f"--page {page}: lists its own commands; leave out the scene and all options but --part"])
+    found = measure(page, parts, lambda name: progress_bar(name, quiet or as_json))
+    failed = {name: each["status"] for name, each in found.items() if each["status"] not in ("ok", "kept")}
+    record = {"status": "failed" if failed else "ok", "page": str(page), "parts": found}
+    measured = [name for name, each in found.items() if each["status"] == "ok"]
+    hand_over(lambda: record, as_json, lambda: print(f"written to {page}: measured {', '.join(measured) or 'nothing'}"))
+    for name, status in failed.items():
+        print(f"{name} {status}", file=sys.stderr)
+    if failed:
+        raise typer.Exit(FAILED)
 
 
 def _write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
