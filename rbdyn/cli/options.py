@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options that several commands share. Help tells the default of each: ``show_default`` where it is None."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,9 +11,9 @@ def flag(*names: str, says: str, **more: Any) -> Any:
     return typer.Option(*names, metavar="", help=says, **more)
 
 
-def folder_option(says: str) -> Any:
+def folder_option(says: str, default: str = "nothing is written") -> Any:
     """``--out`` of a command that writes other files than ``Out`` says."""
-    return typer.Option(metavar="DIR", help=says)
+    return typer.Option("--out", metavar="DIR", help=says, show_default=default)
 
 
 def verbose_flag(says: str) -> Any:
@@ -26,9 +26,14 @@ def study_flag(name: str, studies: str) -> Any:
     return flag(name, says=f"{studies}, instead.")
 
 
-def count_option(least: int, says: str) -> Any:
+def count_option(least: int, says: str, default: int) -> Any:
     """A number of things to run."""
-    return typer.Option(min=least, max=100_000, metavar="N", help=says)
+    return typer.Option(min=least, max=100_000, metavar="N", help=says, show_default=str(default))
+
+
+def scene_option(key: str, says: str) -> Any:
+    """An option for a key of the scene."""
+    return typer.Option(help=says, show_default=f"{key} of the scene")
 
 
 def _tell_version(wanted: bool) -> None:
@@ -41,11 +46,16 @@ def _tell_version(wanted: bool) -> None:
 
 Version = Annotated[bool, flag("--version", says="Print the version.", callback=_tell_version, is_eager=True)]
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to simulate.")]
-Set = Annotated[list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replace a key; repeatable.")]
-Turns = Annotated[float | None, typer.Option(help="Counted shaft turns [numerics.turns].")]
-Replicates = Annotated[int | None, typer.Option(help="Seeded replicates [numerics.replicates].")]
-Seed = Annotated[int | None, typer.Option(help="Seed [numerics.seed].")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all processors by default.")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY.PATH=VALUE", help="Replace a key; repeatable.", show_default="the scene as it stands"
+    ),
+]
+Turns = Annotated[float | None, scene_option("numerics.turns", "Counted shaft turns.")]
+Replicates = Annotated[int | None, scene_option("numerics.replicates", "Seeded replicates.")]
+Seed = Annotated[int | None, scene_option("numerics.seed", "Seed of all random starts and spreads.")]
+Workers = Annotated[int | None, typer.Option(min=1, metavar="N", help="Threads.", show_default="all processors")]
 Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]

@@ -14,7 +14,8 @@ from synthetic_study import FACTORS, RESPONSES, VERDICT, motion, summary
 from doe.report.html import html_report
 from doe.report.html.build import SCRIPTS
 from doe.report.markdown import markdown_report
-from doe.report.words import label, percentage, quantity, rounded_down, shown, with_error
+from doe.report.words import change, rounded_down
+from rbdyn.records.words import label, quantity, shown, with_error
 
 VOID = {"meta", "input"}
 OPTIONAL = {
@@ -86,7 +87,7 @@ def test_answer_comes_first(page):
         "± 0.0040 mm",
         "The gain is real",
         "9.2400 0/-0.0050",
-        "+11.16 ± 0.65 %",
+        "11.16 ± 0.65 % less",
         "▲ better",
         "pocket 0.999976",
     ):
@@ -155,7 +156,7 @@ def test_pick_is_the_one_that_the_study_stands_by():
     assert "Why this point: by what manufacture leaves of it." in words
     kept = words[words.index("the simulation kept, without tolerances") :]
     # Its own simulated gain, not that of the pick.
-    assert "+11.16 ± 0.65 %" in kept[:400] and "5.5" not in kept[:200]
+    assert "11.16 ± 0.65 % less" in kept[:400] and "5.5" not in kept[:200]
 
 
 def test_tolerances_are_never_rounded_up():
@@ -238,7 +239,7 @@ def test_markdown_says_the_same_and_links_the_pictures():
         "**The gain is real",
         "9.2400 0/-0.0050",
         "a\\|b&lt;c",
-        "+11.16 ± 0.65 %",
+        "11.16 ± 0.65 % less",
     ):
         assert words in text
     assert text.index("## The answer") < text.index("## What was asked")
@@ -288,5 +289,7 @@ def test_names_and_numbers_are_written_for_people():
     assert [shown(x) for x in (None, True, 3, 24000.0, 1.23456e-5, float("inf"), [0.1, 2])] == [
         "", "yes", "3", "24000", "1.235e-05", "", "0.1, 2",
     ]  # fmt: skip
-    assert percentage({"percent": 9.963, "error_percent": 4.462}) == "+10.0 ± 4.5 %"
-    assert percentage({"percent": -3.0, "error_percent": None}) == "-3.00 %"
+    assert change({"percent": 9.963, "error_percent": 4.462}) == "10.0 ± 4.5 % less"
+    assert change({"percent": -3.0, "error_percent": None}) == "3.00 % more"
+    assert change({"percent": -3.0, "error_percent": 0.5, "goal": "max"}) == "3.00 ± 0.50 % less"
+    assert change({"percent": 3.0, "error_percent": 0.5, "goal": "target"}) == "3.00 ± 0.50 % off target less"

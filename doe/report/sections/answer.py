@@ -5,7 +5,8 @@ from typing import Any
 
 from doe.report.sections.blocks import Block, Section, Table, Tile, Tiles, Words
 from doe.report.sections.record import Factor, Record, factors, nearest, part, responses, scalars
-from doe.report.words import dimension, half_width, label, percentage, quantity, rounded_down, shown, with_error
+from doe.report.words import change, dimension, half_width, rounded_down
+from rbdyn.records.words import label, quantity, shown, with_error
 
 # Characters above which a value is a sentence, to be broken.
 LONG = 40
@@ -56,10 +57,10 @@ def _gains(summary: Record) -> Table:
     gains = part(summary, "gains") or {}
     columns = [part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick")]
     rows = [
-        (label(name), *(_value(column.get(name)) for column in columns), percentage(gain), verdict(gain))
+        (label(name), *(_value(column.get(name)) for column in columns), change(gain), verdict(gain))
         for name, gain in gains.items()
     ]
-    header = ("response", "baseline", "pick", "gain", "verdict")
+    header = ("response", "baseline", "pick", "change", "verdict")
     return Table("Gains confirmed by simulation (95 % intervals)", header, rows, text_columns=(4,))
 
 
@@ -206,10 +207,10 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         name = nearest(summary, part(summary, "front", "pick", "factors"), points) or "pick"
         found = part(points, name, "gains") or (part(summary, "gains") if name == "pick" else None) or {}
         rows = [
-            [label(each), percentage(gain), percentage(found.get(each) or {}), verdict(found.get(each) or {})]
+            [label(each), change(gain), change(found.get(each) or {}), verdict(found.get(each) or {})]
             for each, gain in predicted.items()
         ]
-        columns = ("response", "gain on the surfaces", "gain simulated", "verdict")
+        columns = ("response", "on the surfaces", "simulated", "verdict")
         caption = f"What the surfaces promised and the simulation kept, {name.replace('_', ' ')}"
         blocks.append(Table(caption, columns, rows, text_columns=(3,)))
     gained = {name.replace("_", " "): point["gains"] for name, point in points.items() if point.get("gains")}
@@ -226,7 +227,7 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 def _signed(gain: Record | None) -> str:
     """A gain with the sign of its verdict."""
-    return f"{verdict(gain)[:1]} {percentage(gain)}" if gain else ""
+    return f"{verdict(gain)[:1]} {change(gain)}" if gain else ""
 
 
 def _value(found: Record | None) -> str:

@@ -8,7 +8,8 @@ from doe.report.sections.answer import allocation, record_table
 from doe.report.sections.blocks import Block, Figures, Heading, Section, Table, Words
 from doe.report.sections.plot import wide_svg
 from doe.report.sections.record import Record, part
-from doe.report.words import dimension, label, shown
+from doe.report.words import dimension
+from rbdyn.records.words import label, shown
 
 # Keys of a chain that have a place of their own.
 SHOWN_KEYS = {"closing_link", "yield", "contributions", "allocation", "status"}

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from doe.report.words import label, quantity, shown
+from rbdyn.records.words import label, quantity, shown
 
 Record = Mapping[str, Any]
 # The efficiencies of a design go by a capital letter.

@@ -9,11 +9,11 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-from doe.report.words import label
 from doe.response_surface import Surface
 from doe.study.design import design_of
 from doe.study.whole import StudyResult
 from doe.study_file import Study
+from rbdyn.records.words import label
 
 
 def response_surface(study: Study, surface: Surface, path: Path) -> None:
