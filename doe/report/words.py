@@ -35,6 +35,11 @@ def change(gain: Mapping[str, Any]) -> str:
     return "" if value is None else improvement(value, gain.get("error_percent"), gain.get("goal", "min"))
 
 
+def moved(part: Mapping[str, Any]) -> str:
+    """'by +0.0200' of a part whose nominal was moved, else nothing."""
+    return f"by {part['moved_mm']:+.4f}" if part.get("moved_mm") else ""
+
+
 def dimension(part: Mapping[str, Any]) -> str:
     """'9.2900 0/-0.0050' of a part's nominal and deviations."""
 

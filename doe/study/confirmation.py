@@ -127,4 +127,4 @@ def statement(gains: Sequence[Gain]) -> str:
         if group
     ]
     together = f" (intervals that hold for all {len(gains)} together)" if len(gains) > 1 else ""
-    return f"Simulated gains over the baseline{together}: {'; '.join(parts)}."
+    return f"Simulated changes from the baseline{together}: {'; '.join(parts)}."

@@ -11,6 +11,8 @@ UNITS = {
 }  # fmt: skip
 # A number below this many digits before the point is written without an exponent.
 PLAIN_BELOW = 1e7
+# What is smaller is left over from rounding.
+NOISE = 1e-12
 
 
 def quantity(name: str) -> tuple[str, str]:
@@ -39,7 +41,7 @@ def shown(value: Any, digits: int = 4) -> str:
         return str(value)
     if not math.isfinite(value):
         return ""
-    text = f"{value:.{digits}g}"
+    text = f"{0.0 if abs(value) < NOISE else value:.{digits}g}"
     return f"{value:.0f}" if "e+" in text and abs(value) < PLAIN_BELOW else text
 
 
@@ -56,14 +58,14 @@ def with_error(value: float | None, error: float | None) -> str:
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
-def improvement(percent: float, error: float | None, goal: str) -> str:
-    """'3.30 ± 0.62 % less' of an improvement [%] with its 95 % half-width: which way the response itself went.
+def improvement(gain: float, error: float | None, goal: str, unit: str = "%") -> str:
+    """'3.30 ± 0.62 % less' of an improvement with its 95 % half-width: which way the response itself went.
 
     ``goal``: "min" or "max", else the distance from a target is what grew less.
     """
     better, worse = {"min": ("less", "more"), "max": ("more", "less")}.get(goal, ("off target less", "off target more"))
-    size = with_error(abs(percent), error) if error else f"{abs(percent):.2f}"
-    return f"{size} % {worse if percent < 0.0 else better}"
+    size = with_error(abs(gain), error) if error else f"{abs(gain):.2f}"
+    return f"{size} {unit}".rstrip() + f" {worse if gain < 0.0 else better}"
 
 
 class Figure(NamedTuple):

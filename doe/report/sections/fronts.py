@@ -93,7 +93,7 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     if gains := record.get("predicted_gains"):
         rows = [(label(name), change(gain), str(gain.get("verdict") or "")) for name, gain in gains.items()]
         header = ("response", "change", "verdict")
-        blocks.append(Table(f"Gains on the surfaces {where}", header, rows, text_columns=(2,)))
+        blocks.append(Table(f"Changes on the surfaces {where}", header, rows, text_columns=(2,)))
     blocks.append(Words(record.get("statement") or ""))
     blocks += [_limits(record), tolerances(summary)]
     blocks.append(Words(part(summary, "tolerances_sentence") or ""))

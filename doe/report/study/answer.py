@@ -66,7 +66,8 @@ def _print_answer(outcome: StudyResult) -> None:
     print(outcome.edge.sentence)
     for name, chain in outcome.chains.items():
         print_chain(name, chain)
-        print(chain.status)
+        if chain.refused:
+            print(chain.status)
     for group in grouped(outcome.failures):
         print(f"failed ({len(group['labels'])}): {', '.join(group['labels'])}: {group['cause']}")
 
