@@ -11,7 +11,7 @@ import typer
 
 from doe.commands.options import Data, Out, Quiet, Retry, Scheduler
 from doe.commands.steps import Effort, fitted, keeping_runs, save
-from rbdyn.cli.options import Json, Workers, flag
+from rbdyn.cli.options import Json, Workers, flag, valued
 from rbdyn.cli.terminal import guarded, hand_over
 from rbdyn.faults import InputError, refuse
 
@@ -26,27 +26,14 @@ def fit(
     data: Data = None,
     factor: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="Column of --data that is a factor, where there is no study; repeatable.",
-            show_default="all numbers but --response",
-        ),
+        valued("NAME", "Column of --data that is a factor, without STUDY; repeatable.", "all numbers but --response"),
     ] = None,
     response: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="Column of --data that is fitted, where there is no study; repeatable.",
-            show_default="all numbers but --factor",
-        ),
+        valued("NAME", "Column of --data to be fitted, without STUDY; repeatable.", "all numbers but --factor"),
     ] = None,
     model: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Terms of the surfaces, where there is no study: linear, interaction, quadratic or reduced.",
-            show_default="quadratic",
-        ),
+        str | None, valued("NAME", "linear, interaction, quadratic or reduced, without STUDY.", "quadratic")
     ] = None,
     out: Out = None,
     workers: Workers = None,

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from doe.commands.options import Data, Direct, Out, Quiet, Retry, Scheduler, StudyPath
 from doe.commands.steps import Effort, fitted, keeping_runs, save, searched
-from rbdyn.cli.options import Json, Workers, flag
+from rbdyn.cli.options import Json, Workers, flag, valued
 from rbdyn.cli.terminal import guarded, hand_over
 from rbdyn.faults import InputError, refuse
 
@@ -17,10 +15,10 @@ if TYPE_CHECKING:
 
 Point = Annotated[
     str | None,
-    typer.Option(
-        metavar="A,B,...|NAME=A,...",
-        help="Also what the surfaces say of this point: factor values in order, or by name (the rest at the baseline).",
-        show_default="none",
+    valued(
+        "A,B,...|NAME=A,...",
+        "Also what the surfaces say of this point: factor values in order, or by name (the rest at the baseline).",
+        "none",
     ),
 ]
 

@@ -5,16 +5,12 @@ from typing import Annotated
 
 import typer
 
-from rbdyn.cli.options import flag, folder_option
+from rbdyn.cli.options import flag, folder_option, valued
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study to run.")]
-Data = Annotated[
-    Path | None,
-    typer.Option(metavar="TABLE.csv", help="Table of runs made elsewhere.", show_default="runs are simulated"),
-]
+Data = Annotated[Path | None, valued("TABLE.csv", "Table of runs made elsewhere.", "runs are simulated")]
 Scheduler = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="Run on the dask cluster of this scheduler.", show_default="threads here"),
+    str | None, valued("ADDRESS", "Run on the dask cluster of this scheduler.", "threads of this machine")
 ]
 Retry = Annotated[bool, flag("--retry", says="Run points again that failed before.")]
 Direct = Annotated[

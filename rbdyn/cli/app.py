@@ -27,6 +27,7 @@ from rbdyn.cli.options import (
     flag,
     folder_option,
     study_flag,
+    valued,
     verbose_flag,
 )
 from rbdyn.cli.terminal import FAILED, guarded, hand_over, keeping, output_folder, print_table, progress_bar
@@ -61,10 +62,10 @@ def simulate(
     workers: Workers = None,
     target: Annotated[
         str | None,
-        typer.Option(
-            metavar="2%",
-            help="Choose tolerance, turns and replicates so that impact, whirl and loss are known to this.",
-            show_default="those of the scene",
+        valued(
+            "2%",
+            "Choose tolerance, turns and replicates so that impact, whirl and loss are known to this.",
+            "those given",
         ),
     ] = None,
     out: Out = None,
@@ -101,15 +102,9 @@ def accuracy(
     scaling: Annotated[bool, study_flag("--scaling", "Time by rollers and slices, memory by turns")] = False,
     battery: Annotated[bool, study_flag("--battery", "Solvers over thousands of random ball bearings")] = False,
     scenes: Annotated[int | None, count_option(1, "Scenes of the battery.", 5000)] = None,
-    trajectory: Annotated[
-        float | None,
-        typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn.", show_default="0.25"),
-    ] = None,
+    trajectory: Annotated[float | None, valued("TURNS", "Length of the trajectories, up to 1 turn.", "0.25")] = None,
     sought: Annotated[
-        float | None,
-        typer.Option(
-            "--sought-percent", min=0.01, max=50.0, help="Bias of an output that counts [%].", show_default="1"
-        ),
+        float | None, valued("%", "Bias of an output that counts.", "1", "--sought-percent", min=0.01, max=50.0)
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -297,9 +292,7 @@ def _print_target(target: dict[str, Any]) -> None:
 def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
     out: Annotated[Path | None, folder_option("Write here.", "'show' beside the result")] = None,
-    turns: Annotated[
-        float | None, typer.Option(help="Counted shaft turns to show.", show_default="all, at most 20")
-    ] = None,
+    turns: Annotated[float | None, valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
     replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, flag("--animate", says="Also a moving picture and a player.")] = False,
     lyapunov: Annotated[bool, flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,

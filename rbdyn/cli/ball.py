@@ -1,15 +1,25 @@
 """The command ``rbdyn ball``. Physics is imported inside it, so that help comes at once."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rbdyn.cli.options import Json, Quiet, SceneFile, Set, folder_option, verbose_flag
+from rbdyn.cli.options import Json, Quiet, SceneFile, Set, folder_option, valued, verbose_flag
 from rbdyn.cli.terminal import FAILED, guarded, hand_over, output_folder
 from rbdyn.faults import InputError
 
-STUDY = "the equilibrium alone"
+if TYPE_CHECKING:
+    from rbdyn.scene import BallScene
+
+VALUES, UNASKED = "start:stop:count or a,b,c", "the equilibrium alone"
+
+
+def study_option(metavar: str, says: str) -> Any:
+    """An option that asks for a study instead of the equilibrium."""
+    return valued(metavar, f"{says}, instead.", UNASKED)
 
 
 def ball(
@@ -17,47 +27,20 @@ def ball(
     assignments: Set = None,
     sweeps: Annotated[
         list[str] | None,
-        typer.Option(
-            "--sweep",
-            metavar="KEY=VALUES",
-            help="Sweep a number of the scene, start:stop:count or a,b,c; repeatable for a grid.",
-            show_default="one point",
-        ),
+        valued("KEY=VALUES", f"Sweep a number of the scene, {VALUES}; repeatable for a grid.", "one point", "--sweep"),
     ] = None,
-    preload: Annotated[
-        str | None,
-        typer.Option(
-            metavar="N",
-            help="Stress and life over axial preload, start:stop:count or a,b,c, instead.",
-            show_default=STUDY,
-        ),
-    ] = None,
-    clearance: Annotated[
-        str | None,
-        typer.Option(metavar="UM", help="The same over the diametral clearance, instead.", show_default=STUDY),
-    ] = None,
-    wear: Annotated[
-        str | None,
-        typer.Option(metavar="UM", help="The same over the diameter that balls lose, instead.", show_default=STUDY),
-    ] = None,
+    preload: Annotated[str | None, study_option("N", f"Stress and life over axial preload, {VALUES}")] = None,
+    clearance: Annotated[str | None, study_option("UM", "The same over the diametral clearance")] = None,
+    wear: Annotated[str | None, study_option("UM", "The same over the diameter that balls lose")] = None,
     race_limits: Annotated[
-        str | None,
-        typer.Option(
-            metavar="CLASS", help="Race errors with which bearings meet P2, P4 or P5, instead.", show_default=STUDY
-        ),
+        str | None, study_option("CLASS", "Race errors with which bearings meet P2, P4 or P5")
     ] = None,
     wanted: Annotated[
-        float | None,
-        typer.Option("--yield", help="Share of bearings that must meet --race-limits.", show_default="0.95"),
+        float | None, valued("SHARE", "Share of bearings that must meet --race-limits.", "0.95", "--yield")
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option(
-            min=0,
-            metavar="N",
-            help="Seed of [errors], or of the lot of --race-limits.",
-            show_default="errors.seed of the scene; of the lot 1",
-        ),
+        valued("N", "Seed of form errors, or of the lot of --race-limits.", "errors.seed; of the lot 1", min=0),
     ] = None,
     out: Annotated[Path | None, folder_option("Write the result as JSON here, with its tables and pictures.")] = None,
     as_json: Json = False,
@@ -70,9 +53,7 @@ def ball(
 
         loaded = balls_only(Scene.load(scene, assignments or []))
         if seed is not None and race_limits is None:
-            if loaded.errors is None:
-                raise InputError([f"--seed {seed}: nothing is drawn here; it is for [errors] and --race-limits"])
-            loaded = loaded.changed({"errors.seed": seed})
+            loaded = _seeded(loaded, seed)
         studies = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
         requested = {name: value for name, value in studies.items() if value is not None}
         flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *requested)]
@@ -99,3 +80,10 @@ def ball(
         hand_over(result.as_dict, as_json, lambda: print_result(result, quiet, verbose), folder, files)
     if not result.found:
         raise typer.Exit(FAILED)
+
+
+def _seeded(scene: BallScene, seed: int) -> BallScene:
+    """The scene with other draws of its form errors. Raises InputError where there are none."""
+    if scene.errors is None:
+        raise InputError([f"--seed {seed}: nothing is drawn here; it is for the table errors and --race-limits"])
+    return scene.changed({"errors.seed": seed})

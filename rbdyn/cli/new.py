@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rbdyn.cli.options import Json
+from rbdyn.cli.options import Json, valued
 from rbdyn.cli.terminal import guarded, print_json
 from rbdyn.faults import InputError, one_line, refuse
 
@@ -35,27 +35,19 @@ def new(
     designation: Annotated[
         list[str], typer.Argument(metavar="DESIGNATION", help="Bearing: NU210, NU 1010 M, 6208 C3, 7208B.")
     ],
-    speed: Annotated[
-        float | None,
-        typer.Option(metavar="RPM", help="Speed of the inner ring.", show_default="half the reference speed"),
-    ] = None,
-    load: Annotated[float | None, typer.Option(metavar="N", help="Radial load.", show_default="0.1 C")] = None,
+    speed: Annotated[float | None, valued("RPM", "Speed of the inner ring.", "half the reference speed")] = None,
+    load: Annotated[float | None, valued("N", "Radial load.", "0.1 C")] = None,
     preload: Annotated[
-        float | None,
-        typer.Option(metavar="N", help="Axial preload of a ball bearing.", show_default="loads half of the balls"),
+        float | None, valued("N", "Axial preload of a ball bearing.", "what loads half of the balls")
     ] = None,
     oil: Annotated[
         str, typer.Option(metavar="NAME", help='"ISO VG 32 PAO", "grease VG 100", 23699, "Jet Oil II".')
     ] = OIL,
     temperature: Annotated[float, typer.Option(metavar="C", help="Temperature of the oil.")] = TEMPERATURE_C,
-    clearance: Annotated[
-        str | None, typer.Option(metavar="CLASS", help="C2, CN, C3 or C4.", show_default="of DESIGNATION, else CN")
-    ] = None,
-    bore: Annotated[
-        float | None, typer.Option(metavar="MM", help="Bore, where the table lacks the bearing.", show_default=LISTED)
-    ] = None,
-    outside: Annotated[float | None, typer.Option(metavar="MM", help="Outside diameter.", show_default=LISTED)] = None,
-    width: Annotated[float | None, typer.Option(metavar="MM", help="Width.", show_default=LISTED)] = None,
+    clearance: Annotated[str | None, valued("CLASS", "C2, CN, C3 or C4.", "of DESIGNATION, else CN")] = None,
+    bore: Annotated[float | None, valued("MM", "Bore, where the table lacks the bearing.", LISTED)] = None,
+    outside: Annotated[float | None, valued("MM", "Outside diameter.", LISTED)] = None,
+    width: Annotated[float | None, valued("MM", "Width.", LISTED)] = None,
     as_json: Json = False,
 ) -> None:
     """Write a commented scene of a catalogue bearing, its interior estimated, on standard output."""

@@ -11,9 +11,14 @@ def flag(*names: str, says: str, **more: Any) -> Any:
     return typer.Option(*names, metavar="", help=says, **more)
 
 
+def valued(metavar: str, says: str, default: str, *names: str, **more: Any) -> Any:
+    """An option with a value; ``default`` says what holds without it, where that is no plain value."""
+    return typer.Option(*names, metavar=metavar, help=says, show_default=default, **more)
+
+
 def folder_option(says: str, default: str = "nothing is written") -> Any:
     """``--out`` of a command that writes other files than ``Out`` says."""
-    return typer.Option("--out", metavar="DIR", help=says, show_default=default)
+    return valued("DIR", says, default, "--out")
 
 
 def verbose_flag(says: str) -> Any:
@@ -28,12 +33,7 @@ def study_flag(name: str, studies: str) -> Any:
 
 def count_option(least: int, says: str, default: int) -> Any:
     """A number of things to run."""
-    return typer.Option(min=least, max=100_000, metavar="N", help=says, show_default=str(default))
-
-
-def scene_option(key: str, says: str) -> Any:
-    """An option for a key of the scene."""
-    return typer.Option(help=says, show_default=f"{key} of the scene")
+    return valued("N", says, str(default), min=least, max=100_000)
 
 
 def _tell_version(wanted: bool) -> None:
@@ -47,15 +47,12 @@ def _tell_version(wanted: bool) -> None:
 Version = Annotated[bool, flag("--version", says="Print the version.", callback=_tell_version, is_eager=True)]
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to simulate.")]
 Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY.PATH=VALUE", help="Replace a key; repeatable.", show_default="the scene as it stands"
-    ),
+    list[str] | None, valued("KEY.PATH=VALUE", "Replace a key; repeatable.", "the scene as it stands", "--set")
 ]
-Turns = Annotated[float | None, scene_option("numerics.turns", "Counted shaft turns.")]
-Replicates = Annotated[int | None, scene_option("numerics.replicates", "Seeded replicates.")]
-Seed = Annotated[int | None, scene_option("numerics.seed", "Seed of all random starts and spreads.")]
-Workers = Annotated[int | None, typer.Option(min=1, metavar="N", help="Threads.", show_default="all processors")]
+Turns = Annotated[float | None, valued("N", "Counted shaft turns.", "numerics.turns of the scene")]
+Replicates = Annotated[int | None, valued("N", "Seeded replicates.", "numerics.replicates of the scene")]
+Seed = Annotated[int | None, valued("N", "Seed of all random starts and spreads.", "numerics.seed of the scene")]
+Workers = Annotated[int | None, valued("N", "Threads.", "all processors", min=1)]
 Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]
