@@ -55,7 +55,7 @@ def check_responses(study: Study) -> None:
 
 def read_scene(study: Study) -> dict[str, Any]:
     """Tables of the study's scene file. Raises InputError when the file or a factor's key is not there."""
-    path = study.beside(study.file.scene.file)
+    path = study.beside(study.scene.file)
     data = read_toml(path)
     refuse(
         f"{study.path}: factor.key = {factor.key!r}: no such key in {path}; write table.key as in that file"
@@ -68,7 +68,7 @@ def read_scene(study: Study) -> dict[str, Any]:
 
 def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
     """The study's scene at factor values, with a seed. Raises InputError when a value is impossible."""
-    path = study.beside(study.file.scene.file)
+    path = study.beside(study.scene.file)
     assignments = [f"{factor.key}={float(x)!r}" for factor, x in zip(study.file.factor, factors, strict=True)]
     return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments])
 
@@ -78,7 +78,7 @@ def design_scenes(study: Study, points: Array, order: Sequence[int] | None = Non
 
     ``order``: place of each run in the standard order, which sets its seed; as given unless told.
     """
-    data, first, overrides = read_scene(study), study.file.design.seed, study.file.scene.set
+    data, first, overrides = read_scene(study), study.file.design.seed, study.scene.set
     places = range(len(points)) if order is None else order
     numbered = zip(places, points, strict=True)
     return [scene_at(study, data, point, first + place, overrides) for place, point in numbered]
@@ -88,7 +88,7 @@ def confirmation_scene(study: Study, point: Array) -> Scene:
     """Scene of a confirmation run: more replicates, fresh seeds."""
     settings, seed = study.file.confirmation, study.file.design.seed + CONFIRMATION_SEEDS
     effort = [f"numerics.replicates={settings.replicates}", "numerics.companion=true"]
-    return scene_at(study, read_scene(study), point, seed, [*study.file.scene.set, *effort, *settings.set])
+    return scene_at(study, read_scene(study), point, seed, [*study.scene.set, *effort, *settings.set])
 
 
 def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
@@ -97,7 +97,7 @@ def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
     As long as a design run unless the study says otherwise.
     """
     data, direct = read_scene(study), study.file.direct
-    overrides = [*study.file.scene.set, f"numerics.replicates={direct.replicates}", "numerics.companion=false"]
+    overrides = [*study.scene.set, f"numerics.replicates={direct.replicates}", "numerics.companion=false"]
     if direct.discard_turns is not None:
         overrides.append(f"numerics.discard_turns={direct.discard_turns!r}")
     if direct.turns is not None:

@@ -6,7 +6,7 @@ import difflib
 import math
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import date, time
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -70,6 +70,10 @@ class Strict(BaseModel):
     """Base of all input tables: frozen, no unknown keys, no silent conversions, no NaN or infinity."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, ignored_types=(InSI,))
+
+    def __repr_args__(self) -> Iterator[tuple[str, Any]]:
+        """What was given: defaults would bury it."""
+        return ((name, getattr(self, name)) for name in type(self).model_fields if name in self.model_fields_set)
 
 
 class Consistent(Strict):
@@ -183,8 +187,8 @@ def set_key(data: dict[str, Any], assignment: str) -> None:
     Raises InputError when the assignment has no ``=``, its path runs through a plain value, or it is not one value.
     """
     path, sign, text = assignment.partition("=")
-    keys, source = [key.strip() for key in path.split(".")], f"--set {one_line(assignment, 2 * LONGEST_NAME)}"
-    if not sign or not all(keys) or len(keys) > DEEPEST:
+    source = f"--set {one_line(assignment, 2 * LONGEST_NAME)}"
+    if not sign:
         raise InputError([f"{source}: write it as key.path=value"])
     try:
         given = _parsed(f"value = {text}", source)
@@ -192,12 +196,20 @@ def set_key(data: dict[str, Any], assignment: str) -> None:
         given = {"value": text.strip()}
     if len(given) > 1:
         raise InputError([f"{source}: more than one value; give each its own --set"])
+    put_key(data, path, given["value"], source)
+
+
+def put_key(data: dict[str, Any], path: str, value: Any, source: str) -> None:
+    """Put a value under the dotted ``path`` of nested tables. Raises InputError when that is none, or runs through a value."""
+    keys = [key.strip() for key in path.split(".")]
+    if not all(keys) or len(keys) > DEEPEST:
+        raise InputError([f"{source}: write it as key.path=value"])
     table = data
     for key in keys[:-1]:
         table = table.setdefault(key, {})
         if not isinstance(table, dict):
             raise InputError([f"{source}: {one_line(key, LONGEST_NAME)} is a value, not a table; check the key path"])
-    table[keys[-1]] = given["value"]
+    table[keys[-1]] = value
 
 
 def _without(data: Any, bad: set[tuple[int | str, ...]], place: tuple[str, ...] = ()) -> Any:

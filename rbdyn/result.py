@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.faults import InputError, bounded, read_text
 from rbdyn.records.record import Record, derived, json_fields, keyed
+from rbdyn.records.words import Brief, Figure, quantity
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,7 +68,7 @@ class SavedRecord(Record):
         return read_record(path, cls.FORMAT, cls.WHAT, cls.from_dict)
 
 
-class SimulationResult(SavedRecord):
+class SimulationResult(Brief, SavedRecord):
     """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input.
 
     ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of
@@ -105,12 +106,26 @@ class SimulationResult(SavedRecord):
     versions: dict[str, str]
     scene: dict[str, Any]
 
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """Figures with errors, by their key, which names the unit."""
+        figures = ((path[0], getattr(self, one.name)) for one, path in json_fields(self))
+        return {key: figure for key, figure in figures if isinstance(figure, Quantity)}
+
+    def brief(self) -> tuple[str, list[Figure]]:
+        """Status, replicates, seed and notes; the figures."""
+        figures = [
+            Figure(words, each.value, each.error, unit)
+            for key, each in self.quantities.items()
+            for words, unit in (quantity(key),)
+        ]
+        return f"{self.status}, {self.replicates} replicates, seed {self.seed}, {len(self.notes)} notes", figures
+
     def table(self) -> pd.DataFrame:
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 
-        figures = ((path[0], getattr(self, one.name)) for one, path in json_fields(self))
-        rows = {key: figure.as_dict() for key, figure in figures if isinstance(figure, Quantity)}
+        rows = {key: figure.as_dict() for key, figure in self.quantities.items()}
         return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
 
 

@@ -32,6 +32,12 @@ WIDEST = 64.0  # times the tolerances of the linear rule
 Tolerances = Mapping[str, float]
 
 
+def moved_by(part: Part, step: float) -> Part:
+    """The part with another nominal."""
+    nominal = round(part.nominal_mm + step, DIGITS)
+    return replace(part, nominal_mm=nominal, moved_mm=round(part.moved_mm + nominal - part.nominal_mm, DIGITS))
+
+
 @dataclass(frozen=True)
 class Allocation:
     """The search for tolerances of a checked chain."""
@@ -79,8 +85,7 @@ class Allocation:
                 if gone:
                     break
                 raise
-            place = next(place for place, part in enumerate(parts) if part.name == moved)
-            parts[place] = replace(parts[place], nominal_mm=round(parts[place].nominal_mm + step, DIGITS))
+            parts = [moved_by(part, step) if part.name == moved else part for part in parts]
             if moved not in self.function.arguments or abs(step) < SLACK:
                 return parts
             gone += abs(step)

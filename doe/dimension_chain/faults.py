@@ -9,24 +9,20 @@ from doe.dimension_chain.closing import NoValueError, is_part, press_fit_factor,
 from doe.dimension_chain.expressions import shown
 from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.iso286 import LARGEST, positioned
-from doe.dimension_chain.links import SLACK, Allocate, Chain, ClosingLink, Link
-from doe.dimension_chain.parts import coded_limits, has_deviations
+from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link
+from doe.dimension_chain.parts import coded_limits
 
 
 def faults(chain: Chain) -> list[str]:
     """All faults of a chain; empty if there is none."""
     used = _used(chain.link)
-    sentences = [fault for link in chain.link for fault in _link_faults(link, chain.allocate, link.name in used)]
+    sentences = [fault for link in chain.link for fault in _link_faults(link, chain, link.name in used)]
     lower, upper = chain.closing_link.lower_mm, chain.closing_link.upper_mm
     if lower >= upper:
         sentences.append(f"closing_link.lower_mm = {lower:g}: must be below upper_mm = {upper:g}; swap them")
     counts = Counter(link.name for link in chain.link)
     repeated = [name for name, count in counts.items() if count > 1]
     sentences += [f'link.name = "{name}": used {counts[name]} times; name each once' for name in repeated]
-    bare = [link.name for link in chain.free if not has_deviations(link)]
-    if bare and len(bare) < len(chain.free):
-        mend = "give all or none, or set fixed = true on those given"
-        sentences.append(f'link "{bare[0]}": no deviations, while other links that are not fixed have them; {mend}')
     sentences += _reference_faults(chain) + _selective_faults(chain)
     sentences += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient != 0])
     # The width that fixed links leave can only be told of a chain that is otherwise sound.
@@ -45,14 +41,15 @@ def _used(links: list[Link]) -> set[str]:
     return names
 
 
-def _link_faults(link: Link, rule: Allocate, used: bool) -> list[str]:
+def _link_faults(link: Link, chain: Chain, used: bool) -> list[str]:
     if not link.is_dimension:
         return _function_faults(link)
-    bare = not has_deviations(link) and link.lower_mm is None
+    rule = chain.allocate
+    bare = not link.has_deviations and link.lower_mm is None
     half = (link.upper_mm is None) != (link.lower_mm is None)
     lower, upper, mean = link.lower_mm or 0.0, link.upper_mm or 0.0, link.mean_mm
     shaped = link.distribution in ("uniform", "triangular")
-    free, iso = not link.fixed, rule.method == "iso286" or rule.grades
+    free, iso = link in chain.free, rule.method == "iso286" or rule.grades
     lettered = link.position not in ("unilateral", "symmetric")
     size, idle = f"nominal_mm = {link.nominal:g}", link.coefficient == 0 and not used
     large = free and rule.grades and link.nominal > LARGEST

@@ -7,11 +7,6 @@ from doe.dimension_chain.iso492 import SURFACES, ring_limits
 from doe.dimension_chain.links import DIGITS, Interval, Link, Part
 
 
-def has_deviations(link: Link) -> bool:
-    """Whether a link says how far it deviates; a growth by temperature always does."""
-    return link.thermal_growth is not None or link.fit is not None or link.upper_mm is not None
-
-
 def coded_limits(link: Link) -> Interval:
     """Lower and upper deviation, mm, of the link's ``fit``. Raises ValueError for an unknown code or size."""
     code = link.fit or ""

@@ -13,7 +13,7 @@ from doe.dimension_chain.faults import faults
 from doe.dimension_chain.intervals import interval, linear_interval
 from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part
 from doe.dimension_chain.monte_carlo import ALIKE, Assemblies, draw
-from doe.dimension_chain.parts import given_parts, has_deviations
+from doe.dimension_chain.parts import given_parts
 from doe.dimension_chain.selective_assembly import SelectiveAssembly, selective_assembly
 from doe.dimension_chain.yields import closing_moments, exact_shares, normal_yield, sampled_ppm, standard_error
 from rbdyn.faults import InputError
@@ -22,7 +22,7 @@ from rbdyn.records.record import Record, derived, keyed, outside_json
 # Shares below the quantiles: the median, 95 %, and the 99.73 % of plus and minus three standard deviations.
 QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
 # What is told of an allocated part.
-ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade")
+ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade", "moved_mm")
 
 
 class Linearisation(Record):
@@ -112,7 +112,7 @@ def solve(
 def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
     chain, function, limits = search.chain, search.function, search.chain.closing_link
     allocation = search.allocated()
-    given = all(has_deviations(link) for link in chain.free)
+    given = all(link.has_deviations for link in chain.free)
     parts = given_parts(chain.link) if given else allocation
     drawn = draw(function, parts, limits, samples=samples, seed=seed)
     mean, deviation = float(drawn.values.mean()), float(drawn.values.std())
@@ -186,7 +186,9 @@ def _cost(chain: Chain, allocation: Sequence[Part]) -> float | None:
 
 def _status(search: Allocation, parts: list[Part], allocation: list[Part], share: float, given: bool) -> str:
     if not given:
-        return "ok: deviations allocated"
+        rule = search.chain.allocate
+        units = ", in proportion to ISO 286's tolerance units (grades = true narrows them to its grades)"
+        return f"ok: deviations allocated{units if rule.method == 'iso286' and not rule.grades else ''}"
     if _kept(search, parts, share):
         return "ok"
     limits, mode, width = search.chain.closing_link, search.mode, search.chain.width_mm

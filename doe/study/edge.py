@@ -17,6 +17,7 @@ from doe.study.goals import goals_of, region_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
 from rbdyn.records.record import Record, derived, keyed, outside_json
+from rbdyn.records.words import improvement, quantity
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
@@ -29,7 +30,7 @@ class Outward(Record):
 
     ``gains`` by response: [improvement, its 95 % half-width] in units of the response over ``unit`` (a micrometre of a
     factor in millimetres, else one unit of the factor); the half-width is NaN where it is not known. ``source`` is
-    "surfaces" or "simulation".
+    "surfaces" or "simulation". ``goals``: what is wanted, by response; small unless told.
     """
 
     factor: str = outside_json()
@@ -38,6 +39,7 @@ class Outward(Record):
     unit: str = keyed("per")
     source: str
     gains: Mapping[str, tuple[float, float]] = outside_json()
+    goals: Mapping[str, str] = outside_json(default_factory=dict)
     gains_beyond: dict[str, dict[str, float | None]] = derived(
         lambda self: {name: {"value": gain, "error": or_none(error)} for name, (gain, error) in self.gains.items()},
         "gains",
@@ -46,9 +48,15 @@ class Outward(Record):
     @property
     def sentence(self) -> str:
         """In words."""
-        listed = ", ".join(f"{name} {gain:+.2g} ± {error:.2g}" for name, (gain, error) in self.gains.items())
-        where = f"{self.factor} lies at the {self.side} bound of the region, {self.bound:.4g}"
-        return f"{where}; gain to be had per {self.unit} beyond it by {self.source}: {listed}"
+        listed = ", ".join(
+            f"{name} {improvement(gain, error, self.goals.get(name, 'min'), quantity(name)[1])}"
+            for name, (gain, error) in self.gains.items()
+        )
+        at = f"{self.bound:.4g} {quantity(self.factor)[1]}".rstrip()
+        return (
+            f"{self.factor} lies at the {self.side} bound of the region, {at}; to be expected per {self.unit} beyond it by "
+            f"{self.source}: {listed}"
+        )
 
 
 class Edge(Record):
@@ -100,7 +108,9 @@ def edge_of(
         reach = region_of(study)[index] * study.step[index]
         bound = float(study.centre[index] + side * reach)
         per_unit = {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()}
-        outward.append(Outward(study.factors[index], "upper" if side > 0 else "lower", bound, unit, source, per_unit))
+        goals = {response.name: response.goal for response in study.file.response}
+        which = "upper" if side > 0 else "lower"
+        outward.append(Outward(study.factors[index], which, bound, unit, source, per_unit, goals))
     far = None if direct is None else share_at_edge(study, direct)
     return Edge(tuple(outward), share_at_edge(study, front), far)
 

@@ -18,8 +18,8 @@ class Factor(Strict):
 
     name: Name
     """Name of the factor in tables and messages."""
-    key: Annotated[str, Field(min_length=3)]
-    """Its key in the scene, such as cage.pocket_clearance_mm."""
+    key: Annotated[str, Field(min_length=3)] = ""
+    """Its key in the scene, such as cage.pocket_clearance_mm; needed beside [scene]."""
     centre: Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
     """Value at coded 0."""
     step: Positive

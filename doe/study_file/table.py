@@ -5,7 +5,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,7 +48,8 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     header, rows = _fields(path)
     wanted, errors = [*factors, *responses], [f"{name}_error" for name in responses]
     faults = [
-        f"{path}: column {_cut(name)} is missing; add it, or rename the factor or response in {named_in}"
+        f"{path}: column {_cut(name)} is missing; add it, or rename the factor or response in {named_in} to one of "
+        f"{listed(header)}"
         for name in wanted
         if name not in header
     ]
@@ -69,6 +70,19 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
         replicates=np.asarray(columns.get(COUNT, np.zeros(size)), np.int64),
         block=np.asarray(columns.get("block", np.zeros(size)), np.int64),
     )
+
+
+def columns_of(path: Path) -> dict[str, bool]:
+    """Names of the columns of a table, and whether all in it are numbers. Raises InputError."""
+    header, rows = _fields(path)
+    return {
+        name: all(NUMBER.fullmatch(row[place].strip()) for row in rows) for place, name in enumerate(header) if name
+    }
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names of columns for a message."""
+    return ", ".join(one_line(name, LONGEST_NAME) for name in names)
 
 
 def _fields(path: Path) -> tuple[list[str], list[list[str]]]:

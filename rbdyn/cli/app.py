@@ -28,6 +28,7 @@ from rbdyn.cli.options import (
     flag,
     folder_option,
     study_flag,
+    valued,
     verbose_flag,
 )
 from rbdyn.cli.terminal import (
@@ -72,9 +73,10 @@ def simulate(
     workers: Workers = None,
     target: Annotated[
         str | None,
-        typer.Option(
-            metavar="2%",
-            help="Choose tolerance, turns and replicates so that impact, whirl and loss are known to this.",
+        valued(
+            "2%",
+            "Choose tolerance, turns and replicates so that impact, whirl and loss are known to this.",
+            "those given",
         ),
     ] = None,
     out: Out = None,
@@ -105,18 +107,15 @@ def accuracy(
     slices: Annotated[bool, study_flag("--slices", "Slices of a profiled roller")] = False,
     replicates: Annotated[bool, study_flag("--replicates", "Statistical error against run time")] = False,
     coverage: Annotated[bool, study_flag("--coverage", "How often the stated intervals hold the truth")] = False,
-    repeats: Annotated[int | None, count_option(2, "Repeats of the coverage; 200 unless given.")] = None,
+    repeats: Annotated[int | None, count_option(2, "Repeats of the coverage.", 200)] = None,
     options: Annotated[bool, study_flag("--options", "What each option costs")] = False,
     stability: Annotated[bool, study_flag("--stability", "How stiff and extreme variants of the scene end")] = False,
     scaling: Annotated[bool, study_flag("--scaling", "Time by rollers and slices, memory by turns")] = False,
     battery: Annotated[bool, study_flag("--battery", "Solvers over thousands of random ball bearings")] = False,
-    scenes: Annotated[int | None, count_option(1, "Scenes of the battery; 5000 unless given.")] = None,
-    trajectory: Annotated[
-        float | None, typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25.")
-    ] = None,
+    scenes: Annotated[int | None, count_option(1, "Scenes of the battery.", 5000)] = None,
+    trajectory: Annotated[float | None, valued("TURNS", "Length of the trajectories, up to 1 turn.", "0.25")] = None,
     sought: Annotated[
-        float | None,
-        typer.Option("--sought-percent", min=0.01, max=50.0, help="Bias of an output that counts; by default 1 %."),
+        float | None, valued("%", "Bias of an output that counts.", "1", "--sought-percent", min=0.01, max=50.0)
     ] = None,
     page: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Measure the shipped examples and write one page of Markdown.")
@@ -335,8 +334,8 @@ def _print_target(target: dict[str, Any]) -> None:
 @app.command()
 def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
-    out: Annotated[Path | None, folder_option("Write here; by default in 'show' beside the result.")] = None,
-    turns: Annotated[float | None, typer.Option(help="Counted shaft turns to show; at most 20 unless given.")] = None,
+    out: Annotated[Path | None, folder_option("Write here.", "'show' beside the result")] = None,
+    turns: Annotated[float | None, valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
     replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, flag("--animate", says="Also a moving picture and a player.")] = False,
     lyapunov: Annotated[bool, flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,

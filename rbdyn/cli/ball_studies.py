@@ -129,13 +129,21 @@ def _single(scene: BallScene, option: str) -> SingleRowScene:
 
 
 def run(
-    scene: BallScene, name: str, value: str, wanted: float, out: Path | None, source: Path, as_json: bool, quiet: bool
+    scene: BallScene,
+    name: str,
+    value: str,
+    wanted: float,
+    seed: int,
+    out: Path | None,
+    source: Path,
+    as_json: bool,
+    quiet: bool,
 ) -> int:
     """Carry out the study ``name`` over ``value``, print and write it; returns the exit code. Raises InputError."""
     folder, files = output_folder(out, "rbdyn ball", source) if out else None, [f"{name}.json"]
     table: SweepResult | None = None
     if name == "race_limits":
-        record = race_limits(scene, value, wanted)
+        record = race_limits(scene, value, wanted, seed)
     else:
         record, table = optimum_study(scene, name, axis_values(value, f"--{name}"))
     if folder:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,9 +24,9 @@ SHOWN_ORDERS = 30.0
 def _guide_circle(axis: Axes, history: History) -> None:
     clearance = history.scene.guide_clearance_m
     if clearance is not None:
-        angle, radius = np.linspace(0.0, 2.0 * np.pi, 361), clearance * 1e6
-        line: dict[str, Any] = {"color": GREY, "linewidth": 0.9, "label": "guide clearance"}
-        axis.plot(radius * np.cos(angle), radius * np.sin(angle), "--", **line)
+        angle = np.linspace(0.0, 2.0 * np.pi, 361)
+        x, y = clearance * 1e6 * np.cos(angle), clearance * 1e6 * np.sin(angle)
+        axis.plot(x, y, "--", color=GREY, linewidth=0.9, label="half of the diametral guide clearance")
 
 
 def _plane(axis: Axes) -> None:
@@ -49,7 +49,10 @@ def cage_orbit(histories: Mapping[str, History], path: Path) -> None:
         _guide_circle(column[0], history)
         column[0].set_title(title)
         column[1].set_title("enlarged")
-    axes[0][0].legend(loc="upper right", fontsize=8)
+    # Below the figure, where no orbit runs.
+    figure.legend(
+        *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=3, fontsize=8
+    )
     save(figure, path)
 
 

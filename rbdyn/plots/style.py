@@ -38,7 +38,8 @@ def plain(axis: Axes) -> None:
 def save(figure: Figure, path: Path) -> None:
     """Fit the labels, write the file, let go of the figure."""
     figure.tight_layout()
-    figure.savefig(path, dpi=130)
+    # What stands outside the axes, such as a legend, needs a page fitted to it.
+    figure.savefig(path, dpi=130, bbox_inches="tight" if figure.legends else None)
     plt.close(figure)
 
 

@@ -17,6 +17,7 @@ from rbdyn.quasistatic.fatigue import solution_life, turning_rings
 from rbdyn.quasistatic.remarks import Rating, needed_friction
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.records.record import Record, outside_json, spread
+from rbdyn.records.words import Brief, Figure
 from rbdyn.result import SavedRecord
 from rbdyn.scene.ball import BallScene
 
@@ -59,7 +60,7 @@ class DoubleDeckerReport(Record):
     outer: RowReport
 
 
-class BallResult(SavedRecord, kw_only=True):
+class BallResult(Brief, SavedRecord, kw_only=True):
     """Equilibrium of a ball bearing, ``scene`` the resolved input; ``status``: "ok", or why there is none.
 
     ``report``: what was found, None where nothing was. ``ring_growth_um``, ``fits``: where the scene asks for growth or tells
@@ -118,6 +119,20 @@ class BallResult(SavedRecord, kw_only=True):
         """What was found of each row, by its name: "inner" and "outer", or "" for a single one. Raises ValueError as ``reached``."""
         report = self.reached
         return {"": report} if isinstance(report, RowReport) else {"inner": report.inner, "outer": report.outer}
+
+    def brief(self) -> tuple[str, list[Figure]]:
+        """Status and notes; of each row pressures, life and place, and the stiffness: exact figures of the model."""
+        figures = []
+        for name, row in self.row_reports.items() if self.report else ():
+            of_row = f"{name} row " if name else ""
+            figures += [
+                Figure(f"{of_row}pressure, {race} race", p, None, "MPa") for race, p in row.max_stress_MPa.items()
+            ]
+            figures.append(Figure(f"{of_row}life L10", row.life["L10_Mrev"], None, "million turns"))
+        for axis in "xyz" if self.report else "":
+            figures.append(Figure(f"displacement {axis}", 1e3 * self.reached.displacement_mm[axis], None, "µm"))
+            figures.append(Figure(f"stiffness {axis}", self.reached.stiffness[f"{axis}_N_per_um"], None, "N/µm"))
+        return f"{self.status}, {len(self.notes or ())} notes", figures
 
     def table(self) -> pd.DataFrame:
         """A row a ball: azimuth, angles, loads, centrifugal force, gyroscopic moment; units in the names."""

@@ -33,7 +33,18 @@ PROFILE_SLICES = 31
 
 
 class Scene(SceneFile):
-    """Everything a simulation of a cylindrical roller bearing needs. ``load`` of a ball bearing's file gives a BallScene."""
+    """Everything that decides a simulation of a cylindrical roller bearing, checked, with units in the names of the keys.
+
+    ``Scene.load("SCENE.toml")`` reads a file, ``Scene.from_dict(tables)`` or ``Scene(bearing={...}, cage={...}, ...)`` tables as
+    TOML gives them, ``scene.changed({"cage.mass_g": 50.0})`` is the scene with other values. Of a ball bearing all of them give a
+    BallScene. A scene never changes; ``scene.cage.mass_g`` reads a key. What is wrong is an InputError that names every key,
+    value and mend at once; ``rbdyn keys`` lists all keys. ``rbdyn.simulate(scene)`` runs it, ``rbdyn.history(scene, turns)`` gives
+    its motion, ``rbdyn.equilibrium(scene)`` is for balls.
+
+    bearing, cage, lubricant, operation : drawings, oil, speeds and loads; needed.
+    mounting, support : fits and temperatures, a flexible housing; none unless given.
+    materials, traction, model, numerics : with defaults.
+    """
 
     bearing: Bearing
     """The drawing of the bearing."""
@@ -157,6 +168,15 @@ class Scene(SceneFile):
                 f"bearing.tilt_mrad = {bearing.tilt_mrad:g}: even under {load:g} N a roller would touch over "
                 f"{touching * 1e3:.2g} mm of {bearing.effective_length_mm:g} mm; lessen the tilt"
             )
+
+    @property
+    def summary(self) -> str:
+        """The scene in a line; the clearance is as drawn."""
+        bearing, point = self.bearing, self.operation
+        return (
+            f"{bearing.rollers} rollers of {bearing.roller_diameter_mm:g} x {bearing.roller_length_mm:g} mm, diametral clearance "
+            f"{bearing.radial_clearance_mm:g} mm, {point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N radial"
+        )
 
     @property
     def mounted_clearance_mm(self) -> float:

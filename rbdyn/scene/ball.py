@@ -174,7 +174,7 @@ class BallMaterials(Strict):
 
 
 class BallScene(SceneFile):
-    """Everything the equilibrium of a ball bearing needs."""
+    """Everything the equilibrium of a ball bearing needs; made, checked, changed and read as ``Scene`` tells."""
 
     bearing: BallBearing | DoubleDecker
     """The drawing: one row, or two rows with a ring between."""
@@ -216,6 +216,18 @@ class BallScene(SceneFile):
         """The row on the inner ring and that in the outer ring: one and the same but in a double-decker bearing."""
         bearing = self.bearing
         return (bearing.inner, bearing.outer) if isinstance(bearing, DoubleDecker) else (bearing, bearing)
+
+    @property
+    def summary(self) -> str:
+        """The scene in a line."""
+        point, rows = (
+            self.operation,
+            dict.fromkeys(f"{row.balls} x {row.ball_diameter_mm:g} mm" for row in self.outermost_rows),
+        )
+        loads = ", ".join(
+            f"{key} = {value}" for key, value in point.model_dump(exclude_unset=True).items() if "load" in key
+        )
+        return f"{self.bearing.kind}, balls {' and '.join(rows)}, {point.inner_speed_rpm:g} rpm, {loads or 'no load'}"
 
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:

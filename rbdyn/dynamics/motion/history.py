@@ -13,6 +13,7 @@ from rbdyn.dynamics.forces.observe import OBSERVED, observe
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.dynamics.run import Run
+from rbdyn.records.words import Brief, Figure
 from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ BODIES = ("cage_x", "cage_y", "cage_angle", "cage_vx", "cage_vy", "cage_speed", 
 SEEN = ("outer_load", "inner_load", "pocket_load", "outer_slip", "inner_slip", "outer_heat", "inner_heat")
 
 
-@dataclass(frozen=True)
-class History:
+@dataclass(frozen=True, repr=False)
+class History(Brief):
     """Samples at equal intervals after the discarded turns. Arrays over (samples,) or (samples, rollers); SI.
 
     ``azimuth``: of the rollers from the load direction [rad], growing without bound; ``pocket_load``: contact and
@@ -67,6 +68,18 @@ class History:
         if self.scene.cage.guidance == "inner":
             return self.cage_x - self.ring_x, self.cage_y - self.ring_y
         return self.cage_x - self.outer_x, self.cage_y - self.outer_y
+
+    def brief(self) -> tuple[str, list[Figure]]:
+        """Samples and turns; extremes of forces and of the cage's place, and its mean speed."""
+        x, y = self.guide_eccentricity
+        figures = [
+            Figure("largest pocket force", float(np.abs(self.pocket_load).max(initial=0.0)), None, "N"),
+            Figure("largest race load", float(self.inner_load.max(initial=0.0)), None, "N"),
+            Figure("largest cage eccentricity", 1e6 * float(np.hypot(x, y).max(initial=0.0)), None, "µm"),
+            Figure("mean cage speed", float(self.cage_speed.mean()) * 30.0 / np.pi, None, "rpm"),
+        ]
+        turns = np.ptp(self.time) / self.scene.turn_s
+        return f"{len(self.time)} samples over {turns:.3g} shaft turns of one replicate", figures
 
     def life(self) -> ReferenceLife:
         """Reference rating life of ISO/TS 16281 from the loads of this history."""
