@@ -43,14 +43,15 @@ DIRECT_SEEDS = 2_000_000
 # Of a motion that goes into a report.
 ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
+# Factors of each run by name; None for runs that are no design runs.
+Factors = Sequence[Mapping[str, float]] | None
+
 
 def check_responses(study: Study) -> None:
     """Raises InputError for a response that the simulation does not give."""
-    refuse(
-        f"{study.path}: response.name = {name!r}: the simulation does not give it; choose one of {', '.join(RESPONSES)}"
-        for name in study.responses
-        if name not in RESPONSES
-    )
+    mend = f"the simulation does not give it; choose one of {', '.join(RESPONSES)}"
+    alien = [name for name in study.responses if name not in RESPONSES]
+    refuse(f"{study.path}: response.name = {name!r}: {mend}" for name in alien)
 
 
 def read_scene(study: Study) -> dict[str, Any]:
@@ -146,11 +147,7 @@ class Simulations:
     progress: Callable[[str], Progress]
 
     def run(
-        self,
-        scenes: Sequence[Scene],
-        labels: Sequence[str],
-        progress: Progress,
-        factors: Sequence[Mapping[str, float]] | None = None,
+        self, scenes: Sequence[Scene], labels: Sequence[str], progress: Progress, factors: Factors = None
     ) -> list[SimulationResult | Failure]:
         """Results or failures of scenes, in their order, from the store or simulated.
 
@@ -168,9 +165,7 @@ class Simulations:
         return [_result(point, outcomes[point.key]) for point in points]
 
 
-def points_of(
-    scenes: Sequence[Scene], labels: Sequence[str], factors: Sequence[Mapping[str, float]] | None = None
-) -> list[Point]:
+def points_of(scenes: Sequence[Scene], labels: Sequence[str], factors: Factors = None) -> list[Point]:
     """Scenes as points of the store; those with factors are design runs, numbered from 1."""
     version = code_version(SIMULATION)
     keys = [run_key(scene.model_dump(mode="json"), version) for scene in scenes]

@@ -14,7 +14,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, middle
+from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, is_part, middle
 from doe.dimension_chain.cost import cheapest
 from doe.dimension_chain.intervals import interval, total
 from doe.dimension_chain.iso286 import grade_tolerances, tolerance_unit
@@ -61,13 +61,12 @@ class Allocation:
         Raises ValueError where no nominal of that part brings the closing link to its limits.
         """
         by_name = {link.name: link for link in self.chain.link}
-        parts = [
-            allocated_part(link, tolerances[link.name], (grades or {}).get(link.name))
-            if link.name in tolerances
-            else given_part(link, by_name)
-            for link in self.chain.link
-            if link.is_dimension or link.thermal_growth
-        ]
+        parts = []
+        for name, link in by_name.items():
+            if name in tolerances:
+                parts.append(allocated_part(link, tolerances[name], (grades or {}).get(name)))
+            elif is_part(link):
+                parts.append(given_part(link, by_name))
         moved, gone = self.adjusted.name, 0.0
         # One step is exact unless a function uses the part that is moved; then these are steps of Newton.
         for _ in range(NEWTON_STEPS):

@@ -102,22 +102,17 @@ def _reference_faults(chain: Chain) -> list[str]:
     sentences = []
     before: dict[str, Link] = {}
     for link in chain.link:
+        where = f'link "{link.name}"'
         if _sentence(partial(used_links, link)) is None:
-            names = used_links(link)
-            sentences += [
-                f'link "{link.name}": uses "{name}", which no link before it is called; name one of '
-                f"{', '.join(before) or 'those placed before it'}"
-                for name in names
-                if name not in before
-            ]
+            mend = f"name one of {', '.join(before) or 'those placed before it'}"
+            unknown = [name for name in used_links(link) if name not in before]
+            sentences += [f'{where}: uses "{name}", which no link before it is called; {mend}' for name in unknown]
             grown = link.thermal_growth and before.get(link.thermal_growth.of)
             if grown and not (grown.is_dimension and grown.nominal > 0):
-                sentences.append(
-                    f'link "{link.name}": thermal_growth.of = "{grown.name}": must be a positive dimension'
-                )
+                sentences.append(f'{where}: thermal_growth.of = "{grown.name}": must be a positive dimension')
         bore = link.press_fit and before.get(link.press_fit.bore)
         if link.press_fit and bore and (wrong := _sentence(partial(press_fit_factor, link.press_fit, bore.nominal))):
-            sentences.append(f'link "{link.name}": press_fit: {wrong}')
+            sentences.append(f"{where}: press_fit: {wrong}")
         before.setdefault(link.name, link)
     return sentences
 
@@ -158,25 +153,22 @@ def _room_faults(chain: Chain) -> list[str]:
         share, target = search.sure_yield(bare), chain.allocate.target_yield
         if share < target:
             low, high = search.tails(bare)
-            return [
-                f"allocate.target_yield = {target:g}: the fixed links alone give {share:.4g}; narrow or unfix one, or "
-                f"widen the limits: {_nearest(limits, high - low)}"
-            ]
+            short = f"allocate.target_yield = {target:g}: the fixed links alone give {share:.4g}"
+            return [f"{short}; {_nearest(limits, high - low)}"]
     else:
         low, high = interval(search.function, bare, chain.allocate.mode)
         consumed = high - low
         if consumed > SLACK and width <= consumed + SLACK:
-            return [
-                f"link.fixed = true: the fixed links consume {consumed:.4f} mm of the closing link's {width:.4f} "
-                f"mm; narrow or unfix one, or widen the limits: {_nearest(limits, consumed)}"
-            ]
+            short = f"the fixed links consume {consumed:.4f} mm of the closing link's {width:.4f} mm"
+            return [f"link.fixed = true: {short}; {_nearest(limits, consumed)}"]
     tight = _sentence(search.linear_rule)
     return [f'allocate.method = "{chain.allocate.method}": {tight}'] if tight else []
 
 
 def _nearest(limits: ClosingLink, width: float) -> str:
     middle = (limits.lower_mm + limits.upper_mm) / 2
-    return f"the nearest that can be met are wider than {middle - width / 2:.4f} to {middle + width / 2:.4f} mm"
+    nearest = f"wider than {middle - width / 2:.4f} to {middle + width / 2:.4f} mm"
+    return f"narrow or unfix one, or widen the limits: the nearest that can be met are {nearest}"
 
 
 def _sentence(attempt: Callable[[], object]) -> str | None:

@@ -129,17 +129,12 @@ def _named(study: Study, goals: Goals, actual: Callable[[Array], Array], after: 
     try:
         yield
     except InfeasibleError as error:
-        missed = [
-            f"{study.responses[index]} {sense} {limit:g} by {by:.4g}"
-            for (index, sense, limit), by in zip(goals.limited, error.violations.tolist(), strict=True)
-            if by > 0.0
-        ]
+        by_limit = zip(goals.limited, error.violations.tolist(), strict=True)
+        broken = [(study.responses[index], sense, limit, by) for (index, sense, limit), by in by_limit if by > 0.0]
+        missed = " and ".join(f"{name} {sense} {limit:g} by {by:.4g}" for name, sense, limit, by in broken)
         where = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(actual(error.point)).items())
-        raise InputError(
-            [
-                f"{study.path}: response.lower, response.upper: no point of the region keeps all limits{after}; the "
-                f"closest ({where}) misses {' and '.join(missed)}; loosen a limit or widen the design"
-            ]
-        ) from None
+        none = f"no point of the region keeps all limits{after}; the closest ({where}) misses {missed}"
+        mend = "loosen a limit or widen the design"
+        raise InputError([f"{study.path}: response.lower, response.upper: {none}; {mend}"]) from None
     except ValueError as error:
         raise InputError([f"{study.path}: front{after}: {error}"]) from None
