@@ -79,17 +79,25 @@ def design_scenes(study: Study, points: Array, order: Sequence[int] | None = Non
 
     ``order``: place of each run in the standard order, which sets its seed; as given unless told.
     """
-    data, first, overrides = read_scene(study), study.file.design.seed, study.file.scene.set
+    data, first = read_scene(study), study.file.design.seed
     places = range(len(points)) if order is None else order
-    numbered = zip(places, points, strict=True)
-    return [scene_at(study, data, point, first + place, overrides) for place, point in numbered]
+    return [
+        scene_at(study, data, point, first + place, study.file.scene.set)
+        for place, point in zip(places, points, strict=True)
+    ]
 
 
 def confirmation_scene(study: Study, point: Array) -> Scene:
     """Scene of a confirmation run: more replicates, fresh seeds."""
-    settings, seed = study.file.confirmation, study.file.design.seed + CONFIRMATION_SEEDS
-    effort = [f"numerics.replicates={settings.replicates}", "numerics.companion=true"]
-    return scene_at(study, read_scene(study), point, seed, [*study.file.scene.set, *effort, *settings.set])
+    confirmation = study.file.confirmation
+    overrides = [
+        *study.file.scene.set,
+        f"numerics.replicates={confirmation.replicates}",
+        "numerics.companion=true",
+        *confirmation.set,
+    ]
+    seed = study.file.design.seed + CONFIRMATION_SEEDS
+    return scene_at(study, read_scene(study), point, seed, overrides)
 
 
 def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:

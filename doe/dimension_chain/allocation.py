@@ -78,8 +78,10 @@ class Allocation:
                 if gone:
                     break
                 raise
-            place = next(place for place, part in enumerate(parts) if part.name == moved)
-            parts[place] = replace(parts[place], nominal_mm=round(parts[place].nominal_mm + step, DIGITS))
+            parts = [
+                replace(part, nominal_mm=round(part.nominal_mm + step, DIGITS)) if part.name == moved else part
+                for part in parts
+            ]
             if moved not in self.function.arguments or abs(step) < SLACK:
                 return parts
             gone += abs(step)

@@ -16,22 +16,24 @@ from doe.dimension_chain.parts import coded_limits, has_deviations
 def faults(chain: Chain) -> list[str]:
     """All faults of a chain; empty if there is none."""
     used = _used(chain.link)
-    sentences = [fault for link in chain.link for fault in _link_faults(link, chain.allocate, link.name in used)]
+    found = [fault for link in chain.link for fault in _link_faults(link, chain.allocate, link.name in used)]
     lower, upper = chain.closing_link.lower_mm, chain.closing_link.upper_mm
     if lower >= upper:
-        sentences.append(f"closing_link.lower_mm = {lower:g}: must be below upper_mm = {upper:g}; swap them")
+        found.append(f"closing_link.lower_mm = {lower:g}: must be below upper_mm = {upper:g}; swap them")
     counts = Counter(link.name for link in chain.link)
     repeated = [name for name, count in counts.items() if count > 1]
-    sentences += [f'link.name = "{name}": used {counts[name]} times; name each once' for name in repeated]
+    found += [f'link.name = "{name}": used {counts[name]} times; name each once' for name in repeated]
     bare = [link.name for link in chain.free if not has_deviations(link)]
     if bare and len(bare) < len(chain.free):
-        mend = "give all or none, or set fixed = true on those given"
-        sentences.append(f'link "{bare[0]}": no deviations, while other links that are not fixed have them; {mend}')
-    sentences += _reference_faults(chain) + _selective_faults(chain)
-    sentences += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient != 0])
+        found.append(
+            f'link "{bare[0]}": no deviations, while other links that are not fixed have them; give all or '
+            "none, or set fixed = true on those given"
+        )
+    found += _reference_faults(chain) + _selective_faults(chain)
+    found += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient != 0])
     # The width that fixed links leave can only be told of a chain that is otherwise sound.
     try:
-        return sentences or _room_faults(chain)
+        return found or _room_faults(chain)
     except NoValueError as error:
         return [str(error)]
 

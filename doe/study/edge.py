@@ -47,8 +47,10 @@ class Outward(Record):
     def sentence(self) -> str:
         """In words."""
         listed = ", ".join(f"{name} {gain:+.2g} ± {error:.2g}" for name, (gain, error) in self.gains.items())
-        where = f"{self.factor} lies at the {self.side} bound of the region, {self.bound:.4g}"
-        return f"{where}; gain to be had per {self.unit} beyond it by {self.source}: {listed}"
+        return (
+            f"{self.factor} lies at the {self.side} bound of the region, {self.bound:.4g}; gain to be had per {self.unit} "
+            f"beyond it by {self.source}: {listed}"
+        )
 
 
 class Edge(Record):
@@ -98,9 +100,16 @@ def edge_of(
             gains, source = _on_surfaces(study, surfaces, pick.point, index, side), "the surfaces"
         unit, scale = _unit(study, index)
         reach = region_of(study)[index] * study.step[index]
-        bound = float(study.centre[index] + side * reach)
-        per_unit = {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()}
-        outward.append(Outward(study.factors[index], "upper" if side > 0 else "lower", bound, unit, source, per_unit))
+        outward.append(
+            Outward(
+                study.factors[index],
+                "upper" if side > 0 else "lower",
+                float(study.centre[index] + side * reach),
+                unit,
+                source,
+                {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()},
+            )
+        )
     far = None if direct is None else share_at_edge(study, direct)
     return Edge(tuple(outward), share_at_edge(study, front), far)
 

@@ -62,13 +62,13 @@ def find_front(
         )
 
     with _named(study, goals, lambda point: point, ""):
-        pareto = _backed_off(study, plain, failed)
-    pareto = replace(pareto, uncertainty=_uncertainty(study, surfaces, pareto))
+        found = _backed_off(study, plain, failed)
+    found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
     if box is None:
-        return pareto
+        return found
     with _named(study, goals, study.actual, " after manufacture"):
-        aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, pareto, box, doubt(share)), failed)
-    return replace(pareto, tolerance_aware=aware)
+        aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt(share)), failed)
+    return replace(found, tolerance_aware=aware)
 
 
 def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> Found:
