@@ -23,6 +23,7 @@ CHUNK = 1 << 14  # assemblies: a handful of columns of them stays in the second-
 RARE = 0.3  # share within the limits below which drawing again would last too long
 ALIKE: tuple[Distribution, ...] = ("normal", "truncated_normal", "uniform")  # laws for all parts alike
 
+Drawn = dict[Distribution, tuple[Array, float, float]]
 Laws = dict[str, Distribution | None]  # by key; None: each part's own
 
 
@@ -110,13 +111,11 @@ def _closing(
     return sums
 
 
-def _drawn(
-    part: Part, laws: set[Distribution], generator: np.random.Generator, count: int
-) -> dict[Distribution, tuple[Array, float, float]]:
+def _drawn(part: Part, laws: set[Distribution], generator: np.random.Generator, count: int) -> Drawn:
     """For each law random numbers and the scale and shift, mm, that make deviations from the nominal of them."""
     if part.tolerance_mm == 0:
         return dict.fromkeys(laws, (np.zeros(count), 0.0, part.lower_mm))
-    drawn: dict[Distribution, tuple[Array, float, float]] = {}
+    drawn: Drawn = {}
     if laws & {"normal", "truncated_normal"}:
         normal = generator.standard_normal(count)
         drawn["normal"] = (normal, part.sigma_mm, part.mean_mm)

@@ -85,9 +85,7 @@ class ChainResult(Record):
         return self.status.startswith("refused")
 
 
-def solve(
-    chain: Chain, *, samples: int | None = None, seed: int | None = None, source: str | None = None
-) -> ChainResult:
+def solve(chain: Chain, *, samples: int | None = None, seed: int | None = None, source: str = "") -> ChainResult:
     """Intervals, yield, contributions and allocation of a chain.
 
     A chain without deviations is judged with the allocated ones (status "ok: deviations allocated"). A chain
@@ -198,10 +196,9 @@ def _status(search: Allocation, parts: list[Part], allocation: list[Part], share
     kind = "RSS" if mode == "rss" else "worst-case"
     wanted = f" where a yield of {search.chain.allocate.target_yield:g} is wanted" if mode == "yield" else ""
     why = f"{kind} tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g}{wanted}"
-    return (
-        f"refused: the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm where "
-        f"{limits.lower_mm:.4f} to {limits.upper_mm:.4f} mm is allowed ({why}); the nearest that fits is {nearest}"
-    )
+    put = f"the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm"
+    allowed = f"{limits.lower_mm:.4f} to {limits.upper_mm:.4f} mm is allowed"
+    return f"refused: {put} where {allowed} ({why}); the nearest that fits is {nearest}"
 
 
 def _kept(search: Allocation, parts: list[Part], share: float) -> bool:

@@ -27,6 +27,10 @@ class Judged(NamedTuple):
     violations: Array
 
 
+Judge = Callable[[Array], Judged]
+History = list[tuple[Array, Judged]]  # points of each generation and what they are judged
+
+
 class InfeasibleError(ValueError):
     """No point keeps all limits. ``point`` comes closest and breaks limit c by ``violations`` (c,)."""
 
@@ -43,9 +47,7 @@ class Search(NamedTuple):
     feasible: float
 
 
-def search(
-    judge: Callable[[Array], Judged], low: Array, high: Array, population: int, generations: int, seed: int
-) -> Search:
+def search(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> Search:
     """NSGA-II over a box, with the archive of all evaluations after every generation.
 
     Raises InfeasibleError when no point evaluated keeps all limits.
@@ -82,15 +84,12 @@ def _scale(violations: Array) -> Array:
     return np.where(largest > 0.0, largest, 1.0)
 
 
-def _evolve(
-    judge: Callable[[Array], Judged], low: Array, high: Array, population: int, generations: int, seed: int
-) -> list[tuple[Array, Judged]]:
-    """Points of each generation and what was found of them."""
+def _evolve(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> History:
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem
     from pymoo.optimize import minimize
 
-    history: list[tuple[Array, Judged]] = []
+    history: History = []
     # The scale of the violations is that of points all over the box.
     sample = judge(np.random.default_rng(seed).uniform(low, high, (population, low.size)))
     scale = _scale(sample.violations)

@@ -16,7 +16,7 @@ from scipy import stats
 
 from doe.arrays import Array, Whole
 from doe.designs.design import replicate_groups
-from doe.designs.model import needed
+from doe.designs.model import Terms, needed
 from doe.response_surface.diagnostics import press
 from doe.response_surface.least_squares import LeastSquares
 
@@ -53,16 +53,14 @@ def row(source: str, ss: float | None, df: int, error: float | None = None, erro
     return AnovaRow(source=source, ss=ss, df=df, ms=mean_square, f=f, p=p)
 
 
-def term_rows(terms: tuple[str, ...], solution: LeastSquares) -> list[AnovaRow]:
+def term_rows(terms: Terms, solution: LeastSquares) -> list[AnovaRow]:
     """Partial sum of squares, F and p of each coefficient."""
     count = len(terms)
     squares = (solution.coefficients[:count] ** 2 / np.diag(solution.inverse)[:count]).tolist()
     return [row(term, ss, 1, solution.mean_square, solution.dof) for term, ss in zip(terms, squares, strict=True)]
 
 
-def anova(
-    terms: tuple[str, ...], solution: LeastSquares, response: Array, points: Array, block: Whole
-) -> list[AnovaRow]:
+def anova(terms: Terms, solution: LeastSquares, response: Array, points: Array, block: Whole) -> list[AnovaRow]:
     """The table: model, terms, blocks if any, residual, lack of fit, pure error, total.
 
     ``solution`` is of the columns of ``terms`` followed by those that tell the blocks apart.
@@ -140,9 +138,7 @@ def goodness(solution: LeastSquares, response: Array, predicted: Array, block: W
     }
 
 
-def eliminate(
-    terms: tuple[str, ...], solve_for: Callable[[tuple[str, ...]], LeastSquares]
-) -> tuple[tuple[str, ...], list[Removal]]:
+def eliminate(terms: Terms, solve_for: Callable[[Terms], LeastSquares]) -> tuple[Terms, list[Removal]]:
     """Terms left, and those removed in their order: the least significant goes, again and again, hierarchy kept.
 
     The term of largest p above `KEEP_BELOW` goes, except the constant and what a remaining interaction or

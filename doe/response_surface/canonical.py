@@ -12,7 +12,7 @@ from scipy import special
 
 from doe.arrays import Array
 from doe.designs import to_actual
-from doe.designs.model import model_matrix, second_order
+from doe.designs.model import Terms, model_matrix, second_order
 from doe.response_surface.data import Data
 
 FLAT = 1e-10  # curvature as a share of the largest coefficient below which it is rounding
@@ -47,7 +47,7 @@ class Canonical(TypedDict):
 
 
 def canonical(
-    terms: tuple[str, ...], coefficients: Array, covariance: Array, dof: int, data: Data
+    terms: Terms, coefficients: Array, covariance: Array, dof: int, data: Data
 ) -> tuple[StationaryPoint | None, Canonical | None]:
     """The single stationary point, None where a direction does not bend, and the canonical analysis of a surface fitted
     to ``data``, None without second-order terms."""
@@ -100,7 +100,7 @@ def _nature(eigenvalues: Array) -> Literal["minimum", "maximum", "saddle"]:
     return "minimum" if eigenvalues.min() > 0 else "maximum" if eigenvalues.max() < 0 else "saddle"
 
 
-def _errors(terms: tuple[str, ...], vectors: Array, covariance: Array, dof: int) -> Array:
+def _errors(terms: Terms, vectors: Array, covariance: Array, dof: int) -> Array:
     """Half widths: an eigenvalue v'Bv changes with the coefficient of x_i x_j by v_i v_j, to first order."""
     second = np.array([len(term) > 1 for term in terms])
     slopes = model_matrix(vectors.T, terms) * second

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from doe.arrays import Array, Rows, Whole
 from doe.designs.evaluation import block_contrasts
+from doe.designs.model import Terms
 from doe.response_surface.least_squares import dependent_columns
 
 
@@ -96,7 +97,7 @@ def check_errors(name: str, standard_errors: ArrayLike | None) -> None:
         raise ValueError(f'{name}: {given}, but weighting = "replicates" needs positive ones; {mend}')
 
 
-def check_matrix(name: str, model: str, terms: tuple[str, ...], matrix: Array) -> None:
+def check_matrix(name: str, model: str, terms: Terms, matrix: Array) -> None:
     """Raises ValueError when runs are too few for the columns, or cannot tell them apart.
 
     ``matrix`` (n, p) holds the columns of ``terms``, then those of the blocks.

@@ -19,7 +19,7 @@ from scipy import special
 
 from doe.arrays import Array, Rows
 from doe.designs.design import replicate_groups
-from doe.designs.model import MODELS, Model, in_actual_units, model_matrix, model_terms, second_order
+from doe.designs.model import MODELS, Model, Terms, in_actual_units, model_matrix, model_terms, second_order
 from doe.response_surface.anova import AnovaRow, Removal, anova, eliminate, find, goodness, observation_variance
 from doe.response_surface.box_cox import BoxCox, backward, box_cox, check_positive, forward, slope
 from doe.response_surface.canonical import Canonical, StationaryPoint, canonical
@@ -72,7 +72,7 @@ class Surface(Record):
     cv_percent: float | None
     adequate_precision: float | None
     stationary_point: StationaryPoint | None
-    terms: tuple[str, ...]
+    terms: Terms
     standard_errors: dict[str, float] = derived(lambda self: self._named(np.sqrt(np.diag(self.covariance))))
     inflation: dict[str, float | None] = derived(
         lambda self: {row["term"]: row["vif"] for row in self.coefficient_table() if row["term"] != "1"}, "vif"
@@ -203,7 +203,7 @@ def fit(
     data = checked(name, coded, values, centre, step, standard_errors, replicates, block)
     if weighting == "replicates":
         check_errors(name, standard_errors)
-    return _fit(name, data, model, weighting, "none" if transform is None else transform)
+    return _fit(name, data, model, weighting, "none" if transform is None else transform, advised=True)
 
 
 def _figures(surface: Surface, source: str, *keys: str) -> dict[str, Any]:
@@ -211,9 +211,7 @@ def _figures(surface: Surface, source: str, *keys: str) -> dict[str, Any]:
     return {key: row[key] for key in keys}
 
 
-def _fit(
-    name: str, data: Data, model: Model, weighting: Weighting, transform: Transform, advised: bool = True
-) -> Surface:
+def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: Transform, advised: bool) -> Surface:
     terms = model_terms(data.points.shape[1], model)
     check_matrix(name, model, terms, _columns(data, terms))
     if not np.ptp(data.values):
@@ -264,11 +262,11 @@ def _fit(
     )
 
 
-def _columns(data: Data, terms: tuple[str, ...]) -> Array:
+def _columns(data: Data, terms: Terms) -> Array:
     return np.hstack([model_matrix(data.points, terms), data.block_columns])
 
 
-def _exponent(name: str, data: Data, terms: tuple[str, ...], transform: Transform) -> float | None:
+def _exponent(name: str, data: Data, terms: Terms, transform: Transform) -> float | None:
     if transform == "none":
         return None
     check_positive(data.values, name)

@@ -45,8 +45,9 @@ def run_on_cluster(
                 # A result that went with its worker is made again on another.
                 if place in futures:
                     answers.put(place)
+                broken = place in futures and futures[place].status == "error"
                 alone_s = 0.0 if _workers(client) else alone_s + LOOK_S
-                if client.status != "running" or alone_s > DESERTED_S:
+                if broken or client.status != "running" or alone_s > DESERTED_S:
                     raise _gone(address, client) from None
                 continue
             except InputError:

@@ -37,7 +37,7 @@ class Chosen:
 
 
 def choose(
-    study: Study, surfaces: Sequence[Surface], on_surfaces: ParetoFront, direct: Direct | None, simulations: Simulations
+    study: Study, surfaces: Sequence[Surface], found: ParetoFront, direct: Direct | None, simulations: Simulations
 ) -> Chosen:
     """Simulate the pick; while a limit is not kept, back off by what was missed and simulate the next best point.
 
@@ -45,7 +45,7 @@ def choose(
     """
     tried: list[tuple[Confirmed, ParetoFront, DirectPick | None]] = []
     baseline: list[Confirmed] = []
-    front = on_surfaces
+    front = found
     while True:
         simulated = [*baseline, *(each for each, _, _ in tried)] if tried else []
         chosen = None if direct is None else direct_pick(study, surfaces, direct, simulated, len(tried))

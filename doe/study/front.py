@@ -62,13 +62,13 @@ def find_front(
         )
 
     with _named(study, goals, lambda point: point, ""):
-        pareto = _backed_off(study, plain, failed)
-    pareto = replace(pareto, uncertainty=_uncertainty(study, surfaces, pareto))
+        found = _backed_off(study, plain, failed)
+    found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
     if box is None:
-        return pareto
+        return found
     with _named(study, goals, study.actual, " after manufacture"):
-        aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, pareto, box, doubt(share)), failed)
-    return replace(pareto, tolerance_aware=aware)
+        aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt(share)), failed)
+    return replace(found, tolerance_aware=aware)
 
 
 def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> Found:
@@ -129,17 +129,12 @@ def _named(study: Study, goals: Goals, actual: Callable[[Array], Array], after: 
     try:
         yield
     except InfeasibleError as error:
-        missed = [
-            f"{study.responses[index]} {sense} {limit:g} by {by:.4g}"
-            for (index, sense, limit), by in zip(goals.limited, error.violations.tolist(), strict=True)
-            if by > 0.0
-        ]
+        by_limit = zip(goals.limited, error.violations.tolist(), strict=True)
+        broken = [(study.responses[index], sense, limit, by) for (index, sense, limit), by in by_limit if by > 0.0]
+        missed = " and ".join(f"{name} {sense} {limit:g} by {by:.4g}" for name, sense, limit, by in broken)
         where = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(actual(error.point)).items())
-        raise InputError(
-            [
-                f"{study.path}: response.lower, response.upper: no point of the region keeps all limits{after}; the "
-                f"closest ({where}) misses {' and '.join(missed)}; loosen a limit or widen the design"
-            ]
-        ) from None
+        none = f"no point of the region keeps all limits{after}; the closest ({where}) misses {missed}"
+        mend = "loosen a limit or widen the design"
+        raise InputError([f"{study.path}: response.lower, response.upper: {none}; {mend}"]) from None
     except ValueError as error:
         raise InputError([f"{study.path}: front{after}: {error}"]) from None

@@ -42,10 +42,9 @@ class Beside(Record):
         shown = {factor: effect for factor, effect in self.effects.items() if effect.theirs_significant}
         opposite = [factor for factor, effect in shown.items() if not effect.same_sign]
         signs = f"sign differs for {', '.join(opposite)}" if opposite else "all with our sign"
-        return (
-            f"{self.response}: our mean is {self.our_range[1] / self.their_range[1]:.2f} of theirs; of their "
-            f"{len(shown)} significant linear effects, {signs}; rank correlation {self.rank_correlation:+.2f}."
-        )
+        level = f"our mean is {self.our_range[1] / self.their_range[1]:.2f} of theirs"
+        effects = f"of their {len(shown)} significant linear effects, {signs}"
+        return f"{self.response}: {level}; {effects}; rank correlation {self.rank_correlation:+.2f}."
 
 
 def reference_runs(study: Study) -> Runs | None:

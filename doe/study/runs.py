@@ -76,13 +76,9 @@ def ordered_runs(study: Study) -> Ordered:
     clearance.check_responses(study)
     design = design_of(study)
     actual = study.actual(design.coded)
-    return Ordered(
-        design,
-        actual,
-        clearance.design_scenes(study, actual, design.order.tolist()),
-        [f"design run {run}" for run in range(1, len(actual) + 1)],
-        [study.by_factor(point) for point in actual],
-    )
+    scenes = clearance.design_scenes(study, actual, design.order.tolist())
+    labels = [f"design run {run}" for run in range(1, len(actual) + 1)]
+    return Ordered(design, actual, scenes, labels, [study.by_factor(point) for point in actual])
 
 
 def run_design(

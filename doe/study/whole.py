@@ -129,13 +129,13 @@ def run_study(
     clock.lap("design_s")
     surfaces = with_rivals(fit_surfaces(study, runs))
     clock.lap("fit_s")
-    front = find_front(study, surfaces)
+    found = find_front(study, surfaces)
     clock.lap("front_s")
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress)
-        searched = find_direct(study, front, simulations) if direct else None
+        searched = find_direct(study, found, simulations) if direct else None
         clock.lap("direct_s")
-        chosen = choose(study, surfaces, front, searched, simulations)
+        chosen = choose(study, surfaces, found, searched, simulations)
         confirmed, at = chosen.confirmed, None if searched is None else searched.front.points
         edge = edge_of(study, surfaces, confirmed["pick"], chosen.front.points, at, simulations if direct else None)
         clock.lap("confirmation_s")
