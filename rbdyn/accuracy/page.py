@@ -114,5 +114,5 @@ def _markdown(report: Report) -> str:
     for table in report.tables:
         rows = (table.header, ["---"] * len(table.header), *table.cells)
         lines = (f"| {' | '.join(each.replace('|', BAR) for each in row)} |" for row in rows)
-        tables.append("\n".join((f"{table.title}\n", *lines)))
+        tables.append("\n".join((f"**{table.title}**\n", *lines)))
     return "\n\n".join((*tables, *report.sentences))

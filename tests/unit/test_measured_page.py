@@ -79,7 +79,7 @@ def test_unit_tables_become_markdown(monkeypatch):
     asked = []
     monkeypatch.setattr(page, "study", lambda *given: asked.append(given) or report)
     line = f"rbdyn accuracy {ROOT}/examples/cylindrical_roller.toml --options --set numerics.turns=7"
-    assert page._run(line, None).endswith("one\n\n| a | b |\n| --- | --- |\n| 1\\|2 | 3 |\n\nSo it is.")
+    assert page._run(line, None).endswith("**one**\n\n| a | b |\n| --- | --- |\n| 1\\|2 | 3 |\n\nSo it is.")
     assert asked[0][0] == "options" and asked[0][1].numerics.turns == 7
 
 
