@@ -71,7 +71,7 @@ def _print_row(title: str, row: RowReport, verbose: bool) -> None:
     rows = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in row.balls]
     print_table(title, header, rows)
     print(
-        "ring: "
+        "ring (x along the radial load, z along the axis): "
         + ", ".join(f"{axis} {1e3 * place[axis]:.4g} um" for axis in "xyz")
         + ", "
         + ", ".join(f"tilt {axis} {tilt[axis]:.4g} mrad" for axis in "xy")

@@ -31,6 +31,7 @@ def _guide_circle(axis: Axes, history: History) -> None:
 
 def _plane(axis: Axes) -> None:
     axis.set_aspect("equal", adjustable="datalim")
+    axis.locator_params(nbins=6)
     axis.set_xlabel("cage centre, along the load [µm]")
     axis.set_ylabel("across [µm]")
     plain(axis)
