@@ -36,8 +36,8 @@ def change(gain: Mapping[str, Any]) -> str:
 
 
 def moved(part: Mapping[str, Any]) -> str:
-    """'by +0.0200' of a part whose nominal was moved, else nothing."""
-    return f"by {part['moved_mm']:+.4f}" if part.get("moved_mm") else ""
+    """'+0.0200' of a part whose nominal was moved, else nothing."""
+    return f"{part['moved_mm']:+.4f}" if part.get("moved_mm") else ""
 
 
 def dimension(part: Mapping[str, Any]) -> str:

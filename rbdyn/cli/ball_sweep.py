@@ -19,13 +19,13 @@ SHOWN = 8
 # Header and columns of the table: the larger of two columns; of a double-decker, those of both rows.
 HEADER = {
     "x [um]": ("x_mm",),
-    "z [um]": ("z_mm",),
+    "axial, z [um]": ("z_mm",),
     "inner angle": ("inner_angle_max_deg",),
     "outer angle": ("outer_angle_max_deg",),
     "largest load [N]": ("inner_load_max_N", "outer_load_max_N"),
     "pressure [MPa]": ("inner_pressure_MPa", "outer_pressure_MPa"),
     "stiffness x [N/um]": ("stiffness_x_N_per_um",),
-    "z": ("stiffness_z_N_per_um",),
+    "axial, z": ("stiffness_z_N_per_um",),
     "L10 [Mrev]": ("L10_Mrev",),
 }
 

@@ -31,6 +31,7 @@ def _guide_circle(axis: Axes, history: History) -> None:
 
 def _plane(axis: Axes) -> None:
     axis.set_aspect("equal", adjustable="datalim")
+    axis.locator_params(nbins=6)
     axis.set(xlabel="cage centre, along the load [µm]", ylabel="across [µm]")
     plain(axis)
 

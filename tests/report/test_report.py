@@ -7,6 +7,7 @@ import json
 import re
 from html.parser import HTMLParser
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -344,7 +345,8 @@ def test_pictures_keep_their_words_off_the_curves(monkeypatch, tmp_path):
     kept = {}
     monkeypatch.setattr(Figure, "savefig", lambda figure, path, **options: kept.update({path: figure}))
     orbit = SimpleNamespace(
-        guide_eccentricity=(np.arange(3.0), np.arange(3.0)), scene=SimpleNamespace(guide_clearance_m=1e-4)
+        guide_eccentricity=(np.linspace(-66e-6, -43e-6, 9), np.linspace(19e-6, 39e-6, 9)),
+        scene=SimpleNamespace(guide_clearance_m=75e-6),
     )
     cage_orbit({"baseline": orbit, "pick": orbit}, "orbit")
     figure = kept["orbit"]
@@ -352,6 +354,11 @@ def test_pictures_keep_their_words_off_the_curves(monkeypatch, tmp_path):
     (box,) = (legend.get_window_extent() for legend in figure.legends)
     assert not any(box.overlaps(axis.get_window_extent()) for axis in figure.axes)
     assert not any(axis.get_legend() for axis in figure.axes)
+    cage_orbit({"one": orbit}, "one")
+    kept["one"].canvas.draw()
+    for axis in [*figure.axes, *kept["one"].axes]:
+        boxes = [each.get_window_extent() for each in axis.get_xticklabels() if each.get_text()]
+        assert not any(one.overlaps(two.padded(18.0)) for one, two in pairwise(boxes))
     study = Study.load(EXAMPLES / "clearance_study.toml")
     response_surface(study, fit_surfaces(study, read_runs(study, EXAMPLES / "ccd_table4.csv"))[0], "surface")
     for axis, held in zip(kept["surface"].axes, ("pocket clearance 0.3 mm", "guide clearance 0.15 mm"), strict=True):

@@ -277,3 +277,21 @@ def test_without_scripts_tables_and_static_pictures_are_there(browser):
         assert not page.find_element("id", "surface").is_displayed()
     finally:
         driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+
+
+@pytest.mark.parametrize("width", [400, 1200])
+def test_wide_pictures_stay_legible(browser, width):
+    """Their smallest letters have 6 px at least: on a narrow page they scroll in a box of their own, and the page does not."""
+    page = opened(browser)
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        found = page.execute_script(
+            "return [...document.querySelectorAll('svg.wide')].map(each => [each.getBoundingClientRect().width"
+            " / each.viewBox.baseVal.width, each.parentElement.clientWidth, document.documentElement.scrollWidth])"
+        )
+    finally:
+        page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    assert len(found) >= 2
+    for scale, box, whole in found:
+        assert 10.0 * scale >= 6.0 and box <= whole <= width

@@ -20,7 +20,7 @@ def print_chain(name: str, chain: ChainResult, quiet: bool = False, verbose: boo
     """Parts, contributions, closing link and yield of a dimension chain; verbosely also the yields by distribution."""
     told = {"ok": ": parts that would fill the limits, which the given ones keep"}.get(chain.status, "")
     title = f"dimension chain {name}" + (": the nearest parts that meet the limits" if chain.refused else told)
-    moved = [f"by {part.moved_mm:+.4f}" if part.moved_mm else "" for part in chain.allocation]
+    moved = [f"{part.moved_mm:+.4f}" if part.moved_mm else "" for part in chain.allocation]
     rows = [(part.name, part.text, part.grade or "", *([by] if any(moved) else []))
             for part, by in zip(chain.allocation, moved, strict=True)]  # fmt: skip
     print_table(title, ("part", "dimension [mm]", "grade", *(["nominal moved [mm]"] if any(moved) else [])), rows)
