@@ -3,8 +3,6 @@
 The only module of this package that runs bearing simulations.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import socket
@@ -231,7 +229,7 @@ def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point
     run_on_cluster(scheduler, work, tasks, lambda place, ran: give(taken[place], ran))
 
 
-def attempt(scene: Scene, stop: Stop | None = None) -> Ran:
+def attempt(scene: Scene, stop: "Stop | None" = None) -> Ran:
     """Simulate a scene in one thread; whatever is wrong with it is the cause of a failure."""
     from rbdyn.dynamics.ensemble import CancelledError
     from rbdyn.dynamics.simulate import simulate
@@ -270,7 +268,7 @@ def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array,
     return np.array(values), np.array(errors, dtype=float), behind
 
 
-def histories(study: Study, points: dict[str, Array], turns: float) -> dict[str, History]:
+def histories(study: Study, points: dict[str, Array], turns: float) -> "dict[str, History]":
     """Motion of the confirmation scene at each point, over at most ``turns`` shaft turns. Raises RunError."""
     from rbdyn.dynamics.motion.history import history
 
@@ -278,7 +276,7 @@ def histories(study: Study, points: dict[str, Array], turns: float) -> dict[str,
     return {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
 
 
-def draw_motion(motions: Mapping[str, History], folder: Path) -> list[str]:
+def draw_motion(motions: "Mapping[str, History]", folder: Path) -> list[str]:
     """Draw cage orbits and pocket forces; returns the names of the pictures."""
     from rbdyn import plots
 
@@ -287,7 +285,7 @@ def draw_motion(motions: Mapping[str, History], folder: Path) -> list[str]:
     return ["cage_orbit.png", "pocket_forces.png"]
 
 
-def motion_record(motions: Mapping[str, History]) -> dict[str, Any]:
+def motion_record(motions: "Mapping[str, History]") -> dict[str, Any]:
     """Motions small enough to be mailed, by name: the orbit of the cage in its guide, and frames to be played.
 
     Each holds ``t_s`` and ``cage_orbit_um`` {"x", "y"}: the whole motion, thinned to at most ORBIT_POINTS;

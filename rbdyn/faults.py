@@ -1,7 +1,5 @@
 """Faults in what a user typed: collected all at once, one sentence each, with file, key, value and mend."""
 
-from __future__ import annotations
-
 import difflib
 import math
 import re
@@ -40,7 +38,7 @@ class InputError(Exception):
         self.faults = [one_line(fault) for fault in listed]
         super().__init__("\n".join(self.faults))
 
-    def __reduce__(self) -> tuple[type[InputError], tuple[list[str]]]:
+    def __reduce__(self) -> "tuple[type[InputError], tuple[list[str]]]":
         """How it travels between processes: with its faults, not with their text."""
         return type(self), (self.faults,)
 

@@ -1,7 +1,5 @@
 """What a simulation returns: a frozen record that saves and loads itself as JSON."""
 
-from __future__ import annotations
-
 import functools
 import json
 import math
@@ -121,7 +119,7 @@ class SimulationResult(Brief, SavedRecord):
         ]
         return f"{self.status}, {self.replicates} replicates, seed {self.seed}, {len(self.notes)} notes", figures
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 

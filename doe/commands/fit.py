@@ -1,7 +1,5 @@
 """``doe fit``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -67,7 +65,7 @@ def fit(
         hand_over(lambda: record, as_json, lambda: print_fit(surfaces, quiet, verbose, loaded.factors))
 
 
-def _study(path: Path | None, data: Path | None, named: Mapping[str, Any]) -> Study:
+def _study(path: Path | None, data: Path | None, named: Mapping[str, Any]) -> "Study":
     """The study of the file; without one, of the table and what the command names of it. Raises InputError."""
     from doe.study_file import Study
     from doe.study_file.of_table import study_of_table

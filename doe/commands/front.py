@@ -1,7 +1,5 @@
 """``doe front``."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Annotated
 
 from doe.commands.options import Data, Direct, Out, Quiet, Retry, Scheduler, StudyPath
@@ -62,7 +60,7 @@ def front(
         hand_over(lambda: record, as_json, lambda: print_front(record, verbose))
 
 
-def _point(study: Study, text: str) -> list[float]:
+def _point(study: "Study", text: str) -> list[float]:
     """Factor values that ``--point`` names. Raises InputError with every fault."""
     from math import isfinite
 

@@ -1,7 +1,5 @@
 """``doe keys``."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from rbdyn.cli.keys import AsSchema, Word, run
@@ -18,7 +16,7 @@ def keys(word: Word = None, as_schema: AsSchema = False, as_json: Json = False) 
         run(kinds(), word, as_schema, as_json)
 
 
-def kinds() -> dict[str, type[BaseModel]]:
+def kinds() -> "dict[str, type[BaseModel]]":
     """The kinds of files that ``doe`` reads."""
     from doe.dimension_chain.links import Chain
     from doe.dimension_chain.reading import Chains

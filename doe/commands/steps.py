@@ -1,7 +1,5 @@
 """What the commands share: runs and surfaces of a study, and where a record goes."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
@@ -47,7 +45,7 @@ class Effort(NamedTuple):
     quiet: bool
 
 
-def fitted(study: Study, data: Path | None, effort: Effort) -> list[Surface]:
+def fitted(study: "Study", data: Path | None, effort: Effort) -> "list[Surface]":
     """Surfaces of a study, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
     from doe.study.runs import read_runs, run_design
     from doe.study.surfaces import fit_surfaces
@@ -59,7 +57,7 @@ def fitted(study: Study, data: Path | None, effort: Effort) -> list[Surface]:
         return fit_surfaces(study, run_design(study, folder, workers, progress, scheduler, retry))
 
 
-def searched(study: Study, found: ParetoFront, effort: Effort) -> Direct:
+def searched(study: "Study", found: "ParetoFront", effort: Effort) -> "Direct":
     """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
     from doe.clearance import Simulations
     from doe.running.store import Store

@@ -7,8 +7,6 @@ at the finalists, which alone are reported. Runs that chose a point say nothing 
 Sources: Deb et al. (2002) for NSGA-II; Hughes (2001) and Teich (2001) for dominance under noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -41,7 +39,7 @@ class Samples(NamedTuple):
         """Whether each point's run failed, (n,)."""
         return np.asarray(np.isnan(self.values).any(axis=1))
 
-    def rows(self, which: Any) -> Samples:
+    def rows(self, which: Any) -> "Samples":
         """Some of them."""
         return Samples(*(part[which] for part in self))
 

@@ -1,7 +1,5 @@
 """The runs that a surface is fitted to, and whether they can be."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +28,7 @@ class Data:
     centre: Array
     step: Array
 
-    def rows(self, rows: Rows) -> Data:
+    def rows(self, rows: Rows) -> "Data":
         """The runs of these rows alone."""
         errors = None if self.standard_errors is None else self.standard_errors[rows]
         per_run = self.points[rows], self.values[rows], errors, self.replicates[rows], self.block[rows]

@@ -7,8 +7,6 @@ as the pure error of a design without replicates, is None and never NaN.
 Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, Literal
@@ -125,7 +123,7 @@ class Surface(Record):
             return error
         return error / slope(self.predict(coded), self.transform)
 
-    def refit(self, rows: Rows) -> Surface:
+    def refit(self, rows: Rows) -> "Surface":
         """The same kind of surface through these runs alone. Raises ValueError when they do not suffice."""
         transform: Transform = "none" if self.transform is None else self.transform
         return _fit(self.name, self.data.rows(rows), self.model, self.weighting, transform, advised=False)

@@ -17,8 +17,6 @@ call never counts; what fails stays in the table. From Python::
 Names are fetched when first used: importing the package loads neither numba nor scipy.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -53,8 +51,8 @@ _HOMES = {
 
 
 def study(
-    name: str, scene: Scene | BallScene, progress: Callable[[int, int], None] | None = None, **options: Any
-) -> Report:
+    name: str, scene: "Scene | BallScene", progress: Callable[[int, int], None] | None = None, **options: Any
+) -> "Report":
     """Run the study ``name`` of ``STUDIES``; ``progress(done, total)`` is called as it goes on.
 
     Raises KeyError for an unknown name, InputError where the scene has nothing to study, RunError, KeyboardInterrupt.

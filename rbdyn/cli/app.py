@@ -1,7 +1,5 @@
 """The command ``rbdyn``: simulate, map, accuracy and show; ``ball``, ``new``, ``keys`` and ``manual`` stand beside."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -156,7 +154,7 @@ def accuracy(
         raise typer.Exit(FAILED)
 
 
-def _print_map(mapped: SlipMap) -> None:
+def _print_map(mapped: "SlipMap") -> None:
     header = ("load [N]", *(f"{value:g} rpm" for value in mapped.speeds_rpm))
     rows = [
         (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
@@ -166,7 +164,7 @@ def _print_map(mapped: SlipMap) -> None:
     print(f"{len(mapped.points)} points in {mapped.wall_s:.1f} s, seed {mapped.seed}")
 
 
-def _write_map(mapped: SlipMap, folder: Path) -> list[str]:
+def _write_map(mapped: "SlipMap", folder: Path) -> list[str]:
     """Write map.json, map.csv and map.png; returns the file names."""
     from rbdyn.plots.slip_map import draw
     from rbdyn.result import write_json
@@ -212,7 +210,7 @@ def slip_map(
         raise typer.Exit(FAILED)
 
 
-def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> Scene:
+def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> "Scene":
     """Scene of a roller bearing, with keys of [numerics] that have options of their own. Raises InputError for any other."""
     from rbdyn.scene import Scene, rollers_only
 
@@ -251,7 +249,7 @@ def _measure(page: Path | None, parts: list[str], others: bool, as_json: bool, q
         raise typer.Exit(FAILED)
 
 
-def _write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
+def _write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str]:
     from rbdyn import plots
     from rbdyn.dynamics.motion.history import history, most_turns
 
@@ -265,7 +263,7 @@ def _write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     return ["result.json", "history.csv", "cage_orbit.png", "pocket_forces.png"]
 
 
-def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
+def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
     def shown(error: float | None) -> str:
         return "not estimated" if error is None else f"± {error:.2g}"
 

@@ -1,7 +1,5 @@
 """The command ``rbdyn ball``. Physics is imported inside it, so that help comes at once."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -88,7 +86,7 @@ def _requested(sweeps: list[str] | None, wanted: float | None, studies: dict[str
     return requested
 
 
-def _seeded(scene: BallScene, seed: int) -> BallScene:
+def _seeded(scene: "BallScene", seed: int) -> "BallScene":
     """The scene with other draws of its form errors. Raises InputError where there are none."""
     if scene.errors is None:
         raise InputError([f"--seed {seed}: nothing is drawn here; it is for the table errors and --race-limits"])

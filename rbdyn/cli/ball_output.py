@@ -1,7 +1,5 @@
 """What ``rbdyn ball`` prints and writes."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -38,7 +36,7 @@ def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
     print_notes(result.notes or (), quiet)
 
 
-def with_runout(scene: BallScene, result: BallResult) -> tuple[BallResult, pd.DataFrame | None]:
+def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.DataFrame | None]":
     """The result with the runout of its ring and the path it takes, where the scene has form errors."""
     if scene.errors is None or not result.found:
         return result, None
@@ -48,7 +46,7 @@ def with_runout(scene: BallScene, result: BallResult) -> tuple[BallResult, pd.Da
     return replace(result, runout=record), followed.table()
 
 
-def write(result: BallResult, folder: Path, path: pd.DataFrame | None = None) -> list[str]:
+def write(result: BallResult, folder: Path, path: "pd.DataFrame | None" = None) -> list[str]:
     """Write result.json, balls.csv, pictures and the ``path`` of a turning ring; returns the names of the files."""
     result.save(folder / "result.json")
     if not result.found:

@@ -1,7 +1,5 @@
 """What ``rbdyn ball --sweep`` runs, prints and writes."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,7 +28,7 @@ HEADER = {
 }
 
 
-def run(scene: BallScene, texts: Sequence[str], out: Path | None, source: Path, as_json: bool, quiet: bool) -> int:
+def run(scene: "BallScene", texts: Sequence[str], out: Path | None, source: Path, as_json: bool, quiet: bool) -> int:
     """Sweep the scene of the file ``source`` as ``--sweep`` asks for; returns the exit code. Raises InputError."""
     from rbdyn.quasistatic.sweep.points import parsed
 
@@ -48,14 +46,14 @@ def run(scene: BallScene, texts: Sequence[str], out: Path | None, source: Path, 
     return FAILED if result.failures else 0
 
 
-def show(result: SweepResult, quiet: bool) -> None:
+def show(result: "SweepResult", quiet: bool) -> None:
     """Print the points, what they cost and the notes."""
     print_points(result)
     print(f"{len(result.statuses)} points in {result.wall_s:.3g} s, {result.cold} of them not started from a neighbour")
     print_notes((f"{result.where(note['points'])}: {note['note']}" for note in result.notes), quiet)
 
 
-def print_points(result: SweepResult) -> None:
+def print_points(result: "SweepResult") -> None:
     """Print the points, of a long sweep the first and the last ones."""
     count = len(result.statuses)
     ends = (*range(SHOWN), *range(count - SHOWN, count)) if count > 2 * SHOWN else range(count)
@@ -66,7 +64,7 @@ def print_points(result: SweepResult) -> None:
     print_table("", [*units, *HEADER], rows)
 
 
-def write(result: SweepResult, folder: Path) -> list[str]:
+def write(result: "SweepResult", folder: Path) -> list[str]:
     """Write sweep.json, sweep.csv and pictures; returns the names of the files."""
     from rbdyn.plots.ball_sweep import pictures
 
@@ -75,14 +73,14 @@ def write(result: SweepResult, folder: Path) -> list[str]:
     return ["sweep.json", "sweep.csv", *pictures(result, folder)]
 
 
-def _row(result: SweepResult, place: int) -> list[str]:
+def _row(result: "SweepResult", place: int) -> list[str]:
     keys = [f"{value:.6g}" for value in result.at(place).values()]
     if result.statuses[place] != "ok":
         return keys + ["failed"] * len(HEADER)
     return keys + [_cell(result, names, place) for names in HEADER.values()]
 
 
-def _cell(result: SweepResult, names: Sequence[str], place: int) -> str:
+def _cell(result: "SweepResult", names: Sequence[str], place: int) -> str:
     columns: dict[str, Any] = result.columns
     rows = ("",) if names[0] in columns else ("inner_row_", "outer_row_")
     values = [max(float(columns[f"{row}{name}"][place]) for name in names) for row in rows]

@@ -1,7 +1,5 @@
 """The command ``rbdyn new``. Physics is imported inside it, so that help comes at once."""
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib
@@ -103,7 +101,7 @@ def _read(reader: Any, name: str, text: str, faults: list[str]) -> Any:
         return None
 
 
-def _misfits(named: Designation, speed: float | None, preload: float | None, clearance: str | None) -> list[str]:
+def _misfits(named: "Designation", speed: float | None, preload: float | None, clearance: str | None) -> list[str]:
     """Options that the bearing has no use for."""
     faults, rollers = [], named.kind == "cylindrical_roller"
     if rollers and speed is not None and abs(speed) < 0.1:
@@ -115,7 +113,7 @@ def _misfits(named: Designation, speed: float | None, preload: float | None, cle
     return faults
 
 
-def _envelope(named: Designation, sizes: dict[str, float | None]) -> Envelope:
+def _envelope(named: "Designation", sizes: dict[str, float | None]) -> "Envelope":
     """Boundary dimensions as typed or as the catalogue lists them. Raises ValueError, InputError."""
     from rbdyn.properties.catalogue import Envelope, envelope
 

@@ -3,8 +3,6 @@
 A result keeps no motion. It keeps scene and seed, and equal scenes give equal bits: the history is computed anew.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -111,7 +109,7 @@ def write(
     return record
 
 
-def _pictures(request: Request, motion: History) -> dict[str, Callable[[Path], object]]:
+def _pictures(request: Request, motion: "History") -> dict[str, Callable[[Path], object]]:
     from rbdyn import plots
 
     title = f"{request.turns:g} counted shaft turns, replicate {request.replicate + 1}"
@@ -127,7 +125,7 @@ def _pictures(request: Request, motion: History) -> dict[str, Callable[[Path], o
     }
 
 
-def _record(request: Request, motion: History) -> dict[str, Any]:
+def _record(request: Request, motion: "History") -> dict[str, Any]:
     import numpy as np
 
     from rbdyn.dynamics.motion import orbit
@@ -159,7 +157,7 @@ def _record(request: Request, motion: History) -> dict[str, Any]:
     }
 
 
-def _race(motion: History, race: Race) -> dict[str, float]:
+def _race(motion: "History", race: "Race") -> dict[str, float]:
     from rbdyn.dynamics.motion import orbit
 
     return {
@@ -170,21 +168,21 @@ def _race(motion: History, race: Race) -> dict[str, float]:
     }
 
 
-def _life(motion: History) -> dict[str, float | str | None]:
+def _life(motion: "History") -> dict[str, float | str | None]:
     """Of the contact loads shown; None where nothing is loaded or nothing turns."""
     life, method = motion.life(), "ISO/TS 16281 reference life from the contact loads over time"
     known = life.as_record(*motion.scene.operation.speeds)
     return {**known, "equivalent_load_N": life.equivalent_load, "method": method}
 
 
-def _largest(hit: Largest) -> dict[str, float | int | None]:
+def _largest(hit: "Largest") -> dict[str, float | int | None]:
     """Where nothing ever touched there is no time and no roller."""
     touched = hit.force > 0.0
     roller = hit.roller + 1 if touched and hit.roller is not None else None
     return {"force_N": hit.force, "time_ms": hit.time * 1e3 if touched else None, "roller": roller}
 
 
-def _peaks(spectrum: Spectrum, unit: float) -> list[dict[str, float]]:
+def _peaks(spectrum: "Spectrum", unit: float) -> list[dict[str, float]]:
     return [{"frequency_Hz": f, "amplitude": unit * amplitude} for f, amplitude in spectrum.peaks(PEAKS)]
 
 

@@ -4,8 +4,6 @@ Only what runs counts: modules that the roots import, directly or through others
 imports for typing. Editing a picture, a command or the description of a key leaves the hash as it was.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import re

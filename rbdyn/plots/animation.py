@@ -1,7 +1,5 @@
 """A moving picture of the bearing and its forces: GIF, or MP4 where ffmpeg is installed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +29,7 @@ LOOKS = {
 }
 
 
-def moving_bearing(history: History, stem: Path) -> Path:
+def moving_bearing(history: "History", stem: Path) -> Path:
     """Write ``stem``.mp4, or .gif where there is no ffmpeg: two shaft turns about the largest pocket force."""
     picture = drawing(history, TURNS, FRAMES_PER_TURN)
     figure = plt.figure(figsize=(6.0, 6.6), dpi=80)

@@ -1,7 +1,5 @@
 """One equilibrium of a ball bearing: loads and contact angles around it, and a section through the most loaded ball."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,7 +26,7 @@ RINGS = {
 }
 
 
-def pictures(result: BallResult, folder: Path) -> list[str]:
+def pictures(result: "BallResult", folder: Path) -> list[str]:
     """Draw loads.png, angles.png and section.png of an equilibrium; returns the names, none where nothing was found."""
     if not result.found:
         return []

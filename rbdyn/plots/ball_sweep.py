@@ -1,7 +1,5 @@
 """Sweeps of a ball bearing: angles, loads, pressure, life and stiffness over one key, maps over two."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,7 +29,7 @@ ROUND_MAPS = (
 )
 
 
-def pictures(result: SweepResult, folder: Path) -> list[str]:
+def pictures(result: "SweepResult", folder: Path) -> list[str]:
     """Draw a sweep over one or two keys; returns the names, none where nothing was found or there are more keys.
 
     Over one key, or two of which the first has few values: angles.png, pressure_and_life.png and stiffness.png; azimuth.png over one.
@@ -64,7 +62,7 @@ UNITS = {
 }  # fmt: skip
 
 
-def angles(result: SweepResult, path: Path) -> None:
+def angles(result: "SweepResult", path: Path) -> None:
     """Range of the contact angles of all balls, on both races."""
     rows = _rows(result)
     figure, axes = plt.subplots(1, len(rows), figsize=(5.8 * len(rows), 4.0), squeeze=False)
@@ -79,7 +77,7 @@ def angles(result: SweepResult, path: Path) -> None:
     save(figure, path)
 
 
-def pressure_and_life(result: SweepResult, path: Path) -> None:
+def pressure_and_life(result: "SweepResult", path: Path) -> None:
     """Peak Hertz pressure of both races, and L10; a dot where each is best."""
     rows = _rows(result)
     figure, axes = plt.subplots(len(rows), 2, figsize=(10.4, 3.8 * len(rows)), squeeze=False)
@@ -99,7 +97,7 @@ def pressure_and_life(result: SweepResult, path: Path) -> None:
     save(figure, path)
 
 
-def stiffness(result: SweepResult, path: Path) -> None:
+def stiffness(result: "SweepResult", path: Path) -> None:
     """Diagonal stiffnesses of the inner ring: across and along the axis, and against tilting."""
     figure, (shift, tilt) = plt.subplots(1, 2, figsize=(10.4, 3.8))
     for x, style, _, pick in _lines(result):
@@ -114,7 +112,7 @@ def stiffness(result: SweepResult, path: Path) -> None:
     save(figure, path)
 
 
-def azimuth(result: SweepResult, path: Path) -> None:
+def azimuth(result: "SweepResult", path: Path) -> None:
     """Contact angles of every ball at some values of the key: inner above, outer below."""
     (key, values), solved = next(iter(result.keys.items())), [status == "ok" for status in result.statuses]
     places = [place for place, good in enumerate(solved) if good]
@@ -134,7 +132,7 @@ def azimuth(result: SweepResult, path: Path) -> None:
     save(figure, path)
 
 
-def maps(result: SweepResult, path: Path) -> None:
+def maps(result: "SweepResult", path: Path) -> None:
     """A panel a figure over both keys; points without an equilibrium stay white."""
     rows = _rows(result)
     panels = [
@@ -160,14 +158,14 @@ def maps(result: SweepResult, path: Path) -> None:
     save(figure, path)
 
 
-def _rows(result: SweepResult) -> dict[str, str]:
+def _rows(result: "SweepResult") -> dict[str, str]:
     """Title and prefix of the columns of each row of balls."""
     if "inner_load_max_N" in result.columns:
         return {"": ""}
     return {f"{name} row": f"{name}_row_" for name in ("inner", "outer")}
 
 
-def _lines(result: SweepResult) -> list[tuple[Array, Any, str, Callable[[str], Array]]]:
+def _lines(result: "SweepResult") -> list[tuple[Array, Any, str, Callable[[str], Array]]]:
     """The last key's values, and for each value of the first of two: style, name, and what picks a column."""
     keys = list(result.keys.items())
     x = np.array(keys[-1][1], dtype=np.float64)
@@ -210,7 +208,7 @@ def _wide(values: Array) -> bool:
     return bool(good.size and good.max() > 30.0 * good.min())
 
 
-def _finish(axis: Axes, result: SweepResult, ylabel: str, title: str) -> None:
+def _finish(axis: Axes, result: "SweepResult", ylabel: str, title: str) -> None:
     axis.set(xlabel=label(list(result.keys)[-1]), ylabel=ylabel)
     axis.set_title(title, fontsize=10)
     handles, _ = axis.get_legend_handles_labels()

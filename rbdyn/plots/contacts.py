@@ -1,7 +1,5 @@
 """Pictures of load, sliding and heat around the bearing, and of where the power goes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +17,7 @@ if TYPE_CHECKING:
 SMALLEST_SHARE = 1e-4
 
 
-def _around(axis: Axes, history: History, values: np.ndarray, factor: float, colour: str, label: str) -> None:
+def _around(axis: Axes, history: "History", values: np.ndarray, factor: float, colour: str, label: str) -> None:
     profile = orbit.against_azimuth(history, values)
     degrees = np.degrees(profile.azimuth)
     axis.fill_between(degrees, factor * profile.low, factor * profile.high, color=colour, alpha=0.2, linewidth=0)
@@ -28,7 +26,7 @@ def _around(axis: Axes, history: History, values: np.ndarray, factor: float, col
     plain(axis)
 
 
-def roller_loads(history: History, path: Path) -> None:
+def roller_loads(history: "History", path: Path) -> None:
     """Load of a roller on both races against azimuth: mean, and the band that holds nine tenths."""
     figure, axis = plt.subplots(figsize=(7.0, 4.2))
     _around(axis, history, history.outer_load, 1.0, OUTER, "outer race")
@@ -39,7 +37,7 @@ def roller_loads(history: History, path: Path) -> None:
     save(figure, path)
 
 
-def sliding(history: History, path: Path) -> None:
+def sliding(history: "History", path: Path) -> None:
     """Slip, pressure times sliding speed, and heat at both races against azimuth."""
     figure, axes = plt.subplots(3, 1, figsize=(7.0, 8.4), sharex=True)
     pressed = orbit.pressure_velocity(history, "outer"), orbit.pressure_velocity(history, "inner")

@@ -6,8 +6,6 @@ so is every play; rollers are drawn smaller than they are to make room. Then wha
 the drawing. The outer ring's centre is the origin. Paper coordinates: u to the right, v down, the load points down.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -118,7 +116,7 @@ def tidy(value: float) -> float:
     return max(digit * decade for digit in TIDY if digit * decade <= value * (1.0 + 1e-9))
 
 
-def drawing(history: History, turns: float, frames_per_turn: int, most_frames: int = 2000) -> Drawing:
+def drawing(history: "History", turns: float, frames_per_turn: int, most_frames: int = 2000) -> Drawing:
     """Frames at equal intervals from ``turns`` shaft turns about the largest pocket force."""
     scene, z = history.scene, history.scene.bearing.rollers
     interval = float(history.time[1] - history.time[0])
@@ -156,7 +154,7 @@ def drawing(history: History, turns: float, frames_per_turn: int, most_frames: i
     )
 
 
-def _sizes(history: History) -> dict[str, Any]:
+def _sizes(history: "History") -> dict[str, Any]:
     scene = history.scene
     pitch, true_roller = 0.5 * scene.bearing.pitch_diameter_mm, 0.5 * scene.bearing.roller_diameter_mm
     outer, inner = (1e3 * radius for radius in scene.geometry.raceways)

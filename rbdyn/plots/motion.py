@@ -1,7 +1,5 @@
 """Pictures of how the cage moves and what hits it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -21,7 +19,7 @@ POCKET_COLOURS = (BLUE, ORANGE, GREEN)
 SHOWN_ORDERS = 30.0
 
 
-def _guide_circle(axis: Axes, history: History) -> None:
+def _guide_circle(axis: Axes, history: "History") -> None:
     clearance = history.scene.guide_clearance_m
     if clearance is not None:
         angle = np.linspace(0.0, 2.0 * np.pi, 361)
@@ -36,7 +34,7 @@ def _plane(axis: Axes) -> None:
     plain(axis)
 
 
-def cage_orbit(histories: Mapping[str, History], path: Path) -> None:
+def cage_orbit(histories: "Mapping[str, History]", path: Path) -> None:
     """Path of the cage centre about that of its guide: in the guide clearance above, enlarged below, a column each."""
     columns = len(histories)
     figure, axes = plt.subplots(2, columns, figsize=(4.8 * columns, 9.0), squeeze=False)
@@ -57,7 +55,7 @@ def cage_orbit(histories: Mapping[str, History], path: Path) -> None:
     save(figure, path)
 
 
-def _draw_pockets(axis: Axes, history: History) -> None:
+def _draw_pockets(axis: Axes, history: "History") -> None:
     order = np.argsort(-np.abs(history.pocket_load).max(axis=0))[:SHOWN_POCKETS]
     for pocket, colour in zip(sorted(order), POCKET_COLOURS, strict=False):
         load = history.pocket_load[:, pocket]
@@ -72,7 +70,7 @@ def _legend_above(axis: Axes) -> None:
     axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=SHOWN_POCKETS, frameon=False, fontsize=8)
 
 
-def pocket_forces(histories: Mapping[str, History], path: Path) -> None:
+def pocket_forces(histories: "Mapping[str, History]", path: Path) -> None:
     """Wall forces of the pockets with the largest forces over time, a panel each."""
     rows = len(histories)
     figure, axes = plt.subplots(rows, 1, figsize=(9.0, 3.0 * rows), squeeze=False, sharex=True)
@@ -84,7 +82,7 @@ def pocket_forces(histories: Mapping[str, History], path: Path) -> None:
     save(figure, path)
 
 
-def forces(history: History, path: Path) -> None:
+def forces(history: "History", path: Path) -> None:
     """Wall forces of the pockets with the largest forces, and the land's dry load, over time; the largest marked."""
     touched = bool(history.land_load.any())
     figure, axes = plt.subplots(1 + touched, 1, figsize=(9.0, 3.4 + 2.2 * touched), squeeze=False, sharex=True)
@@ -108,7 +106,7 @@ def forces(history: History, path: Path) -> None:
     save(figure, path)
 
 
-def _mark(axis: Axes, history: History, hit: orbit.Largest, sign: float, words: str) -> None:
+def _mark(axis: Axes, history: "History", hit: orbit.Largest, sign: float, words: str) -> None:
     axis.plot(hit.time * 1e3, sign * hit.force, "v" if sign > 0.0 else "^", color=VERMILION, markersize=7)
     late = hit.time > 0.75 * history.time[-1]
     axis.annotate(f"largest: {words}", (hit.time * 1e3, sign * hit.force), xytext=(-10 if late else 10, -3),
@@ -117,7 +115,7 @@ def _mark(axis: Axes, history: History, hit: orbit.Largest, sign: float, words: 
     axis.margins(y=0.12)
 
 
-def whirl(history: History, path: Path) -> None:
+def whirl(history: "History", path: Path) -> None:
     """Distribution of the instantaneous whirl ratio, with its median, its quartiles and the mean ratio."""
     edges, density = orbit.whirl_histogram(history)
     quantiles = orbit.whirl_quantiles(history)
@@ -133,7 +131,7 @@ def whirl(history: History, path: Path) -> None:
     save(figure, path)
 
 
-def section(history: History, path: Path) -> None:
+def section(history: "History", path: Path) -> None:
     """Poincare sections: the cage centre once a shaft turn and once a cage turn, on its orbit."""
     x, y = (1e6 * part for part in history.guide_eccentricity)
     figure, axes = plt.subplots(1, 2, figsize=(9.6, 5.4))
@@ -148,7 +146,7 @@ def section(history: History, path: Path) -> None:
     save(figure, path)
 
 
-def spectra(history: History, path: Path) -> None:
+def spectra(history: "History", path: Path) -> None:
     """Amplitude spectra of cage eccentricity and cage speed; cage, shaft and roller-passing frequency marked."""
     cage = abs(orbit.mean_cage_speed(history)) / (2.0 * np.pi)
     passing = cage * history.scene.bearing.rollers

@@ -1,7 +1,5 @@
 """A page of HTML that plays the motion of the bearing: no file beside it, nothing fetched, readable on paper."""
 
-from __future__ import annotations
-
 import html
 import json
 from pathlib import Path
@@ -24,7 +22,7 @@ TEMPLATE = Path(__file__).with_name("player.html")
 BEARING = Path(__file__).with_name("bearing.js")
 
 
-def player_html(history: History) -> str:
+def player_html(history: "History") -> str:
     """The page, of up to three shaft turns about the largest pocket force; rounded to 0.1 um, 1 mrad and four digits."""
     most_frames = MOST_NUMBERS // (PER_ROLLER * history.scene.bearing.rollers + PER_FRAME)
     picture = drawing(history, TURNS, FRAMES_PER_TURN, most_frames)
@@ -34,7 +32,7 @@ def player_html(history: History) -> str:
     return page.replace("{{FIRST_FRAME}}", _svg(picture)).replace("{{DATA}}", record.replace("<", "\\u003c"))
 
 
-def motion_record(history: History, d: Drawing) -> dict[str, Any]:
+def motion_record(history: "History", d: Drawing) -> dict[str, Any]:
     """What ``bearing.js`` draws: sizes [mm], and the motion as flat lists, frame after frame."""
     turn = 2.0 * np.pi
     scene = history.scene

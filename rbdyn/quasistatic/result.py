@@ -1,7 +1,5 @@
 """What an equilibrium of a ball bearing reports, saves and loads: angles, loads, stress, contacts, film, life."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
@@ -134,7 +132,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
             figures.append(Figure(f"stiffness {axis}", self.reached.stiffness[f"{axis}_N_per_um"], None, "N/µm"))
         return f"{self.status}, {len(self.notes or ())} notes", figures
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """A row a ball: azimuth, angles, loads, centrifugal force, gyroscopic moment; units in the names."""
         import pandas as pd
 

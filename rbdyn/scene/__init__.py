@@ -4,8 +4,6 @@ Keys carry their units; whatever a paper leaves out stands here as a default wit
 is compiled: ``rbdyn.dynamics.parameters.model`` turns a scene into the SI parameters of the kernels.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import cached_property
@@ -185,14 +183,14 @@ class Scene(SceneFile):
         return self.bearing.radial_clearance_mm if mounted is None else mounted.operating * 1e3
 
     @cached_property
-    def geometry(self) -> Geometry:
+    def geometry(self) -> "Geometry":
         """Radii, masses and speeds as mounted."""
         from rbdyn.scene.geometry import geometry_of
 
         return geometry_of(self)
 
     @cached_property
-    def mounted_clearance(self) -> MountedClearance | None:
+    def mounted_clearance(self) -> "MountedClearance | None":
         """What fits, temperatures and rotation do to the clearance; None where the scene tells no mounting."""
         if self.mounting is None:
             return None

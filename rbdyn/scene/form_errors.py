@@ -1,7 +1,5 @@
 """Form errors of a ball bearing: grooves and balls as measured, or drawn by a seed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
@@ -110,7 +108,7 @@ class FormErrors(Consistent):
                 f"wave; take at least {2 * highest + 1}"
             )
 
-    def ball_diameter_errors(self, normal: Array) -> Array:
+    def ball_diameter_errors(self, normal: "Array") -> "Array":
         """Each ball's diameter less the nominal one [m], as given or with the spread of standard ``normal`` numbers."""
         import numpy as np
 

@@ -1,7 +1,5 @@
 """A time history of one replicate, on request: motions, and every contact's load, slip and heat, at uniform samples."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -81,13 +79,13 @@ class History(Brief):
         turns = np.ptp(self.time) / self.scene.turn_s
         return f"{len(self.time)} samples over {turns:.3g} shaft turns of one replicate", figures
 
-    def life(self) -> ReferenceLife:
+    def life(self) -> "ReferenceLife":
         """Reference rating life of ISO/TS 16281 from the loads of this history."""
         from rbdyn.dynamics.motion.rating import rating_life
 
         return rating_life(self.scene, self.azimuth, self.inner_load, self.outer_load)
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """A row a sample, units in the column names."""
         import pandas as pd
 

@@ -1,7 +1,5 @@
 """From what one replicate kept, batch by batch, to the figures that are reported."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -46,7 +44,7 @@ class Replicate:
     method: str = "rk45"
     stiffness: Array = field(default_factory=lambda: np.zeros(3))
 
-    def counted_from(self, first: int) -> Replicate:
+    def counted_from(self, first: int) -> "Replicate":
         """The same run, counted from another batch."""
         return replace(self, first=first)
 
@@ -81,7 +79,7 @@ class Replicate:
         """1 - cage speed over kinematic cage speed."""
         return self._figure(CAGE_SLIP)
 
-    def _figure(self, figure: Figure) -> float:
+    def _figure(self, figure: "Figure") -> float:
         return float(figure.of_sums(figure.moments(self).sum(axis=0)))
 
     def _works(self) -> tuple[float, float, float]:

@@ -1,7 +1,5 @@
 """The path of a ring that turns over form errors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -40,7 +38,7 @@ class Followed:
         """Runout of the path; ``face_radius``: where an axial indicator touches [m]."""
         return runout(self.path, self.turns, face_radius)
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """One line a step; units in the names."""
         import pandas as pd
 

@@ -1,7 +1,5 @@
 """What a sweep reports, saves and loads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -79,7 +77,7 @@ class SweepResult:
         """A column over the grid, one axis a key. Raises KeyError for an unknown one."""
         return self.columns[column].reshape(self.shape)
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """A row a point: keys, figures, status, and what its notes are about."""
         import pandas as pd
 
@@ -90,7 +88,7 @@ class SweepResult:
         about = ["; ".join(each) for each in words]
         return pd.DataFrame({**self._places(), **self.columns, "status": self.statuses, "notes": about})
 
-    def balls(self) -> pd.DataFrame:
+    def balls(self) -> "pd.DataFrame":
         """A row a ball and point: keys, row of balls, ball from 1, then as ``BallResult.table``.
 
         Points that failed have none. Raises RuntimeError for a loaded sweep, which does not know its balls.
@@ -161,12 +159,12 @@ class SweepResult:
             write_json(path, self.as_dict())
 
     @classmethod
-    def load(cls, path: Path | str) -> SweepResult:
+    def load(cls, path: Path | str) -> "SweepResult":
         """Read a sweep saved as JSON. Raises InputError when the file is missing or not such a sweep."""
         return read_record(path, FORMAT, "sweep", cls._of_json)
 
     @classmethod
-    def _of_json(cls, data: dict[str, Any]) -> SweepResult:
+    def _of_json(cls, data: dict[str, Any]) -> "SweepResult":
         keys = {key: tuple(values) for key, values in data["keys"].items()}
         points = data["points"]
         names = dict.fromkeys(name for point in points for name in point if name not in (*keys, "status"))
