@@ -34,7 +34,8 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 # it, for every lane is rounded by itself.
 VECTOR = 8 if get_host_cpu_features().get("avx512f") else 4
 # Calls of compiled code return tuples through memory and carry an error status: small functions must vanish.
-PART: dict[str, Any] = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler}
+WRAPPERS = ("no_cpython_wrapper", "no_cfunc_wrapper")
+PART: dict[str, Any] = {**OPTIONS, **dict.fromkeys(WRAPPERS, True), "pipeline_class": PartCompiler}
 INLINED: dict[str, Any] = {**PART, "forceinline": True}
 
 
@@ -56,7 +57,7 @@ class Inner(CPUDispatcher):
     @functools.cached_property
     def twin(self) -> Any:
         """The same function, callable from Python."""
-        return numba.jit(**OPTIONS)(self.py_func)
+        return numba.jit(**{**self.targetoptions, **dict.fromkeys(WRAPPERS, False)})(self.py_func)
 
 
 class Entry(CPUDispatcher):
