@@ -20,7 +20,7 @@ _TYPING = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
 _IMPORT = re.compile(r"^[ \t]*from ([\w.]+) import (\([^)]*\)|.*)$", re.MULTILINE)
 # Where kernels are: what imports their decorators, and what gives a law its bodies.
 _KERNELS = re.compile(
-    r"^from rbdyn\.compiled\.kernel import .*\b(?:entry|kernel|law|routine|INLINED)\b|^@[\w.]+\.body\(", re.MULTILINE
+    r"^from rbdyn\.compiled\.kernel import .*\b(?:entry|\w*kernel|law|routine|INLINED)\b|^@[\w.]+\.body\(", re.MULTILINE
 )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.compiled.elementary import eighteenth_root, fast_exp, fast_log, reordered_sum, tenth_root
-from rbdyn.compiled.kernel import VECTOR, kernel, law
+from rbdyn.compiled.kernel import VECTOR, kernel, law, settled_kernel
 
 EXPONENT = 10.0 / 9.0
 # Below this an overlap is round-off; it keeps logarithms and roots finite.
@@ -237,7 +237,7 @@ def _(contact, k):
     return contact.rise[k]
 
 
-@kernel
+@settled_kernel
 def sum_of_slices(contact, overlap, nx, ny):
     """Load, stiffness, mean approach weighted by stiffness and mean rise weighted by load, of a sliced roller."""
     load = stiffness = weighted = raised = 0.0

@@ -106,9 +106,10 @@ def march_through(
             if not warm or task.free[i] == 0.0:
                 at.q[i] = points.given[k, i]
         found.outcome[k], found.residual[k] = solve_row(task, warm, at, found.figures[k])
-        found.displacement[k] = at.q
-        found.taken[k] = at.sums[TAKEN:]
-        found.matrix[k] = at.matrix
+        for i in range(RING):
+            found.displacement[k, i], found.taken[k, i] = at.q[i], at.sums[TAKEN + i]
+            for m in range(RING):
+                found.matrix[k, i, m] = at.matrix[i, m]
         found.steps[k], found.cold[k] = at.counts[STEPS], at.counts[COLD_STARTS]
         warm = found.outcome[k] == CONVERGED
     return warm
