@@ -116,10 +116,10 @@ def accuracy(
         float | None, valued("%", "Bias of an output that counts.", "1", "--sought-percent", min=0.01, max=50.0)
     ] = None,
     page: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Measure the shipped examples and write one page of Markdown.")
+        Path | None, valued("FILE", "Measure the shipped examples and write one page of Markdown.", "no page")
     ] = None,
     part: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="With --page, run this part only; repeatable.")
+        list[str] | None, valued("NAME", "With --page, run this part only; repeatable.", "all parts")
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,

@@ -33,8 +33,18 @@ def trees_of(packages: Iterable[str]) -> dict[str, Source]:
             parts = (package, *path.relative_to(root).with_suffix("").parts)
             name = ".".join(part for part in parts if part != "__init__")
             text = path.read_text(encoding="utf-8")
-            found[name] = Source(ast.parse(text), text.splitlines())
+            found[name] = Source(_unquoted(ast.parse(text)), text.splitlines())
     return dict(sorted(found.items()))
+
+
+def _unquoted(tree: ast.Module) -> ast.Module:
+    """The tree with types as such where they stand in quotes."""
+    for node in ast.walk(tree):
+        for key in ("annotation", "returns"):
+            quoted = getattr(node, key, None)
+            if isinstance(quoted, ast.Constant) and isinstance(quoted.value, str):
+                setattr(node, key, ast.parse(quoted.value, mode="eval").body)
+    return tree
 
 
 def equations(trees: Trees, package: str) -> Iterator[str]:
