@@ -201,11 +201,9 @@ def _values(node: Mapping[str, Any]) -> str:
 
 
 def _plural(values: str) -> str:
-    return re.sub(
-        "^(a list of |whole )?(number|text)",
-        lambda found: f"{(found[1] or '').replace('a list', 'lists')}{found[2]}s",
-        values,
-    )
+    if values.startswith("a list"):
+        return values.replace("a list", "lists", 1)
+    return re.sub("^(whole )?(number|text)", r"\1\2s", values)
 
 
 def _range(node: Mapping[str, Any]) -> str:

@@ -138,3 +138,10 @@ def test_package_shows_its_names():
     """Command line: in a shell of Python the names of the library and its version complete."""
     assert {"Scene", "simulate", "equilibrium", "load", "__version__"} <= set(dir(rbdyn))
     assert all(getattr(rbdyn, name) is not None for name in rbdyn.__all__)
+
+
+def test_lists_of_lists_are_told_in_plain_words():
+    """Command line: values of nested lists, of whole numbers and of plain ones."""
+    values = {key.key: key.values for key in keys(SCENES)}
+    assert values["bearing.profile_table_mm_um"] == "a list of lists of numbers"
+    assert values["errors.ball_sphericity[].balls"] == "a list of whole numbers from 1"
