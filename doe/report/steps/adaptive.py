@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from doe.arrays import or_none
-from doe.pareto.surrogate_loss import noisy_hypervolume
+from doe.pareto.surrogate_loss import DRAWS, noisy_hypervolume
 from doe.report.steps.confirmation import point_record
 from doe.study.adaptive import Adaptive
 from doe.study.goals import region_of
@@ -21,7 +21,8 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
     rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
     points = [point_record(study, *row) for row in rows]
     costs = front.goals.costs(found.foretold)
-    fresh = noisy_hypervolume(front.costs, front.cost_errors, costs.min(axis=0), costs.max(axis=0), seed=front.seed)
+    scale = costs.min(axis=0), costs.max(axis=0)
+    fresh = noisy_hypervolume(front.costs, front.cost_errors, *scale, DRAWS, front.seed)
     return {
         "front": points,
         "pick": {**points[front.pick], "reason": front.pick_reason},
