@@ -148,13 +148,21 @@ class Store(Database):
                 if not self._closed.is_set():
                     self._sign(connection)
 
-    def put(self, key: str, result: dict[str, Any], *, seconds: float | None = None, **where: Any) -> None:
+    def put(
+        self,
+        key: str,
+        result: dict[str, Any],
+        *,
+        seconds: float | None = None,
+        host: str | None = None,
+        pid: int | None = None,
+    ) -> None:
         """Keep a result; it is on the disk when this returns.
 
-        An equal key already done is left, for equal keys have equal bits. ``where``: its host and pid, if not here.
+        An equal key already done is left, for equal keys have equal bits. ``host``, ``pid``: where it ran, if not here.
         """
         text = json.dumps(result)
-        self._end(key, status="done", result=text, digest=digest_of(text), seconds=seconds, **where)
+        self._end(key, status="done", result=text, digest=digest_of(text), seconds=seconds, host=host, pid=pid)
 
     def fail(self, key: str, cause: str, *, seconds: float | None = None) -> None:
         """Keep why a run could not go on."""

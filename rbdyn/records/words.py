@@ -1,7 +1,8 @@
 """How names and numbers are written for people, and the small tables that a notebook shows of a record."""
 
 import math
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ UNITS = {
 PLAIN_BELOW = 1e7
 # What is smaller is left over from rounding.
 NOISE = 1e-12
+MARK = re.compile(r"\{\{([A-Z]+)\}\}")
 
 
 def quantity(name: str) -> tuple[str, str]:
@@ -93,6 +95,11 @@ class Brief:
         remark, figures = self.brief()
         rows = [(each.words, with_error(each.value, each.error), each.unit) for each in figures]
         return html_table(f"{type(self).__name__}: {remark}", ("figure", "value ± 95 %", "unit"), rows)
+
+
+def filled_page(template: str, marks: Mapping[str, str]) -> str:
+    """A page with its ``{{MARKS}}`` put in; in one pass, so that nothing put in can be taken for a mark."""
+    return MARK.sub(lambda mark: marks[mark[1]], template)
 
 
 def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

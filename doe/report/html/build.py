@@ -1,7 +1,6 @@
 """The page, put together from its parts."""
 
 import json
-import re
 from collections.abc import Mapping
 from html import escape
 from importlib.resources import files
@@ -14,6 +13,7 @@ from doe.report.sections import sections
 from doe.report.sections.blocks import Section, Table, Widget
 from doe.report.sections.contents import title
 from doe.report.sections.record import Record, known
+from rbdyn.records.words import filled_page
 
 # In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
 SCRIPTS = {
@@ -22,7 +22,6 @@ SCRIPTS = {
     "front": ("front.js",),
     "bearing": ("motion.js",),
 }
-MARK = re.compile(r"\{\{([A-Z]+)\}\}")
 
 
 def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str:
@@ -43,8 +42,7 @@ def html_report(summary: Record, motion: Mapping[str, Any] | None = None) -> str
         "DATA": _json(page_data(clean, moving)),
         "SCRIPTS": "\n".join(f"<script>\n{script}</script>" for script in _scripts(widgets)),
     }
-    # In one pass, so that nothing put in can be taken for a mark.
-    return MARK.sub(lambda mark: marks[mark[1]], text("page.html"))
+    return filled_page(text("page.html"), marks)
 
 
 def text(name: str) -> str:

@@ -14,9 +14,9 @@ from markdown_it.token import Token
 from rbdyn.cli.manual.docstrings import equations, library, trees_of
 from rbdyn.cli.manual.part import Part
 from rbdyn.cli.manual.reference import commands_of, keys_of
+from rbdyn.records.words import filled_page
 
 OPTION = re.compile(r"(?<!\S)(--?[a-z][\w-]*)")
-MARK = re.compile(r"\{\{([A-Z]+)\}\}")
 # Headings deeper than this stand on the page and in the search, not in the contents.
 DEEPEST = 3
 
@@ -44,8 +44,7 @@ def page(parts: Sequence[Part]) -> str:
         "CONTENTS": "\n".join(contents),
         "SECTIONS": "\n".join(sections),
     }
-    # In one pass, so that nothing put in can be taken for a mark.
-    return MARK.sub(lambda mark: marks[mark[1]], here.with_name("manual.html").read_text(encoding="utf-8"))
+    return filled_page(here.with_name("manual.html").read_text(encoding="utf-8"), marks)
 
 
 def chapters(parts: Sequence[Part]) -> Iterator[tuple[str, str]]:
