@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self, cast
+from typing import TYPE_CHECKING, Annotated, Any, Self, cast
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from rbdyn.faults import InputError
 from rbdyn.fields import or_refuse
@@ -22,6 +22,7 @@ from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_tract
 from rbdyn.scene.mounting import Mounting, faults, material_of
 from rbdyn.scene.operation import Operation, Support
 from rbdyn.scene.reading import SceneFile
+from rbdyn.scene.uncertain import Uncertain
 from rbdyn.scene.units import unit_notes
 
 if TYPE_CHECKING:
@@ -55,6 +56,8 @@ class Scene(SceneFile):
     """The laws of each interaction."""
     numerics: Numerics = Numerics()
     """Tolerance, length and replication of a run."""
+    uncertain: Annotated[Uncertain | None, Field(exclude=True)] = None
+    """What is not known of all this; no run depends on it."""
 
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:
