@@ -53,12 +53,23 @@ class Emulator:
     def predict(self, points: ArrayLike) -> tuple[Array, Array]:
         """Mean and standard deviation (n,) of the response without scatter at points (n, k)."""
         at, given, runs = np.asarray(points, float), self.hyperparameters, self.solution
-        columns, across = model_matrix(at, self.terms), given.variance * correlation(at, self.points, given.lengths)
+        columns, across = self._beside(at)
         mean = columns @ runs.coefficients + across @ runs.weights
         inside = linalg.solve_triangular(runs.factor, across.T, lower=True)
         left = linalg.solve_triangular(runs.root, (columns - inside.T @ runs.trend).T, trans=1)
         variance = given.variance - (inside**2).sum(axis=0) + (left**2).sum(axis=0)
         return mean, np.sqrt(variance.clip(0.0))
+
+    def mean(self, points: ArrayLike) -> Array:
+        """Mean (n,) of the response at points (n, k), for a fraction of the time of ``predict``."""
+        columns, across = self._beside(np.asarray(points, float))
+        found: Array = columns @ self.solution.coefficients + across @ self.solution.weights
+        return found
+
+    def _beside(self, points: Array) -> tuple[Array, Array]:
+        """Trend columns (n, p) at points (n, k), and covariances (n, runs) with the runs."""
+        given = self.hyperparameters
+        return model_matrix(points, self.terms), given.variance * correlation(points, self.points, given.lengths)
 
     def leave_one_out(self) -> tuple[Array, Array]:
         """What every run would be foretold by the others: mean and standard deviation (n,), its own scatter included."""

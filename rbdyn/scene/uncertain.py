@@ -26,6 +26,14 @@ NEEDS = {
 MAY = {"normal": ("low", "high"), "choices": ("weights",)}
 NUMBERS = ("low", "high", "mode", "mean", "sd", "values", "weights")
 MOST_CHOICES = 6
+# How an input set is run.
+RUNS = (
+    "numerics.turns=40",
+    "numerics.discard_turns=20",
+    "numerics.replicates=2",
+    "numerics.extend=false",
+    "numerics.companion=false",
+)
 LEFT_OUT = "left out"
 
 
@@ -105,6 +113,11 @@ class Uncertain(Strict):
     """Input sets to start from, a power of two; more are added until the spread is known."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the input sets."""
+    inputs: Annotated[int, Field(ge=1, le=30)] = 12
+    """Most inputs that vary: of more documented ones a screening keeps those that matter; declared ones all stay."""
+    set: list[str] = list(RUNS)
+    """Keys of the scene that are otherwise in the runs of input sets, as key=value: many short runs tell more of inputs
+    than few long ones."""
     sample: str | None = None
     """CSV of a posterior sample, a row an input set, whose columns are keys; replaces their laws."""
     correlation: list[Correlation] = []
