@@ -56,8 +56,8 @@ def test_untrusted_ranges_are_shrunk_by_their_noise() -> None:
     runs = _noisy(lambda q: np.sqrt(12.0) * (rough[np.argsort(np.argsort(q[:, 0]))] / 128.0 - 0.5), 2, 128, 0.5, 5)
     found = spread_of(runs, emulated(runs), nested(2, 1024, 6), 1)
     assert not found.by_emulator
-    # Uniform of variance 1: 5 and 95 % at -+ 0.45 sqrt(12), blurred by what is left of the noise.
-    assert abs(found.low + 1.56) < 3.0 * found.errors[0] and abs(found.high - 1.56) < 3.0 * found.errors[2]
+    # Uniform of variance 1: 90 % lie within 0.9 sqrt(12); without shrinking noise would add an eighth.
+    assert found.high - found.low == pytest.approx(0.9 * np.sqrt(12.0), rel=0.06)
     assert 0.02 < found.known < 0.1
 
 
