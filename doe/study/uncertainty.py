@@ -20,7 +20,7 @@ from rbdyn.faults import InputError, RunError, read_toml, set_key
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Uncertain
-from rbdyn.scene.unknown import Input, inputs_of, with_values
+from rbdyn.scene.unknown import Input, inputs_of, value_of, with_values
 
 OUTPUTS = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
 # Fresh input sets of the emulator, input sets at most, and the share of them that may be impossible or fail.
@@ -77,15 +77,23 @@ class _Case:
     data: dict[str, Any]
     scene: Scene
     uncertain: Uncertain
+    every: list[Input]
 
     def scenes(self, inputs: Sequence[Input], values: Sequence[Mapping[str, Any]], seed: int) -> list[Scene | str]:
         """A scene an input set, or why there is none."""
-        by_key = {each.key: each.law for each in inputs}
+        by_key = {each.key: each.law for each in self.every}
+        keys = {each.key for each in inputs}
+        # What multiplies an input that varies goes with it, in the ratio that the scene has.
+        tied = {
+            key: value_of(self.scene, key) / value_of(self.scene, law.times)
+            for key, law in by_key.items()
+            if key not in keys and law.times in keys
+        }
         found: list[Scene | str] = []
         for number, row in enumerate(values):
             overrides = [*self.uncertain.set, f"numerics.seed={seed + number}"]
             try:
-                tables = with_values(self.data, self.source, by_key, row)
+                tables = with_values(self.data, self.source, by_key, {**row, **tied})
                 found.append(Scene.from_dict(tables, self.source, overrides))
             except InputError as error:
                 found.append(str(error.faults[0]))
@@ -102,8 +110,7 @@ def find_uncertainty(
     """
     case = _read(path, overrides)
     asked = case.uncertain.points if points is None else points
-    every = inputs_of(case.scene, case.data, case.uncertain)
-    if not every:
+    if not case.every:
         raise InputError(
             [
                 f"{path}: uncertain: nothing is unknown; name keys as \"table.key\" = {{law = ...}} or take out defaults = 'none'"
@@ -112,7 +119,7 @@ def find_uncertainty(
     (nominal,) = simulations.run([case.scene], ["as the scene says"], simulations.progress("as the scene says"))
     if isinstance(nominal, Failure):
         raise RunError(f"{path}: as the scene says: {nominal.cause}")
-    inputs, screened = _screened(case, every, simulations)
+    inputs, screened = _screened(case, simulations)
     seed = case.uncertain.seed
     factor = laws.copula([each.key for each in inputs], _pairs(case.uncertain, inputs))
     # One input more than there are, which does nothing: what the indices say of it is their floor.
@@ -143,7 +150,8 @@ def _read(path: Path, overrides: Sequence[str]) -> _Case:
     for override in overrides:
         set_key(data, override)
     scene = rollers_only(Scene.from_dict(data, str(path)))
-    return _Case(str(path), data, scene, scene.uncertain or Uncertain())
+    uncertain = scene.uncertain or Uncertain()
+    return _Case(str(path), data, scene, uncertain, inputs_of(scene, data, uncertain))
 
 
 def _pairs(uncertain: Uncertain, inputs: Sequence[Input]) -> list[Any]:
@@ -156,8 +164,9 @@ def _coordinates(quantiles: Array, factor: Array | None) -> Array:
     return np.column_stack([laws.dependent(quantiles[:, :-1], factor), quantiles[:, -1]])
 
 
-def _screened(case: _Case, every: list[Input], simulations: Simulations) -> tuple[list[Input], dict[str, float]]:
+def _screened(case: _Case, simulations: Simulations) -> tuple[list[Input], dict[str, float]]:
     """The inputs that vary, of too many those that matter; and the largest share of each of the others."""
+    every = case.every
     if len(every) <= case.uncertain.inputs:
         return every, {}
     quantiles = plan.two_levels(len(every))
