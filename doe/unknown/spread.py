@@ -33,10 +33,12 @@ class Runs:
 
 @dataclass(frozen=True, eq=False)
 class Emulated:
-    """Emulator of an output over the quantiles of its inputs; of its logarithm where all runs are positive."""
+    """Emulator of an output over the quantiles of its inputs, of its logarithm where all runs are positive; ``noise``: mean
+    variance of a run's output by its replicates, smoothed over the inputs."""
 
     emulator: Emulator
     logarithmic: bool
+    noise: float
     q2: float
     ceiling: float
 
@@ -89,15 +91,15 @@ def emulated(runs: Runs) -> Emulated:
     emulator = fit_emulator(runs.quantiles, values, smooth, trend="linear")
     whole = float(values.var(ddof=1))
     ceiling = 1.0 - float(smooth.mean()) / whole if whole > 0.0 else 0.0
-    return Emulated(emulator, logarithmic, emulator.q2(), ceiling)
+    return Emulated(emulator, logarithmic, float((smooth * unit).mean()), emulator.q2(), ceiling)
 
 
 def spread_of(runs: Runs, fitted: Emulated, fresh: Array, seed: int) -> Spread:
     """Range of an output; ``fresh``: quantiles (m, d) of many input sets as likely as those of the runs."""
     random = np.random.default_rng(seed)
-    whole, noise = float(runs.values.var(ddof=1)), float(np.nanmean(runs.variances))
-    left = max(whole - noise - runs.numerical, 0.0)
-    shares = {"simulation": noise, "numerical": runs.numerical, "inputs": left}
+    whole = float(runs.values.var(ddof=1))
+    left = max(whole - fitted.noise - runs.numerical, 0.0)
+    shares = {"simulation": fitted.noise, "numerical": runs.numerical, "inputs": left}
     total = sum(shares.values()) or 1.0
     shares = {name: value / total for name, value in shares.items()}
     if fitted.trusted:

@@ -4,7 +4,7 @@ import csv
 from pathlib import Path
 from typing import Any
 
-from doe.report.words import quantity, with_error
+from doe.report.words import quantity, shown, with_error
 from doe.study.uncertainty import OutputRange, Uncertainty
 from doe.unknown.sensitivity import CONFIDENCE, Index
 from rbdyn.cli.terminal import print_table
@@ -55,7 +55,7 @@ def sentence(name: str, output: OutputRange, keys: list[str]) -> str:
     words, unit = quantity(name)
     nominal, spread = output.nominal, output.spread
     head = f"{words} {with_error(nominal.value, nominal.error)} {unit}".rstrip()
-    ends = f"{spread.low:.3g} to {spread.high:.3g} {unit}".rstrip()
+    ends = f"{shown(spread.low)} to {shown(spread.high)} {unit}".rstrip()
     if spread.hidden:
         return f"{head}; noise of the simulation hides what the inputs do"
     return f"{head}; {ends} in 90 % of the cases over what is not known; {_decides(output, keys)}"
@@ -83,7 +83,7 @@ def print_uncertainty(found: Uncertainty) -> None:
     title = f"share of the variance that is left while an input is unknown [%], {100.0 * CONFIDENCE:.0f} % intervals"
     print_table(title, ("input", *(quantity(name)[0] for name in found.outputs)), [*rows, floor])
     parts = [
-        (quantity(name)[0], *(f"{100.0 * share:.2g}" for share in output.spread.variance.values()))
+        (quantity(name)[0], *(f"{100.0 * share:.1f}" for share in output.spread.variance.values()))
         for name, output in found.outputs.items()
     ]
     print_table("what a single run's variance comes from [%]", ("output", "simulation", "integration", "inputs"), parts)
