@@ -17,6 +17,9 @@ Retry = Annotated[bool, flag("--retry", says="Run points again that failed befor
 Direct = Annotated[
     bool, flag("--direct", says="Also search the front on the simulator itself and tell what surfaces lose.")
 ]
+Robust = Annotated[
+    bool, flag("--robust", says="Judge the pick over what is not known of the scene; also done where that is declared.")
+]
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of results and of the store of finished runs.")]
 Save = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Also write the JSON record here.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, only the answer.")]

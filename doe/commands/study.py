@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from doe.commands.options import Direct, Out, Quiet, Retry, Scheduler, StudyPath, Verbose, Workers
+from doe.commands.options import Direct, Out, Quiet, Retry, Robust, Scheduler, StudyPath, Verbose, Workers
 from doe.commands.steps import keeping_runs
 from rbdyn.cli.options import Json
 from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json, progress_bar
@@ -20,6 +20,7 @@ def study(
     scheduler: Scheduler = None,
     retry: Retry = False,
     direct: Direct = False,
+    robust: Robust = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -33,7 +34,7 @@ def study(
         output_folder(folder, "doe", path)
         from doe.study.finished import finished, inputs_digest
 
-        if not (verbose or retry) and (record := finished(folder, inputs_digest(loaded, direct))):
+        if not (verbose or retry) and (record := finished(folder, inputs_digest(loaded, direct, robust))):
             if not as_json:
                 print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
                 print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
@@ -52,6 +53,7 @@ def study(
             scheduler,
             retry,
             direct,
+            robust,
         )
         bars.close()
         record = write(outcome, folder)

@@ -88,8 +88,10 @@ def wilson(share: float, count: int) -> tuple[float, float]:
 
 
 def in_doubt(gains: Array, variances: Array) -> Whole:
-    """Places of the rows of which a gain is within two standard errors of nothing."""
-    return np.flatnonzero((np.abs(gains) < 2.0 * np.sqrt(variances)).any(axis=1))
+    """Places of the rows of which a gain is within two standard errors of nothing, the most doubtful first."""
+    sure = (np.abs(gains) / np.sqrt(np.maximum(variances, 1e-300))).min(axis=1)
+    ranked = np.argsort(sure, kind="stable")
+    return ranked[sure[ranked] < 2.0]
 
 
 def _shares(gains: Array, variances: Array, random: np.random.Generator) -> Array:
@@ -118,7 +120,7 @@ def _root(matrix: Array) -> Array:
     return found
 
 
-def decides(quantiles: Array, gains: Array, variances: Array, freedom: Array, fresh: Array, seed: int) -> Decides:
+def decides(quantiles: Array, gains: Array, variances: Array, freedom: Whole, fresh: Array, seed: int) -> Decides:
     """Which inputs decide, from rows at quantiles (n, d) of them, the last an input that does nothing.
 
     ``freedom`` (n, m): degrees of freedom behind the variances; ``fresh`` (k, d): quantiles of many input sets.
