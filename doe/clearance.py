@@ -3,8 +3,6 @@
 The only module of this package that runs bearing simulations.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import socket
@@ -56,7 +54,7 @@ def check_responses(study: Study) -> None:
 
 def read_scene(study: Study) -> dict[str, Any]:
     """Tables of the study's scene file. Raises InputError when the file or a factor's key is not there."""
-    path = study.beside(study.file.scene.file)
+    path = study.beside(study.scene.file)
     data = read_toml(path)
     refuse(
         f"{study.path}: factor.key = {factor.key!r}: no such key in {path}; write table.key as in that file"
@@ -69,7 +67,7 @@ def read_scene(study: Study) -> dict[str, Any]:
 
 def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
     """The study's scene at factor values, with a seed. Raises InputError when a value is impossible."""
-    path = study.beside(study.file.scene.file)
+    path = study.beside(study.scene.file)
     assignments = [f"{factor.key}={float(x)!r}" for factor, x in zip(study.file.factor, factors, strict=True)]
     return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments])
 
@@ -79,25 +77,17 @@ def design_scenes(study: Study, points: Array, order: Sequence[int] | None = Non
 
     ``order``: place of each run in the standard order, which sets its seed; as given unless told.
     """
-    data, first = read_scene(study), study.file.design.seed
+    data, first, overrides = read_scene(study), study.file.design.seed, study.scene.set
     places = range(len(points)) if order is None else order
-    return [
-        scene_at(study, data, point, first + place, study.file.scene.set)
-        for place, point in zip(places, points, strict=True)
-    ]
+    numbered = zip(places, points, strict=True)
+    return [scene_at(study, data, point, first + place, overrides) for place, point in numbered]
 
 
 def confirmation_scene(study: Study, point: Array) -> Scene:
     """Scene of a confirmation run: more replicates, fresh seeds."""
-    confirmation = study.file.confirmation
-    overrides = [
-        *study.file.scene.set,
-        f"numerics.replicates={confirmation.replicates}",
-        "numerics.companion=true",
-        *confirmation.set,
-    ]
-    seed = study.file.design.seed + CONFIRMATION_SEEDS
-    return scene_at(study, read_scene(study), point, seed, overrides)
+    settings, seed = study.file.confirmation, study.file.design.seed + CONFIRMATION_SEEDS
+    effort = [f"numerics.replicates={settings.replicates}", "numerics.companion=true"]
+    return scene_at(study, read_scene(study), point, seed, [*study.scene.set, *effort, *settings.set])
 
 
 def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
@@ -106,18 +96,15 @@ def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
     As long as a design run unless the study says otherwise.
     """
     data, direct = read_scene(study), study.file.direct
-    overrides = [*study.file.scene.set, f"numerics.replicates={direct.replicates}", "numerics.companion=false"]
+    overrides = [*study.scene.set, f"numerics.replicates={direct.replicates}", "numerics.companion=false"]
     if direct.discard_turns is not None:
         overrides.append(f"numerics.discard_turns={direct.discard_turns!r}")
     if direct.turns is not None:
         usual = scene_at(study, data, study.baseline, direct.seed, overrides).numerics.warm_up_turns
         # What is left after the transient; check_direct names a study that leaves nothing.
         overrides.append(f"numerics.turns={max(direct.turns - usual, 1e-3)!r}")
-    overrides += direct.set
-    return [
-        scene_at(study, data, point, direct.seed + DIRECT_SEEDS + number, overrides)
-        for number, point in enumerate(points, first)
-    ]
+    seeded = enumerate(points, direct.seed + DIRECT_SEEDS + first)
+    return [scene_at(study, data, point, seed, [*overrides, *direct.set]) for seed, point in seeded]
 
 
 def check_direct(study: Study) -> None:
@@ -127,12 +114,9 @@ def check_direct(study: Study) -> None:
     if "impact_force_N" in study.responses and counted < window:
         given = "without turns" if study.file.direct.turns is None else f"turns = {study.file.direct.turns:g}"
         least = scene.numerics.warm_up_turns + window
-        raise InputError(
-            [
-                f"{study.path}: direct.{given}: after {scene.numerics.warm_up_turns:g} discarded turns too few are counted "
-                f"for one window of the impact, numerics.impact_window_turns = {window:g}; give turns = {least:g} at least"
-            ]
-        )
+        few = f"after {scene.numerics.warm_up_turns:g} discarded turns too few are counted for one window of the impact"
+        mend = f"numerics.impact_window_turns = {window:g}; give turns = {least:g} at least"
+        raise InputError([f"{study.path}: direct.{given}: {few}, {mend}"])
 
 
 def direct_run(study: Study) -> str:
@@ -179,8 +163,8 @@ class Simulations:
         else:
             texts = {point.key: scene.model_dump_json() for point, scene in zip(points, scenes, strict=True)}
             engine = partial(_on_cluster, texts, self.scheduler)
-        found = run_points(points, self.store, engine, progress, sound, self.retry)
-        return [_result(point, found[point.key]) for point in points]
+        outcomes = run_points(points, self.store, engine, progress, sound, self.retry)
+        return [_result(point, outcomes[point.key]) for point in points]
 
 
 def points_of(
@@ -188,13 +172,11 @@ def points_of(
 ) -> list[Point]:
     """Scenes as points of the store; those with factors are design runs, numbered from 1."""
     version = code_version(SIMULATION)
-    places: list[tuple[int | None, Mapping[str, float]]] = (
-        [(None, {})] * len(scenes) if factors is None else list(enumerate(factors, start=1))
-    )
-    return [
-        Point(run_key(scene.model_dump(mode="json"), version), label, *place)
-        for scene, label, place in zip(scenes, labels, places, strict=True)
-    ]
+    keys = [run_key(scene.model_dump(mode="json"), version) for scene in scenes]
+    if factors is None:
+        return [Point(key, label) for key, label in zip(keys, labels, strict=True)]
+    numbers = range(1, len(keys) + 1)
+    return [Point(*each) for each in zip(keys, labels, numbers, factors, strict=True)]
 
 
 def sound(result: dict[str, Any]) -> bool:
@@ -204,10 +186,10 @@ def sound(result: dict[str, Any]) -> bool:
     return False
 
 
-def _result(point: Point, found: RunResult) -> SimulationResult | Failure:
-    if isinstance(found, Failure):
-        return replace(found, label=point.label, run=point.run, factors=dict(point.factors))
-    return SimulationResult.from_dict(found)
+def _result(point: Point, outcome: RunResult) -> SimulationResult | Failure:
+    if isinstance(outcome, Failure):
+        return replace(outcome, label=point.label, run=point.run, factors=dict(point.factors))
+    return SimulationResult.from_dict(outcome)
 
 
 def _in_threads(
@@ -248,7 +230,7 @@ def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point
     run_on_cluster(scheduler, work, tasks, lambda place, ran: give(taken[place], ran))
 
 
-def attempt(scene: Scene, stop: Stop | None = None) -> Ran:
+def attempt(scene: Scene, stop: "Stop | None" = None) -> Ran:
     """Simulate a scene in one thread; whatever is wrong with it is the cause of a failure."""
     from rbdyn.dynamics.ensemble import CancelledError
     from rbdyn.dynamics.simulate import simulate
@@ -270,9 +252,8 @@ def attempt_text(text: str, version: str) -> Ran:
     """The same on a worker of a cluster, of a scene in JSON. Raises InputError where the worker runs other code."""
     host, pid = socket.gethostname(), os.getpid()
     if code_version(SIMULATION) != version:
-        raise InputError(
-            [f"worker {host}, process {pid}: runs another version of rbdyn or of its sources; install the same"]
-        )
+        where = f"worker {host}, process {pid}"
+        raise InputError([f"{where}: runs another version of rbdyn or of its sources; install the same"])
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
@@ -286,16 +267,14 @@ def figures(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[
     each, each of shape (runs, responses)."""
     from rbdyn.dynamics.statistics.batch_means import MOST_BATCHES
 
-    records: list[dict[str, Any]] = [result.as_dict() for result in results]
-    values, errors, samples = (
-        [[record[name][key] for name in names] for record in records]
-        for key in ("value", "statistical_error", "effective_samples")
-    )
+    quantities = [[record[name] for name in names] for record in (result.as_dict() for result in results)]
+    keys = "value", "statistical_error", "effective_samples"
+    values, errors, samples = ([[quantity[key] for quantity in row] for row in quantities] for key in keys)
     behind = np.minimum(np.array(samples), MOST_BATCHES).astype(np.int64)
     return np.array(values), np.array(errors, dtype=float), behind
 
 
-def histories(study: Study, points: dict[str, Array], turns: float) -> dict[str, History]:
+def histories(study: Study, points: dict[str, Array], turns: float) -> "dict[str, History]":
     """Motion of the confirmation scene at each point, over at most ``turns`` shaft turns. Raises RunError."""
     from rbdyn.dynamics.motion.history import history
 
@@ -303,7 +282,7 @@ def histories(study: Study, points: dict[str, Array], turns: float) -> dict[str,
     return {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
 
 
-def draw_motion(motions: Mapping[str, History], folder: Path) -> list[str]:
+def draw_motion(motions: "Mapping[str, History]", folder: Path) -> list[str]:
     """Draw cage orbits and pocket forces; returns the names of the pictures."""
     from rbdyn import plots
 
@@ -312,7 +291,7 @@ def draw_motion(motions: Mapping[str, History], folder: Path) -> list[str]:
     return ["cage_orbit.png", "pocket_forces.png"]
 
 
-def motion_record(motions: Mapping[str, History]) -> dict[str, Any]:
+def motion_record(motions: "Mapping[str, History]") -> dict[str, Any]:
     """Motions small enough to be mailed, by name: the orbit of the cage in its guide, and frames to be played.
 
     Each holds ``t_s`` and ``cage_orbit_um`` {"x", "y"}: the whole motion, thinned to at most ORBIT_POINTS;
@@ -324,13 +303,13 @@ def motion_record(motions: Mapping[str, History]) -> dict[str, Any]:
 
     record = {}
     for name, motion in motions.items():
-        kept = slice(None, None, -(-len(motion.time) // ORBIT_POINTS))
+        thinned = slice(None, None, -(-len(motion.time) // ORBIT_POINTS))
         x, y = motion.guide_eccentricity
         clearance = motion.scene.guide_clearance_m
         picture = drawing(motion, PLAYED_TURNS, round(FRAMES / PLAYED_TURNS), FRAMES)
         record[name] = {
-            "t_s": np.round(motion.time[kept], 8).tolist(),
-            "cage_orbit_um": {"x": np.round(1e6 * x[kept], 2).tolist(), "y": np.round(1e6 * y[kept], 2).tolist()},
+            "t_s": np.round(motion.time[thinned], 8).tolist(),
+            "cage_orbit_um": {"x": np.round(1e6 * x[thinned], 2).tolist(), "y": np.round(1e6 * y[thinned], 2).tolist()},
             "guide_radius_um": None if clearance is None else round(1e6 * clearance, 3),
             "moving": frames(motion, picture),
         }

@@ -222,10 +222,10 @@ def compare(scene: Path, turns: float) -> None:
     from rbdyn.accuracy.rollers.comparison import attempts_of, compiling, curve, table
     from rbdyn.accuracy.rollers.equal_error import times_faster
     from rbdyn.accuracy.rollers.methods import OURS, Method, by_scipy
-    from rbdyn.accuracy.rollers.trajectory import reference, settled
+    from rbdyn.accuracy.rollers.trajectory import reference, starts_after_transient
     from rbdyn.cli.terminal import print_table
 
-    stretches = settled(Scene.load(scene), turns)
+    stretches = starts_after_transient(Scene.load(scene), turns)
     ready = by_scipy("RK45", lambda stretch: NumpyRightHandSide(stretch.bearing))
     plain = Method("SciPy RK45 on numpy", True, RTOLS, ready)
     compiling(stretches[0], (plain,))

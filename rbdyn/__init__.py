@@ -4,8 +4,6 @@
 Names are fetched when first used: importing the package loads neither numba nor scipy, nor anything else but itself.
 """
 
-from __future__ import annotations
-
 TYPE_CHECKING = False  # as type checkers take it, without ``typing``
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History, history
@@ -44,7 +42,7 @@ _HOMES = {
 }
 
 
-def load(path: str) -> SimulationResult:
+def load(path: str) -> "SimulationResult":
     """Read a saved result. Raises InputError when it is missing or not one."""
     from rbdyn.result import SimulationResult
 

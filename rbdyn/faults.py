@@ -1,19 +1,17 @@
 """Faults in what a user typed: collected all at once, one sentence each, with file, key, value and mend."""
 
-from __future__ import annotations
-
 import difflib
 import math
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import date, time
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from rbdyn.fields import InSI
+from rbdyn.fields import InSI, or_refuse
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -33,22 +31,22 @@ class InputError(Exception):
     """
 
     def __init__(self, faults: Iterable[str]) -> None:
-        found = list(faults)
-        if len(found) > MOST_FAULTS:
-            more = len(found) - MOST_FAULTS + 1
-            found = [*found[: MOST_FAULTS - 1], f"and {more} more faults; mend these first"]
-        self.faults = [one_line(fault) for fault in found]
+        listed = list(faults)
+        if len(listed) > MOST_FAULTS:
+            more = len(listed) - MOST_FAULTS + 1
+            listed = [*listed[: MOST_FAULTS - 1], f"and {more} more faults; mend these first"]
+        self.faults = [one_line(fault) for fault in listed]
         super().__init__("\n".join(self.faults))
 
-    def __reduce__(self) -> tuple[type[InputError], tuple[list[str]]]:
+    def __reduce__(self) -> "tuple[type[InputError], tuple[list[str]]]":
         """How it travels between processes: with its faults, not with their text."""
         return type(self), (self.faults,)
 
 
 def refuse(faults: Iterable[str]) -> None:
     """Raises InputError if there are faults."""
-    if found := list(faults):
-        raise InputError(found)
+    if listed := list(faults):
+        raise InputError(listed)
 
 
 def check_all(checks: Iterable[Callable[[], object]]) -> None:
@@ -71,6 +69,22 @@ class Strict(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, ignored_types=(InSI,))
 
+    def __repr_args__(self) -> Iterator[tuple[str, Any]]:
+        """What was given: defaults would bury it."""
+        return ((name, getattr(self, name)) for name in type(self).model_fields if name in self.model_fields_set)
+
+
+class Consistent(Strict):
+    """A table whose keys must go together: built only where ``faults`` finds none."""
+
+    def faults(self) -> Iterable[str]:
+        """A sentence for each way in which valid keys of the table do not go together."""
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _without_faults(self) -> Self:
+        return or_refuse(self, self.faults())
+
 
 def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:
     """Text as one line: control characters escaped, and beyond ``longest`` characters the middle left out."""
@@ -89,8 +103,8 @@ def read_text(path: Path) -> str:
         raise InputError([f"{path}: no such file; check the path"]) from None
     except UnicodeDecodeError as error:
         line, byte = error.object.count(b"\n", 0, error.start) + 1, error.object[error.start]
-        found = f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8)"
-        raise InputError([f"{found}; save the file as UTF-8"]) from None
+        sentence = f"{path}: cannot be read (line {line}: byte 0x{byte:02x} is no UTF-8)"
+        raise InputError([f"{sentence}; save the file as UTF-8"]) from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise InputError([f"{path}: cannot be read ({why}); check the path"]) from None
@@ -110,15 +124,15 @@ def read_toml(path: Path | str) -> dict[str, Any]:
 
 def bounded(data: dict[str, Any], source: str) -> dict[str, Any]:
     """The data themselves. Raises InputError for tables nested too deep and for integers beyond 64 bits."""
-    found: list[tuple[tuple[int | str, ...], Any]] = [((), data)]
+    waiting: list[tuple[tuple[int | str, ...], Any]] = [((), data)]
     faults = []
-    for place, value in found:
+    for place, value in waiting:
         if len(place) > DEEPEST:
             raise InputError([f"{source}: {_dotted(place[:3])}...: nested more than {DEEPEST} deep; mend the brackets"])
         if isinstance(value, Mapping):
-            found += [((*place, key), each) for key, each in value.items()]
+            waiting += [((*place, key), each) for key, each in value.items()]
         elif isinstance(value, list):
-            found += [((*place, number), each) for number, each in enumerate(value)]
+            waiting += [((*place, number), each) for number, each in enumerate(value)]
         elif isinstance(value, int) and value.bit_length() > 63:
             faults.append(f"{source}: {_dotted(place)}: a whole number beyond 64 bits; take a smaller one")
     refuse(faults)
@@ -147,15 +161,15 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        found: Sequence[Any] = error.errors(include_url=False)
-    faults = _sentences(model, found, data, source)
+        errors: Sequence[Any] = error.errors(include_url=False)
+    faults = _sentences(model, errors, data, source)
     # A table with a bad key is not checked as a whole: without that key it may show more faults.
-    bad = {fault["loc"] for fault in found}
+    bad = {fault["loc"] for fault in errors}
     try:
         model.model_validate(_without(data, bad))
     except ValidationError as error:
         rest = [fault for fault in error.errors(include_url=False) if fault["type"] == "value_error"]
-        names = {str(place[-1]) for fault in found[:MOST_FAULTS] if (place := _place(fault, data))}
+        names = {str(place[-1]) for fault in errors[:MOST_FAULTS] if (place := _place(fault, data))}
         # What is bad was not left out, even if it is missed now.
         faults += [
             fault
@@ -170,9 +184,9 @@ def set_key(data: dict[str, Any], assignment: str) -> None:
 
     Raises InputError when the assignment has no ``=``, its path runs through a plain value, or it is not one value.
     """
-    path, found, text = assignment.partition("=")
-    keys, source = [key.strip() for key in path.split(".")], f"--set {one_line(assignment, 2 * LONGEST_NAME)}"
-    if not found or not all(keys) or len(keys) > DEEPEST:
+    path, sign, text = assignment.partition("=")
+    source = f"--set {one_line(assignment, 2 * LONGEST_NAME)}"
+    if not sign:
         raise InputError([f"{source}: write it as key.path=value"])
     try:
         given = _parsed(f"value = {text}", source)
@@ -180,12 +194,20 @@ def set_key(data: dict[str, Any], assignment: str) -> None:
         given = {"value": text.strip()}
     if len(given) > 1:
         raise InputError([f"{source}: more than one value; give each its own --set"])
+    put_key(data, path, given["value"], source)
+
+
+def put_key(data: dict[str, Any], path: str, value: Any, source: str) -> None:
+    """Put a value under the dotted ``path`` of nested tables. Raises InputError when that is none, or runs through a value."""
+    keys = [key.strip() for key in path.split(".")]
+    if not all(keys) or len(keys) > DEEPEST:
+        raise InputError([f"{source}: write it as key.path=value"])
     table = data
     for key in keys[:-1]:
         table = table.setdefault(key, {})
         if not isinstance(table, dict):
             raise InputError([f"{source}: {one_line(key, LONGEST_NAME)} is a value, not a table; check the key path"])
-    table[keys[-1]] = given["value"]
+    table[keys[-1]] = value
 
 
 def _without(data: Any, bad: set[tuple[int | str, ...]], place: tuple[str, ...] = ()) -> Any:
@@ -194,10 +216,10 @@ def _without(data: Any, bad: set[tuple[int | str, ...]], place: tuple[str, ...] 
     return {key: _without(each, bad, (*place, key)) for key, each in data.items() if (*place, key) not in bad}
 
 
-def _sentences(model: type[BaseModel], found: Sequence[Any], data: Any, source: str) -> list[str]:
+def _sentences(model: type[BaseModel], errors: Sequence[Any], data: Any, source: str) -> list[str]:
     sentences: list[str] = []
     mends: dict[str, list[str]] = {}
-    for fault in found:
+    for fault in errors:
         kind, value, place = fault["type"], fault["input"], _place(fault, data)
         # Where a key may be of several kinds, each kind complains: keep what fits the value given.
         alien = "model_type" if isinstance(value, str) else "literal_error" if isinstance(value, Mapping) else ""

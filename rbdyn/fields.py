@@ -1,6 +1,7 @@
 """Number types and helpers of input tables."""
 
 import math
+from collections.abc import Iterable
 from typing import Annotated, Any, Generic, TypeVar, cast
 
 from pydantic import AfterValidator, Field
@@ -20,6 +21,7 @@ LIGHTEST_RING_KG = 1e-6
 NotVanishing = AfterValidator(_not_vanishing)
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST), NotVanishing]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST)]
+Share = Annotated[float, Field(gt=0.0, le=1.0), NotVanishing]
 
 
 N = TypeVar("N")
@@ -47,8 +49,8 @@ class InSI(Generic[N]):
 SI, OptionalSI = InSI[float], InSI[float | None]
 
 
-def or_refuse(table: Any, faults: list[str]) -> Any:
+def or_refuse(table: Any, faults: Iterable[str]) -> Any:
     """The table, or a ValueError with all its faults, one a line."""
-    if faults:
-        raise ValueError("\n".join(faults))
+    if lines := "\n".join(faults):
+        raise ValueError(lines)
     return table

@@ -1,7 +1,5 @@
 """What a simulation returns: a frozen record that saves and loads itself as JSON."""
 
-from __future__ import annotations
-
 import functools
 import json
 import math
@@ -15,11 +13,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.faults import InputError, bounded, read_text
 from rbdyn.records.record import Record, derived, json_fields, keyed
+from rbdyn.records.words import Brief, Figure, quantity
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Saved = TypeVar("Saved")
+# Read from the installed files, which takes half a millisecond.
+version_of = functools.cache(version)
 
 
 class Quantity(Record):
@@ -65,7 +66,7 @@ class SavedRecord(Record):
         return read_record(path, cls.FORMAT, cls.WHAT, cls.from_dict)
 
 
-class SimulationResult(SavedRecord):
+class SimulationResult(Brief, SavedRecord):
     """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input.
 
     ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of
@@ -103,12 +104,26 @@ class SimulationResult(SavedRecord):
     versions: dict[str, str]
     scene: dict[str, Any]
 
-    def table(self) -> pd.DataFrame:
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """Figures with errors, by their key, which names the unit."""
+        figures = ((path[0], getattr(self, one.name)) for one, path in json_fields(self))
+        return {key: figure for key, figure in figures if isinstance(figure, Quantity)}
+
+    def brief(self) -> tuple[str, list[Figure]]:
+        """Status, replicates, seed and notes; the figures."""
+        figures = [
+            Figure(words, each.value, each.error, unit)
+            for key, each in self.quantities.items()
+            for words, unit in (quantity(key),)
+        ]
+        return f"{self.status}, {self.replicates} replicates, seed {self.seed}, {len(self.notes)} notes", figures
+
+    def table(self) -> "pd.DataFrame":
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""
         import pandas as pd
 
-        figures = ((path[0], getattr(self, one.name)) for one, path in json_fields(self))
-        rows = {key: figure.as_dict() for key, figure in figures if isinstance(figure, Quantity)}
+        rows = {key: figure.as_dict() for key, figure in self.quantities.items()}
         return pd.DataFrame.from_dict(rows, orient="index", dtype=float).rename_axis("figure")
 
 
@@ -123,10 +138,10 @@ def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[
         data = json.loads(text)
     except (ValueError, RecursionError):
         data = None
-    found = data.get("format") if isinstance(data, dict) else None
-    if found != form:
-        old = f"format is {found}, not {form}; run the scene again"
-        raise InputError([f"{path}: {old if isinstance(found, str) else f'not a saved {what}; check the path'}"])
+    given = data.get("format") if isinstance(data, dict) else None
+    if given != form:
+        old = f"format is {given}, not {form}; run the scene again"
+        raise InputError([f"{path}: {old if isinstance(given, str) else f'not a saved {what}; check the path'}"])
     try:
         return restore(bounded(data, str(path)))
     except (AttributeError, KeyError, TypeError, ValueError):
@@ -150,11 +165,5 @@ def whole_file(path: Path | str) -> Iterator[Path]:
 
 def versions() -> dict[str, str]:
     """Versions that the bits of a result depend on."""
-    packages = {name: _version(name) for name in ("rbdyn", "numpy", "numba")}
+    packages = {name: version_of(name) for name in ("rbdyn", "numpy", "numba")}
     return {**packages, "python": platform.python_version(), "machine": platform.machine()}
-
-
-@functools.cache
-def _version(package: str) -> str:
-    # Read from the installed files, which takes half a millisecond.
-    return version(package)

@@ -25,7 +25,7 @@ def design(
 
         loaded = Study.load(path)
         # Without its scene the runs are made elsewhere, and only the design itself can be judged.
-        if loaded.beside(loaded.file.scene.file).exists():
+        if loaded.file.scene and loaded.beside(loaded.scene.file).exists():
             check_study(loaded)
         points = design_of(loaded)
         record = design_record(loaded, points, evaluation(loaded, points))

@@ -1,16 +1,38 @@
 """``doe fit``."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
-from doe.commands.options import Data, Out, Quiet, Retry, Scheduler, StudyPath, Workers
+import typer
+
+from doe.commands.options import Data, Out, Quiet, Retry, Scheduler
 from doe.commands.steps import Effort, fitted, keeping_runs, save
-from rbdyn.cli.options import Json, flag
+from rbdyn.cli.options import Json, Workers, flag, valued
 from rbdyn.cli.terminal import guarded, hand_over
+from rbdyn.faults import InputError, refuse
+
+if TYPE_CHECKING:
+    from doe.study_file import Study
 
 
 def fit(
-    path: StudyPath,
+    path: Annotated[
+        Path | None, typer.Argument(metavar="STUDY.toml", help="Study to fit; none for a table alone.")
+    ] = None,
     data: Data = None,
+    factor: Annotated[
+        list[str] | None,
+        valued("NAME", "Column of --data that is a factor, without STUDY; repeatable.", "all numbers but --response"),
+    ] = None,
+    response: Annotated[
+        list[str] | None,
+        valued("NAME", "Column of --data to be fitted, without STUDY; repeatable.", "all numbers but --factor"),
+    ] = None,
+    model: Annotated[
+        str | None, valued("NAME", "linear, interaction, quadratic or reduced, without STUDY.", "quadratic")
+    ] = None,
     out: Out = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -22,17 +44,37 @@ def fit(
     ] = False,
 ) -> None:
     """Fit the response surfaces and print their analysis of variance."""
-    with guarded(as_json), keeping_runs(out):
+    with guarded(as_json), ExitStack() as kept:
+        loaded = _study(path, data, {"factor": factor, "response": response, "model": model})
+        kept.enter_context(keeping_runs(out, loaded.path))
         from doe.report.steps.fit import fit_record, fit_tables, print_fit
         from doe.study.surfaces import with_rivals
 
-        loaded, surfaces = fitted(path, data, Effort(out, workers, scheduler, retry, quiet or as_json))
+        surfaces = fitted(loaded, data, Effort(out, workers, scheduler, retry, quiet or as_json))
         surfaces = with_rivals(surfaces)
         record = fit_record(surfaces)
-        save(out, path, "fit.json", record)
+        save(out, loaded.path, "fit.json", record)
         if out is not None:
             import pandas as pd
 
             for name, rows in fit_tables(surfaces).items():
                 pd.DataFrame(rows).to_csv(out / name, index=False)
+        if path is None and not as_json:
+            named = f"factors {', '.join(loaded.factors)}; responses {', '.join(loaded.responses)}"
+            print(f"{data}: {named}; coded -1 and +1 are the ends of a factor's range")
         hand_over(lambda: record, as_json, lambda: print_fit(surfaces, quiet, verbose, loaded.factors))
+
+
+def _study(path: Path | None, data: Path | None, named: Mapping[str, Any]) -> "Study":
+    """The study of the file; without one, of the table and what the command names of it. Raises InputError."""
+    from doe.study_file import Study
+    from doe.study_file.of_table import study_of_table
+
+    if path is not None:
+        refuse(f"--{option}: {path} says it; leave out one or the other" for option, given in named.items() if given)
+        return Study.load(path)
+    if data is None:
+        raise InputError(
+            ["fit: nothing to fit; give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"]
+        )
+    return study_of_table(data, named["factor"] or (), named["response"] or (), named["model"] or "quadratic")

@@ -1,14 +1,10 @@
 """``doe front``."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from doe.commands.options import Data, Direct, Out, Quiet, Retry, Scheduler, StudyPath, Workers
+from doe.commands.options import Data, Direct, Out, Quiet, Retry, Scheduler, StudyPath
 from doe.commands.steps import Effort, fitted, keeping_runs, save, searched
-from rbdyn.cli.options import Json, flag
+from rbdyn.cli.options import Json, Workers, flag, valued
 from rbdyn.cli.terminal import guarded, hand_over
 from rbdyn.faults import InputError, refuse
 
@@ -17,9 +13,10 @@ if TYPE_CHECKING:
 
 Point = Annotated[
     str | None,
-    typer.Option(
-        metavar="A,B,...|NAME=A,...",
-        help="Also what the surfaces say of this point: factor values in order, or by name (the rest at the baseline).",
+    valued(
+        "A,B,...|NAME=A,...",
+        "Also what the surfaces say of this point: factor values in order, or by name (the rest at the baseline).",
+        "none",
     ),
 ]
 
@@ -38,17 +35,17 @@ def front(
     verbose: Annotated[bool, flag("--verbose", "-v", says="Also every point of the front.")] = False,
 ) -> None:
     """Find the Pareto front on the response surfaces."""
-    with guarded(as_json), keeping_runs(out):
+    with guarded(as_json), keeping_runs(out, path):
         from doe.report.steps.front import front_record, given_point_record, print_front
         from doe.study.front import find_front
         from doe.study.goals import check_goals
         from doe.study_file import Study
 
-        study = Study.load(path)
-        check_goals(study)
-        values = None if point is None else _point(study, point)
+        loaded = Study.load(path)
+        check_goals(loaded)
+        values = None if point is None else _point(loaded, point)
         effort = Effort(out, workers, scheduler, retry, quiet or as_json)
-        loaded, surfaces = fitted(path, data, effort)
+        surfaces = fitted(loaded, data, effort)
         found = find_front(loaded, surfaces)
         record = front_record(loaded, surfaces, found)
         if values is not None:
@@ -63,7 +60,7 @@ def front(
         hand_over(lambda: record, as_json, lambda: print_front(record, verbose))
 
 
-def _point(study: Study, text: str) -> list[float]:
+def _point(study: "Study", text: str) -> list[float]:
     """Factor values that ``--point`` names. Raises InputError with every fault."""
     from math import isfinite
 

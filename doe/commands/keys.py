@@ -1,15 +1,25 @@
 """``doe keys``."""
 
+from typing import TYPE_CHECKING
+
 from rbdyn.cli.keys import AsSchema, Word, run
 from rbdyn.cli.options import Json
 from rbdyn.cli.terminal import guarded
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
 
 
 def keys(word: Word = None, as_schema: AsSchema = False, as_json: Json = False) -> None:
     """Tell what every key of a study or of a dimension chain means, its unit, range and default."""
     with guarded(as_json):
-        from doe.dimension_chain.links import Chain
-        from doe.dimension_chain.reading import Chains
-        from doe.study_file import StudyFile
+        run(kinds(), word, as_schema, as_json)
 
-        run({"study": StudyFile, "chain": Chain, "file of chains": Chains}, word, as_schema, as_json)
+
+def kinds() -> "dict[str, type[BaseModel]]":
+    """The kinds of files that ``doe`` reads."""
+    from doe.dimension_chain.links import Chain
+    from doe.dimension_chain.reading import Chains
+    from doe.study_file import StudyFile
+
+    return {"study": StudyFile, "chain": Chain, "file of chains": Chains}

@@ -5,13 +5,12 @@ from typing import Annotated
 
 import typer
 
-from rbdyn.cli.options import flag
+from rbdyn.cli.options import flag, folder_option, valued
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study to run.")]
-Data = Annotated[Path | None, typer.Option(metavar="TABLE.csv", help="Runs of a table instead of simulated ones.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all processors by default.")]
+Data = Annotated[Path | None, valued("TABLE.csv", "Table of runs made elsewhere.", "runs are simulated")]
 Scheduler = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="Run on the dask cluster of this scheduler instead of threads.")
+    str | None, valued("ADDRESS", "Run on the dask cluster of this scheduler.", "threads of this machine")
 ]
 Retry = Annotated[bool, flag("--retry", says="Run points again that failed before.")]
 Direct = Annotated[
@@ -20,7 +19,10 @@ Direct = Annotated[
 Robust = Annotated[
     bool, flag("--robust", says="Judge the pick over what is not known of the scene; also done where that is declared.")
 ]
-Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of results and of the store of finished runs.")]
-Save = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Also write the JSON record here.")]
+Out = Annotated[Path | None, folder_option("Folder of results and of the store of finished runs.")]
+StudyOut = Annotated[
+    Path | None, folder_option("Folder of results and of the store of finished runs.", "STUDY_results")
+]
+Save = Annotated[Path | None, folder_option("Also write the JSON record here.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, only the answer.")]
 Verbose = Annotated[bool, flag("--verbose", "-v", says="Also print the analysis of variance.")]

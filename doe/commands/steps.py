@@ -1,10 +1,8 @@
 """What the commands share: runs and surfaces of a study, and where a record goes."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,11 +25,13 @@ def save(out: Path | None, source: Path, name: str, record: dict[str, Any]) -> N
 
 
 @contextmanager
-def keeping_runs(out: Path | None) -> Iterator[None]:
-    """Let Ctrl-C tell that finished runs are kept, once there is a store of them in ``out``."""
+def keeping_runs(out: Path | None, source: Path) -> Iterator[None]:
+    """Let Ctrl-C tell that finished runs are kept, once there is a store of them in ``out``, and ``doe status`` that the
+    study of the file ``source`` runs there."""
+    from doe.running.at_work import at_work
     from doe.study.runs import STORE
 
-    with keeping(None if out is None else out / STORE):
+    with keeping(None if out is None else out / STORE), nullcontext() if out is None else at_work(source, out):
         yield
 
 
@@ -45,21 +45,19 @@ class Effort(NamedTuple):
     quiet: bool
 
 
-def fitted(path: Path, data: Path | None, effort: Effort) -> tuple[Study, list[Surface]]:
-    """The study and its surfaces, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
+def fitted(study: "Study", data: Path | None, effort: Effort) -> "list[Surface]":
+    """Surfaces of a study, of a table or of simulated runs. Raises InputError, RunError, KeyboardInterrupt."""
     from doe.study.runs import read_runs, run_design
     from doe.study.surfaces import fit_surfaces
-    from doe.study_file import Study
 
-    loaded = Study.load(path)
     if data is not None:
-        return loaded, fit_surfaces(loaded, read_runs(loaded, data))
+        return fit_surfaces(study, read_runs(study, data))
     out, workers, scheduler, retry, quiet = effort
-    with _store_folder(out, path) as folder, progress_bar("design runs", quiet) as progress:
-        return loaded, fit_surfaces(loaded, run_design(loaded, folder, workers, progress, scheduler, retry))
+    with _store_folder(out, study.path) as folder, progress_bar("design runs", quiet) as progress:
+        return fit_surfaces(study, run_design(study, folder, workers, progress, scheduler, retry))
 
 
-def searched(study: Study, found: ParetoFront, effort: Effort) -> Direct:
+def searched(study: "Study", found: "ParetoFront", effort: Effort) -> "Direct":
     """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
     from doe.clearance import Simulations
     from doe.running.store import Store

@@ -7,15 +7,15 @@ from typing import Any
 
 import typer
 
-from doe.commands.options import Direct, Out, Quiet, Retry, Robust, Scheduler, StudyPath, Verbose, Workers
+from doe.commands.options import Direct, Quiet, Retry, Robust, Scheduler, StudyOut, StudyPath, Verbose
 from doe.commands.steps import keeping_runs
-from rbdyn.cli.options import Json
+from rbdyn.cli.options import Json, Workers
 from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json, progress_bar
 
 
 def study(
     path: StudyPath,
-    out: Out = None,
+    out: StudyOut = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     retry: Retry = False,
@@ -27,7 +27,7 @@ def study(
 ) -> None:
     """Design, simulate, fit, optimise, confirm and dimension in one go; resumes by itself."""
     folder = out or Path(f"{path.stem}_results")
-    with guarded(as_json), keeping_runs(folder), ExitStack() as bars:
+    with guarded(as_json), keeping_runs(folder, path), ExitStack() as bars:
         from doe.study_file import Study
 
         loaded = Study.load(path)

@@ -6,20 +6,22 @@ from typing import Annotated
 
 import typer
 
-from doe.commands.options import Out, Quiet, Retry, Scheduler, Workers
+from doe.commands.options import Quiet, Retry, Scheduler
 from doe.commands.steps import keeping_runs
-from rbdyn.cli.options import Json, Set
+from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
 from rbdyn.cli.terminal import guarded, hand_over, output_folder, progress_bar
 
 
 def uncertainty(
     path: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene of a roller bearing.")],
     points: Annotated[
-        int | None, typer.Option(min=16, max=512, help="Input sets to start from, a power of two; 128 if left out.")
+        int | None, valued("N", "Input sets to start from, a power of two.", "128", min=16, max=512)
     ] = None,
     target: Annotated[str, typer.Option(metavar="SHARE", help="How well the ends of a range are to be known.")] = "10%",
     overrides: Set = None,
-    out: Out = None,
+    out: Annotated[
+        Path | None, folder_option("Folder of results and of the store of finished runs.", "SCENE_uncertainty")
+    ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     retry: Retry = False,
@@ -28,7 +30,7 @@ def uncertainty(
 ) -> None:
     """Tell what is not known of a scene, what that does to every output, and which input decides."""
     folder = out or Path(f"{path.stem}_uncertainty")
-    with guarded(as_json), keeping_runs(folder), ExitStack() as bars:
+    with guarded(as_json), keeping_runs(folder, path), ExitStack() as bars:
         from doe.clearance import Simulations
         from doe.report.steps.uncertainty import print_uncertainty, record_of, write
         from doe.running.store import Store

@@ -33,17 +33,14 @@ def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = Fals
     Technometrics 2 (1960) 455-475.
     """
     if factors not in TOGETHER:
-        raise ValueError(
-            f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; use kind = \"central_composite\""
-        )
+        mend = 'use kind = "central_composite"'
+        raise ValueError(f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; {mend}")
     number = BLOCKS.get(factors, 1) if blocks else 1
     if blocks and number == 1:
         raise ValueError(f"blocks = true: a Box-Behnken design in {factors} factors has no orthogonal blocks")
     if centre_replicates % number:
-        raise ValueError(
-            f"centre_replicates = {centre_replicates}: {number} blocks need equal shares of the centre "
-            f"points; give a multiple of {number}"
-        )
+        need = f"{number} blocks need equal shares of the centre points; give a multiple of {number}"
+        raise ValueError(f"centre_replicates = {centre_replicates}: {need}")
     edges, of_run = [], []
     for place, letters in enumerate(TOGETHER[factors]):
         columns = ["ABCDEFG".index(letter) for letter in letters]

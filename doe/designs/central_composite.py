@@ -7,8 +7,6 @@ import numpy as np
 from doe.designs.cube import corner_blocks, cube_points
 from doe.designs.design import Design, assembled
 
-WORDS = ("rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "face_centred", "inscribed")
-
 
 def central_composite(
     factors: int,
@@ -81,19 +79,19 @@ def axial_distance(
     """
     cube = 2**factors if cube_runs is None else cube_runs
     total = cube + 2 * factors + sum(centres)
-    if alpha in ("face_centred", "inscribed"):
-        return 1.0
-    if alpha == "rotatable":
-        return math.pow(cube, 0.25)
-    if alpha == "spherical":
-        return math.sqrt(factors)
-    if alpha == "orthogonal_blocks":
-        return math.sqrt(factors * (1 + centres[1] / (2 * factors)) / (1 + centres[0] / cube))
-    if alpha == "orthogonal_columns":
-        return math.sqrt((math.sqrt(cube * total) - cube) / 2)
+    distances = {
+        "rotatable": math.pow(cube, 0.25),
+        "spherical": math.sqrt(factors),
+        "orthogonal_blocks": math.sqrt(factors * (1 + centres[1] / (2 * factors)) / (1 + centres[0] / cube)),
+        "orthogonal_columns": math.sqrt((math.sqrt(cube * total) - cube) / 2),
+        "face_centred": 1.0,
+        "inscribed": 1.0,
+    }
     if isinstance(alpha, str):
-        words = ", ".join(f'"{word}"' for word in WORDS)
-        raise ValueError(f"alpha = {alpha!r}: write {words} or a positive number")
+        if alpha not in distances:
+            words = ", ".join(f'"{word}"' for word in distances)
+            raise ValueError(f"alpha = {alpha!r}: write {words} or a positive number")
+        return distances[alpha]
     if not (math.isfinite(alpha) and alpha > 0):
         raise ValueError(f"alpha = {alpha}: must be a positive number")
     return float(alpha)
@@ -110,15 +108,13 @@ def centre_shares(
 
     Raises ValueError for an unknown ``alpha``.
     """
-    free = ("orthogonal_blocks", "inscribed")
-    wanted = axial_distance(
-        factors, "rotatable" if alpha in free else alpha, cube_runs=cube_runs, centres=(0, centre_replicates)
-    )
+    asked = "rotatable" if alpha in ("orthogonal_blocks", "inscribed") else alpha
+    wanted = axial_distance(factors, asked, cube_runs=cube_runs, centres=(0, centre_replicates))
 
     def away(with_cube: int) -> float:
         shares = (with_cube, centre_replicates - with_cube)
-        found = axial_distance(factors, "orthogonal_blocks", cube_runs=cube_runs, centres=shares)
-        return abs(math.log(found / wanted))
+        orthogonal = axial_distance(factors, "orthogonal_blocks", cube_runs=cube_runs, centres=shares)
+        return abs(math.log(orthogonal / wanted))
 
     best = min(range(0, centre_replicates + 1, cube_blocks), key=away)
     return best, centre_replicates - best

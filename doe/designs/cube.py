@@ -22,10 +22,8 @@ def cube_points(factors: int, cube: str = "full") -> Array:
         raise ValueError(f'cube = {cube!r}: choose "full" or "resolution_v"')
     generators = RESOLUTION_V.get(factors, ()) if cube == "resolution_v" else ()
     if cube == "resolution_v" and not generators:
-        raise ValueError(
-            f"cube = 'resolution_v': no fraction of resolution V is tabulated for {factors} factors, "
-            f'only for {min(RESOLUTION_V)} to {max(RESOLUTION_V)}; use cube = "full"'
-        )
+        tabulated = f"tabulated for {factors} factors, only for {min(RESOLUTION_V)} to {max(RESOLUTION_V)}"
+        raise ValueError(f"cube = 'resolution_v': no fraction of resolution V is {tabulated}; use cube = \"full\"")
     basic = factors - len(generators)
     corners = np.array([corner[::-1] for corner in product((-1.0, 1.0), repeat=basic)])
     added = [corners[:, ["ABCDEFGH".index(letter) for letter in word]].prod(axis=1) for word in generators]
@@ -40,11 +38,9 @@ def corner_blocks(corners: Array, blocks: int) -> Rows:
     """
     if blocks == 1:
         return np.zeros(len(corners), dtype=np.intp)
-    words = [
-        corners[:, word].prod(axis=1)
-        for size in range(corners.shape[1], 2, -1)
-        for word in combinations(range(corners.shape[1]), size)
-    ]
+    count = corners.shape[1]
+    longest_first = (word for size in range(count, 2, -1) for word in combinations(range(count), size))
+    words = [corners[:, word].prod(axis=1) for word in longest_first]
     short = _short_products(corners)
     clear = [word for word in words if not np.abs(short.T @ word).any()]
     if blocks == 2 and clear:
@@ -54,10 +50,8 @@ def corner_blocks(corners: Array, blocks: int) -> Rows:
             between = one * two
             if not np.abs(short.T @ between).any():
                 return (2 * (one > 0) + (two > 0)).astype(np.intp)
-    raise ValueError(
-        f"cube_blocks = {blocks}: {len(corners)} corners of {corners.shape[1]} factors cannot be divided so "
-        "without confusing a block with a second-order term; use fewer blocks or a larger cube"
-    )
+    what = f"cube_blocks = {blocks}: {len(corners)} corners of {corners.shape[1]} factors cannot be divided so without"
+    raise ValueError(f"{what} confusing a block with a second-order term; use fewer blocks or a larger cube")
 
 
 def _short_products(corners: Array) -> Array:

@@ -1,14 +1,17 @@
-"""A design of experiments as a record: its points, their blocks and kinds, and the order of the runs."""
+"""A design of experiments as a record: its points, their blocks and kinds, and the order of the runs; coded and actual
+units of points, and which of them are replicates."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from doe.arrays import Array, Rows
+from doe.arrays import Array, Rows, Whole
 
 Region = Literal["ball", "box"]
+SAME_POINT = 1e-9  # coded units within which two runs are replicates
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +53,8 @@ class Design:
         if seed is not None:
             ties = np.random.default_rng(seed).permutation(len(self.coded))
         rows = np.lexsort((ties, self.block))
-        return replace(
-            self,
-            coded=self.coded[rows],
-            block=self.block[rows],
-            kind=tuple(self.kind[row] for row in rows),
-            order=self.order[rows],
-        )
+        kind = tuple(self.kind[row] for row in rows)
+        return replace(self, coded=self.coded[rows], block=self.block[rows], kind=kind, order=self.order[rows])
 
 
 def assembled(parts: Sequence[tuple[str, Array]], blocks: Sequence[int], reach: float, region: Region) -> Design:
@@ -64,3 +62,31 @@ def assembled(parts: Sequence[tuple[str, Array]], blocks: Sequence[int], reach: 
     coded = np.vstack([points for _, points in parts]) + 0.0  # no negative zeros
     kinds = tuple(kind for kind, points in parts for _ in points)
     return Design(coded, np.array(blocks, dtype=np.intp), kinds, np.arange(len(coded)), reach, region)
+
+
+def replicate_groups(points: Array, block: Whole | None = None) -> Whole:
+    """For each run (n, k) the first run at the same point, and in the same block where blocks are given, shape (n,)."""
+    first = np.empty(len(points), np.int64)
+    for place, point in enumerate(points):
+        # Run by run: all distances at once would take gigabytes of ten thousand runs.
+        same = np.abs(points[: place + 1] - point).max(axis=1) <= SAME_POINT
+        if block is not None:
+            same &= block[: place + 1] == block[place]
+        first[place] = same.argmax()
+    return first
+
+
+def to_actual(coded: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
+    """Actual factor values of coded points (..., k); ``centre`` and ``step`` (k,) are in actual units."""
+    return np.asarray(centre, float) + np.asarray(coded, float) * np.asarray(step, float)
+
+
+def to_coded(actual: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
+    """Coded values of actual points (..., k); the inverse of `to_actual`.
+
+    Raises ValueError when a step is zero.
+    """
+    step = np.asarray(step, float)
+    if np.any(step == 0):
+        raise ValueError(f"step = {step.tolist()}: every step must differ from zero")
+    return (np.asarray(actual, float) - np.asarray(centre, float)) / step

@@ -5,20 +5,20 @@ Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th e
 
 import math
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
+from scipy import special, stats
 
 from doe.arrays import Array, Rows
-from doe.designs.design import Region
-from doe.designs.model import model_matrix
-from doe.designs.region import directions, lattice, moment_matrix, sample
-from doe.designs.replicates import replicate_groups
+from doe.designs.design import Region, replicate_groups
+from doe.designs.model import model_matrix, term_powers
 
 SIGNIFICANCE = 0.05  # of the tests whose power is given
 RADII = 11  # of the variance dispersion graph
+SAMPLE = 12  # base-2 logarithm of the size of the quasi-random sample of a region
 
 
 def evaluate(
@@ -132,7 +132,7 @@ def _precision(points: Array, terms: Sequence[str], covariance: Array, region: R
             for radius, shell in zip(radii.tolist(), shells, strict=True)
         ],
         "fraction_of_design_space": [
-            {"percent": percent, "variance": float(np.percentile(spread, percent))} for percent in range(0, 101, 5)
+            {"percent": share, "variance": float(np.percentile(spread, share))} for share in range(0, 101, 5)
         ],
     }
 
@@ -163,13 +163,8 @@ def _inflation(matrix: Array, covariance: Array, terms: Sequence[str]) -> dict[s
 def _degrees_of_freedom(points: Array, groups: Rows, terms: int, blocks: int) -> dict[str, int]:
     residual = len(points) - terms - blocks
     pure = len(points) - len(np.unique(replicate_groups(points, groups)))
-    return {
-        "model": terms - 1,
-        "blocks": blocks,
-        "residual": residual,
-        "lack_of_fit": residual - pure,
-        "pure_error": pure,
-    }
+    missed = {"lack_of_fit": residual - pure, "pure_error": pure}
+    return {"model": terms - 1, "blocks": blocks, "residual": residual, **missed}
 
 
 def _blocks(matrix: Array, contrasts: Array, groups: Rows) -> dict[str, Any] | None:
@@ -186,10 +181,49 @@ def _power(covariance: Array, terms: Sequence[str], residual: int) -> dict[str, 
         if term == "1":
             continue
         power[term] = {"one_sigma": None, "two_sigma": None}
-        if residual > 0:
-            limit = stats.f.isf(SIGNIFICANCE, 1, residual)
-            per_sigma = 1.0 if "^2" in term else 0.5
-            for name, change in (("one_sigma", 1.0), ("two_sigma", 2.0)):
-                shift = (per_sigma * change) ** 2 / variance
+        for name, change in (("one_sigma", 1.0), ("two_sigma", 2.0)):
+            if residual > 0:
+                limit = stats.f.isf(SIGNIFICANCE, 1, residual)
+                shift = ((1.0 if "^2" in term else 0.5) * change) ** 2 / variance
                 power[term][name] = 100.0 * float(stats.ncf.sf(limit, 1, residual, shift))
     return power
+
+
+def moment_matrix(terms: Sequence[str], factors: int, region: Region, reach: float) -> Array:
+    """Mean over the region of the products of any two terms, shape (p, p).
+
+    ``reach``: radius of the ball or half-width of the box. Closed form: in a box the mean of x^m is
+    reach^m/(m + 1) for each factor and even m; for the ball see Folland, Am. Math. Mon. 108 (2001) 446-448.
+    """
+    powers = term_powers(terms, factors)
+    both = powers[:, None, :] + powers[None, :, :]
+    degree = both.sum(axis=-1)
+    if region == "box":
+        means = np.prod(1.0 / (both + 1.0), axis=-1)
+    else:
+        on_sphere = special.gammaln(factors / 2) - special.gammaln((factors + degree) / 2)
+        on_sphere += (special.gammaln((both + 1) / 2) - special.gammaln(0.5)).sum(axis=-1)
+        means = np.exp(on_sphere) * factors / (factors + degree)
+    return np.where((both % 2 == 1).any(axis=-1), 0.0, means * reach**degree)
+
+
+def directions(factors: int) -> Array:
+    """Unit vectors (3^k - 1, k) to the middle of every face, edge and corner of a cube."""
+    towards = np.array([each for each in product((-1.0, 0.0, 1.0), repeat=factors) if any(each)])
+    return towards / np.linalg.norm(towards, axis=1, keepdims=True)
+
+
+def sample(factors: int, region: Region, reach: float) -> Array:
+    """Evenly spread points (4096, k) of the region, always the same ones."""
+    if region == "box":
+        return reach * (2.0 * stats.qmc.Sobol(factors, seed=0).random_base2(SAMPLE) - 1.0)
+    unit = stats.qmc.Sobol(factors + 1, seed=0).random_base2(SAMPLE)
+    normal = stats.norm.ppf(unit[:, :-1].clip(1e-12, 1 - 1e-12))
+    radius = reach * unit[:, -1:] ** (1.0 / factors)
+    return radius * normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+
+def lattice(factors: int, reach: float) -> Array:
+    """Regular points of a box with its corners, faces and centre: five levels a factor, three beyond six factors."""
+    levels = np.linspace(-reach, reach, 5 if factors <= 6 else 3)
+    return np.array(list(product(levels, repeat=factors)))

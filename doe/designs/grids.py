@@ -17,11 +17,9 @@ def full_factorial(factors: int, *, levels: int = 3, centre_replicates: int = 0)
 
     ``centre_replicates`` points are added at the centre. Raises ValueError beyond 10 000 combinations.
     """
-    if levels**factors > MOST_RUNS:
-        raise ValueError(
-            f"levels = {levels}: {factors} factors give {levels**factors} runs, more than {MOST_RUNS}; "
-            'give fewer levels or use kind = "sobol"'
-        )
+    if (runs := levels**factors) > MOST_RUNS:
+        mend = 'give fewer levels or use kind = "sobol"'
+        raise ValueError(f"levels = {levels}: {factors} factors give {runs} runs, more than {MOST_RUNS}; {mend}")
     values = np.linspace(-1.0, 1.0, levels)
     return _filled("grid", np.array([each[::-1] for each in product(values, repeat=factors)]), centre_replicates)
 

@@ -17,9 +17,10 @@ from doe.arrays import Array, Rows
 
 Model = Literal["linear", "interaction", "quadratic", "reduced"]
 MODELS: tuple[str, ...] = get_args(Model)
+Terms = tuple[str, ...]
 
 
-def model_terms(factors: int, model: str) -> tuple[str, ...]:
+def model_terms(factors: int, model: str) -> Terms:
     """Terms of a model: "linear", "interaction" (with products of two factors), else the full second order.
 
     A model that is reduced by the data needs runs for all terms that it starts from.
@@ -37,7 +38,7 @@ def term_powers(terms: Sequence[str], factors: int) -> Rows:
     return of_column[first] + of_column[second]
 
 
-def needed(term: str, terms: tuple[str, ...]) -> bool:
+def needed(term: str, terms: Terms) -> bool:
     """Whether hierarchy keeps a term: the constant, or one that another term is built on."""
     return term == "1" or any(term in other for other in terms if other != term)
 
@@ -50,7 +51,7 @@ def model_matrix(coded: ArrayLike, terms: Sequence[str]) -> Array:
     return padded[..., first] * padded[..., second]
 
 
-def second_order(terms: tuple[str, ...], coefficients: Array, factors: int) -> tuple[float, Array, Array]:
+def second_order(terms: Terms, coefficients: Array, factors: int) -> tuple[float, Array, Array]:
     """Constant b0, gradient b (k,) and symmetric B (k, k) of b0 + b x + x' B x."""
     padded = np.zeros((factors + 1, factors + 1))
     for a, b, value in zip(*_pairs(terms), coefficients.tolist(), strict=True):
@@ -59,7 +60,7 @@ def second_order(terms: tuple[str, ...], coefficients: Array, factors: int) -> t
     return float(padded[0, 0]), 2 * padded[0, 1:], padded[1:, 1:]
 
 
-def in_actual_units(terms: tuple[str, ...], coefficients: Array, centre: Array, step: Array) -> Array:
+def in_actual_units(terms: Terms, coefficients: Array, centre: Array, step: Array) -> Array:
     """Coefficients of the same terms in actual units, of a hierarchical model in coded ones."""
     constant, gradient, matrix = second_order(terms, coefficients, centre.size)
     matrix, gradient = matrix / np.outer(step, step), gradient / step
@@ -70,7 +71,7 @@ def in_actual_units(terms: tuple[str, ...], coefficients: Array, centre: Array, 
 
 
 @cache
-def _pairs(terms: tuple[str, ...]) -> tuple[list[int], list[int]]:
+def _pairs(terms: Terms) -> tuple[list[int], list[int]]:
     """The two columns, of 1 and the factors, whose product each term is."""
     pairs = [_pair(term) for term in terms]
     return [a for a, _ in pairs], [b for _, b in pairs]

@@ -21,7 +21,7 @@ from doe.dimension_chain.iso286 import grade_tolerances, tolerance_unit
 from doe.dimension_chain.links import DIGITS, SLACK, Chain, Interval, Link, Mode, Part
 from doe.dimension_chain.monte_carlo import Assemblies, draw
 from doe.dimension_chain.parts import allocated_part, given_part
-from doe.dimension_chain.yields import closing_moments, exact_shares, sampled_yields, standard_error
+from doe.dimension_chain.yields import closing_moments, exact_shares, standard_error
 
 SAMPLES = 100_000  # assemblies that judge a yield where no convolution can
 HALVINGS = 26
@@ -30,6 +30,12 @@ WANDER = 0.5  # of the nominal: farther off, the steps of Newton have lost the s
 WIDEST = 64.0  # times the tolerances of the linear rule
 
 Tolerances = Mapping[str, float]
+
+
+def moved_by(part: Part, step: float) -> Part:
+    """The part with another nominal."""
+    nominal = round(part.nominal_mm + step, DIGITS)
+    return replace(part, nominal_mm=nominal, moved_mm=round(part.moved_mm + nominal - part.nominal_mm, DIGITS))
 
 
 @dataclass(frozen=True)
@@ -79,10 +85,7 @@ class Allocation:
                 if gone:
                     break
                 raise
-            parts = [
-                replace(part, nominal_mm=round(part.nominal_mm + step, DIGITS)) if part.name == moved else part
-                for part in parts
-            ]
+            parts = [moved_by(part, step) if part.name == moved else part for part in parts]
             if moved not in self.function.arguments or abs(step) < SLACK:
                 return parts
             gone += abs(step)
@@ -102,7 +105,7 @@ class Allocation:
         limits = self.chain.closing_link
         if self.function.linear:
             return 1 - sum(exact_shares(self.function, parts, limits))
-        share = sampled_yields(self._drawn(parts))["as_given"]
+        share = self._drawn(parts).yields["as_given"]
         return share - 2 * standard_error(share, SAMPLES)
 
     def tails(self, parts: list[Part]) -> Interval:
@@ -139,8 +142,8 @@ class Allocation:
             raise ValueError(f'"{idle[0]}" does not move the closing link; fix it')
         if rule.method == "cost":
             curves = [link.cost for link in free if link.cost is not None]
-            found = cheapest(curves, [slopes[link.name] for link in free], rest, mode)
-            return {link.name: t for link, t in zip(free, found, strict=True)}
+            widths = cheapest(curves, [slopes[link.name] for link in free], rest, mode)
+            return {link.name: t for link, t in zip(free, widths, strict=True)}
         iso = rule.method == "iso286"
         weights = {link.name: tolerance_unit(link.nominal) if iso else 1.0 for link in free}
         share = rest / total([abs(slopes[name]) * weight for name, weight in weights.items()], mode)
@@ -178,11 +181,8 @@ class Allocation:
             return self.parts(widths, {name: grade for name, (grade, _) in chosen.items()})
 
         while self.chain.allocate.spend_slack:
-            wider = [
-                name
-                for name, step in steps.items()
-                if 0 <= step < len(ladders[name]) - 1 and self.kept(parts({**steps, name: step + 1}))
-            ]
+            open_ones = [name for name, step in steps.items() if 0 <= step < len(ladders[name]) - 1]
+            wider = [name for name in open_ones if self.kept(parts({**steps, name: steps[name] + 1}))]
             if not wider:
                 break
             best = max(wider, key=lambda name: self._worth(free[name], ladders[name], steps[name]))

@@ -1,4 +1,8 @@
-"""The closing link as a function of the parts' sizes, and its sensitivities."""
+"""The closing link as a function of the parts' sizes, and its sensitivities.
+
+Raceways that a press fit widens or narrows: rings, shafts and housings are thick cylinders of one length in plane stress
+(Lamé), as in `rbdyn.mounting.rings`.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from doe.dimension_chain.expressions import evaluate, names_in, shown
-from doe.dimension_chain.fits import press_fit_factor
 from doe.dimension_chain.links import Link, Part, PressFit
+from rbdyn.mounting.rings import Ring, interface_pressure
+from rbdyn.properties.materials import Material
 
+MM = 1e-3
 STEP = 1e-5  # mm of the central differences that give sensitivities
 LARGEST = 1e12  # of a function's value: what is larger is a slip of the pen, and squares of slopes must stay finite
 
@@ -31,9 +37,8 @@ class Function:
         """Tell the first of the sizes at which the value is not finite."""
         link, values = self.link, np.atleast_1d(value)
         lost = np.flatnonzero(~(np.abs(values) <= LARGEST))
-        at = ", ".join(
-            f"{name} = {np.broadcast_to(sizes[name], values.shape)[lost[0]]:.6g}" for name in _varies_with(link)
-        )
+        first = {name: np.broadcast_to(sizes[name], values.shape)[lost[0]] for name in _varies_with(link)}
+        at = ", ".join(f"{name} = {size:.6g}" for name, size in first.items())
         what = f"expression = {shown(link.expression)}" if link.expression else "press_fit or thermal_growth"
         share = f" ({len(lost)} of {len(values)} assemblies tried)" if len(values) > 1 else ""
         return NoValueError(
@@ -81,11 +86,11 @@ class ClosingFunction:
     def sensitivities(self, sizes: Sizes) -> dict[str, float]:
         """Change of the closing link per change of each part at the given sizes."""
         self.bent(sizes)  # a place without a value is told as it is, before the steps aside
-        found = dict(self.coefficients)
+        slopes = dict(self.coefficients)
         for name in self.arguments:
             above, below = ({**sizes, name: sizes[name] + sign * STEP} for sign in (1, -1))
-            found[name] += float(self.bent(above) - self.bent(below)) / (2 * STEP)
-        return found
+            slopes[name] += float(self.bent(above) - self.bent(below)) / (2 * STEP)
+        return slopes
 
 
 def closing_function(links: Sequence[Link]) -> ClosingFunction:
@@ -141,3 +146,31 @@ def _function(link: Link, by_name: Mapping[str, Link]) -> Callable[[Sizes], Any]
 def _press_fit(fit: PressFit, bore_nominal: float) -> Callable[[Sizes], Any]:
     factor, change = press_fit_factor(fit, bore_nominal), fit.interference_change_mm
     return lambda sizes: factor * np.maximum(sizes[fit.shaft] - sizes[fit.bore] + change, 0.0)
+
+
+def press_fit_factor(fit: PressFit, bore_nominal: float) -> float:
+    """Change of the raceway's diameter per interference of a tight fit; positive on the outer part, else negative.
+
+    A solid shaft in a ring of its own material widens the ring's outside by fit/outside. ``bore_nominal`` [mm] is the
+    diameter of the fit unless it has its own. Raises ValueError unless shaft_bore < fit < outside and the raceway lies
+    on one of the two parts.
+    """
+    fit_mm, raceway_mm = fit.fit_mm or bore_nominal, fit.raceway_mm
+    outer = raceway_mm > fit_mm
+    # The raceway bounds the part that it stands on, unless told otherwise.
+    shaft_bore_mm = (0.0 if outer else raceway_mm) if fit.shaft_bore_mm is None else fit.shaft_bore_mm
+    outside_mm = raceway_mm if fit.outside_mm is None else fit.outside_mm
+    if fit.outside_mm is None and not outer:
+        raise ValueError("outside_mm is missing: give the outside diameter of what holds the ring")
+    if not shaft_bore_mm <= raceway_mm <= outside_mm or raceway_mm == fit_mm:
+        raise ValueError(f"a raceway of {raceway_mm:g} mm lies on neither part; mend its diameter")
+    # Free of loads but the pressure, a part needs neither mass nor heat.
+    shaft_steel = Material(1e9 * fit.shaft_modulus_GPa, fit.shaft_poisson, 0.0)
+    bore_steel = Material(1e9 * fit.bore_modulus_GPa, fit.bore_poisson, 0.0)
+    shaft = Ring(MM * shaft_bore_mm / 2, MM * fit_mm / 2, shaft_steel)
+    bore = Ring(MM * fit_mm / 2, MM * outside_mm / 2, bore_steel)
+    pressure = interface_pressure(shaft, bore, MM)
+    radius = MM * raceway_mm / 2
+    if outer:
+        return 2 * bore.pressure_growth(radius, inside=pressure) / MM
+    return 2 * shaft.pressure_growth(radius, outside=pressure) / MM

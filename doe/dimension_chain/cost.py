@@ -23,16 +23,13 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
 
     from scipy.optimize import brentq
 
+    def tolerance(curve: Cost, slope: float, log_multiplier: float) -> float:
+        power, weight = (curve.k + 2, 2 * slope**2) if mode == "rss" else (curve.k + 1, abs(slope))
+        wish = (curve.k * curve.b / weight) ** (1 / power) * exp(-log_multiplier / power)
+        return min(max(wish, curve.narrowest_mm), curve.widest_mm or inf)
+
     def tolerances(log_multiplier: float) -> list[float]:
-        found = []
-        for curve, slope in zip(curves, slopes, strict=True):
-            if mode == "rss":
-                power, weight = curve.k + 2, 2 * slope**2
-            else:
-                power, weight = curve.k + 1, abs(slope)
-            wish = (curve.k * curve.b / weight) ** (1 / power) * exp(-log_multiplier / power)
-            found.append(min(max(wish, curve.narrowest_mm), curve.widest_mm or inf))
-        return found
+        return [tolerance(curve, slope, log_multiplier) for curve, slope in zip(curves, slopes, strict=True)]
 
     def excess(log_multiplier: float) -> float:
         shares = [abs(s) * t for s, t in zip(slopes, tolerances(log_multiplier), strict=True)]
@@ -40,10 +37,8 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
 
     if excess(SPAN) > 0:
         needed = width * (1 + excess(SPAN))
-        raise ValueError(
-            f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm; widen the limits or "
-            "let a process go narrower"
-        )
+        what = f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm"
+        raise ValueError(f"{what}; widen the limits or let a process go narrower")
     if excess(-SPAN / 4) < 0:
         return tolerances(-SPAN / 4)
     return tolerances(brentq(excess, -SPAN / 4, SPAN, xtol=1e-13, rtol=1e-14))

@@ -12,6 +12,7 @@ from scipy.special import ndtr, ndtri
 from doe.arrays import Array
 from doe.dimension_chain.links import Distribution, Part
 
+FILLING = ("uniform", "triangular")  # the tolerance from end to end
 NORMAL_REACH = 9.0  # standard deviations beyond which a normal part has a share below 1e-18
 
 
@@ -20,48 +21,45 @@ def standard_limits(part: Part) -> tuple[float, float]:
     return (part.lower_mm - part.mean_mm) / part.sigma_mm, (part.upper_mm - part.mean_mm) / part.sigma_mm
 
 
+def frame(part: Part, kind: Distribution) -> tuple[float, float]:
+    """Scale and shift, mm, that make deviations from the nominal of standard numbers."""
+    return (part.tolerance_mm, part.lower_mm) if kind in FILLING else (part.sigma_mm, part.mean_mm)
+
+
 def quantile(part: Part, kind: Distribution, probability: Array) -> Array:
     """Deviation from the nominal, mm, below which a part lies with each probability."""
-    lower, width = part.lower_mm, part.tolerance_mm
-    values: Array
-    if width == 0:
-        values = np.full_like(probability, lower)
-    elif kind == "uniform":
-        values = lower + width * probability
-    elif kind == "triangular":
+    if part.tolerance_mm == 0:
+        return np.full_like(probability, part.lower_mm)
+    scale, shift = frame(part, kind)
+    if kind == "triangular":
         root = np.sqrt(np.minimum(probability, 1 - probability) / 2)
-        values = lower + width * np.where(probability < 0.5, root, 1 - root)
-    else:
-        if kind == "truncated_normal":
-            below, above = (ndtr(limit) for limit in standard_limits(part))
-            probability = below + (above - below) * probability
-        values = part.mean_mm + part.sigma_mm * ndtri(probability)
-    return values
+        return shift + scale * np.where(probability < 0.5, root, 1 - root)
+    if kind == "truncated_normal":
+        below, above = (ndtr(limit) for limit in standard_limits(part))
+        probability = below + (above - below) * probability
+    return shift + scale * (probability if kind == "uniform" else ndtri(probability))
 
 
 def share_below(part: Part, kind: Distribution, deviation: Array) -> Array:
     """Share of a part's production below each deviation from the nominal, mm."""
-    lower, width = part.lower_mm, part.tolerance_mm
-    shares: Array
-    if width == 0:
-        shares = (deviation >= lower).astype(float)
-    elif kind in ("uniform", "triangular"):
-        place = np.clip((deviation - lower) / width, 0.0, 1.0)
-        bent = np.where(place < 0.5, 2 * place**2, 1 - 2 * (1 - place) ** 2)
-        shares = place if kind == "uniform" else bent
-    else:
-        shares = ndtr((deviation - part.mean_mm) / part.sigma_mm)
-        if kind == "truncated_normal":
-            below, above = (ndtr(limit) for limit in standard_limits(part))
-            shares = np.clip((shares - below) / (above - below), 0.0, 1.0)
-    return shares
+    if part.tolerance_mm == 0:
+        return (deviation >= part.lower_mm).astype(float)
+    scale, shift = frame(part, kind)
+    place = (deviation - shift) / scale
+    if kind in FILLING:
+        place = np.clip(place, 0.0, 1.0)
+        return place if kind == "uniform" else np.where(place < 0.5, 2 * place**2, 1 - 2 * (1 - place) ** 2)
+    if kind == "normal":
+        return ndtr(place)
+    below, above = (ndtr(limit) for limit in standard_limits(part))
+    return np.clip((ndtr(place) - below) / (above - below), 0.0, 1.0)
 
 
 def moments(part: Part, kind: Distribution) -> tuple[float, float]:
     """Mean deviation from the nominal, mm, and variance, mm^2."""
     if part.tolerance_mm == 0:
         return part.lower_mm, 0.0
-    if kind in ("uniform", "triangular"):
+    if kind in FILLING:
         return part.middle_mm, part.tolerance_mm**2 / (12 if kind == "uniform" else 24)
     if kind == "normal":
         return part.mean_mm, part.sigma_mm**2

@@ -21,14 +21,7 @@ BINARY: dict[type[ast.operator], Operator] = {
     ast.Pow: lambda base, power: np.asarray(base, float) ** power,
 }
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "abs": np.abs,
-    "sqrt": np.sqrt,
-    "exp": np.exp,
-    "log": np.log,
-    "sin": np.sin,
-    "cos": np.cos,
-    "tan": np.tan,
-    "arctan": np.arctan,
+    **{name: getattr(np, name) for name in ("abs", "sqrt", "exp", "log", "sin", "cos", "tan", "arctan")},
     "min": lambda *values: reduce(np.minimum, values),
     "max": lambda *values: reduce(np.maximum, values),
 }
@@ -71,24 +64,20 @@ def _parsed(text: str) -> ast.expr:
     if level:
         raise ValueError(f"nests deeper than {DEEPEST} operations; split it into links of coefficient 0")
     for node in ast.walk(tree):
-        known = (
-            isinstance(node, ast.Name | ast.Load | ast.UAdd | ast.USub | ast.UnaryOp)
-            or (isinstance(node, ast.BinOp) and type(node.op) in BINARY)
-            or isinstance(node, ast.operator)
-            or (isinstance(node, ast.Constant) and type(node.value) in (int, float))
-            or (
-                isinstance(node, ast.Call)
-                and isinstance(node.func, ast.Name)
-                and node.func.id in FUNCTIONS
-                and (len(node.args) == 1 or (node.args and node.func.id in MANY))
-                and not node.keywords
-            )
-        )
-        if not known:
-            raise ValueError(
-                f"holds {shown(ast.unparse(node) or type(node).__name__)}; only + - * / **, numbers, names of links and "
-                f"{', '.join(FUNCTIONS)} are read"
-            )
+        match node:
+            case ast.Name() | ast.Load() | ast.UAdd() | ast.USub() | ast.UnaryOp() | ast.operator():
+                read = True
+            case ast.BinOp(op=sign):
+                read = type(sign) in BINARY
+            case ast.Constant(value=number):
+                read = type(number) in (int, float)
+            case ast.Call(func=ast.Name(id=name), args=[_, *more], keywords=[]):
+                read = name in FUNCTIONS and (not more or name in MANY)
+            case _:
+                read = False
+        if not read:
+            what, known = shown(ast.unparse(node) or type(node).__name__), ", ".join(FUNCTIONS)
+            raise ValueError(f"holds {what}; only + - * / **, numbers, names of links and {known} are read")
     return tree
 
 

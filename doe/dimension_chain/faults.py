@@ -5,36 +5,29 @@ from collections.abc import Callable
 from functools import partial
 
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import NoValueError, is_part, used_links
+from doe.dimension_chain.closing import NoValueError, is_part, press_fit_factor, used_links
 from doe.dimension_chain.expressions import shown
-from doe.dimension_chain.fits import press_fit_factor
 from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.iso286 import LARGEST, positioned
-from doe.dimension_chain.links import SLACK, Allocate, Chain, ClosingLink, Link
-from doe.dimension_chain.parts import coded_limits, has_deviations
+from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link
+from doe.dimension_chain.parts import coded_limits
 
 
 def faults(chain: Chain) -> list[str]:
     """All faults of a chain; empty if there is none."""
     used = _used(chain.link)
-    found = [fault for link in chain.link for fault in _link_faults(link, chain.allocate, link.name in used)]
+    sentences = [fault for link in chain.link for fault in _link_faults(link, chain, link.name in used)]
     lower, upper = chain.closing_link.lower_mm, chain.closing_link.upper_mm
     if lower >= upper:
-        found.append(f"closing_link.lower_mm = {lower:g}: must be below upper_mm = {upper:g}; swap them")
+        sentences.append(f"closing_link.lower_mm = {lower:g}: must be below upper_mm = {upper:g}; swap them")
     counts = Counter(link.name for link in chain.link)
     repeated = [name for name, count in counts.items() if count > 1]
-    found += [f'link.name = "{name}": used {counts[name]} times; name each once' for name in repeated]
-    bare = [link.name for link in chain.free if not has_deviations(link)]
-    if bare and len(bare) < len(chain.free):
-        found.append(
-            f'link "{bare[0]}": no deviations, while other links that are not fixed have them; give all or '
-            "none, or set fixed = true on those given"
-        )
-    found += _reference_faults(chain) + _selective_faults(chain)
-    found += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient != 0])
+    sentences += [f'link.name = "{name}": used {counts[name]} times; name each once' for name in repeated]
+    sentences += _reference_faults(chain) + _selective_faults(chain)
+    sentences += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient != 0])
     # The width that fixed links leave can only be told of a chain that is otherwise sound.
     try:
-        return found or _room_faults(chain)
+        return sentences or _room_faults(chain)
     except NoValueError as error:
         return [str(error)]
 
@@ -48,77 +41,67 @@ def _used(links: list[Link]) -> set[str]:
     return names
 
 
-def _link_faults(link: Link, rule: Allocate, used: bool) -> list[str]:
+def _link_faults(link: Link, chain: Chain, used: bool) -> list[str]:
     if not link.is_dimension:
         return _function_faults(link)
-    bare = not has_deviations(link) and link.lower_mm is None
+    rule = chain.allocate
+    bare = not link.has_deviations and link.lower_mm is None
     half = (link.upper_mm is None) != (link.lower_mm is None)
     lower, upper, mean = link.lower_mm or 0.0, link.upper_mm or 0.0, link.mean_mm
     shaped = link.distribution in ("uniform", "triangular")
-    free, iso = not link.fixed, rule.method == "iso286" or rule.grades
+    free, iso = link in chain.free, rule.method == "iso286" or rule.grades
     lettered = link.position not in ("unilateral", "symmetric")
+    size, idle = f"nominal_mm = {link.nominal:g}", link.coefficient == 0 and not used
+    large = free and rule.grades and link.nominal > LARGEST
+    priceless = free and rule.method == "cost" and link.cost is None
+    twice = link.fit is not None and (link.upper_mm is not None or link.lower_mm is not None)
     checks = [
         (link.nominal_mm is None, "nominal_mm: missing; add it"),
-        (
-            link.coefficient == 0 and not used,
-            "coefficient = 0: must not be zero; set it, remove the link, or use it in a function",
-        ),
+        (idle, "coefficient = 0: must not be zero; set it, remove the link, or use it in a function"),
         (half, "only one of upper_mm and lower_mm is given; give both or neither"),
         (link.fixed and bare, "fixed = true without deviations; give upper_mm and lower_mm or unfix it"),
         (not half and lower > upper, f"lower_mm = {lower:g}: exceeds upper_mm = {upper:g}; swap them"),
-        (
-            free and iso and link.nominal <= 0,
-            f"nominal_mm = {link.nominal:g}: ISO 286 needs it positive; allocate otherwise or fix it",
-        ),
-        (
-            free and rule.grades and link.nominal > LARGEST,
-            f"nominal_mm = {link.nominal:g}: the grades here end at {LARGEST} mm; set grades = false or fix it",
-        ),
-        (
-            free and rule.method == "cost" and link.cost is None,
-            'method = "cost" needs a curve; give cost = { b = ..., k = ... } or fix it',
-        ),
+        (free and iso and link.nominal <= 0, f"{size}: ISO 286 needs it positive; allocate otherwise or fix it"),
+        (large, f"{size}: the grades here end at {LARGEST} mm; set grades = false or fix it"),
+        (priceless, 'method = "cost" needs a curve; give cost = { b = ..., k = ... } or fix it'),
         (mean is not None and bare, f"mean_mm = {mean}: needs deviations; give upper_mm and lower_mm"),
         (mean is not None and shaped, f'mean_mm = {mean}: not for "{link.distribution}"; remove it'),
-        (
-            link.fit is not None and (link.upper_mm is not None or link.lower_mm is not None),
-            f'fit = "{link.fit}": says the deviations already; remove upper_mm and lower_mm, or the fit',
-        ),
+        (twice, f'fit = "{link.fit}": says the deviations already; remove upper_mm and lower_mm, or the fit'),
     ]
-    found = [sentence for bad, sentence in checks if bad]
+    sentences = [sentence for bad, sentence in checks if bad]
     if link.fit is not None and (unknown := _sentence(lambda: coded_limits(link))):
-        found.append(f'fit = "{link.fit}": {unknown}')
+        sentences.append(f'fit = "{link.fit}": {unknown}')
     elif link.fit is not None:
         lower, upper = coded_limits(link)
     if mean is not None and not (bare or half) and not lower <= mean <= upper:
-        found.append(f"mean_mm = {mean}: is a deviation from the nominal; put it between lower_mm and upper_mm")
+        sentences.append(f"mean_mm = {mean}: is a deviation from the nominal; put it between lower_mm and upper_mm")
     if free and lettered and (outside := _sentence(lambda: positioned(link.nominal, link.position, 0.0))):
-        found.append(f'position = "{link.position}": {outside}')
-    return [f'link "{link.name}": {sentence}' for sentence in found]
+        sentences.append(f'position = "{link.position}": {outside}')
+    return [f'link "{link.name}": {sentence}' for sentence in sentences]
 
 
 def _function_faults(link: Link) -> list[str]:
     """Faults of a link that is a function: it takes nothing that only a dimension has."""
     kinds = [key for key in ("press_fit", "thermal_growth", "expression") if getattr(link, key) is not None]
-    found = [f"{' and '.join(kinds)} stand together; a link is one of them"] if len(kinds) > 1 else []
+    sentences = [f"{' and '.join(kinds)} stand together; a link is one of them"] if len(kinds) > 1 else []
     alien = [key for key in ("nominal_mm", "upper_mm", "lower_mm", "fit", "mean_mm", "cost") if getattr(link, key)]
-    found += [f"{key} = {getattr(link, key)}: a link of kind {kinds[0]} has none; remove it" for key in alien]
+    sentences += [f"{key} = {getattr(link, key)}: a link of kind {kinds[0]} has none; remove it" for key in alien]
     rise = link.thermal_growth
     if rise and rise.lower_K > rise.upper_K:
-        found.append(f"lower_K = {rise.lower_K:g}: exceeds upper_K = {rise.upper_K:g}; swap them")
+        sentences.append(f"lower_K = {rise.lower_K:g}: exceeds upper_K = {rise.upper_K:g}; swap them")
     if unread := _sentence(lambda: used_links(link)):
-        found.append(f"expression = {shown(link.expression or '')}: {unread}")
-    return [f'link "{link.name}": {sentence}' for sentence in found]
+        sentences.append(f"expression = {shown(link.expression or '')}: {unread}")
+    return [f'link "{link.name}": {sentence}' for sentence in sentences]
 
 
 def _reference_faults(chain: Chain) -> list[str]:
     """Functions must use links that stand before them, and make sense with them."""
-    found = []
+    sentences = []
     before: dict[str, Link] = {}
     for link in chain.link:
         if _sentence(partial(used_links, link)) is None:
             names = used_links(link)
-            found += [
+            sentences += [
                 f'link "{link.name}": uses "{name}", which no link before it is called; name one of '
                 f"{', '.join(before) or 'those placed before it'}"
                 for name in names
@@ -126,12 +109,14 @@ def _reference_faults(chain: Chain) -> list[str]:
             ]
             grown = link.thermal_growth and before.get(link.thermal_growth.of)
             if grown and not (grown.is_dimension and grown.nominal > 0):
-                found.append(f'link "{link.name}": thermal_growth.of = "{grown.name}": must be a positive dimension')
+                sentences.append(
+                    f'link "{link.name}": thermal_growth.of = "{grown.name}": must be a positive dimension'
+                )
         bore = link.press_fit and before.get(link.press_fit.bore)
         if link.press_fit and bore and (wrong := _sentence(partial(press_fit_factor, link.press_fit, bore.nominal))):
-            found.append(f'link "{link.name}": press_fit: {wrong}')
+            sentences.append(f'link "{link.name}": press_fit: {wrong}')
         before.setdefault(link.name, link)
-    return found
+    return sentences
 
 
 def _selective_faults(chain: Chain) -> list[str]:
@@ -139,14 +124,13 @@ def _selective_faults(chain: Chain) -> list[str]:
         return []
     parts = [link.name for link in chain.link if is_part(link)]
     pair = {"first": chain.selective.first, "second": chain.selective.second}
-    found = [
-        f'selective.{key} = "{name}": is no part; name one of {", ".join(parts)}'
-        for key, name in pair.items()
-        if name not in parts
+    alien = {key: name for key, name in pair.items() if name not in parts}
+    sentences = [
+        f'selective.{key} = "{name}": is no part; name one of {", ".join(parts)}' for key, name in alien.items()
     ]
     if pair["first"] == pair["second"]:
-        found.append(f'selective.second = "{pair["second"]}": is the first part too; name another')
-    return found
+        sentences.append(f'selective.second = "{pair["second"]}": is the first part too; name another')
+    return sentences
 
 
 def _allocation_faults(chain: Chain, free: list[str]) -> list[str]:

@@ -43,14 +43,12 @@ def _searched(function: ClosingFunction, parts: Sequence[Part]) -> Interval:
     straight = [part for part in parts if part.name not in function.arguments]
     ends = []
     for sign in (1, -1):
-        rest = sum(_end(function.coefficients[part.name], part, sign) for part in straight)
+        rest = 0.0
+        for part in straight:
+            coefficient = function.coefficients[part.name]
+            rest += coefficient * (part.nominal_mm + (part.lower_mm if sign * coefficient > 0 else part.upper_mm))
         ends.append(rest + sign * _least(function, bent, sign))
     return round(ends[0], DIGITS), round(ends[1], DIGITS)
-
-
-def _end(coefficient: float, part: Part, sign: int) -> float:
-    deviation = part.lower_mm if sign * coefficient > 0 else part.upper_mm
-    return coefficient * (part.nominal_mm + deviation)
 
 
 def _least(function: ClosingFunction, parts: list[Part], sign: int) -> float:
@@ -60,10 +58,9 @@ def _least(function: ClosingFunction, parts: list[Part], sign: int) -> float:
 
     def value(places: Array) -> Array:
         """At places (n, k) from 0 to 1 between the limits."""
-        sizes = nominals | {
-            part.name: part.nominal_mm + part.lower_mm + part.tolerance_mm * places[:, i]
-            for i, part in enumerate(varying)
-        }
+        sizes: dict[str, Array] = dict(nominals)
+        for part, place in zip(varying, places.T, strict=True):
+            sizes[part.name] = part.nominal_mm + part.lower_mm + part.tolerance_mm * place
         shares = sum(function.coefficients[part.name] * sizes[part.name] for part in parts)
         return np.broadcast_to(sign * (shares + function.bent(sizes)), len(places))
 
@@ -84,5 +81,5 @@ def _least(function: ClosingFunction, parts: list[Part], sign: int) -> float:
 
     start = inside[at_inside.argmin()] if at_inside.min() < lowest else corners[at_corners.argmin()]
     scale = max(part.tolerance_mm for part in varying)
-    found = minimize(lambda place: float(value(place[None, :])[0]) / scale, start, bounds=[(0.0, 1.0)] * len(varying))
-    return min(lowest, scale * float(found.fun))
+    optimum = minimize(lambda place: float(value(place[None, :])[0]) / scale, start, bounds=[(0.0, 1.0)] * len(varying))
+    return min(lowest, scale * float(optimum.fun))

@@ -122,7 +122,8 @@ class Link(Strict):
     capability: Positive = 1.0
     """T/(6 sigma) of a normal or truncated normal part."""
     fixed: bool = False
-    """Whether the tolerance stays as given when tolerances are allocated."""
+    """Whether the tolerance stays as given when tolerances are allocated, also where all links have deviations. Beside
+    links without any, given ones stay in any case."""
     position: Position = "unilateral"
     """Where an allocated tolerance lies: on one side, so that it can only shorten the closing link, on both, or by a
     letter of ISO 286."""
@@ -141,6 +142,11 @@ class Link(Strict):
         return self.press_fit is None and self.thermal_growth is None and self.expression is None
 
     @property
+    def has_deviations(self) -> bool:
+        """Whether it says how far it deviates; a growth by temperature always does."""
+        return self.thermal_growth is not None or self.fit is not None or self.upper_mm is not None
+
+    @property
     def nominal(self) -> float:
         """Nominal of a dimension, mm; 0 where it is missing, which is a fault."""
         return self.nominal_mm or 0.0
@@ -150,7 +156,8 @@ class Allocate(Strict):
     """How tolerances are shared."""
 
     method: Literal["equal", "iso286", "cost"] = "equal"
-    """How tolerances are shared: equal ones, in the ratios of ISO 286's tolerance units, or at the least cost."""
+    """How tolerances are shared: equal ones, in proportion to ISO 286's tolerance units (for its grades: grades = true), or
+    at the least cost."""
     mode: Mode = "worst_case"
     """What must stay within the limits: the worst case, the root sum square, or target_yield of the assemblies."""
     grades: bool = False
@@ -212,13 +219,14 @@ class Chain(Strict):
 
     @property
     def free(self) -> list[Link]:
-        """Dimensions whose tolerances are to be allocated."""
-        return [link for link in self.link if link.is_dimension and not link.fixed]
+        """Dimensions whose tolerances are to be allocated: those without deviations; where all have some, all but the fixed."""
+        loose = [link for link in self.link if link.is_dimension and not link.fixed]
+        return [link for link in loose if not link.has_deviations] or loose
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part with all its numbers, mm; ``mean_mm`` is a deviation from the nominal."""
+    """A part with all its numbers, mm; ``mean_mm`` is a deviation from the nominal, which was moved by ``moved_mm``."""
 
     name: str
     coefficient: float
@@ -229,6 +237,7 @@ class Part:
     mean_mm: float
     grade: str | None = None
     capability: float = 1.0
+    moved_mm: float = 0.0
 
     @property
     def tolerance_mm(self) -> float:

@@ -9,6 +9,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -22,6 +23,9 @@ CHUNK = 1 << 14  # assemblies: a handful of columns of them stays in the second-
 RARE = 0.3  # share within the limits below which drawing again would last too long
 ALIKE: tuple[Distribution, ...] = ("normal", "truncated_normal", "uniform")  # laws for all parts alike
 
+Drawn = dict[Distribution, tuple[Array, float, float]]
+Laws = dict[str, Distribution | None]  # by key; None: each part's own
+
 
 @dataclass(frozen=True)
 class Assemblies:
@@ -34,6 +38,11 @@ class Assemblies:
     below: dict[str, int]
     above: dict[str, int]
     values: Array
+
+    @property
+    def yields(self) -> dict[str, float]:
+        """Share of the assemblies that lie within the limits, by law."""
+        return {law: 1 - (self.below[law] + self.above[law]) / self.samples for law in self.below}
 
 
 def draw(
@@ -57,86 +66,69 @@ def draw(
     own = {part.distribution for part in parts}
     # Parts that all follow one law need no draw of their own.
     shared = own.pop() if len(own) == 1 and own <= set(laws) else None
+    wanted: Laws = {} if shared else {"as_given": None}
+    wanted |= {law: law for law in laws}
 
-    def chunk(index: int) -> dict[str, tuple[int, int]]:
+    def chunk(index: int) -> dict[str, Sequence[Any]]:
         out = values[starts[index] : starts[index] + CHUNK]
-        closing = _closing(function, parts, laws, shared is None, np.random.default_rng(streams[index]), len(out))
+        closing = _closing(function, parts, wanted, np.random.default_rng(streams[index]), len(out))
         np.copyto(out, closing[shared or "as_given"])
-        return {law: _outside(each, limits) for law, each in closing.items()}
+        low, high = limits.lower_mm - SLACK, limits.upper_mm + SLACK
+        return {law: [np.count_nonzero(each < low), np.count_nonzero(each > high)] for law, each in closing.items()}
 
-    workers = threads or os.cpu_count() or 1
-    if workers == 1 or len(starts) == 1:
-        counted = [chunk(index) for index in range(len(starts))]
-    else:
-        with ThreadPoolExecutor(workers) as pool:
-            counted = list(pool.map(chunk, range(len(starts))))
-    outside = {law: tuple(sum(each[law][side] for each in counted) for side in (0, 1)) for law in counted[0]}
+    with ThreadPoolExecutor(min(threads or os.cpu_count() or 1, len(starts))) as pool:
+        counted = list(pool.map(chunk, range(len(starts))))
+    outside = {law: np.sum([each[law] for each in counted], axis=0).tolist() for law in counted[0]}
     if shared is not None:
         outside["as_given"] = outside[shared]
-    keys = ("as_given", *laws)
-    return Assemblies(samples, {k: outside[k][0] for k in keys}, {k: outside[k][1] for k in keys}, values)
-
-
-def _outside(values: Array, limits: ClosingLink) -> tuple[int, int]:
-    below = np.count_nonzero(values < limits.lower_mm - SLACK)
-    return int(below), int(np.count_nonzero(values > limits.upper_mm + SLACK))
+    below, above = ({key: outside[key][side] for key in ("as_given", *laws)} for side in (0, 1))
+    return Assemblies(samples, below, above, values)
 
 
 def _closing(
-    function: ClosingFunction,
-    parts: Sequence[Part],
-    laws: Sequence[Distribution],
-    own: bool,
-    generator: np.random.Generator,
-    count: int,
+    function: ClosingFunction, parts: Sequence[Part], laws: Laws, generator: np.random.Generator, count: int
 ) -> dict[str, Array]:
-    """Closing links of one chunk by law, and by each part's own distribution where ``own``."""
-    keys = [*(["as_given"] if own else []), *laws]
-    sums = {key: np.zeros(count) for key in keys}
-    offsets = dict.fromkeys(keys, 0.0)
-    sizes: dict[str, dict[str, Array]] = {key: {} for key in keys}
+    """Closing links of one chunk by each of the ``laws``."""
+    sums = {key: np.zeros(count) for key in laws}
+    offsets = dict.fromkeys(laws, 0.0)
+    sizes: dict[str, dict[str, Array]] = {key: {} for key in laws}
     work = np.empty(count)
     for part in parts:
         coefficient = function.coefficients[part.name]
-        needed: dict[str, Distribution] = dict(zip(laws, laws, strict=True))
-        if own:
-            needed["as_given"] = part.distribution
-        drawn = _drawn(part, set(needed.values()), generator, count)
-        for key, law in needed.items():
-            numbers, scale, shift = drawn[law]
+        drawn = _drawn(part, {law or part.distribution for law in laws.values()}, generator, count)
+        for key, law in laws.items():
+            numbers, scale, shift = drawn[law or part.distribution]
             if part.name in function.arguments:
                 sizes[key][part.name] = part.nominal_mm + shift + scale * numbers
             if coefficient:
                 np.multiply(numbers, coefficient * scale, out=work)
                 sums[key] += work
                 offsets[key] += coefficient * (part.nominal_mm + shift)
-    for key in keys:
+    for key in laws:
         sums[key] += offsets[key]
         if not function.linear:
             sums[key] += function.bent(sizes[key])
     return sums
 
 
-def _drawn(
-    part: Part, laws: set[Distribution], generator: np.random.Generator, count: int
-) -> dict[Distribution, tuple[Array, float, float]]:
+def _drawn(part: Part, laws: set[Distribution], generator: np.random.Generator, count: int) -> Drawn:
     """For each law random numbers and the scale and shift, mm, that make deviations from the nominal of them."""
     if part.tolerance_mm == 0:
         return dict.fromkeys(laws, (np.zeros(count), 0.0, part.lower_mm))
-    found: dict[Distribution, tuple[Array, float, float]] = {}
+    drawn: Drawn = {}
     if laws & {"normal", "truncated_normal"}:
         normal = generator.standard_normal(count)
-        found["normal"] = (normal, part.sigma_mm, part.mean_mm)
+        drawn["normal"] = (normal, part.sigma_mm, part.mean_mm)
         if "truncated_normal" in laws:
             inside = _redrawn(normal, *standard_limits(part), generator)
-            found["truncated_normal"] = (inside, part.sigma_mm, part.mean_mm)
+            drawn["truncated_normal"] = (inside, part.sigma_mm, part.mean_mm)
     if laws & {"uniform", "triangular"}:
         uniform = generator.random(count)
-        found["uniform"] = (uniform, part.tolerance_mm, part.lower_mm)
+        drawn["uniform"] = (uniform, part.tolerance_mm, part.lower_mm)
         if "triangular" in laws:
             # The sum of two uniform numbers is triangular.
-            found["triangular"] = (uniform + generator.random(count), part.tolerance_mm / 2, part.lower_mm)
-    return found
+            drawn["triangular"] = (uniform + generator.random(count), part.tolerance_mm / 2, part.lower_mm)
+    return drawn
 
 
 def _redrawn(normal: Array, low: float, high: float, generator: np.random.Generator) -> Array:

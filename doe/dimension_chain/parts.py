@@ -7,11 +7,6 @@ from doe.dimension_chain.iso492 import SURFACES, ring_limits
 from doe.dimension_chain.links import DIGITS, Interval, Link, Part
 
 
-def has_deviations(link: Link) -> bool:
-    """Whether a link says how far it deviates; a growth by temperature always does."""
-    return link.thermal_growth is not None or link.fit is not None or link.upper_mm is not None
-
-
 def coded_limits(link: Link) -> Interval:
     """Lower and upper deviation, mm, of the link's ``fit``. Raises ValueError for an unknown code or size."""
     code = link.fit or ""
@@ -52,14 +47,5 @@ def allocated_part(link: Link, tolerance: float, grade: str | None = None) -> Pa
 
 def _part(link: Link, nominal: float, lower: float, upper: float, mean: float | None, grade: str | None) -> Part:
     lower, upper = round(lower, DIGITS), round(upper, DIGITS)
-    return Part(
-        link.name,
-        link.coefficient,
-        nominal,
-        upper,
-        lower,
-        link.distribution,
-        (upper + lower) / 2 if mean is None else mean,
-        grade,
-        link.capability,
-    )
+    mean = (upper + lower) / 2 if mean is None else mean
+    return Part(link.name, link.coefficient, nominal, upper, lower, link.distribution, mean, grade, link.capability)

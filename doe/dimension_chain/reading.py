@@ -54,7 +54,7 @@ def read_chains(path: Path | str) -> dict[str, Chain]:
         return {path.stem: chain_from(data, source)}
     chains = validated(Chains, data, source).chain
     counts = Counter(chain.name for chain in chains)
-    found = [f'chain.name = "{name}": used {n} times; name each once' for name, n in counts.items() if n > 1]
-    found += [f'chain "{chain.name}": {fault}' for chain in chains for fault in faults(chain)]
-    refuse(f"{source}: {fault}" for fault in found)
+    sentences = [f'chain.name = "{name}": used {n} times; name each once' for name, n in counts.items() if n > 1]
+    sentences += [f'chain "{chain.name}": {fault}' for chain in chains for fault in faults(chain)]
+    refuse(f"{source}: {fault}" for fault in sentences)
     return {chain.name: chain for chain in chains}

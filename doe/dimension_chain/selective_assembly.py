@@ -7,6 +7,7 @@ applications, 1961).
 
 from bisect import bisect_left
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -49,9 +50,9 @@ def selective_assembly(
 ) -> SelectiveAssembly:
     """Sort, match and judge ``wish.samples`` of every part; see `SelectiveAssembly`."""
     generator = np.random.default_rng(wish.seed)
-    sizes = {
-        part.name: part.nominal_mm + quantile(part, part.distribution, generator.random(wish.samples)) for part in parts
-    }
+    sizes = {}
+    for part in parts:
+        sizes[part.name] = part.nominal_mm + quantile(part, part.distribution, generator.random(wish.samples))
     pair = _pair(parts, wish)
     edges = [class_edges(part, wish.classes, wish.by) for part in pair]
     chosen = _matches([sizes[part.name] for part in pair], edges, _opposed(function, parts, pair))
@@ -98,7 +99,7 @@ def class_worst_case(function: ClosingFunction, parts: Sequence[Part], wish: Sel
     ends = []
     for limits in zip(*bounds, strict=True):
         within = {
-            part.name: Part(part.name, part.coefficient, 0.0, high, low, part.distribution, (low + high) / 2)
+            part.name: replace(part, nominal_mm=0.0, upper_mm=high, lower_mm=low)
             for part, (low, high) in zip(pair, limits, strict=True)
         }
         ends.append(interval(function, [within.get(part.name, part) for part in parts], "worst_case"))
@@ -137,12 +138,12 @@ def _matches(sizes: Sequence[Array], edges: Sequence[Array], opposed: bool) -> t
         sorted_in[1] = classes - 1 - sorted_in[1]
     order = [np.argsort(each, kind="stable") for each in sorted_in]
     starts = [np.concatenate(([0], np.bincount(each, minlength=classes).cumsum())) for each in sorted_in]
-    found: tuple[list[Rows], list[Rows]] = ([], [])
+    matched: tuple[list[Rows], list[Rows]] = ([], [])
     for index in range(classes):
         scarce = min(int(start[index + 1] - start[index]) for start in starts)
-        for taken, each, start in zip(found, order, starts, strict=True):
+        for taken, each, start in zip(matched, order, starts, strict=True):
             taken.append(each[start[index] : start[index] + scarce])
-    return np.concatenate(found[0]), np.concatenate(found[1])
+    return np.concatenate(matched[0]), np.concatenate(matched[1])
 
 
 def _good(closing: Array, limits: ClosingLink) -> float:

@@ -13,23 +13,16 @@ from doe.dimension_chain.faults import faults
 from doe.dimension_chain.intervals import interval, linear_interval
 from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part
 from doe.dimension_chain.monte_carlo import ALIKE, Assemblies, draw
-from doe.dimension_chain.parts import given_parts, has_deviations
+from doe.dimension_chain.parts import given_parts
 from doe.dimension_chain.selective_assembly import SelectiveAssembly, selective_assembly
-from doe.dimension_chain.yields import (
-    closing_moments,
-    exact_shares,
-    normal_yield,
-    sampled_ppm,
-    sampled_yields,
-    standard_error,
-)
+from doe.dimension_chain.yields import closing_moments, exact_shares, normal_yield, sampled_ppm, standard_error
 from rbdyn.faults import InputError
 from rbdyn.records.record import Record, derived, keyed, outside_json
 
 # Shares below the quantiles: the median, 95 %, and the 99.73 % of plus and minus three standard deviations.
 QUANTILES = (0.00135, 0.025, 0.05, 0.5, 0.95, 0.975, 0.99865)
 # What is told of an allocated part.
-ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade")
+ALLOCATED = ("nominal_mm", "upper_mm", "lower_mm", "grade", "moved_mm")
 
 
 class Linearisation(Record):
@@ -92,42 +85,34 @@ class ChainResult(Record):
         return self.status.startswith("refused")
 
 
-def solve(
-    chain: Chain,
-    *,
-    samples: int | None = None,
-    seed: int | None = None,
-    threads: int | None = None,
-    source: str | None = None,
-) -> ChainResult:
+def solve(chain: Chain, *, samples: int | None = None, seed: int | None = None, source: str = "") -> ChainResult:
     """Intervals, yield, contributions and allocation of a chain.
 
     A chain without deviations is judged with the allocated ones (status "ok: deviations allocated"). A chain
     whose given deviations miss the limits, by the interval or yield of its allocation mode, is refused: its status
     starts with "refused: " and names the numbers and the allocation. Otherwise the status is "ok". ``samples`` and
-    ``seed`` are those of the chain unless given; ``threads`` change no bit; ``source`` names the file in messages.
+    ``seed`` are those of the chain unless given; ``source`` names the file in messages.
 
     Raises InputError with every fault of the chain (see `faults`), for fewer than one sample, or where a function has
     no finite value within the tolerances or at an assembly drawn.
     """
     samples = chain.monte_carlo.samples if samples is None else samples
     seed = chain.monte_carlo.seed if seed is None else seed
-    found = faults(chain) + ([f"samples = {samples}: must be at least 1"] if samples < 1 else [])
-    if found:
-        raise InputError(found)
+    sentences = faults(chain) + ([f"samples = {samples}: must be at least 1"] if samples < 1 else [])
+    if sentences:
+        raise InputError(sentences)
     try:
-        return _solved(Allocation(chain), samples, seed, threads)
+        return _solved(Allocation(chain), samples, seed)
     except NoValueError as error:
         raise InputError([f"{source}: {error}" if source else str(error)]) from None
 
 
-def _solved(search: Allocation, samples: int, seed: int, threads: int | None) -> ChainResult:
+def _solved(search: Allocation, samples: int, seed: int) -> ChainResult:
     chain, function, limits = search.chain, search.function, search.chain.closing_link
     allocation = search.allocated()
-    given = all(has_deviations(link) for link in chain.free)
+    given = all(link.has_deviations for link in chain.free)
     parts = given_parts(chain.link) if given else allocation
-    drawn = draw(function, parts, limits, samples=samples, seed=seed, threads=threads)
-    yields = sampled_yields(drawn)
+    drawn = draw(function, parts, limits, samples=samples, seed=seed)
     mean, deviation = float(drawn.values.mean()), float(drawn.values.std())
     nearer = min(limits.upper_mm - mean, mean - limits.lower_mm)
     varies = deviation > SLACK
@@ -135,11 +120,11 @@ def _solved(search: Allocation, samples: int, seed: int, threads: int | None) ->
         nominal_mm=round(float(function.value({part.name: part.nominal_mm for part in parts})), DIGITS),
         worst_case_mm=interval(function, parts, "worst_case"),
         rss_mm=interval(function, parts, "rss"),
-        yields=yields,
-        standard_errors={law: standard_error(share, samples) for law, share in yields.items()},
+        yields=drawn.yields,
+        standard_errors={law: standard_error(share, samples) for law, share in drawn.yields.items()},
         contributions=_contributions(function, parts),
         allocation=tuple(allocation),
-        status=_status(search, parts, allocation, yields["as_given"], given),
+        status=_status(search, parts, allocation, drawn.yields["as_given"], given),
         mean_mm=mean,
         standard_deviation_mm=deviation,
         quantiles_mm=dict(zip(QUANTILES, np.quantile(drawn.values, QUANTILES).tolist(), strict=True)),
@@ -161,12 +146,10 @@ def _contributions(function: ClosingFunction, parts: Sequence[Part]) -> dict[str
     slopes = function.sensitivities(middle(parts))
     spread = [slopes[part.name] ** 2 * moments(part, part.distribution)[1] for part in parts]
     reach = [abs(slopes[part.name]) * part.tolerance_mm for part in parts]
+    shares = ([100 * each / (sum(column) or 1.0) for each in column] for column in (spread, reach))
     return {
-        part.name: {
-            "variance_percent": 100 * variance / (sum(spread) or 1.0),
-            "worst_case_percent": 100 * width / (sum(reach) or 1.0),
-        }
-        for part, variance, width in zip(parts, spread, reach, strict=True)
+        part.name: {"variance_percent": variance, "worst_case_percent": width}
+        for part, variance, width in zip(parts, *shares, strict=True)
     }
 
 
@@ -201,25 +184,21 @@ def _cost(chain: Chain, allocation: Sequence[Part]) -> float | None:
 
 def _status(search: Allocation, parts: list[Part], allocation: list[Part], share: float, given: bool) -> str:
     if not given:
-        return "ok: deviations allocated"
+        rule = search.chain.allocate
+        units = ", in proportion to ISO 286's tolerance units (grades = true narrows them to its grades)"
+        return f"ok: deviations allocated{units if rule.method == 'iso286' and not rule.grades else ''}"
     if _kept(search, parts, share):
         return "ok"
     limits, mode, width = search.chain.closing_link, search.mode, search.chain.width_mm
     low, high = interval(search.function, parts, mode)
     free = {link.name for link in search.chain.free}
     nearest = ", ".join(f"{part.name} {part.text}" for part in allocation if part.name in free)
-    if mode == "yield":
-        wanted = f"a yield of {search.chain.allocate.target_yield:g} is wanted"
-        why = (
-            f"worst-case tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g} where {wanted}"
-        )
-    else:
-        kind = "worst-case" if mode == "worst_case" else "RSS"
-        why = f"{kind} tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g}"
-    return (
-        f"refused: the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm where "
-        f"{limits.lower_mm:.4f} to {limits.upper_mm:.4f} mm is allowed ({why}); the nearest that fits is {nearest}"
-    )
+    kind = "RSS" if mode == "rss" else "worst-case"
+    wanted = f" where a yield of {search.chain.allocate.target_yield:g} is wanted" if mode == "yield" else ""
+    why = f"{kind} tolerance {high - low:.4f} mm where {width:.4f} mm is there, yield {share:.4g}{wanted}"
+    put = f"the given deviations put the closing link at {low:+.4f} to {high:+.4f} mm"
+    allowed = f"{limits.lower_mm:.4f} to {limits.upper_mm:.4f} mm is allowed"
+    return f"refused: {put} where {allowed} ({why}); the nearest that fits is {nearest}"
 
 
 def _kept(search: Allocation, parts: list[Part], share: float) -> bool:

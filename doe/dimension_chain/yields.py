@@ -16,24 +16,15 @@ LATTICE = 1 << 13  # points over the reach of the closing link
 MILLION = 1e6
 
 
-def sampled_yields(drawn: Assemblies) -> dict[str, float]:
-    """Share of the assemblies drawn that lie within the limits, by law."""
-    return {law: 1 - (drawn.below[law] + drawn.above[law]) / drawn.samples for law in drawn.below}
-
-
 def sampled_ppm(drawn: Assemblies) -> dict[str, dict[str, float]]:
     """Assemblies per million below and above the limits, with standard errors, by law."""
-    return {
-        law: {
-            key: MILLION * figure
-            for side, count in (("low", drawn.below[law]), ("high", drawn.above[law]))
-            for key, figure in (
-                (f"{side}_ppm", count / drawn.samples),
-                (f"{side}_standard_error_ppm", standard_error(count / drawn.samples, drawn.samples)),
-            )
-        }
-        for law in drawn.below
-    }
+    rates: dict[str, dict[str, float]] = {law: {} for law in drawn.below}
+    for side, counts in (("low", drawn.below), ("high", drawn.above)):
+        for law, count in counts.items():
+            share = count / drawn.samples
+            rates[law][f"{side}_ppm"] = MILLION * share
+            rates[law][f"{side}_standard_error_ppm"] = MILLION * standard_error(share, drawn.samples)
+    return rates
 
 
 def standard_error(share: float, samples: int) -> float:
@@ -52,10 +43,8 @@ def exact_shares(
     bounds = (limits.lower_mm - SLACK, limits.upper_mm + SLACK)
     kinds = {part.name: law or part.distribution for part in parts}
     terms = [part for part in parts if part.tolerance_mm * function.coefficients[part.name] != 0]
-    nominal = sum(
-        function.coefficients[part.name] * (part.nominal_mm + (0.0 if part in terms else part.lower_mm))
-        for part in parts
-    )
+    sizes = {part.name: part.nominal_mm + (0.0 if part in terms else part.lower_mm) for part in parts}
+    nominal = sum(function.coefficients[name] * size for name, size in sizes.items())
     if not terms:
         return float(nominal < bounds[0]), float(nominal > bounds[1])
     if set(kinds[part.name] for part in terms) == {"normal"}:
@@ -66,12 +55,12 @@ def exact_shares(
     *others, widest = terms
     places, shares = _lattice(function, others, kinds, reaches)
     coefficient = function.coefficients[widest.name]
-    found = []
+    reached = []
     for bound in bounds:
         below = share_below(widest, kinds[widest.name], (bound - nominal - places) / coefficient)
         # No product of BLAS: its threads would cost more than they save and change the last bit.
-        found.append(float((shares * (below if coefficient > 0 else 1 - below)).sum()))
-    return min(max(found[0], 0.0), 1.0), min(max(1 - found[1], 0.0), 1.0)
+        reached.append(float((shares * (below if coefficient > 0 else 1 - below)).sum()))
+    return min(max(reached[0], 0.0), 1.0), min(max(1 - reached[1], 0.0), 1.0)
 
 
 def normal_yield(function: ClosingFunction, parts: Sequence[Part], limits: ClosingLink) -> float:

@@ -1,11 +1,11 @@
 """Pareto fronts: search, picks, errors.
 
-- ``goals``, ``archive``, ``indicators``, ``picks``: costs of responses, what is not dominated, how good, which one
+- ``goals``, ``archive``, ``indicators``, ``picks``: costs of responses, what dominates what, how good a front is, which one
 - ``nsga2``, ``front``: search among cheap responses, and the front found
 - ``uncertainty``: what the surfaces' errors make of a front and of a gain
 - ``quadratic``, ``tolerance_aware``: the front of what manufacture leaves of a point
 - ``tolerance``: backwards from a pick to the widest tolerances that keep its gains
-- ``dominance``, ``direct``, ``surrogate_loss``: the front of a noisy simulator, and what surfaces lose against it
+- ``direct``, ``surrogate_loss``: the front of a noisy simulator, and what surfaces lose against it
 """
 
 from doe.pareto.archive import non_dominated

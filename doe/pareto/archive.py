@@ -1,9 +1,14 @@
-"""Archives of evaluated points: the non-dominated of all, generation by generation, and evenly spread picks of them."""
+"""Dominance, also between means that carry errors; archives of evaluated points and evenly spread picks of them.
+
+Source: Hughes, Evolutionary multi-objective ranking with uncertainty and noise (2001); Teich, Pareto-front exploration
+with uncertain objectives (2001): one dominates another only where the noise cannot have made the difference.
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm
 
 from doe.arrays import Array, Mask, Rows
 from doe.pareto.indicators import normalised
@@ -31,16 +36,54 @@ def dominates(better: Array, worse: Array) -> Mask:
     return np.all(better <= worse, axis=-1) & np.any(better < worse, axis=-1)
 
 
-def archives(history: Sequence[Archive]) -> list[Archive]:
-    """Non-dominated points of all generations up to each of ``history``."""
-    kept = []
-    points, costs = (part[:0] for part in history[0])
-    for new in history:
-        points, costs = np.vstack([points, new.points]), np.vstack([costs, new.costs])
-        rows = non_dominated(costs)
-        points, costs = points[rows], costs[rows]
-        kept.append(Archive(points, costs))
-    return kept
+def dominance(costs: Array) -> Mask:
+    """Whether row i of ``costs`` (n, q) dominates row j, taken at their word: (n, n)."""
+    return dominates(costs[:, None], costs[None, :])
+
+
+def error_aware_dominance(costs: Array, errors: Array, confidence: float) -> Mask:
+    """Whether mean i dominates mean j beyond their errors: (n, n).
+
+    Row i of ``costs`` (n, q) must be smaller than row j in every cost, by more than the one-sided normal quantile of
+    ``confidence`` times the combined standard error of both (``errors`` (n, q)).
+    """
+    difference = costs[None, :] - costs[:, None]
+    combined = np.sqrt(errors[None, :] ** 2 + errors[:, None] ** 2)
+    return (difference > norm.ppf(confidence) * combined).all(axis=-1)
+
+
+def ranks(dominating: Mask) -> Rows:
+    """Front number (n,) of each row: 0 for those that none dominates, 1 for those that only these do, and so on."""
+    rank = np.full(len(dominating), -1, dtype=np.intp)
+    dominators = dominating.sum(axis=0)
+    level = 0
+    while (rank < 0).any():
+        front = (dominators == 0) & (rank < 0)
+        if not front.any():
+            # Errors may make dominance run in circles; who is in one shares a front.
+            front = rank < 0
+        rank[front] = level
+        dominators = dominators - dominating[front].sum(axis=0)
+        level += 1
+    return rank
+
+
+def order(costs: Array, errors: Array, confidence: float) -> Rows:
+    """Place (n,) of each row: by its front beyond errors, and within that by its front at its word."""
+    outer = ranks(error_aware_dominance(costs, errors, confidence))
+    inner = np.empty_like(outer)
+    for level in np.unique(outer):
+        rows = np.flatnonzero(outer == level)
+        inner[rows] = ranks(dominance(costs[rows]))
+    _, places = np.unique(np.column_stack([outer, inner]), axis=0, return_inverse=True)
+    return places.reshape(-1)
+
+
+def merged(archive: Archive, new: Archive) -> Archive:
+    """Non-dominated points of both."""
+    points, costs = np.vstack([archive.points, new.points]), np.vstack([archive.costs, new.costs])
+    rows = non_dominated(costs)
+    return Archive(points[rows], costs[rows])
 
 
 def spread(costs: Array, keep: int, wanted: Sequence[int] = ()) -> Rows:

@@ -7,8 +7,6 @@ at the finalists, which alone are reported. Runs that chose a point say nothing 
 Sources: Deb et al. (2002) for NSGA-II; Hughes (2001) and Teich (2001) for dominance under noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -17,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from doe.arrays import Array, Mask, Rows
-from doe.pareto.archive import spread
-from doe.pareto.dominance import dominance, error_aware_dominance, order, ranks
+from doe.pareto.archive import dominance, error_aware_dominance, order, ranks, spread
 from doe.pareto.goals import Goals
 from doe.pareto.nsga2 import check_search
 from doe.pareto.picks import NAMES, Rule, pick_all
@@ -42,7 +39,7 @@ class Samples(NamedTuple):
         """Whether each point's run failed, (n,)."""
         return np.asarray(np.isnan(self.values).any(axis=1))
 
-    def rows(self, which: Any) -> Samples:
+    def rows(self, which: Any) -> "Samples":
         """Some of them."""
         return Samples(*(part[which] for part in self))
 
@@ -109,30 +106,29 @@ def direct_front(
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     _check(low, high, evaluations, population, resample, confidence)
     generations = int(evaluations * (1.0 - resample)) // population
-    archive = _search(evaluate, low, high, goals, population, generations, seed, confidence)
+    archive = _search(evaluate, (low, high), goals, population, generations, seed, confidence)
     left = evaluations - len(archive.points)
     candidates = archive.rows(_candidates(archive, goals, confidence, max(left // (2 * SELECTING), 1)))
-    fresh = _repeated(evaluate, candidates.points, SELECTING)
+    fresh = repeated(evaluate, candidates.points, SELECTING)
     left -= SELECTING * len(candidates.points)
     chosen = _finalists(fresh, goals, max(left // REPORTING - 1, 1))
     original = np.empty((0, low.size)) if baseline is None else np.asarray(baseline, float)[None]
     repeats = max(left // (len(chosen) + len(original)), 1)
-    final = _repeated(evaluate, np.vstack([candidates.points[chosen], original]), repeats)
+    final = repeated(evaluate, np.vstack([candidates.points[chosen], original]), repeats)
     ours, base = final.rows(slice(len(chosen))), final.rows(slice(len(chosen), None)).values
-    kept = np.flatnonzero(~ours.failed)
-    if not kept.size:
+    sound = np.flatnonzero(~ours.failed)
+    if not sound.size:
         raise ValueError("every run at the finalists failed; see the failures of the runs")
-    ours, believed = ours.rows(kept), goals.costs(candidates.values[chosen][kept])
+    ours, believed = ours.rows(sound), goals.costs(candidates.values[chosen][sound])
     base_costs = goals.costs(base[0]) if len(base) and not np.isnan(base).any() else None
-    picks, among = pick_all(goals.costs(fresh.values[chosen][kept]), goals, base_costs)
+    picks, among = pick_all(goals.costs(fresh.values[chosen][sound]), goals, base_costs)
     costs = goals.costs(ours.values)
+    span = np.ptp(costs, axis=0)
     return DirectFront(
-        points=ours.points,
-        values=ours.values,
-        standard_errors=ours.errors,
+        *ours,
         costs=costs,
         cost_errors=ours.errors[:, goals.objectives],
-        optimism=(costs - believed).mean(axis=0) / np.where(np.ptp(costs, axis=0) > 0.0, np.ptp(costs, axis=0), 1.0),
+        optimism=(costs - believed).mean(axis=0) / np.where(span > 0.0, span, 1.0),
         pick=picks[pick],
         pick_reason=f"{NAMES[pick]} {among}",
         baseline_values=base[0] if len(base) else None,
@@ -151,18 +147,15 @@ def _check(low: Array, high: Array, evaluations: int, population: int, resample:
     if not 0.1 <= resample <= 0.9 or not 0.5 < confidence < 1.0:
         raise ValueError(f"resample = {resample}, confidence = {confidence}: must be in [0.1, 0.9] and (0.5, 1)")
     if evaluations < 5 * population:
-        raise ValueError(
-            f"evaluations = {evaluations}: must be at least five populations ({5 * population}); give more runs "
-            "or a smaller population"
-        )
+        mend = "give more runs or a smaller population"
+        raise ValueError(f"evaluations = {evaluations}: must be at least five populations ({5 * population}); {mend}")
 
 
 def _search(
     evaluate: Evaluate,
-    low: Array,
-    high: Array,
+    box: tuple[Array, Array],
     goals: Goals,
-    population: int,
+    size: int,
     generations: int,
     seed: int,
     confidence: float,
@@ -187,8 +180,8 @@ def _search(
             pop.set("crowding", crowding)
             return pop[np.lexsort((-crowding, place))[:n_survive]]
 
-    problem = Problem(n_var=low.size, n_obj=len(goals.objectives), xl=low, xu=high)
-    algorithm = NSGA2(pop_size=population, sampling=LHS(), survival=Surviving(filter_infeasible=False))
+    problem = Problem(n_var=box[0].size, n_obj=len(goals.objectives), xl=box[0], xu=box[1])
+    algorithm = NSGA2(pop_size=size, sampling=LHS(), survival=Surviving(filter_infeasible=False))
     algorithm.tournament_type = "comp_by_rank_and_crowding"
     algorithm.setup(problem, termination=("n_gen", generations), seed=seed)
     batches: list[Samples] = []
@@ -212,8 +205,8 @@ def _run(evaluate: Evaluate, points: Array) -> Samples:
     return Samples(points, values, np.where(np.isfinite(errors), errors, 0.0))
 
 
-def _repeated(evaluate: Evaluate, points: Array, times: int) -> Samples:
-    """Means of ``times`` fresh runs at each point, all in one batch; NaN where one of them failed."""
+def repeated(evaluate: Evaluate, points: Array, times: int) -> Samples:
+    """Means of ``times`` fresh runs at each of points (n, k), all in one batch; NaN where one of them failed."""
     batch = _run(evaluate, np.tile(points, (times, 1)))
     values = batch.values.reshape(times, len(points), -1)
     stated = np.sqrt((batch.errors.reshape(values.shape) ** 2).sum(axis=0)) / times
@@ -266,6 +259,6 @@ def _finalists(fresh: Samples, goals: Goals, count: int) -> Rows:
     """Rows of the candidates that their fresh runs leave non-dominated, by ascending first cost."""
     rows = _allowed(fresh, goals)
     costs = goals.costs(fresh.values[rows])
-    kept = np.flatnonzero(~dominance(costs).any(axis=0))
-    kept = kept[spread(costs[kept], count)][:count]
-    return rows[kept[np.argsort(costs[kept, 0], kind="stable")]]
+    front = np.flatnonzero(~dominance(costs).any(axis=0))
+    front = front[spread(costs[front], count)][:count]
+    return rows[front[np.argsort(costs[front, 0], kind="stable")]]

@@ -45,9 +45,8 @@ class Neighbourhood:
 
     def parts(self, offsets: Array) -> Array:
         """Responses (n, s, m) of parts at coded ``offsets`` (s, k) from every point."""
-        shape = [
-            surface.around(self.points, offsets) - surface.predict(self.points)[:, None] for surface in self.surfaces
-        ]
+        at = self.points
+        shape = [surface.around(at, offsets) - surface.predict(at)[:, None] for surface in self.surfaces]
         return self.values[:, None, :] + np.stack(shape, axis=-1) + np.einsum("sk,nkm->nsm", offsets, self.slopes)
 
 

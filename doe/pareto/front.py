@@ -102,16 +102,16 @@ def front(
     baseline_values = None if baseline is None else _values(objectives, np.atleast_2d(baseline))[0]
     baseline_costs = None if baseline_values is None else goals.costs(baseline_values)
     best = int(knee_depth(costs).argmax())
-    kept, picks, among = thinned(costs, goals, baseline_costs, keep, [best])
+    rows, picks, among = thinned(costs, goals, baseline_costs, keep, [best])
     return ParetoFront(
-        points=points[kept],
-        values=_values(objectives, points[kept]),
-        costs=costs[kept],
+        points=points[rows],
+        values=_values(objectives, points[rows]),
+        costs=costs[rows],
         hypervolume=hypervolume(costs, ideal, nadir),
         hypervolume_history=np.array([hypervolume(each.costs, ideal, nadir) for each in searched.archives]),
         ideal=ideal,
         nadir=nadir,
-        knee=int(np.searchsorted(kept, best)),
+        knee=int(np.searchsorted(rows, best)),
         pick=picks[pick],
         picks=picks,
         pick_reason=f"{NAMES[pick]} {among}",
@@ -123,7 +123,7 @@ def front(
         generations=generations,
         seed=seed,
         goals=goals,
-        standard_errors=None if standard_errors is None else standard_errors(points[kept]),
+        standard_errors=None if standard_errors is None else standard_errors(points[rows]),
     )
 
 
@@ -137,15 +137,11 @@ def _values(objectives: Objectives, points: Array) -> Array:
     """Responses (n, m) of points. Raises ValueError unless they are finite, a row a point, two or more in a row."""
     values = np.asarray(objectives(points), float)
     if values.ndim != 2 or len(values) != len(points) or values.shape[1] < 2:
-        raise ValueError(
-            f"objectives gave shape {values.shape} for {len(points)} points; give one row a point and at "
-            "least two objectives"
-        )
+        given = f"objectives gave shape {values.shape} for {len(points)} points"
+        raise ValueError(f"{given}; give one row a point and at least two objectives")
     bad = np.argwhere(~np.isfinite(values))
     if bad.size:
         row, column = bad[0]
-        raise ValueError(
-            f"objective {column + 1} is {values[row, column]} at {points[row].tolist()}; narrow the bounds "
-            "or mend the objective"
-        )
+        given = f"objective {column + 1} is {values[row, column]} at {points[row].tolist()}"
+        raise ValueError(f"{given}; narrow the bounds or mend the objective")
     return values

@@ -6,13 +6,17 @@ target ("target"). A response of goal "none" has no cost; it may still have limi
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
 from doe.arrays import Array, Rows
 
 Kind = Literal["min", "max", "target", "none"]
+# What stands for a wish that a response does not have.
+BLANK: dict[str, Any] = {
+    "target": np.nan, "lower": -np.inf, "upper": np.inf, "weight": 1.0, "desired": (np.nan, np.nan)
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,29 +36,15 @@ class Goals:
     desired: Array
 
     @classmethod
-    def of(
-        cls,
-        kinds: Sequence[Kind],
-        *,
-        target: Sequence[float | None] | None = None,
-        lower: Sequence[float | None] | None = None,
-        upper: Sequence[float | None] | None = None,
-        weight: Sequence[float] | None = None,
-        desired: Sequence[Sequence[float] | None] | None = None,
-    ) -> Self:
-        """Goals with None for what is not given.
+    def of(cls, kinds: Sequence[Kind], **given: Sequence[Any]) -> Self:
+        """Goals of the ``kinds``; what else is ``given`` has None where a response has none.
 
         Raises ValueError for a target without its number or a lower limit that is not below the upper one.
         """
-        count = len(kinds)
-        goals = cls(
-            tuple(kinds),
-            _filled(target, count, np.nan),
-            _filled(lower, count, -np.inf),
-            _filled(upper, count, np.inf),
-            np.ones(count) if weight is None else np.array(weight, float),
-            np.array([(np.nan, np.nan) if pair is None else pair for pair in desired or [None] * count], float),
-        )
+        columns = {key: [blank] * len(kinds) for key, blank in BLANK.items()}
+        for key, column in given.items():
+            columns[key] = [BLANK[key] if each is None else each for each in column]
+        goals = cls(tuple(kinds), **{key: np.array(column, float) for key, column in columns.items()})
         for index, kind in enumerate(kinds):
             if kind == "target" and not np.isfinite(goals.target[index]):
                 raise ValueError(f'response {index + 1}: goal = "target" needs its target; give the number')
@@ -86,14 +76,11 @@ class Goals:
 
     def worst(self, low: Array, high: Array) -> Array:
         """Largest costs (..., q) of responses that range from ``low`` to ``high`` (..., m): costs are convex."""
-        columns = [
-            {
-                "min": high[..., i],
-                "max": -low[..., i],
-                "target": np.maximum(np.abs(low[..., i] - self.target[i]), np.abs(high[..., i] - self.target[i])),
-            }[self.kinds[i]]
-            for i in self.objectives
-        ]
+        columns = []
+        for i in self.objectives:
+            least, most = low[..., i], high[..., i]
+            away = np.maximum(np.abs(least - self.target[i]), np.abs(most - self.target[i]))
+            columns.append({"min": most, "max": -least, "target": away}[self.kinds[i]])
         return np.stack(columns, axis=-1)
 
     def slopes(self, values: Array) -> Array:
@@ -110,7 +97,3 @@ class Goals:
         if not below + above:
             return np.zeros((*low.shape[:-1], 0))
         return np.stack(below + above, axis=-1).clip(0.0)
-
-
-def _filled(given: Sequence[float | None] | None, count: int, blank: float) -> Array:
-    return np.array([blank if each is None else each for each in given or [None] * count], float)

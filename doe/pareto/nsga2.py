@@ -7,12 +7,13 @@ Source: Deb et al., A fast and elitist multiobjective genetic algorithm: NSGA-II
 """
 
 from collections.abc import Callable
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto.archive import Archive, archives
+from doe.pareto.archive import Archive, merged
 
 Objectives = Callable[[Array], Array]
 # How far below and above (n, m) what is foretold of points (n, k) their responses may be when limits are judged.
@@ -24,6 +25,10 @@ class Judged(NamedTuple):
 
     costs: Array
     violations: Array
+
+
+Judge = Callable[[Array], Judged]
+History = list[tuple[Array, Judged]]  # points of each generation and what they are judged
 
 
 class InfeasibleError(ValueError):
@@ -42,9 +47,7 @@ class Search(NamedTuple):
     feasible: float
 
 
-def search(
-    judge: Callable[[Array], Judged], low: Array, high: Array, population: int, generations: int, seed: int
-) -> Search:
+def search(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> Search:
     """NSGA-II over a box, with the archive of all evaluations after every generation.
 
     Raises InfeasibleError when no point evaluated keeps all limits.
@@ -57,8 +60,9 @@ def search(
         violations = np.vstack([judged.violations for _, judged in history])
         closest = (violations / _scale(violations)).sum(axis=1).argmin()
         raise InfeasibleError(points[closest], violations[closest])
-    kept = [Archive(points[rows], judged.costs[rows]) for (points, judged), rows in zip(history, allowed, strict=True)]
-    return Search(archives(kept), count, sum(int(rows.sum()) for rows in allowed) / count)
+    good = [Archive(points[rows], judged.costs[rows]) for (points, judged), rows in zip(history, allowed, strict=True)]
+    archives = accumulate(good, merged, initial=Archive(*(part[:0] for part in good[0])))
+    return Search(list(archives)[1:], count, sum(int(rows.sum()) for rows in allowed) / count)
 
 
 def check_search(low: Array, high: Array, population: int, generations: int, keep: int) -> None:
@@ -80,15 +84,12 @@ def _scale(violations: Array) -> Array:
     return np.where(largest > 0.0, largest, 1.0)
 
 
-def _evolve(
-    judge: Callable[[Array], Judged], low: Array, high: Array, population: int, generations: int, seed: int
-) -> list[tuple[Array, Judged]]:
-    """Points of each generation and what was found of them."""
+def _evolve(judge: Judge, low: Array, high: Array, population: int, generations: int, seed: int) -> History:
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem
     from pymoo.optimize import minimize
 
-    history: list[tuple[Array, Judged]] = []
+    history: History = []
     # The scale of the violations is that of points all over the box.
     sample = judge(np.random.default_rng(seed).uniform(low, high, (population, low.size)))
     scale = _scale(sample.violations)

@@ -106,7 +106,6 @@ def _climb(slopes: Array, bend: Array, sweeps: int = 20) -> Array:
         tries = np.stack([-np.ones(len(slopes)), np.ones(len(slopes))])
         if curvature < 0.0:
             tries = np.vstack([tries, (-gradient / (2.0 * curvature)).clip(-1.0, 1.0)])
-        offset[:, axis] = np.take_along_axis(
-            tries, (gradient * tries + curvature * tries**2).argmax(axis=0)[None], axis=0
-        )[0]
+        best = (gradient * tries + curvature * tries**2).argmax(axis=0)
+        offset[:, axis] = np.take_along_axis(tries, best[None], axis=0)[0]
     return (offset * slopes).sum(axis=1) + np.einsum("nj,jk,nk->n", offset, bend, offset)

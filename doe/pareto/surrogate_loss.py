@@ -9,6 +9,8 @@ from doe.pareto.archive import non_dominated
 from doe.pareto.direct import DirectFront
 from doe.pareto.indicators import hypervolume
 
+DRAWS = 200  # of the noise of a front
+
 
 @dataclass(frozen=True)
 class SurrogateLoss:
@@ -38,7 +40,7 @@ class SurrogateLoss:
 
 
 def noisy_hypervolume(
-    costs: Array, errors: Array, ideal: Array, nadir: Array, draws: int = 200, seed: int = 1
+    costs: Array, errors: Array, ideal: Array, nadir: Array, draws: int, seed: int = 1
 ) -> tuple[float, float]:
     """Hypervolume of means (n, q) with standard errors (n, q), and its standard error.
 
@@ -52,7 +54,7 @@ def noisy_hypervolume(
 
 
 def compare_with_surrogate(
-    direct: DirectFront, surrogate_values: Array, surrogate_errors: Array, *, draws: int = 200, seed: int = 1
+    direct: DirectFront, surrogate_values: Array, surrogate_errors: Array, *, seed: int = 1
 ) -> SurrogateLoss:
     """Compare a direct front with a surrogate's, whose points were run on the simulator afresh.
 
@@ -70,8 +72,8 @@ def compare_with_surrogate(
     both = np.vstack([direct.costs, costs])
     both = both[non_dominated(both)]
     ideal, nadir = both.min(axis=0), both.max(axis=0)
-    ours, our_error = noisy_hypervolume(direct.costs, direct.cost_errors, ideal, nadir, draws, seed)
-    theirs, their_error = noisy_hypervolume(costs, errors, ideal, nadir, draws, seed + 1)
+    ours, our_error = noisy_hypervolume(direct.costs, direct.cost_errors, ideal, nadir, DRAWS, seed)
+    theirs, their_error = noisy_hypervolume(costs, errors, ideal, nadir, DRAWS, seed + 1)
     ratio = theirs / ours if ours > 0.0 else None
     error = None if ratio is None else 196.0 * float(np.hypot(ratio * our_error, their_error)) / ours
     return SurrogateLoss(

@@ -37,13 +37,9 @@ class WidestTolerances:
 
     def as_dict(self, factors: Sequence[str]) -> dict[str, dict[str, Any]]:
         """JSON: factor to half width, probability with its error, and what limits it."""
+        sure = {"probability": self.probability, "standard_error": self.standard_error}
         return {
-            name: {
-                "half_width": float(width),
-                "probability": self.probability,
-                "standard_error": self.standard_error,
-                "limited_by": RIM if rim else self.limited_by,
-            }
+            name: {"half_width": float(width), **sure, "limited_by": RIM if rim else self.limited_by}
             for name, width, rim in zip(factors, self.half_widths, self.at_rim, strict=True)
         }
 
@@ -95,70 +91,77 @@ def widest_tolerances(
         raise ValueError(f"ratios = {share.tolist()}, probability = {probability}: must be positive and in (0, 1)")
     if (room < -1e-9 * (high - low)).any():
         raise ValueError(f"pick = {centre.tolist()}: lies outside the region; pick a point within it")
-    parts = _Parts(
-        objectives,
-        centre,
-        np.asarray(limits, float),
-        room.clip(0.0),
-        random_offsets(samples, centre.size, distribution, seed),
-    )
-    if parts.kept(np.zeros(centre.size)) < probability:
-        worst = names[int(parts.broken(np.zeros(centre.size)).argmax())]
-        return _nothing(
-            parts, worst, f"even the exact pick keeps {worst} with a probability below {100 * probability:g} %"
-        )
+    drawn = random_offsets(samples, centre.size, distribution, seed)
+    parts = _Parts(objectives, centre, np.asarray(limits, float), room.clip(0.0), drawn, names, probability)
+    exact = np.zeros(centre.size)
+    if parts.kept(exact) < probability:
+        worst = parts.most_broken(exact)
+        return parts.nothing(worst, f"even the exact pick keeps {worst} with a probability below {parts.percent}")
     if aim != "ratios":
         usual = np.ones(centre.size) if aim == "product" else 1.0 / share
-        weight = usual if weights is None else np.asarray(weights, float)
-        share = _best_ratios(parts, share, probability, aim, weight)
-    return _result(parts, parts.widest(share, probability), share, probability, names)
+        share = _best_ratios(parts, share, aim, usual if weights is None else np.asarray(weights, float))
+    return _result(parts, parts.widest(share), share)
 
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
+    """Parts about a point, and the ``wanted`` probability with which they must keep limits of these names."""
+
     objectives: Costs
     centre: Array
     limits: Array
     room: Array
     offsets: Array
+    names: Sequence[str]
+    wanted: float
 
-    def broken(self, half: Array) -> Array:
-        """How many parts break each limit, (c,)."""
-        costs = self.objectives(self.centre + half * self.offsets)
-        return (~(costs <= self.limits)).sum(axis=0).astype(float)
+    @property
+    def percent(self) -> str:
+        """The wanted probability in words."""
+        return f"{100 * self.wanted:g} %"
+
+    def keep(self, half: Array) -> Mask:
+        """Whether each part keeps each limit, (samples, c)."""
+        return np.asarray(self.objectives(self.centre + half * self.offsets) <= self.limits)
 
     def kept(self, half: Array) -> float:
         """Share of the parts that keep all limits."""
-        costs = self.objectives(self.centre + half * self.offsets)
-        return float((costs <= self.limits).all(axis=1).mean())
+        return float(self.keep(half).all(axis=1).mean())
 
-    def probability(self, half: Array) -> tuple[float, float]:
-        """Share of the parts that keep all limits and its standard error."""
-        share = self.kept(half)
-        return share, error_of_share(share, len(self.offsets))
+    def most_broken(self, half: Array) -> str:
+        """The limit that most parts break."""
+        return self.names[int((~self.keep(half)).sum(axis=0).argmax())]
 
     def half(self, ratios: Array, scale: float) -> Array:
         """Half widths at a scale, none beyond the region."""
         return np.minimum(ratios * scale, self.room)
 
-    def widest(self, ratios: Array, probability: float, march: int = MARCH) -> float:
+    def widest(self, ratios: Array, march: int = MARCH) -> float:
         """Largest scale up to which the limits are kept."""
-        top = float((self.room / ratios).max())
-        steps = np.linspace(0.0, top, march + 1)
-        first = next((i for i in range(1, march + 1) if self.kept(self.half(ratios, steps[i])) < probability), None)
+
+        def lost(scale: float) -> bool:
+            return self.kept(self.half(ratios, scale)) < self.wanted
+
+        steps = np.linspace(0.0, float((self.room / ratios).max()), march + 1).tolist()
+        first = next((place for place in range(1, march + 1) if lost(steps[place])), None)
         if first is None:
-            return top
-        good, bad = float(steps[first - 1]), float(steps[first])
+            return steps[-1]
+        good, bad = steps[first - 1], steps[first]
         for _ in range(HALVINGS):
             middle = (good + bad) / 2.0
-            if self.kept(self.half(ratios, middle)) < probability:
-                bad = middle
-            else:
-                good = middle
+            good, bad = (good, middle) if lost(middle) else (middle, bad)
         return good
 
+    def nothing(self, limit: str, cause: str) -> WidestTolerances:
+        """No tolerance, because of a limit."""
+        zero, share = np.zeros_like(self.centre), self.kept(np.zeros_like(self.centre))
+        sentence = f"No tolerance at all: {cause}; ask for less of the gain, or for less certainty."
+        return WidestTolerances(
+            zero, share, error_of_share(share, len(self.offsets)), limit, zero.astype(bool), sentence
+        )
 
-def _best_ratios(parts: _Parts, share: Array, probability: float, aim: Aim, weight: Array) -> Array:
+
+def _best_ratios(parts: _Parts, share: Array, aim: Aim, weight: Array) -> Array:
     """Ratios whose widest tolerances have the largest product or sum."""
     reach = np.log(20.0)
     free = np.flatnonzero(parts.room > 0.0)
@@ -170,51 +173,28 @@ def _best_ratios(parts: _Parts, share: Array, probability: float, aim: Aim, weig
 
     def worth(logarithms: Array) -> float:
         trial = ratios(logarithms)
-        half = parts.half(trial, parts.widest(trial, probability, march=4))[free]
+        half = parts.half(trial, parts.widest(trial, march=4))[free]
         value = weight[free] @ np.log(half.clip(1e-300)) if aim == "product" else weight[free] @ half
         return -float(value)
 
-    found = minimize(
-        worth,
-        np.zeros(free.size),
-        method="Nelder-Mead",
-        bounds=[(-reach, reach)] * free.size,
-        options={
-            "maxfev": 60 * max(free.size, 1),
-            "xatol": 1e-3,
-            "fatol": 1e-4,
-            "initial_simplex": np.vstack([np.zeros(free.size), 0.7 * np.eye(free.size)]),
-        },
-    )
-    return ratios(found.x)
+    start, bounds = np.zeros(free.size), [(-reach, reach)] * free.size
+    simplex = np.vstack([start, 0.7 * np.eye(free.size)])
+    options = {"maxfev": 60 * max(free.size, 1), "xatol": 1e-3, "fatol": 1e-4, "initial_simplex": simplex}
+    return ratios(minimize(worth, start, method="Nelder-Mead", bounds=bounds, options=options).x)
 
 
-def _nothing(parts: _Parts, limit: str, cause: str) -> WidestTolerances:
-    zero = np.zeros_like(parts.centre)
-    advice = "ask for less of the gain, or for less certainty"
-    return WidestTolerances(
-        zero,
-        *parts.probability(zero),
-        limited_by=limit,
-        at_rim=np.zeros(zero.size, dtype=bool),
-        sentence=f"No tolerance at all: {cause}; {advice}.",
-    )
-
-
-def _result(parts: _Parts, scale: float, ratios: Array, probability: float, names: Sequence[str]) -> WidestTolerances:
+def _result(parts: _Parts, scale: float, ratios: Array) -> WidestTolerances:
     top = float((parts.room / ratios).max())
     if scale <= 1e-6 * top:
-        first = names[int(parts.broken(parts.half(ratios, 1e-3 * top)).argmax())]
-        return _nothing(
-            parts, first, f"as soon as parts differ, less than {100 * probability:g} % of them keep {first}"
-        )
+        first = parts.most_broken(parts.half(ratios, 1e-3 * top))
+        return parts.nothing(first, f"as soon as parts differ, less than {parts.percent} of them keep {first}")
     half = parts.half(ratios, scale)
     at_rim = half >= parts.room * (1.0 - 1e-9)
     # Just beyond, the limit that parts break most is what holds the tolerances back.
-    broken = parts.broken(parts.half(ratios, scale * 1.02))
-    limit = RIM if at_rim.all() else names[int(broken.argmax())]
-    share, error = parts.probability(half)
-    kept = f"Within these tolerances {100 * share:.1f} ± {196 * error:.1f} % of the parts keep all limits"
+    limit = RIM if at_rim.all() else parts.most_broken(parts.half(ratios, scale * 1.02))
+    share = parts.kept(half)
+    error = error_of_share(share, len(parts.offsets))
+    within = f"Within these tolerances {100 * share:.1f} ± {196 * error:.1f} % of the parts keep all limits"
     rim = " Where a tolerance ends at the rim of the region, no run tells whether it may be wider."
-    sentence = f"{kept}; {limit} holds them back." + (rim if at_rim.any() else "")
+    sentence = f"{within}; {limit} holds them back." + (rim if at_rim.any() else "")
     return WidestTolerances(half, share, error, limit, at_rim, sentence)

@@ -140,20 +140,20 @@ def tolerance_aware_front(
     nominal_baseline = goals.costs(_nominal(surfaces, baseline[None]))[0]
     baseline_costs = judge(baseline[None]).costs[0]
     survives_nominal = bool(dominates(costs, nominal_baseline).any())
-    kept, picks, among = thinned(costs, goals, nominal_baseline if survives_nominal else baseline_costs, keep)
-    values = _nominal(surfaces, points[kept])
+    rows, picks, among = thinned(costs, goals, nominal_baseline if survives_nominal else baseline_costs, keep)
+    values = _nominal(surfaces, points[rows])
     inside = ((plain.points >= low - 1e-12) & (plain.points <= high + 1e-12)).all(axis=1)
     robust_plain = judge(plain.points[inside]).costs if inside.any() else costs[:0]
     spans, robust_spans = ((each.min(axis=0), each.max(axis=0)) for each in (plain.costs, costs))
     losing = hypervolume(goals.costs(values), *spans), hypervolume(plain.costs, *spans)
-    gaining = hypervolume(costs[kept], *robust_spans), hypervolume(robust_plain, *robust_spans)
-    candidates = np.vstack([plain.points[plain_pick], points[kept[picks[pick]]]])
+    gaining = hypervolume(costs[rows], *robust_spans), hypervolume(robust_plain, *robust_spans)
+    candidates = np.vstack([plain.points[plain_pick], points[rows[picks[pick]]]])
     made = goals.costs(box.parts(surfaces, candidates, SURVIVAL_PARTS))
     survives = np.mean(dominates(made, nominal_baseline), axis=1).tolist()
     return ToleranceAware(
         box=box,
-        points=points[kept],
-        costs=costs[kept],
+        points=points[rows],
+        costs=costs[rows],
         values=values,
         picks=picks,
         pick=picks[pick],

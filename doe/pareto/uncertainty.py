@@ -27,14 +27,14 @@ class FrontUncertainty:
     ``half_widths`` (f, m): 95 % half widths of the mean responses of each front point. ``non_dominated`` (f,):
     probability that a front point is dominated by none of the others. ``pick_dominates``: probability that the
     pick dominates the baseline. Probabilities carry their Monte Carlo standard errors. ``optimism`` (q,): by how much
-    the rule promises too large a gain of each cost, because it picks what the errors flatter; None without a baseline.
+    the rule promises too large a gain of each cost, because it picks what the errors flatter.
     """
 
     half_widths: Array
     non_dominated: Array
-    pick_dominates: float | None
-    pick_dominates_error: float | None
-    optimism: Array | None
+    pick_dominates: float
+    pick_dominates_error: float
+    optimism: Array
     draws: int
 
 
@@ -65,15 +65,12 @@ def share(hits: Mask) -> tuple[Array, Array]:
 
 def non_dominated_share(costs: Array) -> Array:
     """Probability (f,) that a point is dominated by no other, from drawn costs (d, f, q)."""
-    kept = np.empty(costs.shape[:2], dtype=bool)
-    for row, drawn in zip(kept, costs, strict=True):
-        better = np.ones((len(drawn), len(drawn)), dtype=bool)
-        for column in drawn.T:
-            better &= column[:, None] <= column[None, :]
-        # Equal points do not dominate each other.
-        equal = better & better.T
-        row[:] = ~(better & ~equal).any(axis=0)
-    return kept.mean(axis=0)
+    from pymoo.util.nds.non_dominated_sorting import find_non_dominated
+
+    undominated = np.zeros(costs.shape[:2], dtype=bool)
+    for row, drawn in zip(undominated, costs, strict=True):
+        row[find_non_dominated(drawn)] = True
+    return undominated.mean(axis=0)
 
 
 def front_uncertainty(
@@ -83,8 +80,8 @@ def front_uncertainty(
     values: Array,
     pick: int,
     rule: Rule,
-    baseline: Array | None,
-    baseline_values: Array | None,
+    baseline: Array,
+    baseline_values: Array,
 ) -> FrontUncertainty:
     """How sure a front is, from drawn responses.
 
@@ -95,25 +92,14 @@ def front_uncertainty(
     goals : what is wanted of the responses.
     values : responses (f, m) on the fitted surfaces.
     pick, rule : row of the pick and the rule that made it.
-    baseline, baseline_values : responses (d, m) of the baseline on the drawn surfaces and (m,) on the fitted ones, or
-        None.
+    baseline, baseline_values : responses (d, m) of the baseline on the drawn surfaces and (m,) on the fitted ones.
     """
-    costs = goals.costs(drawn)
-    wins: tuple[Array, Array] | tuple[None, None] = (None, None)
-    optimism = None
-    if baseline is not None and baseline_values is not None:
-        base = goals.costs(baseline)
-        wins = share(dominates(costs[:, pick], base))
-        real = goals.costs(baseline_values) - goals.costs(values)
-        optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
-    return FrontUncertainty(
-        half_widths=half_widths,
-        non_dominated=non_dominated_share(costs),
-        pick_dominates=None if wins[0] is None else float(wins[0]),
-        pick_dominates_error=None if wins[1] is None else float(wins[1]),
-        optimism=optimism,
-        draws=len(drawn),
-    )
+    costs, base = goals.costs(drawn), goals.costs(baseline)
+    wins, error = share(dominates(costs[:, pick], base))
+    real = goals.costs(baseline_values) - goals.costs(values)
+    optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
+    sure = float(wins), float(error)
+    return FrontUncertainty(half_widths, non_dominated_share(costs), *sure, optimism, len(drawn))
 
 
 def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals, rule: Rule) -> Array:

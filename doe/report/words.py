@@ -1,45 +1,10 @@
-"""How names and numbers are written for people: units, sensible digits, errors, tolerances."""
+"""How gains, tolerances and probabilities are written for people; names and numbers by ``rbdyn.records.words``."""
 
 import math
 from collections.abc import Mapping
 from typing import Any
 
-UNITS = {
-    "mm": "mm", "um": "µm", "N": "N", "W": "W", "rpm": "rpm", "s": "s", "ms": "ms", "h": "h", "MPa": "MPa",
-    "GPa": "GPa", "percent": "%", "K": "K", "g": "g",
-}  # fmt: skip
-# A number below this many digits before the point is written without an exponent.
-PLAIN_BELOW = 1e7
-
-
-def quantity(name: str) -> tuple[str, str]:
-    """'impact_force_N' as ('impact force', 'N'); the unit is empty where the name has none."""
-    words = name.split("_")
-    if len(words) > 1 and words[-1] in UNITS:
-        return " ".join(words[:-1]), UNITS[words[-1]]
-    return " ".join(words), ""
-
-
-def label(name: str) -> str:
-    """'impact_force_N' as 'impact force [N]'."""
-    words, unit = quantity(name)
-    return f"{words} [{unit}]" if unit else words
-
-
-def shown(value: Any, digits: int = 4) -> str:
-    """A value for a table: numbers to ``digits`` significant ones; nothing for what is undefined."""
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, list | tuple):
-        return ", ".join(shown(each, digits) for each in value)
-    if not isinstance(value, float):
-        return str(value)
-    if not math.isfinite(value):
-        return ""
-    text = f"{value:.{digits}g}"
-    return f"{value:.0f}" if "e+" in text and abs(value) < PLAIN_BELOW else text
+from rbdyn.records.words import improvement
 
 
 def probability(value: float | None) -> str:
@@ -47,19 +12,6 @@ def probability(value: float | None) -> str:
     if value is None or not math.isfinite(value):
         return ""
     return "< 0.0001" if value < 1e-4 else f"{value:.4f}"
-
-
-def decimals(error: float) -> int:
-    """Decimals that show two significant digits of an error."""
-    return min(max(1 - math.floor(math.log10(error)), 0), 9)
-
-
-def with_error(value: float | None, error: float | None) -> str:
-    """'87.09 ± 0.35': the error to two digits, the value to the same place."""
-    if value is None or error is None or not math.isfinite(error) or error <= 0.0:
-        return shown(value, 5)
-    places = decimals(error)
-    return f"{value:.{places}f} ± {error:.{places}f}"
 
 
 def rounded_down(width: float) -> str:
@@ -77,15 +29,15 @@ def half_width(record: Mapping[str, Any]) -> float | None:
     return math.hypot(*known) if known else None
 
 
-def percentage(record: Mapping[str, Any]) -> str:
-    """'+11.16 ± 0.65 %' of a gain."""
-    value, error = record.get("percent"), record.get("error_percent")
-    if value is None:
-        return ""
-    if not error:
-        return f"{value:+.2f} %"
-    places = decimals(error)
-    return f"{value:+.{places}f} ± {error:.{places}f} %"
+def change(gain: Mapping[str, Any]) -> str:
+    """'11.16 ± 0.65 % less' of a gain; nothing where it is unknown."""
+    value = gain.get("percent")
+    return "" if value is None else improvement(value, gain.get("error_percent"), gain.get("goal", "min"))
+
+
+def moved(part: Mapping[str, Any]) -> str:
+    """'+0.0200' of a part whose nominal was moved, else nothing."""
+    return f"{part['moved_mm']:+.4f}" if part.get("moved_mm") else ""
 
 
 def dimension(part: Mapping[str, Any]) -> str:

@@ -1,4 +1,5 @@
-"""Analysis of variance with partial (type III) sums of squares, what repeated runs say of the fit, R2 and its kin.
+"""Analysis of variance with partial (type III) sums of squares, what repeated runs say of the fit, R2 and its kin, and
+backward elimination.
 
 Weighted fits have weighted sums. Repeated runs count within a block. Where there are blocks, their differences
 are a source of their own and no part of the model: R2 is judged on the scatter within blocks.
@@ -7,15 +8,19 @@ Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th e
 """
 
 import math
+from collections.abc import Callable
 from typing import Any, TypedDict
 
 import numpy as np
 from scipy import stats
 
 from doe.arrays import Array, Whole
-from doe.designs.replicates import replicate_groups
+from doe.designs.design import replicate_groups
+from doe.designs.model import Terms, needed
 from doe.response_surface.diagnostics import press
 from doe.response_surface.least_squares import LeastSquares
+
+KEEP_BELOW = 0.05  # p-value up to which a term stays in a reduced model
 
 
 class AnovaRow(TypedDict):
@@ -32,6 +37,14 @@ class AnovaRow(TypedDict):
     p: float | None
 
 
+class Removal(TypedDict):
+    """A term that went, with its F and p among the terms that were left then."""
+
+    term: str
+    f: float
+    p: float
+
+
 def row(source: str, ss: float | None, df: int, error: float | None = None, error_dof: float = 0) -> AnovaRow:
     """A row with its mean square, tested by F against the mean square ``error`` if there is one."""
     mean_square = None if ss is None else ratio(ss, df)
@@ -40,16 +53,14 @@ def row(source: str, ss: float | None, df: int, error: float | None = None, erro
     return AnovaRow(source=source, ss=ss, df=df, ms=mean_square, f=f, p=p)
 
 
-def term_rows(terms: tuple[str, ...], solution: LeastSquares) -> list[AnovaRow]:
+def term_rows(terms: Terms, solution: LeastSquares) -> list[AnovaRow]:
     """Partial sum of squares, F and p of each coefficient."""
     count = len(terms)
     squares = (solution.coefficients[:count] ** 2 / np.diag(solution.inverse)[:count]).tolist()
     return [row(term, ss, 1, solution.mean_square, solution.dof) for term, ss in zip(terms, squares, strict=True)]
 
 
-def anova(
-    terms: tuple[str, ...], solution: LeastSquares, response: Array, points: Array, block: Whole
-) -> list[AnovaRow]:
+def anova(terms: Terms, solution: LeastSquares, response: Array, points: Array, block: Whole) -> list[AnovaRow]:
     """The table: model, terms, blocks if any, residual, lack of fit, pure error, total.
 
     ``solution`` is of the columns of ``terms`` followed by those that tell the blocks apart.
@@ -59,20 +70,14 @@ def anova(
     block_columns = range(len(terms), len(solution.coefficients))
     groups = replicate_groups(points, block)
     within = sum_within(response, solution.weights, block)
+    about_mean = sum_within(response, solution.weights, np.zeros_like(block))
     return [
         row("model", max(within - residual, 0.0), model_df, *error),
         *(each for each in term_rows(terms, solution) if each["source"] != "1"),
         *([row("block", solution.partial_sum(block_columns), len(block_columns), *error)] * bool(block_columns)),
         row("residual", residual, solution.dof),
         *_lack_of_fit(response, solution, groups),
-        AnovaRow(
-            source="total",
-            ss=sum_within(response, solution.weights, np.zeros_like(block)),
-            df=len(response) - 1,
-            ms=None,
-            f=None,
-            p=None,
-        ),
+        AnovaRow(source="total", ss=about_mean, df=len(response) - 1, ms=None, f=None, p=None),
     ]
 
 
@@ -131,3 +136,23 @@ def goodness(solution: LeastSquares, response: Array, predicted: Array, block: W
         "cv_percent": ratio(100 * math.sqrt(variance), abs(mean)),
         "adequate_precision": ratio(float(np.ptp(predicted)), math.sqrt(size * variance / len(response))),
     }
+
+
+def eliminate(terms: Terms, solve_for: Callable[[Terms], LeastSquares]) -> tuple[Terms, list[Removal]]:
+    """Terms left, and those removed in their order: the least significant goes, again and again, hierarchy kept.
+
+    The term of largest p above `KEEP_BELOW` goes, except the constant and what a remaining interaction or
+    square is built on. ``solve_for`` fits a set of terms.
+    """
+    removed: list[Removal] = []
+    while True:
+        removable = [
+            Removal(term=each["source"], f=each["f"], p=each["p"])
+            for each in term_rows(terms, solve_for(terms))
+            if each["f"] is not None and each["p"] is not None and each["p"] > KEEP_BELOW
+            if not needed(each["source"], terms)
+        ]
+        if not removable:
+            return terms, removed
+        removed.append(max(removable, key=lambda removal: (removal["p"], removal["term"])))
+        terms = tuple(term for term in terms if term != removed[-1]["term"])

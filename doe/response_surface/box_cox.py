@@ -9,7 +9,7 @@ Source: Box and Cox, An analysis of transformations, J. R. Stat. Soc. B 26 (1964
 import math
 from collections.abc import Callable
 from operator import itemgetter
-from typing import TypedDict
+from typing import TypedDict, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,7 @@ from doe.arrays import Array
 
 USUAL = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 SEARCHED = (-5.0, 5.0)
+LEVEL = 0.95  # of the interval
 NAMES = {-2.0: "1/y^2", -1.0: "1/y", -0.5: "1/sqrt(y)", 0.0: "ln y", 0.5: "sqrt(y)", 2.0: "y^2"}
 
 BoxCox = TypedDict(
@@ -26,7 +27,7 @@ BoxCox = TypedDict(
 )
 
 
-def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", level: float = 0.95) -> BoxCox:
+def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response") -> BoxCox:
     """Profile likelihood of the transform's exponent for a response fitted by the columns of ``matrix``.
 
     Parameters
@@ -34,12 +35,11 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
     matrix : model matrix (n, p) of the runs, with a column of ones.
     values : response of each run, shape (n,), all positive.
     name : name of the response, for the sentences.
-    level : confidence level of the interval.
 
     Returns
     -------
     ``lambda`` of the largest likelihood; ``interval`` of those whose likelihood-ratio statistic is within the
-    chi-squared quantile of ``level``, cut at the range ``searched``; ``recommended``: 1 (no transform) if that
+    chi-squared quantile of `LEVEL`, cut at the range ``searched``; ``recommended``: 1 (no transform) if that
     lies in the interval, else the usual exponent in it nearest to ``lambda``, else ``lambda`` itself; 1 again
     where the whole interval lies beyond the usual ones, which speaks of outliers or missing terms.
 
@@ -60,12 +60,10 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
     grid = np.union1d(np.linspace(*SEARCHED, 81), USUAL)
     heights = np.array([log_likelihood(each) for each in grid])
     top = int(heights.argmax())
-    bracket = grid[max(top - 1, 0)], grid[min(top + 1, grid.size - 1)]
-    peak = optimize.minimize_scalar(
-        lambda exponent: -log_likelihood(exponent), bounds=bracket, method="bounded", options={"xatol": 1e-7}
-    )
+    bracket, fine = (grid[max(top - 1, 0)], grid[min(top + 1, grid.size - 1)]), {"xatol": 1e-7}
+    peak = optimize.minimize_scalar(lambda x: -log_likelihood(x), bounds=bracket, method="bounded", options=fine)
     height, best = max((float(heights[top]), float(grid[top])), (float(-peak.fun), float(peak.x)), key=itemgetter(0))
-    threshold = height - stats.chi2.ppf(level, 1) / 2
+    threshold = height - stats.chi2.ppf(LEVEL, 1) / 2
 
     def end(outwards: Array) -> float:
         """Where the likelihood first falls to the threshold on the way from the best exponent."""
@@ -81,13 +79,9 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response", lev
     beyond = interval[1] < USUAL[0] or interval[0] > USUAL[-1]
     nearest = min(inside, key=lambda each: abs(each - best), default=best)
     recommended = 1.0 if beyond or 1.0 in inside else nearest
-    return {
-        "lambda": best,
-        "interval": interval,
-        "searched": list(SEARCHED),
-        "recommended": recommended,
-        "sentence": _sentence(name, best, interval, recommended, level),
-    }
+    sentence = _sentence(name, best, interval, recommended)
+    profile = {"lambda": best, "interval": interval, "searched": list(SEARCHED), "recommended": recommended}
+    return cast(BoxCox, profile | {"sentence": sentence})
 
 
 def _log_likelihood(columns: Array, response: Array) -> Callable[[float], float]:
@@ -112,8 +106,8 @@ def check_positive(values: ArrayLike, name: str) -> None:
     response = np.asarray(values, float)
     bad = np.flatnonzero(~(np.isfinite(response) & (response > 0.0)))
     if bad.size:
-        found = f"the value of run {bad[0] + 1} is {response[bad[0]]:g}"
-        raise ValueError(f'{name}: {found}, but a power transform needs positive values; use transform = "none"')
+        given = f"the value of run {bad[0] + 1} is {response[bad[0]]:g}"
+        raise ValueError(f'{name}: {given}, but a power transform needs positive values; use transform = "none"')
 
 
 def forward(values: ArrayLike, exponent: float) -> Array:
@@ -143,18 +137,14 @@ def slope(values: ArrayLike, exponent: float) -> Array:
     return np.asarray(values, float) ** (exponent - 1.0)
 
 
-def _sentence(name: str, best: float, interval: list[float], recommended: float, level: float) -> str:
+def _sentence(name: str, best: float, interval: list[float], recommended: float) -> str:
     cut = ", cut at what was searched" if set(interval) & set(SEARCHED) else ""
-    found = (
-        f"{name}: the likelihood is largest for the exponent {best:.2f}, "
-        f"{100 * level:g} % interval {interval[0]:.2f} to {interval[1]:.2f}{cut}"
-    )
+    ends = f"{100 * LEVEL:g} % interval {interval[0]:.2f} to {interval[1]:.2f}{cut}"
+    estimate = f"{name}: the likelihood is largest for the exponent {best:.2f}, {ends}"
     if interval[0] <= 1.0 <= interval[1]:
-        return f"{found}, which holds 1: no transform is called for."
+        return f"{estimate}, which holds 1: no transform is called for."
     if recommended == 1.0:
-        return (
-            f"{found}, beyond all usual exponents: keep the response as it is, and look for an outlier or a "
-            "missing term."
-        )
+        advice = "keep the response as it is, and look for an outlier or a missing term"
+        return f"{estimate}, beyond all usual exponents: {advice}."
     power = NAMES.get(recommended, f"y^{recommended:.3g}")
-    return f"{found}, which does not hold 1: fit {power} instead of y (transform = {recommended:.3g})."
+    return f"{estimate}, which does not hold 1: fit {power} instead of y (transform = {recommended:.3g})."

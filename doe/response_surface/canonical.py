@@ -12,7 +12,8 @@ from scipy import special
 
 from doe.arrays import Array
 from doe.designs import to_actual
-from doe.designs.model import model_matrix, second_order
+from doe.designs.model import Terms, model_matrix, second_order
+from doe.response_surface.data import Data
 
 FLAT = 1e-10  # curvature as a share of the largest coefficient below which it is rounding
 SURE = 0.95  # probability of the intervals of the eigenvalues
@@ -45,73 +46,61 @@ class Canonical(TypedDict):
     distance: float | None
 
 
-def stationary_point(terms: tuple[str, ...], coefficients: Array, centre: Array, step: Array) -> StationaryPoint | None:
-    """The single stationary point, or None where a direction does not bend."""
-    _, gradient, matrix = second_order(terms, coefficients, centre.size)
-    eigenvalues = np.linalg.eigvalsh(matrix).astype(float)
-    if np.abs(eigenvalues).min() <= FLAT * np.abs(coefficients).max():
-        return None
-    coded = np.linalg.solve(-2 * matrix, gradient)
-    return StationaryPoint(
-        coded=coded.tolist(),
-        actual=to_actual(coded, centre, step).tolist(),
-        eigenvalues=eigenvalues.tolist(),
-        nature=_nature(eigenvalues),
-    )
-
-
 def canonical(
-    terms: tuple[str, ...], coefficients: Array, covariance: Array, dof: int, points: Array
-) -> Canonical | None:
-    """Canonical analysis of a surface fitted to runs at ``points`` (n, k); None without second-order terms."""
-    factors = points.shape[1]
+    terms: Terms, coefficients: Array, covariance: Array, dof: int, data: Data
+) -> tuple[StationaryPoint | None, Canonical | None]:
+    """The single stationary point, None where a direction does not bend, and the canonical analysis of a surface fitted
+    to ``data``, None without second-order terms."""
+    factors = data.points.shape[1]
     _, gradient, matrix = second_order(terms, coefficients, factors)
     if not any(len(term) > 1 for term in terms):
-        return None
+        return None, None
     eigenvalues, vectors = (part.astype(float) for part in np.linalg.eigh(matrix))
     vectors = vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(factors)])
     errors = _errors(terms, vectors, covariance, dof) if covariance.any() else None
     flat = np.abs(eigenvalues) <= FLAT * np.abs(coefficients).max()
     unsure = flat if errors is None else flat | (np.abs(eigenvalues) <= errors)
-    place = None if flat.any() else np.linalg.solve(-2 * matrix, gradient).astype(float)
-    inside = None if place is None else _inside(place, points)
+    nature, stationary, inside, distance = _nature(eigenvalues), None, None, None
+    if not flat.any():
+        place = np.linalg.solve(-2 * matrix, gradient).astype(float)
+        inside, distance = _inside(place, data.points), float(np.linalg.norm(place))
+        actual = to_actual(place, data.centre, data.step).tolist()
+        coded, values = place.tolist(), np.linalg.eigvalsh(matrix).tolist()
+        stationary = StationaryPoint(coded=coded, actual=actual, eigenvalues=values, nature=nature)
     ridge = "stationary ridge" if inside else "rising ridge"
-    return Canonical(
+    return stationary, Canonical(
         eigenvalues=eigenvalues.tolist(),
         eigenvalue_errors=None if errors is None else errors.tolist(),
         eigenvectors=vectors.T.tolist(),
-        nature=ridge if unsure.any() else _nature(eigenvalues),
+        nature=ridge if unsure.any() else nature,
         inside=inside,
-        distance=None if place is None else float(np.linalg.norm(place)),
+        distance=distance,
     )
 
 
-def describe_canonical(name: str, found: Canonical, place: StationaryPoint | None) -> str:
+def describe_canonical(analysis: Canonical, place: StationaryPoint | None) -> str:
     """Canonical analysis in a sentence."""
-    values = ", ".join(f"{value:.3g}" for value in found["eigenvalues"])
+    values = ", ".join(f"{value:.3g}" for value in analysis["eigenvalues"])
     if place is None:
-        return f"{name}: no single stationary point, for a direction does not bend (eigenvalues {values})."
+        return f"no single stationary point, for a direction does not bend (eigenvalues {values})."
     where = ", ".join(f"{letter} = {x:.3g}" for letter, x in zip(ascii_uppercase, place["coded"], strict=False))
-    region = "inside" if found["inside"] else "outside"
-    head = f"{name}: stationary point at {where} (coded), {region} the region of the runs, "
-    if "ridge" not in found["nature"]:
-        kind = f"a {found['nature']} (eigenvalues {values})"
-        return head + kind + ("." if found["inside"] else "; the best point lies on the border of the region.")
-    axis = int(np.argmin(np.abs(found["eigenvalues"])))
-    direction = " ".join(
-        f"{x:+.2f} {letter}" for letter, x in zip(ascii_uppercase, found["eigenvectors"][axis], strict=False)
-    )
-    return (
-        f"{head}a {found['nature']}: an eigenvalue of {values} is within its error of zero, so the response "
-        f"hardly bends along {direction} and the place along it is not determined."
-    )
+    region = "inside" if analysis["inside"] else "outside"
+    head = f"stationary point at {where} (coded), {region} the region of the runs, "
+    if "ridge" not in analysis["nature"]:
+        kind = f"a {analysis['nature']} (eigenvalues {values})"
+        return head + kind + ("." if analysis["inside"] else "; the best point lies on the border of the region.")
+    axis = int(np.argmin(np.abs(analysis["eigenvalues"])))
+    lettered = zip(ascii_uppercase, analysis["eigenvectors"][axis], strict=False)
+    flat = f"hardly bends along {' '.join(f'{x:+.2f} {letter}' for letter, x in lettered)}"
+    why = f"an eigenvalue of {values} is within its error of zero"
+    return f"{head}a {analysis['nature']}: {why}, so the response {flat} and the place along it is not determined."
 
 
 def _nature(eigenvalues: Array) -> Literal["minimum", "maximum", "saddle"]:
     return "minimum" if eigenvalues.min() > 0 else "maximum" if eigenvalues.max() < 0 else "saddle"
 
 
-def _errors(terms: tuple[str, ...], vectors: Array, covariance: Array, dof: int) -> Array:
+def _errors(terms: Terms, vectors: Array, covariance: Array, dof: int) -> Array:
     """Half widths: an eigenvalue v'Bv changes with the coefficient of x_i x_j by v_i v_j, to first order."""
     second = np.array([len(term) > 1 for term in terms])
     slopes = model_matrix(vectors.T, terms) * second

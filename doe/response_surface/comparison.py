@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from doe.arrays import Array, Rows, Whole
-from doe.designs.replicates import replicate_groups
+from doe.designs.design import replicate_groups
 from doe.response_surface.gaussian_process import THREADS, fit_gaussian
 
 # More points than these are left out in groups.
@@ -74,16 +74,16 @@ def compare(
     whole = fit_gaussian(points, response, name=name, standard_errors=errors, seed=seed)
     group = replicate_groups(points)
     basis = np.zeros((len(points), 1)) if matrix is None else np.linalg.qr(np.asarray(matrix, float))[0]
-    leverage = (basis**2).sum(axis=1)
     firsts = np.unique(group)
-    folds = _folds(firsts, seed)
-    singly = len(folds) == len(firsts)
+    singly = len(firsts) <= MOST_SINGLY
+    order = firsts if singly else np.random.default_rng(seed).permutation(firsts)
+    folds = np.array_split(order, len(firsts) if singly else FOLDS)
     gaussian = partial(fit_gaussian, name=name, seed=seed, start=whole, search=singly)
 
-    def process(kept: Rows) -> Predictor:
-        return gaussian(points[kept], response[kept], standard_errors=None if errors is None else errors[kept])
+    def process(rows: Rows) -> Predictor:
+        return gaussian(points[rows], response[rows], standard_errors=None if errors is None else errors[rows])
 
-    spared = [[first for first in fold if leverage[group == first].sum() <= INDISPENSABLE] for fold in folds]
+    spared = [[first for first in fold if (basis[group == first] ** 2).sum() <= INDISPENSABLE] for fold in folds]
     truths, foretold = _left_out(name, points, response, group, [each for each in spared if each], (refit, process))
     squares = (truths[:, None] - foretold) ** 2
     compared = f"{len(truths)} of {len(firsts)} points{'' if singly else f' (in {len(folds)} groups)'}"
@@ -100,13 +100,6 @@ def compare(
     }
 
 
-def _folds(firsts: Rows, seed: int) -> list[Rows]:
-    """Points to be left out together: each alone, or of many a twentieth at a time."""
-    if len(firsts) <= MOST_SINGLY:
-        return np.array_split(firsts, len(firsts))
-    return np.array_split(np.random.default_rng(seed).permutation(firsts), FOLDS)
-
-
 def _left_out(
     name: str,
     points: Array,
@@ -121,15 +114,13 @@ def _left_out(
     """
     truths, foretold = [np.empty(0)], [np.empty((0, len(rivals)))]
     for fold in folds:
-        kept = np.flatnonzero(~np.isin(group, fold))
+        rows = np.flatnonzero(~np.isin(group, fold))
         with THREADS.limit(limits=1), suppress(ValueError):
-            foretold.append(np.column_stack([fit(kept).predict(points[fold]) for fit in rivals]))
+            foretold.append(np.column_stack([fit(rows).predict(points[fold]) for fit in rivals]))
             truths.append(np.array([response[group == first].mean() for first in fold]))
     if (count := sum(map(len, truths))) < 3:
-        raise ValueError(
-            f"{name}: only {count} points can be left out of the polynomial, too few to compare; "
-            "add design points or choose a simpler model"
-        )
+        few = f"only {count} points can be left out of the polynomial, too few to compare"
+        raise ValueError(f"{name}: {few}; add design points or choose a simpler model")
     return np.concatenate(truths), np.vstack(foretold)
 
 
@@ -146,12 +137,10 @@ def _score(squares: Array, means: Array) -> dict[str, Any]:
 
 
 def _sentence(name: str, compared: str, polynomial: float, process: float, low: float, high: float) -> str:
-    found = (
-        f"{name}: {compared} left out in turn are missed by {polynomial:.3g} by the polynomial and by "
-        f"{process:.3g} by a Gaussian process (root mean square)"
-    )
+    misses = f"{polynomial:.3g} by the polynomial and by {process:.3g} by a Gaussian process (root mean square)"
+    figures = f"{name}: {compared} left out in turn are missed by {misses}"
     if low > 0.0:
-        return f"{found}; the process is better by more than the error of the comparison: prefer it."
+        return f"{figures}; the process is better by more than the error of the comparison: prefer it."
     if high < 0.0:
-        return f"{found}; the polynomial is better by more than the error of the comparison: keep it."
-    return f"{found}; no clear difference: keep the polynomial, which is simpler."
+        return f"{figures}; the polynomial is better by more than the error of the comparison: keep it."
+    return f"{figures}; no clear difference: keep the polynomial, which is simpler."

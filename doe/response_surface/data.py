@@ -1,7 +1,5 @@
 """The runs that a surface is fitted to, and whether they can be."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from doe.arrays import Array, Rows, Whole
 from doe.designs.evaluation import block_contrasts
+from doe.designs.model import Terms
 from doe.response_surface.least_squares import dependent_columns
 
 
@@ -29,7 +28,7 @@ class Data:
     centre: Array
     step: Array
 
-    def rows(self, rows: Rows) -> Data:
+    def rows(self, rows: Rows) -> "Data":
         """The runs of these rows alone."""
         errors = None if self.standard_errors is None else self.standard_errors[rows]
         per_run = self.points[rows], self.values[rows], errors, self.replicates[rows], self.block[rows]
@@ -60,8 +59,8 @@ def checked(
         raise ValueError(f"{name}: a coded factor is not a finite number; mend or leave out that run")
     bad = np.flatnonzero(~np.isfinite(response))
     if bad.size:
-        found = f"the value of run {bad[0] + 1} is {response[bad[0]]}"
-        raise ValueError(f"{name}: {found}; mend or leave out that run")
+        given = f"the value of run {bad[0] + 1} is {response[bad[0]]}"
+        raise ValueError(f"{name}: {given}; mend or leave out that run")
     errors = None if standard_errors is None else np.broadcast_to(standard_errors, response.shape)
     known = errors is not None and bool((np.isfinite(errors) & (errors > 0)).all())
     return Data(
@@ -92,11 +91,11 @@ def check_errors(name: str, standard_errors: ArrayLike | None) -> None:
     errors = np.atleast_1d(np.asarray(standard_errors, float))
     bad = np.flatnonzero(~(np.isfinite(errors) & (errors > 0)))
     if bad.size:
-        found = f"the error of run {bad[0] + 1} is {errors[bad[0]]:g}"
-        raise ValueError(f'{name}: {found}, but weighting = "replicates" needs positive ones; {mend}')
+        given = f"the error of run {bad[0] + 1} is {errors[bad[0]]:g}"
+        raise ValueError(f'{name}: {given}, but weighting = "replicates" needs positive ones; {mend}')
 
 
-def check_matrix(name: str, model: str, terms: tuple[str, ...], matrix: Array) -> None:
+def check_matrix(name: str, model: str, terms: Terms, matrix: Array) -> None:
     """Raises ValueError when runs are too few for the columns, or cannot tell them apart.
 
     ``matrix`` (n, p) holds the columns of ``terms``, then those of the blocks.
@@ -104,17 +103,12 @@ def check_matrix(name: str, model: str, terms: tuple[str, ...], matrix: Array) -
     runs, size = matrix.shape
     if runs <= size:
         blocks = f", {size - len(terms)} for the blocks" if size > len(terms) else ""
-        raise ValueError(
-            f"{name}: {runs} runs are too few for the {model} model; give at least {size + 1} "
-            f"({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
-        )
-    dependent = dependent_columns(matrix)
-    if dependent:
+        least = f"{size + 1} ({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
+        raise ValueError(f"{name}: {runs} runs are too few for the {model} model; give at least {least}")
+    if dependent := dependent_columns(matrix):
         names = dict.fromkeys(terms[column] if column < len(terms) else "the blocks" for column in dependent)
-        raise ValueError(
-            f"{name}: the runs cannot tell {', '.join(sorted(names))} from the other terms of the {model} model "
-            "(its matrix is singular); add design points or choose a simpler model"
-        )
+        what = f"{', '.join(sorted(names))} from the other terms of the {model} model (its matrix is singular)"
+        raise ValueError(f"{name}: the runs cannot tell {what}; add design points or choose a simpler model")
 
 
 def _whole(labels: ArrayLike | None, size: int) -> Whole:

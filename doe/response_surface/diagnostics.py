@@ -4,12 +4,12 @@ Sources: Belsley, Kuh and Welsch, Regression Diagnostics (1980); Cook and Weisbe
 Regression (1982); Shapiro and Wilk (1965).
 """
 
-from typing import TypedDict
+from typing import TypedDict, cast
 
 import numpy as np
 from scipy import stats
 
-from doe.arrays import Array, Mask
+from doe.arrays import Array
 from doe.response_surface.least_squares import LeastSquares
 
 EXACT = 1e-12  # 1 - leverage below which a run is met exactly, whatever its value
@@ -53,23 +53,19 @@ def diagnose(solution: LeastSquares, response: Array) -> Diagnostics:
     tested = (free > EXACT) & (solution.mean_square > 0)
     weighted = solution.residuals * np.sqrt(solution.weights)
     safe = np.where(tested, free, 1.0)
-    standardized = _where(tested, weighted / np.sqrt(safe * (solution.mean_square or 1.0)))
+    standardized = np.where(tested, weighted / np.sqrt(safe * (solution.mean_square or 1.0)), np.nan)
     # Of a run that takes up the whole residual nothing is left to judge it by.
     rest = solution.dof - standardized**2
     judged = tested & (rest > EXACT * solution.dof) & (solution.dof > 1)
-    studentized = _where(judged, standardized * np.sqrt(max(solution.dof - 1, 0) / np.where(judged, rest, 1.0)))
+    rescaled = standardized * np.sqrt(max(solution.dof - 1, 0) / np.where(judged, rest, 1.0))
+    studentized = np.where(judged, rescaled, np.nan)
     cook = standardized**2 * solution.leverage / safe / len(solution.coefficients)
-    columns = (
-        *(response.tolist(), (response - solution.residuals).tolist(), solution.residuals.tolist()),
-        *(_or_none(standardized), _or_none(studentized), solution.leverage.tolist(), _or_none(cook)),
-    )
-    names = ("observed", "predicted", "residual", "standardized", "studentized", "leverage", "cook")
+    predicted, runs = response - solution.residuals, range(1, len(response) + 1)
+    figures = response, predicted, solution.residuals, standardized, studentized, solution.leverage, cook
+    rows = zip(runs, *map(_or_none, figures), strict=True)
     high = solution.leverage > HIGH_LEVERAGE * len(solution.coefficients) / len(response)
     return Diagnostics(
-        runs=[
-            RunDiagnostics(run=run + 1, **dict(zip(names, values, strict=True)))  # type: ignore[typeddict-item]
-            for run, values in enumerate(zip(*columns, strict=True))
-        ],
+        runs=[cast(RunDiagnostics, dict(zip(RunDiagnostics.__annotations__, row, strict=True))) for row in rows],
         normality=_normality(standardized[tested]),
         outlier=_outlier(studentized, solution.dof - 1),
         high_leverage=(np.flatnonzero(high) + 1).tolist(),
@@ -85,24 +81,17 @@ def press(solution: LeastSquares) -> float | None:
     return float((solution.weights * (solution.residuals / free) ** 2).sum())
 
 
-def describe_diagnostics(name: str, found: Diagnostics, alpha: float) -> list[str]:
+def describe_diagnostics(diagnostics: Diagnostics, alpha: float) -> list[str]:
     """Residual tests in sentences."""
-    return [
-        sentence
-        for sentence in (
-            _say_normality(name, found["normality"]["p"], alpha),
-            _say_outlier(name, found["outlier"], alpha),
-            _say_runs(name, found),
-        )
-        if sentence
-    ]
+    tests = _say_normality(diagnostics["normality"]["p"], alpha), _say_outlier(diagnostics["outlier"], alpha)
+    return [*filter(None, tests), _say_runs(diagnostics)]
 
 
 def _normality(standardized: Array) -> dict[str, float | str | None]:
     if len(standardized) < 3 or np.ptp(standardized) == 0:
         return {"test": "Shapiro-Wilk", "w": None, "p": None}
-    found = stats.shapiro(standardized)
-    return {"test": "Shapiro-Wilk", "w": float(found.statistic), "p": float(found.pvalue)}
+    test = stats.shapiro(standardized)
+    return {"test": "Shapiro-Wilk", "w": float(test.statistic), "p": float(test.pvalue)}
 
 
 def _outlier(studentized: Array, dof: int) -> dict[str, float | int | str | None]:
@@ -115,35 +104,33 @@ def _outlier(studentized: Array, dof: int) -> dict[str, float | int | str | None
     return {"test": test, "run": run + 1, "studentized": float(studentized[run]), "p": p}
 
 
-def _say_normality(name: str, p: float | str | None, alpha: float) -> str:
+def _say_normality(p: float | str | None, alpha: float) -> str:
     if not isinstance(p, float):
         return ""
     if p > alpha:
-        return f"{name}: the residuals look normal (Shapiro-Wilk, {p_text(p)}), as the tests and intervals assume."
-    return (
-        f"{name}: the residuals are not normal (Shapiro-Wilk, {p_text(p)}): p values and intervals are rough; look "
-        "for an outlier, a missing term or a transform."
-    )
+        return f"the residuals look normal (Shapiro-Wilk, {p_text(p)}), as the tests and intervals assume."
+    rough = "p values and intervals are rough; look for an outlier, a missing term or a transform"
+    return f"the residuals are not normal (Shapiro-Wilk, {p_text(p)}): {rough}."
 
 
-def _say_outlier(name: str, outlier: dict[str, float | int | str | None], alpha: float) -> str:
+def _say_outlier(outlier: dict[str, float | int | str | None], alpha: float) -> str:
     p = outlier["p"]
     if not isinstance(p, float):
         return ""
     run = f"run {outlier['run']} (studentized residual {outlier['studentized']:+.2f}, Bonferroni {p_text(p)})"
     if p > alpha:
-        return f"{name}: no run is an outlier; the most extreme is {run}."
-    return f"{name}: {run} is an outlier: check how it was made before it is believed or left out."
+        return f"no run is an outlier; the most extreme is {run}."
+    return f"{run} is an outlier: check how it was made before it is believed or left out."
 
 
-def _say_runs(name: str, found: Diagnostics) -> str:
+def _say_runs(diagnostics: Diagnostics) -> str:
     parts = []
-    if found["influential"]:
-        listed = _list(found["influential"])
+    if diagnostics["influential"]:
+        listed = _list(diagnostics["influential"])
         parts.append(f"{listed} alone would move the surface beyond its own error (Cook's distance above 1)")
-    if found["high_leverage"]:
-        parts.append(f"{_list(found['high_leverage'])}: high leverage (above twice the mean)")
-    return f"{name}: {'; '.join(parts)}." if parts else f"{name}: no run has undue leverage or influence."
+    if diagnostics["high_leverage"]:
+        parts.append(f"{_list(diagnostics['high_leverage'])}: high leverage (above twice the mean)")
+    return f"{'; '.join(parts)}." if parts else "no run has undue leverage or influence."
 
 
 def p_text(p: float) -> str:
@@ -153,10 +140,6 @@ def p_text(p: float) -> str:
 
 def _list(runs: list[int]) -> str:
     return f"run{'s' if len(runs) > 1 else ''} {', '.join(map(str, runs))}"
-
-
-def _where(condition: Mask, values: Array) -> Array:
-    return np.where(condition, values, np.nan)
 
 
 def _or_none(values: Array) -> list[float | None]:

@@ -118,21 +118,18 @@ def fit_gaussian(
     points, response = points_and_values(name, coded, values)
     if not (np.isfinite(points).all() and np.isfinite(response).all()):
         raise ValueError(f"{name}: a factor or value is not a finite number; mend or leave out that run")
+    errors = np.broadcast_to(0.0 if standard_errors is None else np.asarray(standard_errors, float), response.shape)
+    if not (np.isfinite(errors) & (errors >= 0.0)).all():
+        raise ValueError(f"{name}: a standard error is not a number of at least 0; mend or leave all out")
     if start is None and len(points) > MOST_SEARCHED:
         some = np.sort(np.random.default_rng(seed).permutation(len(points))[:MOST_SEARCHED])
-        given = None if standard_errors is None else np.broadcast_to(standard_errors, response.shape)[some]
+        given = None if standard_errors is None else errors[some]
         start = fit_gaussian(points[some], response[some], name=name, standard_errors=given, seed=seed)
         search = False
     mean, scale = float(response.mean()), float(response.std()) or 1.0
-    nugget = np.full(len(response), JITTER)
-    if standard_errors is not None:
-        errors = np.broadcast_to(np.asarray(standard_errors, float), response.shape)
-        if not (np.isfinite(errors).all() and (errors >= 0.0).all()):
-            raise ValueError(f"{name}: a standard error is not a number of at least 0; mend or leave all out")
-        nugget = nugget + (errors / scale) ** 2
     regressor = GaussianProcessRegressor(
         _kernel(points.shape[1], standard_errors is None) if start is None else start.regressor.kernel_,
-        alpha=nugget,
+        alpha=JITTER + (errors / scale) ** 2,
         optimizer=partial(_search, steps=STEPS if start is None else STEPS_FROM_START) if search else None,
         n_restarts_optimizer=RESTARTS if start is None else 0,
         random_state=seed,
@@ -158,8 +155,10 @@ def fit_gaussian(
 def _search(
     objective: Callable[[Array], tuple[float, Array]], first: Array, bounds: Array, steps: int
 ) -> tuple[Array, float]:
-    found = optimize.minimize(objective, first, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": steps})
-    return found.x, found.fun
+    optimum = optimize.minimize(
+        objective, first, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": steps}
+    )
+    return optimum.x, optimum.fun
 
 
 def _kernel(factors: int, scatter: bool) -> Any:

@@ -8,7 +8,6 @@ Sources: Satterthwaite, An approximate distribution of estimates of variance com
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
@@ -62,74 +61,59 @@ def compare(
     dof = 1.0 / float(np.mean(1.0 / (few - 1))) if few.size else None
     df = solution.dof
     chi_square = solution.residual_sum / float(unit.mean())
-    spread = _Spread(unit, dof, weighted)
     project = solution.inverse[:count] @ (matrix * solution.weights[:, None]).T
     return KnownVariance(
         chi_square=chi_square,
         df=df,
-        p=spread.upper_tail(chi_square, df),
-        pure_error=_beside_pure_error(solution, response, unit, groups, spread),
+        p=_upper_tail(unit, dof, weighted, chi_square, df),
+        pure_error=_beside_pure_error(solution, response, unit, groups, dof, weighted),
         covariance=(project * variances) @ project.T,
         dof=dof,
     )
 
 
-def describe_known_variance(name: str, found: KnownVariance, alpha: float) -> list[str]:
+def describe_known_variance(known: KnownVariance, alpha: float) -> list[str]:
     """The comparison in sentences."""
-    against = f"{name}: against the known variance of the replicates chi-square is {found.chi_square:.4g} on {found.df}"
-    if found.p is None:
-        verdict = "too few replicates a run to say more)"
-    elif found.p > alpha:
-        verdict = f"{p_text(found.p)}), the surface misses no more than that explains"
-    else:
-        verdict = f"{p_text(found.p)}), the surface misses more than that explains"
-    share = math.sqrt(found.mean_square_ratio)
-    sentences = [
-        f"{against} degrees of freedom ({verdict}; standard errors here come from the residual and are {share:.3g} "
-        "times those of the known variance alone."
-    ]
-    f, p = found.pure_error_ratio, found.pure_error_p
+    against = f"against the known variance of the replicates chi-square is {known.chi_square:.4g} on {known.df}"
+    verdict = "too few replicates a run to say more)"
+    if known.p is not None:
+        verdict = f"{p_text(known.p)}), the surface misses {'no ' if known.p > alpha else ''}more than that explains"
+    share = math.sqrt(known.mean_square_ratio)
+    size = f"standard errors here come from the residual and are {share:.3g} times those of the known variance alone"
+    sentences = [f"{against} degrees of freedom ({verdict}; {size}."]
+    f, p = known.pure_error_ratio, known.pure_error_p
     if f is None or p is None:
         return sentences
-    head = f"{name}: repeated runs scatter with {f:.3g} times the variance that their replicates tell ({p_text(p)}): "
+    head = f"repeated runs scatter with {f:.3g} times the variance that their replicates tell ({p_text(p)}): "
     if p > alpha:
         return [*sentences, head + "the two agree, so the errors of the runs can be relied on."]
-    why = (
-        "more varies from run to run than the replicates show"
-        if f > 1
-        else "the errors of the runs are too wide, or the repeated runs share their seeds"
-    )
+    why = "the errors of the runs are too wide, or the repeated runs share their seeds"
+    if f > 1:
+        why = "more varies from run to run than the replicates show"
     return [*sentences, head + f"the two disagree; {why}, and tests against pure error count."]
 
 
-@dataclass(frozen=True)
-class _Spread:
-    """Distribution of a sum of squares in units of a variance known to ``dof`` degrees of freedom a run."""
-
-    unit: Array
-    dof: float | None
-    weighted: bool
-
-    def upper_tail(self, chi_square: float, df: int) -> float | None:
-        """Probability of a larger sum, None where the replicates are too few to say."""
-        if self.dof is None:
-            return float(special.chdtrc(df, chi_square))
-        if not self.weighted:
-            # The mean of all variances, each known to dof degrees of freedom.
-            total = self.dof * float(self.unit.sum() ** 2 / (self.unit**2).sum())
-            return float(special.fdtrc(df, total, chi_square / df))
-        if self.dof <= 4:
-            return None
-        # Each squared residual over its own estimated variance is an F(1, dof): equal mean and variance
-        # give a multiple of a chi-square.
-        mean = self.dof / (self.dof - 2)
-        spread = 2 * self.dof**2 * (self.dof - 1) / ((self.dof - 2) ** 2 * (self.dof - 4))
-        scale = spread / (2 * mean)
-        return float(special.chdtrc(df * mean / scale, chi_square / scale))
+def _upper_tail(unit: Array, dof: float | None, weighted: bool, chi_square: float, df: int) -> float | None:
+    """Probability of a larger sum of squares in units of a variance known to ``dof`` degrees of freedom a run, None where
+    the replicates are too few to say."""
+    if dof is None:
+        return float(special.chdtrc(df, chi_square))
+    if not weighted:
+        # The mean of all variances, each known to dof degrees of freedom.
+        total = dof * float(unit.sum() ** 2 / (unit**2).sum())
+        return float(special.fdtrc(df, total, chi_square / df))
+    if dof <= 4:
+        return None
+    # Each squared residual over its own estimated variance is an F(1, dof): equal mean and variance
+    # give a multiple of a chi-square.
+    mean = dof / (dof - 2)
+    spread = 2 * dof**2 * (dof - 1) / ((dof - 2) ** 2 * (dof - 4))
+    scale = spread / (2 * mean)
+    return float(special.chdtrc(df * mean / scale, chi_square / scale))
 
 
 def _beside_pure_error(
-    solution: LeastSquares, response: Array, unit: Array, groups: Whole, spread: _Spread
+    solution: LeastSquares, response: Array, unit: Array, groups: Whole, dof: float | None, weighted: bool
 ) -> AnovaRow:
     labels, sizes = np.unique(groups, return_counts=True)
     df = len(groups) - len(labels)
@@ -138,9 +122,9 @@ def _beside_pure_error(
     means = [(1 - 1 / size) * unit[groups == label].sum() for label, size in zip(labels, sizes, strict=True)]
     mean_square = float(sum(means)) / df
     f = ratio(sum_within(response, solution.weights, groups) / df, mean_square)
-    repeated = _Spread(unit[sizes[np.searchsorted(labels, groups)] > 1], spread.dof, spread.weighted)
-    tail = None if f is None else repeated.upper_tail(f * df, df)
-    known = None if spread.dof is None else round(spread.dof * len(repeated.unit))
+    repeated = unit[sizes[np.searchsorted(labels, groups)] > 1]
+    tail = None if f is None else _upper_tail(repeated, dof, weighted, f * df, df)
+    known = None if dof is None else round(dof * len(repeated))
     p = None if tail is None else 2 * min(tail, 1 - tail)
     ss = None if known is None else mean_square * known
     return AnovaRow(source="replicate_variance", ss=ss, df=known, ms=mean_square, f=f, p=p)

@@ -51,14 +51,14 @@ def model_error(
     if share <= 0.0:
         return None
     lack, pure = find(table, "lack_of_fit"), find(table, "pure_error")
-    found = []
+    candidates = []
     if lack["p"] is not None and lack["p"] <= SIGNIFICANT and lack["ss"] is not None and lack["df"]:
         beyond = lack["ss"] - lack["df"] * (pure["ms"] or 0.0)
-        found.append(ModelError(beyond / share, lack["df"], "repeats"))
+        candidates.append(ModelError(beyond / share, lack["df"], "repeats"))
     if known is not None and known.p is not None and known.p <= SIGNIFICANT and not _refuted(known):
         beyond = solution.residual_sum * (1.0 - known.df / known.chi_square)
-        found.append(ModelError(beyond / share, known.df, "known variance"))
-    return max((each for each in found if each.variance > 0.0), key=lambda each: each.variance, default=None)
+        candidates.append(ModelError(beyond / share, known.df, "known variance"))
+    return max((each for each in candidates if each.variance > 0.0), key=lambda each: each.variance, default=None)
 
 
 def correlation(one: Array, other: Array) -> Array:

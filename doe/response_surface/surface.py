@@ -7,9 +7,7 @@ as the pure error of a design without replicates, is None and never NaN.
 Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, Literal
 
@@ -18,57 +16,53 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from doe.arrays import Array, Rows
-from doe.designs.model import MODELS, Model, in_actual_units, model_matrix, model_terms, second_order
-from doe.designs.replicates import replicate_groups
-from doe.response_surface.anova import AnovaRow, anova, find, goodness, observation_variance
-from doe.response_surface.box_cox import backward, box_cox, check_positive, forward, slope
-from doe.response_surface.canonical import Canonical, StationaryPoint, canonical, stationary_point
+from doe.designs.design import replicate_groups
+from doe.designs.model import MODELS, Model, Terms, in_actual_units, model_matrix, model_terms, second_order
+from doe.response_surface.anova import AnovaRow, Removal, anova, eliminate, find, goodness, observation_variance
+from doe.response_surface.box_cox import BoxCox, backward, box_cox, check_positive, forward, slope
+from doe.response_surface.canonical import Canonical, StationaryPoint, canonical
 from doe.response_surface.data import Data, check_errors, check_matrix, checked
 from doe.response_surface.diagnostics import Diagnostics, diagnose
-from doe.response_surface.elimination import Removal, eliminate
 from doe.response_surface.known_variance import KnownVariance, compare
 from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import ModelError, model_error
-from rbdyn.records.record import plain
+from rbdyn.records.record import Record, derived, outside_json
 
 Weighting = Literal["equal", "replicates"]
 Transform = Literal["none", "box_cox"] | float
 
-STATISTICS = (
-    *("anova", "lack_of_fit", "pure_error", "r2", "adjusted_r2", "predicted_r2", "press"),
-    *("cv_percent", "adequate_precision", "stationary_point", "terms"),
-)
-DETAILS = (
-    *("covariance", "residual_dof", "observation_variance", "actual_coefficients", "weighting", "transform", "box_cox"),
-    *("blocks", "elimination", "canonical", "known_variance", "model_error", "diagnostics", "rival"),
-)
+TESTED = ("t", "p", "low", "high")
 
 
-@dataclass(frozen=True, eq=False)
-class Surface:
+class Surface(Record):
     """A fitted surface of one response.
 
     ``coefficients`` (p,) and ``covariance`` (p, p) follow ``terms``, in coded units and units of the
     response or of its transform; ``transform`` is the exponent of Box and Cox, None without one. They and all
     statistics are on the scale of the fit; predictions are in units of the response. ``covariance`` is
     scaled by ``residual_mean_square`` on ``residual_dof`` degrees of freedom; with weights 1 / variance that
-    mean square has no unit, and `known_variance` tells what it should be.
+    mean square has no unit, and `known_variance` tells what it should be. ``lack_of_fit`` is what the surface misses
+    against the scatter of replicates, ``pure_error`` that scatter about their own means.
     ``observation_variance`` is that of a new run about the surface (of the mean run, if they differ).
     ``r2``, ``adjusted_r2`` and ``predicted_r2`` leave out what the blocks differ by; ``blocks`` are their
     effects by label, about the mean over all runs for which the surface stands. ``vif`` follows ``terms`` (NaN for "1").
+    ``actual_coefficients`` are those of the same terms with the factors in actual units, ``box_cox`` is advice on a power
+    transform for an untransformed fit, None where values or fit allow none.
     ``stationary_point`` is None for a surface that has none or no single one, ``canonical`` for one without
     curvature, ``known_variance`` where the errors of the runs are not known, ``model_error`` where lack of fit is not
     significant, ``rival`` until `doe.study.surfaces.with_rivals` has compared it with a Gaussian process.
     """
 
-    name: str
+    name: str = outside_json()
+    data: Data = outside_json()
+    coefficients: Array = outside_json()
+    vif: Array = outside_json()
+    residual_mean_square: float = outside_json()
     model: Model
-    terms: tuple[str, ...]
-    coefficients: Array
-    covariance: Array
-    residual_mean_square: float
-    residual_dof: int
+    by_term: dict[str, float] = derived(lambda self: self._named(self.coefficients), "coefficients")
     anova: list[AnovaRow]
+    lack_of_fit: dict[str, Any] = derived(lambda self: _figures(self, "lack_of_fit", "ss", "df", "f", "p"))
+    pure_error: dict[str, Any] = derived(lambda self: _figures(self, "pure_error", "ss", "df", "ms"))
     r2: float | None
     adjusted_r2: float | None
     predicted_r2: float | None
@@ -76,18 +70,30 @@ class Surface:
     cv_percent: float | None
     adequate_precision: float | None
     stationary_point: StationaryPoint | None
-    canonical: Canonical | None
-    vif: Array
-    blocks: dict[str, float]
-    elimination: list[Removal]
-    diagnostics: Diagnostics
-    known_variance: KnownVariance | None
-    model_error: ModelError | None
+    terms: Terms
+    standard_errors: dict[str, float] = derived(lambda self: self._named(np.sqrt(np.diag(self.covariance))))
+    inflation: dict[str, float | None] = derived(
+        lambda self: {row["term"]: row["vif"] for row in self.coefficient_table() if row["term"] != "1"}, "vif"
+    )
+    tests: dict[str, dict[str, float | None]] = derived(
+        lambda self: {row["term"]: {key: row[key] for key in TESTED} for row in self.coefficient_table()}
+    )
+    covariance: Array
+    residual_dof: int
     observation_variance: float
+    actual_coefficients: dict[str, float] = derived(
+        lambda self: self._named(in_actual_units(self.terms, self.coefficients, self.data.centre, self.data.step))
+    )
     weighting: Weighting
     transform: float | None
-    data: Data
-    rival: dict[str, Any] | None = None
+    box_cox: BoxCox | None
+    blocks: dict[str, float]
+    elimination: list[Removal]
+    canonical: Canonical | None
+    known_variance: KnownVariance | None
+    model_error: ModelError | None
+    diagnostics: Diagnostics
+    rival: dict[str, Any] | None
 
     def predict(self, coded: ArrayLike) -> Array:
         """Response at coded points (..., k), shape (...): its mean, or of a transformed one its median."""
@@ -117,72 +123,34 @@ class Surface:
             return error
         return error / slope(self.predict(coded), self.transform)
 
-    def refit(self, rows: Rows) -> Surface:
+    def refit(self, rows: Rows) -> "Surface":
         """The same kind of surface through these runs alone. Raises ValueError when they do not suffice."""
         transform: Transform = "none" if self.transform is None else self.transform
-        return _fit(self.name, self.data.rows(rows), self.model, self.weighting, transform)
+        return _fit(self.name, self.data.rows(rows), self.model, self.weighting, transform, advised=False)
 
     @property
     def interval_dof(self) -> int:
         """Degrees of freedom of the intervals of a mean: of the residual, or of what told the model error."""
         return self.residual_dof if self.model_error is None else self.model_error.dof
 
-    @property
-    def lack_of_fit(self) -> dict[str, Any]:
-        """What the surface misses against the scatter of replicates: ``ss``, ``df``, ``f``, ``p``."""
-        row = find(self.anova, "lack_of_fit")
-        return {"ss": row["ss"], "df": row["df"], "f": row["f"], "p": row["p"]}
-
-    @property
-    def pure_error(self) -> dict[str, Any]:
-        """Scatter of replicates about their own means: ``ss``, ``df``, ``ms``."""
-        row = find(self.anova, "pure_error")
-        return {"ss": row["ss"], "df": row["df"], "ms": row["ms"]}
-
-    @property
-    def actual_coefficients(self) -> dict[str, float]:
-        """Coefficients of the same terms with the factors in actual units."""
-        values = in_actual_units(self.terms, self.coefficients, self.data.centre, self.data.step)
-        return dict(zip(self.terms, values.tolist(), strict=True))
-
-    @cached_property
-    def box_cox(self) -> dict[str, Any] | None:
-        """Advice on a power transform for an untransformed fit; None where values or fit allow none."""
-        if self.transform is not None or (self.data.values <= 0).any() or self.residual_mean_square == 0:
-            return None
-        return dict(box_cox(_columns(self.data, self.terms), self.data.values, name=self.name))
-
-    def coefficient_table(self, level: float = 0.95) -> list[dict[str, Any]]:
-        """For each term: ``term, coefficient, standard_error, t, p, low, high, vif``, in coded units."""
+    def coefficient_table(self) -> list[dict[str, Any]]:
+        """For each term: ``term, coefficient, standard_error, t, p, low, high, vif``, in coded units, at 95 %."""
         errors = np.sqrt(np.diag(self.covariance))
-        reach = special.stdtrit(self.residual_dof, (1 + level) / 2) * errors
+        columns = self.coefficients, errors, special.stdtrit(self.residual_dof, 0.975) * errors, self.vif
         rows = []
-        for term, c, error, half, vif in zip(
-            self.terms, *(x.tolist() for x in (self.coefficients, errors, reach, self.vif)), strict=True
-        ):
+        for term, c, error, half, vif in zip(self.terms, *(each.tolist() for each in columns), strict=True):
             t = c / error if error > 0 else None
             p = None if t is None else 2 * float(special.stdtr(self.residual_dof, -abs(t)))
             judged = {"t": t, "p": p, "low": c - half, "high": c + half, "vif": None if vif != vif else vif}
             rows.append({"term": term, "coefficient": c, "standard_error": error, **judged})
         return rows
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain numbers, lists and dicts, ready for JSON: coefficients by term, and all statistics."""
-        table = self.coefficient_table()
-        coefficients = dict(zip(self.terms, self.coefficients.tolist(), strict=True))
-        return {
-            "model": self.model,
-            "coefficients": coefficients,
-            **{key: plain(getattr(self, key)) for key in STATISTICS},
-            "standard_errors": {row["term"]: row["standard_error"] for row in table},
-            "vif": {row["term"]: row["vif"] for row in table if row["term"] != "1"},
-            "tests": {row["term"]: {key: row[key] for key in ("t", "p", "low", "high")} for row in table},
-            **{key: plain(getattr(self, key)) for key in DETAILS},
-        }
-
     @cached_property
     def _polynomial(self) -> tuple[float, Array, Array]:
         return second_order(self.terms, self.coefficients, self.data.points.shape[1])
+
+    def _named(self, values: Array) -> dict[str, float]:
+        return dict(zip(self.terms, values.tolist(), strict=True))
 
     def _back(self, values: Array) -> Array:
         if self.transform is None:
@@ -233,17 +201,20 @@ def fit(
     data = checked(name, coded, values, centre, step, standard_errors, replicates, block)
     if weighting == "replicates":
         check_errors(name, standard_errors)
-    return _fit(name, data, model, weighting, "none" if transform is None else transform)
+    return _fit(name, data, model, weighting, "none" if transform is None else transform, advised=True)
 
 
-def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: Transform) -> Surface:
+def _figures(surface: Surface, source: str, *keys: str) -> dict[str, Any]:
+    row: Mapping[str, Any] = find(surface.anova, source)
+    return {key: row[key] for key in keys}
+
+
+def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: Transform, advised: bool) -> Surface:
     terms = model_terms(data.points.shape[1], model)
     check_matrix(name, model, terms, _columns(data, terms))
     if not np.ptp(data.values):
-        raise ValueError(
-            f"{name}: all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit; "
-            "check the response or leave it out"
-        )
+        alike = f"all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit"
+        raise ValueError(f"{name}: {alike}; check the response or leave it out")
     exponent = _exponent(name, data, terms, transform)
     response, variances = _on_scale_of_fit(data, exponent)
     weights = 1.0 / variances if weighting == "replicates" and variances is not None else None
@@ -253,27 +224,28 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
     matrix = _columns(data, terms)
     solution = solve(matrix, response, weights)
     count = len(terms)
-    covariance = solution.mean_square * solution.inverse
+    covariance = (solution.mean_square * solution.inverse)[:count, :count]
     groups = replicate_groups(data.points, data.block)
-    known = (
-        None if variances is None else compare(solution, matrix, response, variances, data.replicates, groups, count)
-    )
-    table = anova(terms, solution, response, data.points, data.block)
-    if known is not None:
+    table, known = anova(terms, solution, response, data.points, data.block), None
+    if variances is not None:
+        known = compare(solution, matrix, response, variances, data.replicates, groups, count)
         table.insert(len(table) - 1, known.pure_error)
     coefficients = solution.coefficients[:count]
+    stationary, analysis = canonical(terms, coefficients, covariance, solution.dof, data)
+    open_to_transform = exponent is None and (data.values > 0).all() and solution.mean_square != 0
     return Surface(
         name=name,
         model=model,
         terms=terms,
         coefficients=coefficients,
-        covariance=covariance[:count, :count],
+        data=data,
+        covariance=covariance,
         residual_mean_square=solution.mean_square,
         residual_dof=solution.dof,
         anova=table,
         **goodness(solution, response, matrix[:, :count] @ coefficients, data.block),
-        stationary_point=stationary_point(terms, coefficients, data.centre, data.step),
-        canonical=canonical(terms, coefficients, covariance[:count, :count], solution.dof, data.points),
+        stationary_point=stationary,
+        canonical=analysis,
         vif=solution.inflation[:count],
         blocks=_block_effects(data, solution.coefficients[count:]),
         elimination=removed,
@@ -283,15 +255,16 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
         observation_variance=observation_variance(solution),
         weighting=weighting,
         transform=exponent,
-        data=data,
+        box_cox=box_cox(matrix, data.values, name=name) if advised and open_to_transform else None,
+        rival=None,
     )
 
 
-def _columns(data: Data, terms: tuple[str, ...]) -> Array:
+def _columns(data: Data, terms: Terms) -> Array:
     return np.hstack([model_matrix(data.points, terms), data.block_columns])
 
 
-def _exponent(name: str, data: Data, terms: tuple[str, ...], transform: Transform) -> float | None:
+def _exponent(name: str, data: Data, terms: Terms, transform: Transform) -> float | None:
     if transform == "none":
         return None
     check_positive(data.values, name)

@@ -1,10 +1,10 @@
-"""Runs on a cluster: the workers of a dask scheduler, reached through joblib."""
+"""Runs on a cluster: the workers of a dask scheduler, by dask.distributed."""
 
 import asyncio
 import logging
 import queue
-import threading
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from typing import Any
 
@@ -30,25 +30,35 @@ def run_on_cluster(
     other code; StoppedError when it goes away.
     """
     with _client(address) as client:
-        texts = tasks()
-        answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        thread = threading.Thread(target=_feed, args=(client, work, texts, answers), daemon=True)
-        thread.start()
-        left, alone_s = len(texts), 0.0
-        while left:
+        # All at once, so that workers which join later find work.
+        futures = dict(enumerate(client.map(work, tasks(), pure=False)))
+        answers: queue.SimpleQueue[int] = queue.SimpleQueue()
+        for number, future in futures.items():
+            future.add_done_callback(lambda _, number=number: answers.put(number))
+        alone_s = 0.0
+        while futures:
+            place = -1
             try:
-                answer = answers.get(timeout=LOOK_S)
-            except queue.Empty:
+                place = answers.get(timeout=LOOK_S)
+                ran = futures[place].result(timeout=LOOK_S)
+            except (queue.Empty, TimeoutError):
+                # A result that went with its worker is made again on another.
+                if place in futures:
+                    answers.put(place)
+                broken = place in futures and futures[place].status == "error"
                 alone_s = 0.0 if _workers(client) else alone_s + LOOK_S
-                if client.status != "running" or alone_s > DESERTED_S:
+                if broken or client.status != "running" or alone_s > DESERTED_S:
                     raise _gone(address, client) from None
                 continue
-            if isinstance(answer, InputError):
-                raise answer
-            if isinstance(answer, BaseException):
-                raise _gone(address, client) from answer
-            ended(*answer)
-            left -= 1
+            except InputError:
+                raise
+            except (CancelledError, OSError, MemoryError) as error:
+                raise _gone(address, client) from error
+            except Exception as error:
+                ran = Ran(None, f"its workers were lost ({error})", 0.0, lost=True)
+            # What is still held would be run again if its worker were lost.
+            futures.pop(place).release()
+            ended(place, ran)
 
 
 def _gone(address: str, client: Any) -> StoppedError:
@@ -58,50 +68,6 @@ def _gone(address: str, client: Any) -> StoppedError:
 
 def _workers(client: Any) -> int:
     return len(client.scheduler_info(n_workers=-1)["workers"]) if client.status == "running" else 0
-
-
-def _feed(client: Any, work: Callable[[str], Ran], texts: Sequence[str], answers: Any) -> None:
-    """Put (place, Ran) into ``answers`` as each ends, or what went wrong."""
-    from joblib import Parallel, delayed, parallel_config
-
-    # All at once, so that workers which join later find work. The text of a scene is sent with its task: larger objects
-    # would be kept on one worker, and lost with it.
-    tasks = (delayed(_numbered)(place, text, work) for place, text in enumerate(texts))
-    try:
-        with parallel_config(backend=_backend(client)):
-            run = Parallel(n_jobs=-1, return_as="generator_unordered", batch_size=1, pre_dispatch="all")
-            for answer in run(tasks):
-                answers.put(answer)
-    except Exception as error:
-        answers.put(error)
-
-
-def _numbered(place: int, text: str, work: Callable[[str], Ran]) -> tuple[int, Ran]:
-    return place, work(text)
-
-
-def _backend(client: Any) -> Any:
-    """joblib's dask backend, which also hands over a task that dask has given up, and never runs any in this process."""
-    from joblib._dask import DaskDistributedBackend
-
-    class Backend(DaskDistributedBackend):
-        def effective_n_jobs(self, n_jobs: int) -> int:
-            # Of a single worker joblib makes none at all.
-            return max(2, super().effective_n_jobs(n_jobs))
-
-        def submit(self, func: Any, callback: Any = None) -> Any:
-            future = super().submit(func, callback)
-            place = func.items[0][1][0]
-
-            def given_up(ended: Any) -> None:
-                error = ended.exception()
-                if error is not None and callback is not None:
-                    callback([(place, Ran(None, f"its workers were lost ({error})", 0.0, lost=True))])
-
-            future.add_done_callback(given_up)
-            return future
-
-    return Backend(client=client)
 
 
 async def _knock(address: str) -> None:
@@ -115,12 +81,11 @@ async def _knock(address: str) -> None:
 
 @contextmanager
 def _client(address: str) -> Iterator[Any]:
+    where = f"--scheduler {address}"
     try:
         import distributed
     except ImportError:
-        raise InputError(
-            [f"--scheduler {address}: needs the package distributed; pip install 'rbdyn[cluster]'"]
-        ) from None
+        raise InputError([f"{where}: needs the package distributed; pip install 'rbdyn[cluster]'"]) from None
     # What it would log is said here in a sentence.
     for name in logging.root.manager.loggerDict:
         if name.split(".")[0] == "distributed":
@@ -130,16 +95,13 @@ def _client(address: str) -> Iterator[Any]:
         client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
     # What answers there may be anything, and its words mean anything.
     except Exception:
-        raise InputError(
-            [f"--scheduler {address}: no dask scheduler answers there within {KNOCK_S:g} s; check the address"]
-        ) from None
+        silent = f"no dask scheduler answers there within {KNOCK_S:g} s"
+        raise InputError([f"{where}: {silent}; check the address"]) from None
     try:
         try:
             client.wait_for_workers(1, timeout=WORKERS_S)
         except TimeoutError:
-            raise InputError(
-                [f"--scheduler {address}: has no workers; start some with dask worker {address}"]
-            ) from None
+            raise InputError([f"{where}: has no workers; start some with dask worker {address}"]) from None
         yield client
     finally:
         client.close(timeout=CONNECT_S)

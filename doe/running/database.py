@@ -27,14 +27,13 @@ SCHEMA = (
 # How long to wait for another process that writes [s].
 PATIENCE_S = 30.0
 # What mends a complaint of sqlite.
+PLACE = "see that its folder is there and that both can be written, or name another folder"
 MENDS = {
     sqlite3.SQLITE_NOTADB: "it is no database; move it away or name another folder",
     sqlite3.SQLITE_CORRUPT: "it is damaged; move it away, its runs are then run again",
     sqlite3.SQLITE_BUSY: "another process holds it; start again when that has ended",
-    **dict.fromkeys(
-        (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY),
-        "see that its folder is there and that both can be written, or name another folder",
-    ),
+    sqlite3.SQLITE_CANTOPEN: PLACE,
+    sqlite3.SQLITE_READONLY: PLACE,
 }
 
 
@@ -67,20 +66,19 @@ class Database:
             self._connection = sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False)
         if not tables:
             with self._transaction(durable=True) as connection:
-                tables = self._tables()
-                if not tables:
+                if not self._tables():
                     for statement in SCHEMA:
                         connection.execute(statement)
                     connection.executemany("INSERT INTO meta VALUES (?, ?)", [("format", FORMAT), ("version", VERSION)])
-                    tables = self._tables()
+                tables = self._tables()
         meta = dict(self._connection.execute("SELECT name, value FROM meta")) if "meta" in tables else {}
-        found = meta.get("version", "1") if meta.get("format") == FORMAT else ""
+        version = meta.get("version", "1") if meta.get("format") == FORMAT else ""
         # The first version was a bare table of results.
         if tables == {"runs"}:
-            found = "1"
-        if found != VERSION:
-            newer = found.isdigit() and int(found) > int(VERSION)
-            what = f"a store of version {found}, not {VERSION}" if found else "not a store of runs"
+            version = "1"
+        if version != VERSION:
+            newer = version.isdigit() and int(version) > int(VERSION)
+            what = f"a store of version {version}, not {VERSION}" if version else "not a store of runs"
             mend = "install the newer doe that made it" if newer else "move it away"
             raise InputError([f"{self.path}: {what}; {mend} or name another folder"])
         (sound,) = self._connection.execute("PRAGMA quick_check(1)").fetchone()
@@ -90,8 +88,8 @@ class Database:
             _patiently(self._connection, "PRAGMA journal_mode=WAL")
 
     def _tables(self) -> set[str]:
-        found = _patiently(self._connection, "SELECT name FROM sqlite_master WHERE type = 'table'")
-        return {name for (name,) in found}
+        rows = _patiently(self._connection, "SELECT name FROM sqlite_master WHERE type = 'table'")
+        return {name for (name,) in rows}
 
     def _tell(self, things: Sequence[str], sentence: str) -> None:
         """Say it of things on standard error, unless it was said of all of them."""

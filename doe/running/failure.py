@@ -38,14 +38,11 @@ def grouped(failures: Iterable[Failure]) -> list[dict[str, Any]]:
 
     Causes that differ in their numbers only are one; the first of them stands for all.
     """
-    return [
-        {
-            "cause": group[0].cause,
-            "runs": [failure.run for failure in group if failure.run is not None],
-            "labels": [failure.label for failure in group],
-        }
-        for group in sorted(alike(failures, lambda failure: failure.cause), key=len, reverse=True)
-    ]
+    groups = []
+    for group in sorted(alike(failures, lambda failure: failure.cause), key=len, reverse=True):
+        runs = [failure.run for failure in group if failure.run is not None]
+        groups.append({"cause": group[0].cause, "runs": runs, "labels": [failure.label for failure in group]})
+    return groups
 
 
 def alike(items: Iterable[T], text: Callable[[T], str]) -> list[list[T]]:

@@ -5,6 +5,7 @@ import os
 import socket
 import time
 import uuid
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -61,16 +62,12 @@ def this_process() -> Owner:
 
 @functools.cache
 def _machine() -> str:
-    parts = [socket.gethostname()]
-    for read in (
-        lambda: Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip(),
-        lambda: os.readlink("/proc/self/ns/pid"),
-    ):
-        try:
-            parts.append(read())
-        except OSError:
-            parts.append("")
-    return "/".join(parts)
+    boot, space = "", ""
+    with suppress(OSError):
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    with suppress(OSError):
+        space = os.readlink("/proc/self/ns/pid")
+    return f"{socket.gethostname()}/{boot}/{space}"
 
 
 def _born(pid: int) -> str:
@@ -90,8 +87,6 @@ def _answers(pid: int) -> str:
     """The same where the system has no /proc: only whether it lives."""
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
-        return ""
-    except PermissionError:
-        pass
+    except OSError as error:
+        return "" if isinstance(error, ProcessLookupError) else "alive"
     return "alive"

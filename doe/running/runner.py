@@ -46,7 +46,7 @@ def run_points(
     written, KeyboardInterrupt on Ctrl-C; either way all finished runs stay stored and claims are given back.
     """
     wanted = {point.key: point for point in points}
-    found: dict[str, RunResult] = {}
+    outcomes: dict[str, RunResult] = {}
 
     def take(free: Sequence[Point]) -> list[Point]:
         mine = store.claim(free, sound)
@@ -55,22 +55,22 @@ def run_points(
     def give(point: Point, ran: Ran) -> None:
         if ran.result is not None:
             store.put(point.key, ran.result, seconds=ran.seconds, host=ran.host, pid=ran.pid)
-            found[point.key] = ran.result
+            outcomes[point.key] = ran.result
         else:
             cause = ran.cause or "no result"
             if not ran.lost:
                 store.fail(point.key, cause, seconds=ran.seconds)
-            found[point.key] = Failure(point.label, cause, point.run, dict(point.factors))
-        progress(len(found), len(wanted))
+            outcomes[point.key] = Failure(point.label, cause, point.run, dict(point.factors))
+        progress(len(outcomes), len(wanted))
 
     if retry:
         store.forget_failures(list(wanted.values()))
     try:
         while True:
-            found |= store.outcomes(_left(wanted, found), sound)
-            progress(len(found), len(wanted))
-            if not (left := _left(wanted, found)):
-                return found
+            outcomes |= store.outcomes(_left(wanted, outcomes), sound)
+            progress(len(outcomes), len(wanted))
+            if not (left := _left(wanted, outcomes)):
+                return outcomes
             taken = {claim.key for claim in store.claims()}
             if free := [point for point in left if point.key not in taken]:
                 engine(free, take, give)
@@ -80,5 +80,5 @@ def run_points(
         store.release()
 
 
-def _left(wanted: dict[str, Point], found: dict[str, RunResult]) -> list[Point]:
-    return [point for key, point in wanted.items() if key not in found]
+def _left(wanted: dict[str, Point], outcomes: dict[str, RunResult]) -> list[Point]:
+    return [point for key, point in wanted.items() if key not in outcomes]

@@ -16,7 +16,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from doe.running.database import Database
@@ -85,28 +84,25 @@ class Store(Database):
 
     def get(self, key: str) -> dict[str, Any] | None:
         """The stored result, or None."""
-        found = self.outcomes([Point(key, key)]).get(key)
-        return found if isinstance(found, dict) else None
+        outcome = self.outcomes([Point(key, key)]).get(key)
+        return outcome if isinstance(outcome, dict) else None
 
     def outcomes(self, points: Sequence[Point], sound: Sound = None) -> dict[str, RunResult]:
         """Results and failures of those points that have ended, by key.
 
         A row spoilt on the disk, or whose result is not ``sound``, is told on standard error and counts as not there.
         """
-        found, spoilt = dict[str, RunResult](), list[str]()
+        outcomes, spoilt = dict[str, RunResult](), list[str]()
         query = "SELECT status, result, digest, cause FROM runs WHERE key = ? AND status != 'claimed'"
         with self._lock, self._faults():
             for point in points:
-                row = self._connection.execute(query, (point.key,)).fetchone()
-                if row is None:
-                    continue
-                outcome = _outcome(point, sound, *row)
-                if outcome is not None:
-                    found[point.key] = outcome
-                else:
-                    spoilt.append(point.label)
+                if row := self._connection.execute(query, (point.key,)).fetchone():
+                    if (outcome := _outcome(point, sound, *row)) is not None:
+                        outcomes[point.key] = outcome
+                    else:
+                        spoilt.append(point.label)
         self._tell(spoilt, f"kept results that cannot be read count as not done: {', '.join(spoilt)}")
-        return found
+        return outcomes
 
     def claim(self, points: Sequence[Point], sound: Sound = None) -> set[str]:
         """Take what nobody has done or is doing; returns the keys that are now ours to run.
@@ -114,13 +110,12 @@ class Store(Database):
         Claims of a process that is gone are taken over; a row spoilt, or whose result is not ``sound``, is not there.
         """
         mine, me = set(), self._me
+        query = "SELECT owner, status, result, digest, cause FROM runs WHERE key = ?"
         with self._transaction(durable=False) as connection:
             self._sign(connection)
             live: dict[str, bool] = {}
             for point in points:
-                row = connection.execute(
-                    "SELECT owner, status, result, digest, cause FROM runs WHERE key = ?", (point.key,)
-                ).fetchone()
+                row = connection.execute(query, (point.key,)).fetchone()
                 if row is not None and row[1] != "claimed" and _outcome(point, sound, *row[1:]) is not None:
                     continue
                 if row is not None and row[1] == "claimed":
@@ -140,10 +135,8 @@ class Store(Database):
     def _sign(self, connection: sqlite3.Connection) -> None:
         """Note that this owner lives, now and from time to time from here on."""
         me = self._me
-        connection.execute(
-            "INSERT OR REPLACE INTO owners VALUES (?, ?, ?, ?, ?, ?)",
-            (me.token, me.host, me.machine, me.pid, me.born, time.time()),
-        )
+        signed = me.token, me.host, me.machine, me.pid, me.born, time.time()
+        connection.execute("INSERT OR REPLACE INTO owners VALUES (?, ?, ?, ?, ?, ?)", signed)
         if self._beating is None:
             self._beating = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
             self._beating.start()
@@ -155,36 +148,28 @@ class Store(Database):
                 if not self._closed.is_set():
                     self._sign(connection)
 
-    def put(
-        self,
-        key: str,
-        result: dict[str, Any],
-        *,
-        seconds: float | None = None,
-        host: str | None = None,
-        pid: int | None = None,
-    ) -> None:
+    def put(self, key: str, result: dict[str, Any], *, seconds: float | None = None, **where: Any) -> None:
         """Keep a result; it is on the disk when this returns.
 
-        An equal key already done is left, for equal keys have equal bits. ``host``, ``pid``: where it ran, if not here.
+        An equal key already done is left, for equal keys have equal bits. ``where``: its host and pid, if not here.
         """
         text = json.dumps(result)
-        self._end(key, "done", text, digest_of(text), None, seconds, host, pid)
+        self._end(key, status="done", result=text, digest=digest_of(text), seconds=seconds, **where)
 
     def fail(self, key: str, cause: str, *, seconds: float | None = None) -> None:
         """Keep why a run could not go on."""
-        self._end(key, "failed", None, None, cause, seconds, None, None)
+        self._end(key, status="failed", cause=cause, seconds=seconds)
 
-    def _end(self, key: str, status: str, *facts: Any) -> None:
-        names = ("result", "digest", "cause", "seconds", "host", "pid", "ended", "status")
-        result, digest, cause, seconds, host, pid = facts
-        where = (host or self._me.host, pid or self._me.pid)
-        values = (result, digest, cause, seconds, *where, time.time(), status)
+    def _end(self, key: str, **facts: Any) -> None:
+        where = {"host": facts.get("host") or self._me.host, "pid": facts.get("pid") or self._me.pid}
+        facts |= {"ended": time.time()} | where
+        columns = ", ".join(facts)
+        replaced = ", ".join(f"{name} = excluded.{name}" for name in facts)
         with self._transaction(durable=True) as connection:
             connection.execute(
-                f"INSERT INTO runs (key, study, {', '.join(names)}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) "
-                f"DO UPDATE SET {', '.join(f'{name} = excluded.{name}' for name in names)} WHERE runs.status = 'claimed'",
-                (key, self._study, *values),
+                f"INSERT INTO runs (key, study, {columns}) VALUES (?, ?{', ?' * len(facts)}) ON CONFLICT (key) "
+                f"DO UPDATE SET {replaced} WHERE runs.status = 'claimed'",
+                (key, self._study, *facts.values()),
             )
 
     def forget_failures(self, points: Sequence[Point]) -> None:
@@ -214,12 +199,10 @@ class Store(Database):
     def ended(self) -> list[EndedRun]:
         """All runs that have ended, oldest first."""
         seconds, started = (f"iif(typeof({name}) = 'real', {name}, NULL)" for name in ("seconds", "started"))
-        query = (
-            f"SELECT key, status, {seconds}, {started}, ended, owner FROM runs "
-            "WHERE status != 'claimed' AND typeof(ended) = 'real' ORDER BY ended"
-        )
+        query = f"SELECT key, status, {seconds}, {started}, ended, owner FROM runs WHERE status != 'claimed'"
         with self._lock, self._faults():
-            return [EndedRun(*row) for row in self._connection.execute(query)]
+            rows = self._connection.execute(f"{query} AND typeof(ended) = 'real' ORDER BY ended")
+            return [EndedRun(*row) for row in rows]
 
     def close(self) -> None:
         """Give back claims and close."""
@@ -236,16 +219,13 @@ class Store(Database):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *ended: object) -> None:
         self.close()
 
     def _lives(self, owner: str) -> bool:
         """Whether an owner may still be at work; one that signed ahead of this machine's clock is told."""
-        row = self._connection.execute(
-            "SELECT host, machine, pid, born, owner, beat FROM owners WHERE owner = ?", (owner,)
-        ).fetchone()
+        query = "SELECT host, machine, pid, born, owner, beat FROM owners WHERE owner = ?"
+        row = self._connection.execute(query, (owner,)).fetchone()
         if row is None or not isinstance(row[5], float):
             return False
         lives, ahead = Owner(*row[:5]).lives(row[5]), row[5] - time.time()
@@ -265,7 +245,7 @@ def _outcome(point: Point, sound: Sound, status: str, result: Any, digest: Any, 
     if not isinstance(result, str) or digest_of(result) != digest:
         return None
     try:
-        found = json.loads(result)
+        record = json.loads(result)
     except ValueError:
         return None
-    return found if isinstance(found, dict) and (sound is None or sound(found)) else None
+    return record if isinstance(record, dict) and (sound is None or sound(record)) else None

@@ -33,14 +33,12 @@ def solve_chains(
     for number, chain in enumerate(study.file.chain):
         widest, given = half_widths[study.factors.index(chain.factor)], chain.half_width_mm
         if given is not None and given > widest:
-            notes.append(
-                f"{study.path}: chain {chain.name}: half_width_mm = {given:g}: wider than the {widest:.3g} within which "
-                "the gains are kept as [tolerances] asks; narrow it, or keep less"
-            )
+            why = f"wider than the {widest:.3g} within which the gains are kept as [tolerances] asks"
+            where = f"{study.path}: chain {chain.name}: half_width_mm = {given:g}"
+            notes.append(f"{where}: {why}; narrow it, or keep less")
         try:
-            solved[chain.name] = solve(
-                _chain(study, number, pick, half_widths), source=f"{study.path}: chain {chain.name}"
-            )
+            parts = _chain(study, number, pick, half_widths)
+            solved[chain.name] = solve(parts, source=f"{study.path}: chain {chain.name}")
         except InputError as error:
             notes += error.faults
     return solved, notes

@@ -66,11 +66,9 @@ def choose(
     best = min(range(len(tried)), key=lambda place: _badness(limits_of(study, tried[place][0])))
     pick, front, chosen = tried[best]
     wanted = choices(study, front, direct, chosen)
-    wanted |= {
-        f"try_{place + 1}": Choice(each.point, f"try {place + 1} for the pick: {each.reason}")
-        for place, (each, _, _) in enumerate(tried)
-        if place != best
-    }
+    for number, (each, _, _) in enumerate(tried, 1):
+        if each is not pick:
+            wanted[f"try_{number}"] = Choice(each.point, f"try {number} for the pick: {each.reason}")
     wanted["pick"] = Choice(pick.point, pick.reason)
     confirmed, failures = confirm(study, wanted, simulations)
     return Chosen(front, chosen, confirmed, failures, len(tried))
@@ -94,15 +92,15 @@ def choices(
     for a tolerance-aware front, its pick is that of the surfaces. Of those that the drawing cannot tell apart
     the first stands for all, and its reason says so.
     """
-    found: dict[str, Choice] = {}
+    wanted: dict[str, Choice] = {}
     for name, point, reason in _candidates(study, front, direct, chosen):
         rounded = rounded_within(study, point)
-        twin = next((known for known, each in found.items() if np.array_equal(each.point, rounded)), None)
+        twin = next((known for known, each in wanted.items() if np.array_equal(each.point, rounded)), None)
         if twin is None:
-            found[name] = Choice(rounded, reason)
+            wanted[name] = Choice(rounded, reason)
         elif name != study.file.front.pick:
-            found[twin] = Choice(rounded, f"{found[twin].reason}; also {reason}")
-    return found
+            wanted[twin] = Choice(rounded, f"{wanted[twin].reason}; also {reason}")
+    return wanted
 
 
 def _candidates(

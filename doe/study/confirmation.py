@@ -15,6 +15,7 @@ from doe.study.predicted import verdict
 from doe.study_file import Study
 from rbdyn.faults import RunError
 from rbdyn.records.record import Record, derived, keyed, outside_json
+from rbdyn.records.words import improvement
 from rbdyn.result import SimulationResult
 
 
@@ -53,12 +54,13 @@ class Confirmed:
 class Gain(Record):
     """Relative improvement [%] of a response at a point over the baseline, with its 95 % half-width.
 
-    ``verdict``: whether the change is larger than its error.
+    ``verdict``: whether the change is larger than its error; ``goal``: what is wanted of the response.
     """
 
     response: str = outside_json()
     percent: float
     error: float = keyed("error_percent")
+    goal: str = "min"
     verdict: str = derived(lambda self: verdict(self.percent, self.error))
 
 
@@ -102,7 +104,7 @@ def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
     scale = 100.0 / np.abs(baseline.values[chosen])
     percent = (goals.costs(baseline.values) - goals.costs(pick.values)) * scale
     return [
-        Gain(study.responses[index], float(p), float(e))
+        Gain(study.responses[index], float(p), float(e), study.file.response[index].goal)
         for index, p, e in zip(chosen, percent, error * scale, strict=True)
     ]
 
@@ -120,9 +122,9 @@ def statement(gains: Sequence[Gain]) -> str:
         "inside its own noise: no gain is shown": [gain for gain in gains if abs(gain.percent) <= wider * gain.error],
     }
     parts = [
-        f"{', '.join(f'{each.response} {each.percent:+.2f} ± {wider * each.error:.2f} %' for each in group)}: {words}"
+        f"{', '.join(f'{each.response} {improvement(each.percent, wider * each.error, each.goal)}' for each in group)}: {words}"
         for words, group in by_words.items()
         if group
     ]
     together = f" (intervals that hold for all {len(gains)} together)" if len(gains) > 1 else ""
-    return f"Simulated gains over the baseline{together}: {'; '.join(parts)}."
+    return f"Simulated changes from the baseline{together}: {'; '.join(parts)}."

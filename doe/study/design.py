@@ -11,9 +11,8 @@ from doe.study_file.design_section import KEYS_OF
 from doe.study_file.design_section import Design as DesignSettings
 from rbdyn.faults import InputError, refuse
 
-MAKERS: dict[str, Callable[..., Design]] = {
-    make.__name__: make for make in (central_composite, box_behnken, full_factorial, latin_hypercube, sobol)
-}
+ALL = (central_composite, box_behnken, full_factorial, latin_hypercube, sobol)
+MAKERS: dict[str, Callable[..., Design]] = {make.__name__: make for make in ALL}
 
 
 def design_of(study: Study) -> Design:
@@ -46,15 +45,11 @@ def check_runs(study: Study, design: Design) -> None:
         needed = len(terms) + design.blocks
         what = f"{len(terms)} terms" + (f", {design.blocks - 1} block effects" if design.blocks > 1 else "")
         if runs < needed:
-            faults.append(
-                f"{where}: the {runs} runs of the design are too few; it needs {needed} ({what} and one to "
-                "judge the fit): enlarge the design or choose a simpler model"
-            )
+            few = f"the {runs} runs of the design are too few; it needs {needed} ({what} and one to judge the fit)"
+            faults.append(f"{where}: {few}: enlarge the design or choose a simpler model")
         elif lost := lost_terms(design.coded, terms, design.block):
-            faults.append(
-                f"{where}: the runs of the design cannot tell {', '.join(lost)} from the other terms; add "
-                "levels or centre points, or choose a simpler model"
-            )
+            mend = "add levels or centre points, or choose a simpler model"
+            faults.append(f"{where}: the runs of the design cannot tell {', '.join(lost)} from the other terms; {mend}")
     refuse(faults)
 
 
@@ -69,5 +64,5 @@ def evaluation(study: Study, design: Design) -> dict[str, Any]:
     factors = len(study.factors)
     model = max((response.model for response in study.file.response), key=lambda each: len(model_terms(factors, each)))
     terms = model_terms(factors, model)
-    found = evaluate(design.coded, terms, design.block, region=design.region, reach=design.extent)
-    return {"model": model, **found}
+    judged = evaluate(design.coded, terms, design.block, region=design.region, reach=design.extent)
+    return {"model": model, **judged}

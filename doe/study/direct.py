@@ -11,7 +11,7 @@ from doe.arrays import Array
 from doe.clearance import Simulations
 from doe.pareto import ParetoFront
 from doe.pareto.archive import spread
-from doe.pareto.direct import DirectFront, direct_front
+from doe.pareto.direct import DirectFront, direct_front, repeated
 from doe.pareto.surrogate_loss import SurrogateLoss, compare_with_surrogate
 from doe.running.failure import Failure, grouped
 from doe.running.runner import Progress
@@ -70,7 +70,7 @@ class Evaluator:
         self._progress(self.done + done, max(self._total, self.done + total))
 
 
-def find_direct(study: Study, found: ParetoFront, simulations: Simulations) -> Direct:
+def find_direct(study: Study, on_surfaces: ParetoFront, simulations: Simulations) -> Direct:
     """Search the front on the simulator, then run as many points of the surfaces' front on it, and compare.
 
     Raises RunError where every run of a stage fails, InputError for impossible settings, KeyboardInterrupt.
@@ -89,18 +89,14 @@ def find_direct(study: Study, found: ParetoFront, simulations: Simulations) -> D
             **settings.model_dump(include={"evaluations", "population", "seed", "confidence", "resample"}),
         )
         searched = time.perf_counter()
-        rows = spread(found.costs, len(front.points), [found.pick])[: len(front.points)]
-        points = found.points[rows]
+        rows = spread(on_surfaces.costs, len(front.points), [on_surfaces.pick])[: len(front.points)]
         # As many runs a point as a finalist of the direct front has.
-        values, errors = evaluate(np.tile(points, (front.repeats, 1)))
-        shape = (front.repeats, len(points), values.shape[1])
-        means = values.reshape(shape).mean(axis=0)
-        mean_errors = np.sqrt((errors.reshape(shape) ** 2).sum(axis=0)) / front.repeats
-        loss = compare_with_surrogate(front, means, mean_errors, seed=settings.seed)
+        surrogate = repeated(evaluate, on_surfaces.points[rows], front.repeats)
+        loss = compare_with_surrogate(front, surrogate.values, surrogate.errors, seed=settings.seed)
     except ValueError as error:
         if evaluate.failures:
             causes = "; ".join(group["cause"] for group in grouped(evaluate.failures))
             raise RunError(f"direct front: {error} ({causes})") from None
         raise InputError([f"{study.path}: direct: {error}"]) from None
     seconds = {"search": searched - started, "comparison": time.perf_counter() - searched}
-    return Direct(front, points, means, mean_errors, loss, tuple(evaluate.failures), seconds)
+    return Direct(front, *surrogate, loss, tuple(evaluate.failures), seconds)

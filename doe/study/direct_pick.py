@@ -57,12 +57,8 @@ def direct_pick(
             violations = goals.violations(front.values - below, front.values + above)
         baselines += [] if aware.robust_baseline is None else [aware.robust_baseline]
         after = ", by what its tolerances leave of it"
-    fresh = np.array(
-        [
-            not any(np.array_equal(rounded_within(study, point), each.point) for each in simulated)
-            for point in front.points
-        ]
-    )
+    rounded = [rounded_within(study, point) for point in front.points]
+    fresh = np.array([not any(np.array_equal(point, each.point) for each in simulated) for point in rounded])
     rows = np.flatnonzero(fresh) if fresh.any() else np.arange(len(front.points))
     row, reason = pick_among(costs[rows], violations[rows], goals, baselines, study.file.front.pick)
     words = f"{reason.replace('front points', 'points of the direct front')}{after}"

@@ -19,13 +19,16 @@ def predict_all(surfaces: Sequence[Surface], coded: Array) -> Array:
     return np.column_stack([surface.predict(coded) for surface in surfaces])
 
 
+def standard_errors_all(surfaces: Sequence[Surface], coded: Array) -> Array:
+    """Standard errors (n, m) of the mean responses at coded points (n, k)."""
+    return np.column_stack([surface.prediction_standard_error(coded) for surface in surfaces])
+
+
 def draw_all(surfaces: Sequence[Surface], draws: int, seed: int) -> list[Array]:
     """Coefficients (draws, p) of each surface, drawn from their multivariate t independently by response."""
     random = np.random.default_rng(seed)
-    return [
-        draw_coefficients(surface.coefficients, surface.covariance, surface.residual_dof, draws, random)
-        for surface in surfaces
-    ]
+    known = [(surface.coefficients, surface.covariance, surface.residual_dof) for surface in surfaces]
+    return [draw_coefficients(*each, draws, random) for each in known]
 
 
 def predict_draws(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array, seed: int = 1) -> Array:
@@ -40,10 +43,9 @@ def predict_draws(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Ar
 
 def predict_paired(surfaces: Sequence[Surface], drawn: Sequence[Array], coded: Array) -> Array:
     """Responses (n, m) at coded points (n, k), each on the drawn coefficients (n, p) of its own row."""
-    columns = [
-        link_of(surface)((model_matrix(coded, surface.terms) * coefficients).sum(axis=-1))
-        for surface, coefficients in zip(surfaces, drawn, strict=True)
-    ]
+    columns = []
+    for surface, coefficients in zip(surfaces, drawn, strict=True):
+        columns.append(link_of(surface)((model_matrix(coded, surface.terms) * coefficients).sum(axis=-1)))
     return np.column_stack(columns)
 
 
@@ -62,6 +64,5 @@ def link_of(surface: Surface) -> Callable[[Array], Array]:
 
 def quadratics(surfaces: Sequence[Surface], factors: int) -> list[Quadratic]:
     """The surfaces as quadratics of the coded factors."""
-    return [
-        Quadratic(*second_order(surface.terms, surface.coefficients, factors), link_of(surface)) for surface in surfaces
-    ]
+    forms = [second_order(surface.terms, surface.coefficients, factors) for surface in surfaces]
+    return [Quadratic(*form, link_of(surface)) for form, surface in zip(forms, surfaces, strict=True)]

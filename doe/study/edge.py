@@ -17,6 +17,7 @@ from doe.study.goals import goals_of, region_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
 from rbdyn.records.record import Record, derived, keyed, outside_json
+from rbdyn.records.words import improvement, quantity
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
@@ -29,7 +30,7 @@ class Outward(Record):
 
     ``gains`` by response: [improvement, its 95 % half-width] in units of the response over ``unit`` (a micrometre of a
     factor in millimetres, else one unit of the factor); the half-width is NaN where it is not known. ``source`` is
-    "surfaces" or "simulation".
+    "surfaces" or "simulation". ``goals``: what is wanted, by response; small unless told.
     """
 
     factor: str = outside_json()
@@ -38,6 +39,7 @@ class Outward(Record):
     unit: str = keyed("per")
     source: str
     gains: Mapping[str, tuple[float, float]] = outside_json()
+    goals: Mapping[str, str] = outside_json(default_factory=dict)
     gains_beyond: dict[str, dict[str, float | None]] = derived(
         lambda self: {name: {"value": gain, "error": or_none(error)} for name, (gain, error) in self.gains.items()},
         "gains",
@@ -46,10 +48,14 @@ class Outward(Record):
     @property
     def sentence(self) -> str:
         """In words."""
-        listed = ", ".join(f"{name} {gain:+.2g} ± {error:.2g}" for name, (gain, error) in self.gains.items())
+        listed = ", ".join(
+            f"{name} {improvement(gain, error, self.goals.get(name, 'min'), quantity(name)[1])}"
+            for name, (gain, error) in self.gains.items()
+        )
+        at = f"{self.bound:.4g} {quantity(self.factor)[1]}".rstrip()
         return (
-            f"{self.factor} lies at the {self.side} bound of the region, {self.bound:.4g}; gain to be had per {self.unit} "
-            f"beyond it by {self.source}: {listed}"
+            f"{self.factor} lies at the {self.side} bound of the region, {at}; to be expected per {self.unit} beyond it by "
+            f"{self.source}: {listed}"
         )
 
 
@@ -100,16 +106,11 @@ def edge_of(
             gains, source = _on_surfaces(study, surfaces, pick.point, index, side), "the surfaces"
         unit, scale = _unit(study, index)
         reach = region_of(study)[index] * study.step[index]
-        outward.append(
-            Outward(
-                study.factors[index],
-                "upper" if side > 0 else "lower",
-                float(study.centre[index] + side * reach),
-                unit,
-                source,
-                {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()},
-            )
-        )
+        bound = float(study.centre[index] + side * reach)
+        per_unit = {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()}
+        goals = {response.name: response.goal for response in study.file.response}
+        which = "upper" if side > 0 else "lower"
+        outward.append(Outward(study.factors[index], which, bound, unit, source, per_unit, goals))
     far = None if direct is None else share_at_edge(study, direct)
     return Edge(tuple(outward), share_at_edge(study, front), far)
 
@@ -157,7 +158,7 @@ def _simulated(
     study: Study, pick: Confirmed, names: Sequence[tuple[int, int]], simulations: Simulations
 ) -> dict[int, dict[str, tuple[float, float]]]:
     """Gains a unit of each factor from runs beyond its bound, like those of the confirmation; none where a run fails."""
-    scenes, kept = [], []
+    scenes, reachable = [], []
     for index, side in names:
         point = pick.point.copy()
         point[index] += side * AHEAD * study.step[index]
@@ -166,19 +167,18 @@ def _simulated(
         except InputError:
             # A factor cannot go there: nothing lies beyond the bound.
             continue
-        kept.append((index, point))
-    labels = [f"beyond the bound of {study.factors[index]}" for index, _ in kept]
-    results = simulations.run(scenes, labels, simulations.progress("beyond the region")) if kept else []
+        reachable.append((index, point))
+    labels = [f"beyond the bound of {study.factors[index]}" for index, _ in reachable]
+    results = simulations.run(scenes, labels, simulations.progress("beyond the region")) if reachable else []
     goals = goals_of(study)
+    wanted = [study.responses[index] for index in goals.objectives]
     gains_beyond = {}
-    for (index, point), result in zip(kept, results, strict=True):
+    for (index, point), result in zip(reachable, results, strict=True):
         if isinstance(result, Failure):
             continue
         there = confirmed_from(study, Choice(point, ""), result)
         gain = (goals.costs(pick.values) - goals.costs(there.values)) / (AHEAD * study.step[index])
         joint = np.hypot(*(np.nan_to_num(each.error[goals.objectives]) for each in (pick, there)))
-        gains_beyond[index] = {
-            study.responses[response]: (float(g), float(e))
-            for response, g, e in zip(goals.objectives, gain, joint / (AHEAD * study.step[index]), strict=True)
-        }
+        figures = zip(gain.tolist(), (joint / (AHEAD * study.step[index])).tolist(), strict=True)
+        gains_beyond[index] = dict(zip(wanted, figures, strict=True))
     return gains_beyond

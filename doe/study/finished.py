@@ -12,7 +12,7 @@ from rbdyn.result import versions
 
 def inputs_digest(study: Study, direct: bool, robust: bool = False) -> str:
     """Hash of all that the files of a study depend on: the study, the files it names, the code, what was asked."""
-    named = [study.file.scene.file, *(chain.file for chain in study.file.chain)]
+    named = [study.scene.file, *(chain.file for chain in study.file.chain)]
     named += [] if study.file.reference is None else [study.file.reference.file]
     digest = hashlib.sha256()
     for text in (

@@ -16,7 +16,7 @@ from doe.pareto.uncertainty import FrontUncertainty, front_uncertainty
 from doe.response_surface import Surface
 from doe.study.back_off import Doubt, surfaces_doubt
 from doe.study.confirmation import Confirmed
-from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
+from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics, standard_errors_all
 from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
 from doe.study_file import Study
 from rbdyn.faults import InputError
@@ -57,9 +57,7 @@ def find_front(
             goals=goals,
             baseline=study.baseline,
             **settings.model_dump(include=SEARCH),
-            standard_errors=lambda points: np.column_stack(
-                [surface.prediction_standard_error(study.coded(points)) for surface in surfaces]
-            ),
+            standard_errors=lambda points: standard_errors_all(surfaces, study.coded(points)),
             doubt=lambda points: doubt(share)(study.coded(points)),
         )
 
@@ -79,45 +77,36 @@ def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> 
         return search(0.0)
     for share in (1.0 + failed, *SHARES)[failed == 0 :]:
         try:
-            found = search(share)
+            searched = search(share)
         except InfeasibleError:
             if share == SHARES[-1]:
                 raise
             continue
         probability = study.file.confirmation.limit_probability
-        kept = f"with {100.0 * share:g} % of the back-off for" if share < 1.0 else "with"
-        words = f"; on the surfaces it keeps the limits {kept} a probability of {probability:g}"
-        return replace(found, pick_reason=found.pick_reason + words)
+        how = f"with {100.0 * share:g} % of the back-off for" if share < 1.0 else "with"
+        words = f"; on the surfaces it keeps the limits {how} a probability of {probability:g}"
+        return replace(searched, pick_reason=searched.pick_reason + words)
     raise AssertionError("the last share either returns or raises")
 
 
 def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
     """95 % half widths (..., m) of mean responses; NaN for a surface that leaves no residual."""
-    factors = [
-        float(stats.t.ppf(0.975, surface.interval_dof)) if surface.interval_dof > 0 else np.nan for surface in surfaces
-    ]
-    return np.array(factors) * standard_errors
+    dofs = [surface.interval_dof for surface in surfaces]
+    return np.array([stats.t.ppf(0.975, dof) if dof > 0 else np.nan for dof in dofs]) * standard_errors
 
 
-def _uncertainty(study: Study, surfaces: Sequence[Surface], found: ParetoFront) -> FrontUncertainty:
-    assert found.standard_errors is not None
+def _uncertainty(study: Study, surfaces: Sequence[Surface], pareto: ParetoFront) -> FrontUncertainty:
+    assert pareto.standard_errors is not None and pareto.baseline_values is not None
     drawn = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
-    points = np.vstack([found.points, study.baseline])
+    points = np.vstack([pareto.points, study.baseline])
     values = predict_draws(surfaces, drawn, study.coded(points), study.file.front.seed)
-    return front_uncertainty(
-        values[:, :-1],
-        half_widths(surfaces, found.standard_errors),
-        found.goals,
-        found.values,
-        found.pick,
-        study.file.front.pick,
-        values[:, -1],
-        found.baseline_values,
-    )
+    sure, baseline = half_widths(surfaces, pareto.standard_errors), (values[:, -1], pareto.baseline_values)
+    pick = pareto.goals, pareto.values, pareto.pick, study.file.front.pick
+    return front_uncertainty(values[:, :-1], sure, *pick, *baseline)
 
 
 def _tolerance_aware(
-    study: Study, surfaces: Sequence[Surface], found: ParetoFront, box: ToleranceBox, doubt: Doubt
+    study: Study, surfaces: Sequence[Surface], pareto: ParetoFront, box: ToleranceBox, doubt: Doubt
 ) -> ToleranceAware:
     reach = region_of(study)
     return tolerance_aware_front(
@@ -125,10 +114,10 @@ def _tolerance_aware(
         box,
         -reach,
         reach,
-        found.goals,
+        pareto.goals,
         baseline=study.coded(study.baseline),
-        plain=Archive(study.coded(found.points), found.costs),
-        plain_pick=found.pick,
+        plain=Archive(study.coded(pareto.points), pareto.costs),
+        plain_pick=pareto.pick,
         doubt=doubt,
         **study.file.front.model_dump(include=SEARCH),
     )
@@ -140,17 +129,12 @@ def _named(study: Study, goals: Goals, actual: Callable[[Array], Array], after: 
     try:
         yield
     except InfeasibleError as error:
-        missed = [
-            f"{study.responses[index]} {sense} {limit:g} by {by:.4g}"
-            for (index, sense, limit), by in zip(goals.limited, error.violations.tolist(), strict=True)
-            if by > 0.0
-        ]
+        by_limit = zip(goals.limited, error.violations.tolist(), strict=True)
+        broken = [(study.responses[index], sense, limit, by) for (index, sense, limit), by in by_limit if by > 0.0]
+        missed = " and ".join(f"{name} {sense} {limit:g} by {by:.4g}" for name, sense, limit, by in broken)
         where = ", ".join(f"{name} = {x:.5g}" for name, x in study.by_factor(actual(error.point)).items())
-        raise InputError(
-            [
-                f"{study.path}: response.lower, response.upper: no point of the region keeps all limits{after}; the "
-                f"closest ({where}) misses {' and '.join(missed)}; loosen a limit or widen the design"
-            ]
-        ) from None
+        none = f"no point of the region keeps all limits{after}; the closest ({where}) misses {missed}"
+        mend = "loosen a limit or widen the design"
+        raise InputError([f"{study.path}: response.lower, response.upper: {none}; {mend}"]) from None
     except ValueError as error:
         raise InputError([f"{study.path}: front{after}: {error}"]) from None

@@ -3,7 +3,7 @@
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto import Goals
+from doe.pareto.goals import BLANK, Goals
 from doe.pareto.tolerance_aware import ToleranceBox
 from doe.study.design import design_of
 from doe.study_file import Study
@@ -13,9 +13,7 @@ from rbdyn.faults import InputError, refuse
 def goals_of(study: Study) -> Goals:
     """What is wanted of the study's responses."""
     responses = study.file.response
-    rest = {
-        key: [getattr(each, key) for each in responses] for key in ("target", "lower", "upper", "weight", "desired")
-    }
+    rest = {key: [getattr(each, key) for each in responses] for key in BLANK}
     return Goals.of([response.goal for response in responses], **rest)
 
 
@@ -52,12 +50,10 @@ def known_tolerances(study: Study) -> dict[str, float]:
     """Half widths of the factors in their units: their own, else the narrowest of the chains that close on them."""
     known = {}
     for factor in study.file.factor:
-        widths = [chain.half_width_mm for chain in study.file.chain if chain.factor == factor.name]
-        given = [width for width in widths if width is not None]
-        if factor.tolerance is not None:
-            known[factor.name] = factor.tolerance
-        elif given:
-            known[factor.name] = min(given)
+        closing = [chain.half_width_mm for chain in study.file.chain if chain.factor == factor.name]
+        widths = [width for width in closing if width is not None]
+        if factor.tolerance is not None or widths:
+            known[factor.name] = min(widths) if factor.tolerance is None else factor.tolerance
     return known
 
 
@@ -66,9 +62,8 @@ def tolerance_box(study: Study) -> ToleranceBox | None:
     front = study.file.front
     if front.tolerance_aware == "none":
         return None
-    return ToleranceBox(
-        tolerances_of(study), front.tolerance_aware, front.quantile, front.distribution, front.tolerance_samples
-    )
+    parts = front.quantile, front.distribution, front.tolerance_samples
+    return ToleranceBox(tolerances_of(study), front.tolerance_aware, *parts)
 
 
 def tolerances_of(study: Study) -> Array:

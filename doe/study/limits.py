@@ -78,11 +78,10 @@ def sentence(limits: Sequence[Limit], probability: float, tried: int) -> str:
         "undecided": "LIMIT UNDECIDED at the pick: {}, within its error of the bound",
         "kept": f"Limit kept at the pick with a probability of at least {probability:g}: {{}}",
     }
-    parts = [
-        words[verdict].format(", ".join(each.shown for each in group))
-        for verdict in reversed(ORDER)
-        if (group := [limit for limit in limits if limit.verdict == verdict])
-    ]
+    parts = []
+    for verdict in reversed(ORDER):
+        group = [limit.shown for limit in limits if limit.verdict == verdict]
+        parts += [words[verdict].format(", ".join(group))] if group else []
     tries = "the first point simulated" if tried == 1 else f"{tried} points were tried"
     return f"{'. '.join(parts)} ({tries})."
 

@@ -14,6 +14,7 @@ from doe.study.drawn import jacobian, predict_all
 from doe.study.goals import goals_of
 from doe.study_file import Study
 from rbdyn.records.record import Record, derived, keyed, outside_json
+from rbdyn.records.words import improvement
 
 
 def verdict(percent: float, error: float | None) -> str:
@@ -40,6 +41,7 @@ class PredictedGain(Record):
     error: float | None = keyed("error_percent")
     verdict: str = derived(lambda self: verdict(self.percent, self.error))
     scatter: float | None = keyed("single_run_scatter_percent")
+    goal: str = "min"
     within_scatter: bool | None = derived(
         lambda self: None if self.scatter is None else abs(self.percent) <= self.scatter, "within_single_run_scatter"
     )
@@ -47,8 +49,8 @@ class PredictedGain(Record):
     @property
     def sentence(self) -> str:
         """The gain in words."""
-        error = "" if self.error is None else f" ± {self.error:.2f}"
-        said = f"{self.response}: {self.baseline:.5g} to {self.value:.5g}, a gain of {self.percent:+.2f}{error} %"
+        changed = improvement(self.percent, self.error, self.goal)
+        said = f"{self.response}: {self.baseline:.5g} to {self.value:.5g}, {changed}"
         judged = {
             "within error": "which is inside its own noise",
             "better": "which is more than its error",
@@ -91,6 +93,7 @@ def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> 
                 percent=float(scale * (costs[0, column] - costs[1, column])),
                 error=None if error is None else error * scale,
                 scatter=None if scatter is None else scatter * scale,
+                goal=study.file.response[index].goal,
             )
         )
     return gains
@@ -109,19 +112,19 @@ def _missed(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
     return math.sqrt(max(variance, 0.0))
 
 
+# What a verdict amounts to.
+AMOUNT = {
+    "better": "better beyond its error", "worse": "worse beyond its error",
+    "within error": "not told from noise", "without error": "of unknown error",
+}  # fmt: skip
+
+
 def statement(gains: Sequence[PredictedGain]) -> str:
     """What the gains amount to, in a sentence."""
-    words = {
-        "better": "better beyond its error",
-        "worse": "worse beyond its error",
-        "within error": "not told from noise",
-        "without error": "of unknown error",
-    }
-    parts = [
-        f"{said}: {', '.join(names)}"
-        for verdict, said in words.items()
-        if (names := [gain.response for gain in gains if gain.verdict == verdict])
-    ]
+    parts = []
+    for verdict, words in AMOUNT.items():
+        names = [gain.response for gain in gains if gain.verdict == verdict]
+        parts += [f"{words}: {', '.join(names)}"] if names else []
     hidden = [gain.response for gain in gains if gain.within_scatter]
     tail = f" One run each would not show: {', '.join(hidden)}." if hidden else ""
     return f"On the surfaces, {'; '.join(parts)}.{tail}"

@@ -42,10 +42,9 @@ class Beside(Record):
         shown = {factor: effect for factor, effect in self.effects.items() if effect.theirs_significant}
         opposite = [factor for factor, effect in shown.items() if not effect.same_sign]
         signs = f"sign differs for {', '.join(opposite)}" if opposite else "all with our sign"
-        return (
-            f"{self.response}: our mean is {self.our_range[1] / self.their_range[1]:.2f} of theirs; of their "
-            f"{len(shown)} significant linear effects, {signs}; rank correlation {self.rank_correlation:+.2f}."
-        )
+        level = f"our mean is {self.our_range[1] / self.their_range[1]:.2f} of theirs"
+        effects = f"of their {len(shown)} significant linear effects, {signs}"
+        return f"{self.response}: {level}; {effects}; rank correlation {self.rank_correlation:+.2f}."
 
 
 def reference_runs(study: Study) -> Runs | None:
@@ -59,9 +58,8 @@ def reference_runs(study: Study) -> Runs | None:
     for point in design_points(study):
         distance = [float(np.abs(table.coded[row] - point).max()) for row in left]
         if not distance or min(distance) > 0.02:
-            raise InputError(
-                [f"{path}: no run left for the design point {point.round(3).tolist()} (coded); mend the reference"]
-            )
+            place = f"the design point {point.round(3).tolist()} (coded)"
+            raise InputError([f"{path}: no run left for {place}; mend the reference"])
         order.append(left.pop(int(np.argmin(distance))))
     return Runs(table.coded[order], table.actual[order], table.values[order], table.errors[order])
 
@@ -70,6 +68,7 @@ def beside(study: Study, ours: Runs, theirs: Runs) -> list[Beside]:
     """Every response of both, with the linear effects on the surfaces through either."""
     assert study.file.reference is not None
     surfaces = zip(fit_surfaces(study, ours), fit_surfaces(study, theirs), strict=True)
+    lettered = dict(zip(study.factors, ascii_uppercase, strict=False))
     rows = []
     for index, (name, pair) in enumerate(zip(study.responses, surfaces, strict=True)):
         our_values, their_values = ours.values[:, index], theirs.values[:, index]
@@ -78,10 +77,7 @@ def beside(study: Study, ours: Runs, theirs: Runs) -> list[Beside]:
                 response=name,
                 our_range=(our_values.min(), our_values.mean(), our_values.max()),
                 their_range=(their_values.min(), their_values.mean(), their_values.max()),
-                effects={
-                    factor: _effect(*pair, letter)
-                    for factor, letter in zip(study.factors, ascii_uppercase, strict=False)
-                },
+                effects={name: _effect(*pair, letter) for name, letter in lettered.items()},
                 rank_correlation=float(spearmanr(our_values, their_values).statistic),
                 why=study.file.reference.why.get(name, ""),
             )
@@ -90,8 +86,6 @@ def beside(study: Study, ours: Runs, theirs: Runs) -> list[Beside]:
 
 
 def _effect(ours: Surface, theirs: Surface, letter: str) -> Effect:
-    values = [
-        dict(zip(each.terms, each.coefficients.tolist(), strict=True)).get(letter, 0.0) for each in (ours, theirs)
-    ]
+    values = [each.by_term.get(letter, 0.0) for each in (ours, theirs)]
     p = [{row["source"]: row["p"] for row in each.anova}.get(letter) for each in (ours, theirs)]
-    return Effect(*values, *(each is not None and each < 0.05 for each in p))
+    return Effect(values[0], values[1], *(each is not None and each < 0.05 for each in p))

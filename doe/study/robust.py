@@ -163,9 +163,9 @@ def _simulated(
 
 def _case(study: Study) -> Case:
     """The study's scene with what is not known of it; factors are known."""
-    path = study.beside(study.file.scene.file)
+    path = study.beside(study.scene.file)
     data = clearance.read_scene(study)
-    for override in study.file.scene.set:
+    for override in study.scene.set:
         set_key(data, override)
     fixed = frozenset(factor.key for factor in study.file.factor)
     return case_of(str(path), data, study.responses, study.file.uncertain, fixed)

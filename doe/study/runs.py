@@ -76,13 +76,9 @@ def ordered_runs(study: Study) -> Ordered:
     clearance.check_responses(study)
     design = design_of(study)
     actual = study.actual(design.coded)
-    return Ordered(
-        design,
-        actual,
-        clearance.design_scenes(study, actual, design.order.tolist()),
-        [f"design run {run}" for run in range(1, len(actual) + 1)],
-        [study.by_factor(point) for point in actual],
-    )
+    scenes = clearance.design_scenes(study, actual, design.order.tolist())
+    labels = [f"design run {run}" for run in range(1, len(actual) + 1)]
+    return Ordered(design, actual, scenes, labels, [study.by_factor(point) for point in actual])
 
 
 def run_design(
@@ -106,25 +102,21 @@ def run_design(
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
     if failures and len(left) < (needed := fewest_runs(study, design)):
-        raise RunError(
-            f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}: "
-            f"{sentence(failures)}"
-        )
-    found = [result for result in results if not isinstance(result, Failure)]
-    notes = _each_once(note for result in found for note in result.notes)
+        few = f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}"
+        raise RunError(f"{few}: {sentence(failures)}")
+    sound = [result for result in results if not isinstance(result, Failure)]
+    notes = _each_once(note for result in sound for note in result.notes)
     if failures:
         notes.append(f"{len(failures)} design runs failed and are left out: {sentence(failures)}")
-    values, errors, independent = clearance.responses(study, found)
+    values, errors, independent = clearance.responses(study, sound)
     block = np.array(design.block_numbers)[left] if design.blocks > 1 else None
     return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)
 
 
 def _each_once(notes: Iterable[str]) -> list[str]:
     """Notes of all runs; of those that differ in their numbers only the first, and how many there are."""
-    return [
-        group[0] if len(set(group)) == 1 else f"{group[0]} (so or similarly {len(group)} runs)"
-        for group in alike(notes, str)
-    ]
+    told = ((group, len(set(group)) == 1) for group in alike(notes, str))
+    return [group[0] if same else f"{group[0]} (so or similarly {len(group)} runs)" for group, same in told]
 
 
 def fewest_runs(study: Study, design: Design) -> int:

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from doe import clearance
+from doe.running.at_work import folders_of
 from doe.running.failure import Failure, grouped
 from doe.running.store import Claim, EndedRun, Point, Store
 from doe.study.runs import STORE, ordered_runs
 from doe.study_file import Study
+from rbdyn.faults import InputError
 
 FORMAT = "doe.status/1"
 
@@ -23,6 +25,15 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
         return _record(study, folder, points, {}, [], [])
     with Store(folder / STORE, read_only=True) as store:
         return _record(study, folder, points, store.outcomes(points, clearance.sound), store.claims(), store.ended())
+
+
+def folder_of(study: Study) -> Path:
+    """Folder in which the study runs, or its usual one while it does not. Raises InputError where it runs in several."""
+    running = folders_of(study.path)
+    if len(running) > 1:
+        folders = " and in ".join(map(str, running))
+        raise InputError([f"{study.path}: runs in {folders}; name one of them by --out"])
+    return running[0] if running else Path(f"{study.path.stem}_results")
 
 
 def _record(

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy import special
@@ -10,6 +11,7 @@ from doe.arrays import Array, Whole
 from doe.response_surface import Surface, fit, model_matrix
 from doe.study.runs import Runs
 from doe.study_file import Study
+from doe.study_file.study import Fitted
 from rbdyn.faults import refuse
 
 
@@ -18,24 +20,12 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
     surfaces, faults = [], []
     number = independent_values(runs)
     errors = standard_errors(runs.errors, number)
+    units: dict[str, Any] = {"centre": study.centre, "step": study.step, "block": runs.block}
     columns = zip(study.file.response, runs.values.T, errors.T, number.T, strict=True)
     for response, values, error, behind in columns:
+        asked = response.model_dump(include={"name", *Fitted.model_fields}) | units
         try:
-            surfaces.append(
-                fit(
-                    runs.coded,
-                    values,
-                    name=response.name,
-                    model=response.model,
-                    centre=study.centre,
-                    step=study.step,
-                    standard_errors=error,
-                    replicates=behind,
-                    weighting=response.weighting,
-                    block=runs.block,
-                    transform=response.transform,
-                )
-            )
+            surfaces.append(fit(runs.coded, values, standard_errors=error, replicates=behind, **asked))
         except ValueError as error_of_fit:
             faults.append(f"{study.path}: {error_of_fit}")
     refuse(faults)
@@ -53,17 +43,11 @@ def with_rivals(surfaces: Sequence[Surface], seed: int = 1) -> list[Surface]:
 def _with_rival(surface: Surface, seed: int) -> Surface:
     from doe.response_surface.comparison import compare
 
-    data = surface.data
+    data, matrix = surface.data, model_matrix(surface.data.points, surface.terms)
+    errors = data.standard_errors if surface.weighting == "replicates" else None
+    named: dict[str, Any] = {"name": surface.name, "seed": seed}
     try:
-        rival = compare(
-            data.points,
-            data.values,
-            surface.refit,
-            name=surface.name,
-            matrix=model_matrix(data.points, surface.terms),
-            standard_errors=data.standard_errors if surface.weighting == "replicates" else None,
-            seed=seed,
-        )
+        rival = compare(data.points, data.values, surface.refit, matrix=matrix, standard_errors=errors, **named)
     except ValueError:
         return surface
     return replace(surface, rival=rival)

@@ -33,9 +33,10 @@ from doe.study.runs import STORE, Runs, run_design
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
 from doe.study_file import Study
+from rbdyn.records.words import html_table, improvement, label, quantity, shown, with_error
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StudyResult:
     """Everything a report needs.
 
@@ -65,6 +66,23 @@ class StudyResult:
     failures: tuple[Failure, ...]
     notes: tuple[str, ...]
     cost: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        told = [
+            f"{quantity(gain.response)[0]} {improvement(gain.percent, gain.error, gain.goal)}"
+            for gain in self.gains["pick"]
+        ]
+        return f"<StudyResult: {', '.join([*told, *([self.limits_sentence] if self.limits_sentence else [])])}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: factors and simulated responses of baseline and pick, and what the pick gains."""
+        places = zip(self.study.factors, self.baseline.point.tolist(), self.pick.point.tolist(), strict=True)
+        rows = [(label(name), shown(before), shown(after), "") for name, before, after in places]
+        both = [each for point in (self.baseline, self.pick) for each in (point.values.tolist(), point.error.tolist())]
+        gained = {each.response: improvement(each.percent, each.error, each.goal) for each in self.gains["pick"]}
+        for name, value, error, new, new_error in zip(self.study.responses, *both, strict=True):
+            rows.append((label(name), with_error(value, error), with_error(new, new_error), gained.get(name, "")))
+        return html_table("study: values ± 95 %, simulated", ("", "baseline", "pick", "change"), rows)
 
     @property
     def baseline(self) -> Confirmed:
@@ -133,12 +151,12 @@ def run_study(
         clock.lap("robust_s")
     pick = confirmed["pick"].point
     local = None if searched is None else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])
-    tolerances = (
-        None if study.file.tolerances is None else widest_of(study, surfaces, pick, study.file.tolerances, local)
-    )
+    wished = study.file.tolerances
+    tolerances = None if wished is None else widest_of(study, surfaces, pick, wished, local)
     chains, notes = solve_chains(study, pick, tolerances)
     if reference is not None:
         reference = reference.only(runs.places)
+    others = {name: each for name, each in confirmed.items() if name != "baseline"}
     lost = (*(() if searched is None else searched.failures), *(() if judged is None else judged.failures))
     return StudyResult(
         study=study,
@@ -153,9 +171,7 @@ def run_study(
         edge=edge,
         tried=chosen.tried,
         confirmed=confirmed,
-        gains={
-            name: gains(study, confirmed["baseline"], each) for name, each in confirmed.items() if name != "baseline"
-        },
+        gains={name: gains(study, confirmed["baseline"], each) for name, each in others.items()},
         tolerances=tolerances,
         chains=chains,
         beside=[] if reference is None else beside(study, runs, reference),

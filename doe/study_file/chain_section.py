@@ -47,9 +47,8 @@ def chain_table(chain: StudyChain, folder: Path, value: float, half_width: float
     """
     half = chain.half_width_mm if chain.half_width_mm is not None else half_width
     if half is None:
-        raise InputError(
-            [f"chain {chain.name}: half_width_mm: missing, and no tolerance of {chain.factor} is known; add it"]
-        )
+        why = f"missing, and no tolerance of {chain.factor} is known; add it"
+        raise InputError([f"chain {chain.name}: half_width_mm: {why}"])
     limits = {"lower_mm": value - half, "upper_mm": value + half}
     if chain.file is not None:
         named = _of_file(chain.name, folder / chain.file)

@@ -18,8 +18,8 @@ class Factor(Strict):
 
     name: Name
     """Name of the factor in tables and messages."""
-    key: Annotated[str, Field(min_length=3)]
-    """Its key in the scene, such as cage.pocket_clearance_mm."""
+    key: Annotated[str, Field(min_length=3)] = ""
+    """Its key in the scene, such as cage.pocket_clearance_mm; needed beside [scene]."""
     centre: Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
     """Value at coded 0."""
     step: Positive
@@ -35,9 +35,8 @@ class Factor(Strict):
         if self.step < FINEST * abs(self.centre):
             faults.append(f"step = {self.step:g}: is lost in rounding beside centre = {self.centre:g}; widen it")
         if self.resolution is not None and self.resolution < FINEST * self.step:
-            faults.append(
-                f"resolution = {self.resolution:g}: makes more than {1.0 / FINEST:g} steps of step = {self.step:g}; coarsen it"
-            )
+            steps = f"makes more than {1.0 / FINEST:g} steps of step = {self.step:g}"
+            faults.append(f"resolution = {self.resolution:g}: {steps}; coarsen it")
         return or_refuse(self, faults)
 
 
@@ -87,12 +86,9 @@ class Design(Strict):
 
     @model_validator(mode="after")
     def _keys_belong_to_the_kind(self) -> Self:
-        alien = set().union(*KEYS_OF.values()) - KEYS_OF[self.kind]
-        faults = [
-            f"{key}: kind = {self.kind!r} has no such key; remove it or choose another kind"
-            for key in type(self).model_fields
-            if key in alien & self.model_fields_set
-        ]
+        alien = self.model_fields_set & set().union(*KEYS_OF.values()) - KEYS_OF[self.kind]
+        mend = f"kind = {self.kind!r} has no such key; remove it or choose another kind"
+        faults = [f"{key}: {mend}" for key in type(self).model_fields if key in alien]
         if self.cube_blocks > 1 and not self.blocks:
             faults.append(f"cube_blocks = {self.cube_blocks}: needs blocks; write blocks = true beside it")
         return or_refuse(self, faults)

@@ -94,9 +94,8 @@ class Direct(Strict):
     @model_validator(mode="after")
     def _something_is_counted(self) -> Self:
         if self.turns is not None and (self.discard_turns or 0.0) >= self.turns:
-            raise ValueError(
-                f"discard_turns = {self.discard_turns:g}: must be below turns = {self.turns:g}; discard fewer"
-            )
+            below = f"must be below turns = {self.turns:g}"
+            raise ValueError(f"discard_turns = {self.discard_turns:g}: {below}; discard fewer")
         return self
 
 

@@ -9,12 +9,12 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from doe.arrays import Array
-from doe.designs.coding import to_actual, to_coded
+from doe.designs.design import to_actual, to_coded
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Design, Factor, Name
 from doe.study_file.front_section import Direct, Front, Goal, Robust, Tolerances
 from doe.study_file.table import COUNT, LABELS, Table, read_table
-from rbdyn.faults import Strict, read_toml, validated
+from rbdyn.faults import InputError, Strict, read_toml, validated
 from rbdyn.fields import or_refuse
 from rbdyn.scene.uncertain import Uncertain
 
@@ -75,9 +75,9 @@ class Reference(Strict):
 class StudyFile(Strict):
     """The whole file."""
 
-    scene: SceneFile
-    """The scene that every run starts from."""
-    factor: Annotated[list[Factor], Field(min_length=2, max_length=8)]
+    scene: SceneFile | None = None
+    """The scene that every run starts from; none where all runs come from a table."""
+    factor: Annotated[list[Factor], Field(min_length=1, max_length=8)]
     """The factors."""
     response: Annotated[list[Response], Field(min_length=1)]
     """The responses."""
@@ -105,10 +105,14 @@ class StudyFile(Strict):
     @model_validator(mode="after")
     def _names_agree(self) -> Self:
         names, responses = [factor.name for factor in self.factor], [response.name for response in self.response]
+        keys = [factor.key for factor in self.factor if factor.key]
         faults = []
+        if self.scene is not None:
+            faults += [f"factor[{n}].key: missing; add it" for n, one in enumerate(self.factor, 1) if not one.key]
+            faults += ["factor: one is too few to simulate; add another"] * (len(names) == 1)
         for kind, given in (
             ("factor.name", names),
-            ("factor.key", [factor.key for factor in self.factor]),
+            ("factor.key", keys),
             ("response.name", responses),
             ("chain.name", [chain.name for chain in self.chain]),
         ):
@@ -140,6 +144,17 @@ class Study:
         """Read STUDY.toml. Raises InputError with all faults at once."""
         path = Path(path)
         return cls(path, validated(StudyFile, read_toml(path), str(path)))
+
+    @property
+    def scene(self) -> SceneFile:
+        """Scene of the runs. Raises InputError for a study that has none."""
+        if self.file.scene is None:
+            raise InputError(
+                [
+                    f"{self.path}: scene: missing; add [scene] with its file, or give fit or front the runs by --data TABLE.csv"
+                ]
+            )
+        return self.file.scene
 
     @property
     def factors(self) -> list[str]:
@@ -180,10 +195,9 @@ class Study:
 
     def rounded(self, point: Array) -> Array:
         """A point with every factor at its resolution."""
-        values = [
-            x if factor.resolution is None else round(round(x / factor.resolution) * factor.resolution, 12)
-            for factor, x in zip(self.file.factor, point.tolist(), strict=True)
-        ]
+        values = []
+        for fine, x in zip((factor.resolution for factor in self.file.factor), point.tolist(), strict=True):
+            values.append(x if fine is None else round(round(x / fine) * fine, 12))
         return np.array(values)
 
     def beside(self, name: str) -> Path:

@@ -5,7 +5,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,7 +48,8 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     header, rows = _fields(path)
     wanted, errors = [*factors, *responses], [f"{name}_error" for name in responses]
     faults = [
-        f"{path}: column {_cut(name)} is missing; add it, or rename the factor or response in {named_in}"
+        f"{path}: column {_cut(name)} is missing; add it, or rename the factor or response in {named_in} to one of "
+        f"{listed(header)}"
         for name in wanted
         if name not in header
     ]
@@ -71,6 +72,19 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     )
 
 
+def columns_of(path: Path) -> dict[str, bool]:
+    """Names of the columns of a table, and whether all in it are numbers. Raises InputError."""
+    header, rows = _fields(path)
+    return {
+        name: all(NUMBER.fullmatch(row[place].strip()) for row in rows) for place, name in enumerate(header) if name
+    }
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names of columns for a message."""
+    return ", ".join(one_line(name, LONGEST_NAME) for name in names)
+
+
 def _fields(path: Path) -> tuple[list[str], list[list[str]]]:
     """Names in the header and fields of the rows, as many in each; blank lines are none. Raises InputError."""
     lines = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
@@ -88,11 +102,8 @@ def _fields(path: Path) -> tuple[list[str], list[list[str]]]:
     header, rows = [name.strip() for name in found[0]], found[1:]
     if len(header) == 1 and (marks := [mark for mark in ";\t|" if mark in header[0]]):
         raise InputError([f"{path}: has {marks[0]!r} between its fields; write commas there and points in numbers"])
-    faults = [
-        f"{path}: column {_cut(name)} comes {count} times; keep one"
-        for name, count in Counter(header).items()
-        if count > 1 and name
-    ]
+    several = {name: count for name, count in Counter(header).items() if count > 1 and name}
+    faults = [f"{path}: column {_cut(name)} comes {count} times; keep one" for name, count in several.items()]
     if not rows:
         faults.append(f"{path}: has a header and no rows; add a row a run")
     for number, row in enumerate(rows, 1):

@@ -2,7 +2,7 @@
 
 Studies, each a module with ``study(scene, progress) -> Report``; the command ``rbdyn accuracy`` runs them by name:
 ``rollers`` in time, ``balls`` in equilibrium. ``choice``: which study a command line means; ``judgement``: what errors
-allow to conclude; ``report``: tables, files.
+allow to conclude; ``report``: tables, files; ``page``: the parts of ``measured.toml`` on the shipped examples, as one page.
 
 A reference is a much tighter run that two methods agree on; an error and a time come from separate runs, the first
 call never counts; what fails stays in the table. From Python::
@@ -16,8 +16,6 @@ call never counts; what fails stays in the table. From Python::
 
 Names are fetched when first used: importing the package loads neither numba nor scipy.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
@@ -53,8 +51,8 @@ _HOMES = {
 
 
 def study(
-    name: str, scene: Scene | BallScene, progress: Callable[[int, int], None] | None = None, **options: Any
-) -> Report:
+    name: str, scene: "Scene | BallScene", progress: Callable[[int, int], None] | None = None, **options: Any
+) -> "Report":
     """Run the study ``name`` of ``STUDIES``; ``progress(done, total)`` is called as it goes on.
 
     Raises KeyError for an unknown name, InputError where the scene has nothing to study, RunError, KeyboardInterrupt.

@@ -45,8 +45,8 @@ def judged(value: float, error: float, sought: float = SOUGHT) -> Verdict:
 
 def overall(verdicts: Iterable[Verdict]) -> Verdict:
     """That of several differences at once: one beyond settles it, one undecided leaves it open."""
-    found = set(verdicts)
-    return "beyond" if "beyond" in found else "undecided" if "undecided" in found else "within"
+    given = set(verdicts)
+    return "beyond" if "beyond" in given else "undecided" if "undecided" in given else "within"
 
 
 def check_replicates(scene: Scene) -> None:

@@ -91,6 +91,20 @@ def record(form: str, **parts: Any) -> dict[str, Any]:
     return {"format": form, "status": "ok", **parts, "machine": processor(), "versions": versions()}
 
 
+def reported(
+    stem: str,
+    tables: Sequence[Table],
+    sentences: Sequence[str],
+    sheet: Sequence[Mapping[str, Any]],
+    draw: Callable[[Path], None] | None = None,
+    form: str = "",
+    **parts: Any,
+) -> Report:
+    """A study of one sheet and at most one picture, which have its name as its format has; ``parts`` of its record."""
+    pictures = {} if draw is None else {stem: draw}
+    return Report(stem, record(form or f"rbdyn.{stem}/1", **parts), tables, sentences, {stem: sheet}, pictures)
+
+
 def write(report: Report, folder: Path) -> list[str]:
     """Write the record, the sheets and the pictures; returns the file names."""
     import pandas as pd

@@ -2,6 +2,7 @@
 
 - ``app``: simulate, map, accuracy, show; ``ball``: the command of ball bearings, its output (``ball_output``), studies
   (``ball_studies``) and sweeps (``ball_sweep``); ``keys``: what every key of an input file means
+- ``manual``: keys, commands, equations and the prose between them as one page
 - ``new``: a scene of a catalogue bearing, from ``new_scene`` and a ``template``
 - ``options``, ``ranges``: arguments that several commands share, lists of numbers as they are typed
 - ``terminal``: exit codes, messages, output folders, progress, for ``doe`` too; ``streams``, ``loading``: streams that

@@ -1,6 +1,4 @@
-"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball``, ``new`` and ``keys`` stand beside."""
-
-from __future__ import annotations
+"""The command ``rbdyn``: simulate, map, accuracy and show; ``ball``, ``new``, ``keys`` and ``manual`` stand beside."""
 
 import sys
 from pathlib import Path
@@ -10,6 +8,7 @@ import typer
 
 from rbdyn.cli.ball import ball
 from rbdyn.cli.keys import command as keys
+from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
 from rbdyn.cli.options import (
     Json,
@@ -27,9 +26,19 @@ from rbdyn.cli.options import (
     flag,
     folder_option,
     study_flag,
+    valued,
     verbose_flag,
 )
-from rbdyn.cli.terminal import FAILED, guarded, hand_over, keeping, output_folder, print_table, progress_bar
+from rbdyn.cli.terminal import (
+    FAILED,
+    guarded,
+    hand_over,
+    keeping,
+    output_folder,
+    print_notes,
+    print_table,
+    progress_bar,
+)
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -44,6 +53,7 @@ TRACE_TURNS = 10.0
 app.command()(ball)
 app.command("keys")(keys)
 app.command()(new)
+app.command()(manual)
 
 
 @app.callback()
@@ -61,9 +71,10 @@ def simulate(
     workers: Workers = None,
     target: Annotated[
         str | None,
-        typer.Option(
-            metavar="2%",
-            help="Choose tolerance, turns and replicates so that impact, whirl and loss are known to this.",
+        valued(
+            "2%",
+            "Choose tolerance, turns and replicates so that impact, whirl and loss are known to this.",
+            "those given",
         ),
     ] = None,
     out: Out = None,
@@ -87,25 +98,28 @@ def simulate(
 
 @app.command()
 def accuracy(
-    scene: SceneFile,
+    scene: Annotated[Path | None, typer.Argument(metavar="SCENE.toml", help="Scene to study.")] = None,
     assignments: Set = None,
     out: Annotated[Path | None, folder_option("Write the study as JSON, CSV and pictures here.")] = None,
     methods: Annotated[bool, study_flag("--methods", "Other integrators beside ours")] = False,
     slices: Annotated[bool, study_flag("--slices", "Slices of a profiled roller")] = False,
     replicates: Annotated[bool, study_flag("--replicates", "Statistical error against run time")] = False,
     coverage: Annotated[bool, study_flag("--coverage", "How often the stated intervals hold the truth")] = False,
-    repeats: Annotated[int | None, count_option(2, "Repeats of the coverage; 200 unless given.")] = None,
+    repeats: Annotated[int | None, count_option(2, "Repeats of the coverage.", 200)] = None,
     options: Annotated[bool, study_flag("--options", "What each option costs")] = False,
     stability: Annotated[bool, study_flag("--stability", "How stiff and extreme variants of the scene end")] = False,
     scaling: Annotated[bool, study_flag("--scaling", "Time by rollers and slices, memory by turns")] = False,
     battery: Annotated[bool, study_flag("--battery", "Solvers over thousands of random ball bearings")] = False,
-    scenes: Annotated[int | None, count_option(1, "Scenes of the battery; 5000 unless given.")] = None,
-    trajectory: Annotated[
-        float | None, typer.Option(metavar="TURNS", help="Length of the trajectories, up to 1 turn; by default 0.25.")
-    ] = None,
+    scenes: Annotated[int | None, count_option(1, "Scenes of the battery.", 5000)] = None,
+    trajectory: Annotated[float | None, valued("TURNS", "Length of the trajectories, up to 1 turn.", "0.25")] = None,
     sought: Annotated[
-        float | None,
-        typer.Option("--sought-percent", min=0.01, max=50.0, help="Bias of an output that counts; by default 1 %."),
+        float | None, valued("%", "Bias of an output that counts.", "1", "--sought-percent", min=0.01, max=50.0)
+    ] = None,
+    page: Annotated[
+        Path | None, valued("FILE", "Measure the shipped examples and write one page of Markdown.", "no page")
+    ] = None,
+    part: Annotated[
+        list[str] | None, valued("NAME", "With --page, run this part only; repeatable.", "all parts")
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -121,9 +135,13 @@ def accuracy(
             **{"methods": methods, "slices": slices, "replicates": replicates, "coverage": coverage},
             **{"options": options, "stability": stability, "scaling": scaling, "battery": battery},
         }
-        loaded = Scene.load(scene, assignments or [])
         typed = {"turns": trajectory, "scenes": scenes, "repeats": repeats, "sought": sought}
         limits = {key: value for key, value in typed.items() if value is not None}
+        if scene is None or page or part:
+            others = bool(scene or assignments or out or limits or any(flags.values()))
+            _measure(page, part or [], others, as_json, quiet)
+            return
+        loaded = Scene.load(scene, assignments or [])
         name = chosen_study(flags, limits, loaded)
         if "sought" in limits:
             limits["sought"] *= 0.01
@@ -136,24 +154,24 @@ def accuracy(
         raise typer.Exit(FAILED)
 
 
-def _print_map(found: SlipMap) -> None:
-    header = ("load [N]", *(f"{value:g} rpm" for value in found.speeds_rpm))
+def _print_map(mapped: "SlipMap") -> None:
+    header = ("load [N]", *(f"{value:g} rpm" for value in mapped.speeds_rpm))
     rows = [
         (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
-        for value, row in zip(found.loads_N, found.grid("cage_slip"), strict=True)
+        for value, row in zip(mapped.loads_N, mapped.grid("cage_slip"), strict=True)
     ]
     print_table("cage slip", header, rows)
-    print(f"{len(found.points)} points in {found.wall_s:.1f} s, seed {found.seed}")
+    print(f"{len(mapped.points)} points in {mapped.wall_s:.1f} s, seed {mapped.seed}")
 
 
-def _write_map(found: SlipMap, folder: Path) -> list[str]:
+def _write_map(mapped: "SlipMap", folder: Path) -> list[str]:
     """Write map.json, map.csv and map.png; returns the file names."""
     from rbdyn.plots.slip_map import draw
     from rbdyn.result import write_json
 
-    write_json(folder / "map.json", found.as_dict())
-    found.table().to_csv(folder / "map.csv", index=False)
-    draw(found, folder / "map.png")
+    write_json(folder / "map.json", mapped.as_dict())
+    mapped.table().to_csv(folder / "map.csv", index=False)
+    draw(mapped, folder / "map.png")
     return ["map.json", "map.csv", "map.png"]
 
 
@@ -183,16 +201,16 @@ def slip_map(
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
         points = folder / study.POINTS if folder else None
         with keeping(points), progress_bar("mapping", quiet or as_json) as progress:
-            found = study.slip_map(loaded, *axes, workers, progress, points)
-        files = _write_map(found, folder) if folder else []
-        hand_over(found.as_dict, as_json, lambda: _print_map(found), folder, files)
-        for point in found.failed:
+            mapped = study.slip_map(loaded, *axes, workers, progress, points)
+        files = _write_map(mapped, folder) if folder else []
+        hand_over(mapped.as_dict, as_json, lambda: _print_map(mapped), folder, files)
+        for point in mapped.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
-    if found.failed:
+    if mapped.failed:
         raise typer.Exit(FAILED)
 
 
-def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> Scene:
+def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> "Scene":
     """Scene of a roller bearing, with keys of [numerics] that have options of their own. Raises InputError for any other."""
     from rbdyn.scene import Scene, rollers_only
 
@@ -210,7 +228,28 @@ def _aim(target: str, turns: float | None, replicates: int | None) -> float:
     return target_of(target)
 
 
-def _write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
+def _measure(page: Path | None, parts: list[str], others: bool, as_json: bool, quiet: bool) -> None:
+    """Write the page of measured figures. Raises InputError where it is not named, or something else is asked for too."""
+    from rbdyn.accuracy.page import measure
+    from rbdyn.faults import InputError
+
+    if page is None:
+        known = "goes with --page FILE only" if parts else "is missing; name the scene to study, or --page FILE"
+        raise InputError([f"{'--part' if parts else 'SCENE.toml'}: {known}"])
+    if others:
+        raise InputError([f"--page {page}: lists its own commands; leave out the scene and all options but --part"])
+    found = measure(page, parts, lambda name: progress_bar(name, quiet or as_json))
+    failed = {name: each["status"] for name, each in found.items() if each["status"] not in ("ok", "kept")}
+    record = {"status": "failed" if failed else "ok", "page": str(page), "parts": found}
+    measured = [name for name, each in found.items() if each["status"] == "ok"]
+    hand_over(lambda: record, as_json, lambda: print(f"written to {page}: measured {', '.join(measured) or 'nothing'}"))
+    for name, status in failed.items():
+        print(f"{name} {status}", file=sys.stderr)
+    if failed:
+        raise typer.Exit(FAILED)
+
+
+def _write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str]:
     from rbdyn import plots
     from rbdyn.dynamics.motion.history import history, most_turns
 
@@ -224,7 +263,7 @@ def _write(scene: Scene, result: SimulationResult, folder: Path) -> list[str]:
     return ["result.json", "history.csv", "cage_orbit.png", "pocket_forces.png"]
 
 
-def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
+def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
     def shown(error: float | None) -> str:
         return "not estimated" if error is None else f"± {error:.2g}"
 
@@ -237,16 +276,19 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
         "cage speed [rpm]": result.cage_speed_rpm,
         "cage slip": result.cage_slip,
     }
-    header = ["figure", "value", "statistical error (95 %)", "numerical error (95 %)"]
+    header = ("figure", "value", "statistical error (95 %)", "numerical error (95 %)", "effective samples")
     rows = [
-        [label, f"{figure.value:.5g}", shown(figure.statistical_error), shown(figure.numerical_error)]
-        for label, figure in figures.items()
+        (
+            label,
+            f"{of.value:.5g}",
+            shown(of.statistical_error),
+            shown(of.numerical_error),
+            f"{of.effective_samples:.0f}",
+        )
+        for label, of in figures.items()
     ]
-    if verbose:
-        header.append("effective samples")
-        for row, figure in zip(rows, figures.values(), strict=True):
-            row.append(f"{figure.effective_samples:.0f}")
-    print_table("", header, rows)
+    columns = len(header) if verbose else -1
+    print_table("", header[:columns], [row[:columns] for row in rows])
     if result.target is not None:
         _print_target(result.target)
     print(
@@ -270,9 +312,7 @@ def _print(result: SimulationResult, quiet: bool, verbose: bool) -> None:
         gap = result.power_gap * result.power_loss.value
         print_table(f"power lost, each to ± {gap:.2g} W (gap of the power balance)", ("term", "W"), terms)
         print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
-    if not quiet:
-        for note in result.notes:
-            print(f"note: {note}")
+    print_notes(result.notes, quiet)
 
 
 def _print_target(target: dict[str, Any]) -> None:
@@ -292,8 +332,8 @@ def _print_target(target: dict[str, Any]) -> None:
 @app.command()
 def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
-    out: Annotated[Path | None, folder_option("Write here; by default in 'show' beside the result.")] = None,
-    turns: Annotated[float | None, typer.Option(help="Counted shaft turns to show; at most 20 unless given.")] = None,
+    out: Annotated[Path | None, folder_option("Write here.", "'show' beside the result")] = None,
+    turns: Annotated[float | None, valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
     replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, flag("--animate", says="Also a moving picture and a player.")] = False,
     lyapunov: Annotated[bool, flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,

@@ -1,13 +1,23 @@
 """The command ``rbdyn ball``. Physics is imported inside it, so that help comes at once."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rbdyn.cli.options import Json, Quiet, SceneFile, Set, folder_option, verbose_flag
+from rbdyn.cli.options import Json, Quiet, SceneFile, Set, folder_option, valued, verbose_flag
 from rbdyn.cli.terminal import FAILED, guarded, hand_over, output_folder
 from rbdyn.faults import InputError
+
+if TYPE_CHECKING:
+    from rbdyn.scene import BallScene
+
+VALUES, UNASKED = "start:stop:count or a,b,c", "the equilibrium alone"
+
+
+def study_option(metavar: str, says: str) -> Any:
+    """An option that asks for a study instead of the equilibrium."""
+    return valued(metavar, f"{says}, instead.", UNASKED)
 
 
 def ball(
@@ -15,27 +25,20 @@ def ball(
     assignments: Set = None,
     sweeps: Annotated[
         list[str] | None,
-        typer.Option(
-            "--sweep",
-            metavar="KEY=VALUES",
-            help="Sweep a number of the scene, start:stop:count or a,b,c; repeatable for a grid.",
-        ),
+        valued("KEY=VALUES", f"Sweep a number of the scene, {VALUES}; repeatable for a grid.", "one point", "--sweep"),
     ] = None,
-    preload: Annotated[
-        str | None,
-        typer.Option(metavar="N", help="Stress and life over axial preload, start:stop:count or a,b,c, instead."),
-    ] = None,
-    clearance: Annotated[
-        str | None, typer.Option(metavar="UM", help="The same over the diametral clearance, instead.")
-    ] = None,
-    wear: Annotated[
-        str | None, typer.Option(metavar="UM", help="The same over the diameter that balls lose, instead.")
-    ] = None,
+    preload: Annotated[str | None, study_option("N", f"Stress and life over axial preload, {VALUES}")] = None,
+    clearance: Annotated[str | None, study_option("UM", "The same over the diametral clearance")] = None,
+    wear: Annotated[str | None, study_option("UM", "The same over the diameter that balls lose")] = None,
     race_limits: Annotated[
-        str | None, typer.Option(metavar="CLASS", help="Race errors with which bearings meet P2, P4 or P5, instead.")
+        str | None, study_option("CLASS", "Race errors with which bearings meet P2, P4 or P5")
     ] = None,
     wanted: Annotated[
-        float | None, typer.Option("--yield", help="Share of bearings that must meet --race-limits; 0.95 if left out.")
+        float | None, valued("SHARE", "Share of bearings that must meet --race-limits.", "0.95", "--yield")
+    ] = None,
+    seed: Annotated[
+        int | None,
+        valued("N", "Seed of form errors, or of the lot of --race-limits.", "errors.seed; of the lot 1", min=0),
     ] = None,
     out: Annotated[Path | None, folder_option("Write the result as JSON here, with its tables and pictures.")] = None,
     as_json: Json = False,
@@ -47,13 +50,10 @@ def ball(
         from rbdyn.scene import Scene, balls_only
 
         loaded = balls_only(Scene.load(scene, assignments or []))
+        if seed is not None and race_limits is None:
+            loaded = _seeded(loaded, seed)
         studies = {"preload": preload, "clearance": clearance, "wear": wear, "race_limits": race_limits}
-        requested = {name: value for name, value in studies.items() if value is not None}
-        flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *requested)]
-        if len(flags) > 1:
-            raise InputError([f"{' and '.join(flags)}: are studies of their own; choose one"])
-        if wanted is not None and race_limits is None:
-            raise InputError([f"--yield {wanted:g}: is a share of --race-limits; add that or leave it out"])
+        requested = _requested(sweeps, wanted, studies)
         if sweeps:
             from rbdyn.cli.ball_sweep import run as run_sweep
 
@@ -62,7 +62,8 @@ def ball(
             from rbdyn.cli.ball_studies import run as run_study
 
             share = 0.95 if wanted is None else wanted
-            raise typer.Exit(run_study(loaded, name, value, share, out, scene, as_json, quiet))
+            draw = 1 if seed is None else seed
+            raise typer.Exit(run_study(loaded, name, value, share, draw, out, scene, as_json, quiet))
         folder = output_folder(out, "rbdyn ball", scene) if out else None
         from rbdyn.cli.ball_output import print_result, with_runout, write
         from rbdyn.quasistatic.bearing import equilibrium
@@ -72,3 +73,21 @@ def ball(
         hand_over(result.as_dict, as_json, lambda: print_result(result, quiet, verbose), folder, files)
     if not result.found:
         raise typer.Exit(FAILED)
+
+
+def _requested(sweeps: list[str] | None, wanted: float | None, studies: dict[str, str | None]) -> dict[str, str]:
+    """The study asked for, with its values. Raises InputError for two, and for a yield of none."""
+    requested = {name: value for name, value in studies.items() if value is not None}
+    flags = [f"--{name.replace('_', '-')}" for name in (*(["sweep"] if sweeps else []), *requested)]
+    if len(flags) > 1:
+        raise InputError([f"{' and '.join(flags)}: are studies of their own; choose one"])
+    if wanted is not None and studies["race_limits"] is None:
+        raise InputError([f"--yield {wanted:g}: is a share of --race-limits; add that or leave it out"])
+    return requested
+
+
+def _seeded(scene: "BallScene", seed: int) -> "BallScene":
+    """The scene with other draws of its form errors. Raises InputError where there are none."""
+    if scene.errors is None:
+        raise InputError([f"--seed {seed}: nothing is drawn here; it is for the table errors and --race-limits"])
+    return scene.changed({"errors.seed": seed})

@@ -1,13 +1,11 @@
 """What ``rbdyn ball`` prints and writes."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.cli.terminal import print_table
+from rbdyn.cli.terminal import print_notes, print_table
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
 from rbdyn.scene import BallScene
 
@@ -35,11 +33,10 @@ def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
             f"runout over {runout['turns']} turns: radial {runout['indicator_um']:.3g} um by an indicator, {runout['minimum_zone_um']:.3g} um "
             f"between circles, axial {runout['axial_um']:.3g} um, face {runout['face_um']:.3g} um; asynchronous {runout['asynchronous_radial_um']:.3g} um"
         )
-    for note in () if quiet else result.notes or ():
-        print(f"note: {note}")
+    print_notes(result.notes or (), quiet)
 
 
-def with_runout(scene: BallScene, result: BallResult) -> tuple[BallResult, pd.DataFrame | None]:
+def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.DataFrame | None]":
     """The result with the runout of its ring and the path it takes, where the scene has form errors."""
     if scene.errors is None or not result.found:
         return result, None
@@ -49,7 +46,7 @@ def with_runout(scene: BallScene, result: BallResult) -> tuple[BallResult, pd.Da
     return replace(result, runout=record), followed.table()
 
 
-def write(result: BallResult, folder: Path, path: pd.DataFrame | None = None) -> list[str]:
+def write(result: BallResult, folder: Path, path: "pd.DataFrame | None" = None) -> list[str]:
     """Write result.json, balls.csv, pictures and the ``path`` of a turning ring; returns the names of the files."""
     result.save(folder / "result.json")
     if not result.found:
@@ -71,17 +68,12 @@ def _print_row(title: str, row: RowReport, verbose: bool) -> None:
     rows = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in row.balls]
     print_table(title, header, rows)
     print(
-        "ring: "
-        + ", ".join(f"{axis} {1e3 * place[axis]:.4g} um" for axis in "xyz")
-        + ", "
-        + ", ".join(f"tilt {axis} {tilt[axis]:.4g} mrad" for axis in "xy")
+        f"ring (x along the radial load, z along the axis): {_place(place)}, {', '.join(f'tilt {axis} {tilt[axis]:.4g} mrad' for axis in 'xy')}"
     )
     for race, contact in row.contacts.items():
-        film = (
-            f", film {contact['central_film_um']:.3g} um, lambda {contact['lambda_ratio']:.2g}"
-            if "central_film_um" in contact
-            else ""
-        )
+        film = ""
+        if "central_film_um" in contact:
+            film = f", film {contact['central_film_um']:.3g} um, lambda {contact['lambda_ratio']:.2g}"
         print(
             f"{race} race: up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa over "
             f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} um{film}"
@@ -90,30 +82,28 @@ def _print_row(title: str, row: RowReport, verbose: bool) -> None:
     if life["L10_Mrev"] is not None:
         hours = f", {life['L10_h']:.4g} h" if life["L10_h"] is not None else ""
         print(f"life L10r: {life['L10_Mrev']:.4g} million turns{hours} ({life['method']})")
-    print("stiffness: " + ", ".join(f"{axis} {stiffness[f'{axis}_N_per_um']:.4g} N/um" for axis in "xyz"))
+    print(f"stiffness: {_diagonal(stiffness)}")
     if verbose:
-        print_table(
-            "stiffness [N/m, N, N m]",
-            ("", "x", "y", "z", "tilt x", "tilt y"),
-            [
-                (name, *(f"{value:.4g}" for value in values))
-                for name, values in zip(("x", "y", "z", "tilt x", "tilt y"), stiffness["matrix_SI"], strict=True)
-            ],
-        )
+        names = ("x", "y", "z", "tilt x", "tilt y")
+        lines = [[f"{value:.4g}" for value in values] for values in stiffness["matrix_SI"]]
+        print_table("stiffness [N/m, N, N m]", ("", *names), [(a, *b) for a, b in zip(names, lines, strict=True)])
         searches = "" if row.searches is None else f"{row.searches} searches, "
         print(f"{searches}{row.iterations} Newton steps, {row.residual_N:.2g} N left over")
 
 
+def _place(place: dict[str, float]) -> str:
+    return ", ".join(f"{axis} {1e3 * place[axis]:.4g} um" for axis in "xyz")
+
+
+def _diagonal(stiffness: dict[str, Any]) -> str:
+    return ", ".join(f"{axis} {stiffness[f'{axis}_N_per_um']:.4g} N/um" for axis in "xyz")
+
+
 def _print_middle_ring(report: DoubleDeckerReport) -> None:
-    middle, place, stiffness = report.middle_ring, report.displacement_mm, report.stiffness
+    middle = report.middle_ring
     share = "" if middle["speed_share"] is None else f", {100.0 * middle['speed_share']:.4g} % of the speed"
     print(f"middle ring: {middle['speed_rpm']:.5g} rpm{share} ({middle['speed_status']})")
-    print(
-        "both rows: "
-        + ", ".join(f"{axis} {1e3 * place[axis]:.4g} um" for axis in "xyz")
-        + "; stiffness "
-        + ", ".join(f"{axis} {stiffness[f'{axis}_N_per_um']:.4g} N/um" for axis in "xyz")
-    )
+    print(f"both rows: {_place(report.displacement_mm)}; stiffness {_diagonal(report.stiffness)}")
 
 
 def _print_fits(fits: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rbdyn.cli.ball_sweep import print_points
 from rbdyn.cli.ranges import axis_values
-from rbdyn.cli.terminal import hand_over, output_folder, print_table
+from rbdyn.cli.terminal import hand_over, output_folder, print_notes, print_table
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.remarks import remarks, tipping
@@ -17,7 +17,7 @@ from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.runout.classes import ToleranceClass, running_accuracy
 from rbdyn.quasistatic.runout.lots import Lot
 from rbdyn.quasistatic.runout.model import bench_of, follow_ring, single_row
-from rbdyn.quasistatic.runout.tolerance_design import RaceLimits, design
+from rbdyn.quasistatic.runout.tolerance_design import design
 from rbdyn.quasistatic.runout.turn import Followed
 from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
 from rbdyn.quasistatic.sweep.result import SweepResult
@@ -33,11 +33,7 @@ SWEPT = {
     "wear": (over_wear, "um", 1e-6),
 }
 # What its record tells of a point, by column of the table.
-SWEPT_FIGURES = {
-    "inner_stress_MPa": "inner_pressure_MPa",
-    "outer_stress_MPa": "outer_pressure_MPa",
-    "L10_Mrev": "L10_Mrev",
-}
+SWEPT_FIGURES = {f"{race}_stress_MPa": f"{race}_pressure_MPa" for race in ("inner", "outer")} | {"L10_Mrev": "L10_Mrev"}
 # Bearings of a lot that are solved in full to size the limits of race errors.
 SOLVED = 100
 
@@ -56,29 +52,27 @@ def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tupl
     """
     run, unit, si = SWEPT[swept]
     try:
-        found = run(_single(scene, swept), [si * value for value in values])
+        scan = run(_single(scene, swept), [si * value for value in values])
     except ValueError as error:
         raise InputError([f"--{swept}: {error}"]) from None
-    table = _table(scene, f"{swept}_{unit}", values, found)
+    table = _table(scene, f"{swept}_{unit}", values, scan)
     names = {"value": f"{swept}_{unit}", **SWEPT_FIGURES, "status": "status"}
     points = [{name: point[column] for name, column in names.items() if column in point} for point in table.points()]
     return {
         "swept": f"{swept}_{unit}",
         "points": points,
-        "least_stress": _best(found, "least_stress", si),
-        "longest_life": _best(found, "longest_life", si),
-        "notes": [*found.notes, *(f"{table.where(note['points'])}: {note['note']}" for note in table.notes)],
+        "least_stress": _best(scan, "least_stress", si),
+        "longest_life": _best(scan, "longest_life", si),
+        "notes": [*scan.notes, *(f"{table.where(note['points'])}: {note['note']}" for note in table.notes)],
     }, table
 
 
-def _table(scene: BallScene, key: str, values: Sequence[float], found: Sweep) -> SweepResult:
+def _table(scene: BallScene, key: str, values: Sequence[float], scan: Sweep) -> SweepResult:
     """Figures, balls and notes of the points scanned."""
-    points, places = found.points, np.arange(len(values))
+    points, places = scan.points, np.arange(len(values))
     solutions, ratings = [point.solution for point in points], [point.rating for point in points]
-    balls = np.array([solution.figures for solution in solutions])
-    displacement = np.array([solution.displacement for solution in solutions])
-    reaction = np.array([solution.reaction for solution in solutions])
-    stiffness = np.array([solution.stiffness for solution in solutions])
+    told_of = ("figures", "displacement", "reaction", "stiffness")
+    balls, displacement, reaction, stiffness = (np.array([getattr(s, of) for s in solutions]) for of in told_of)
     statuses = tuple(solution.status for solution in solutions)
     columns = ring_columns(displacement, reaction, stiffness) | row_columns(balls, ratings)
     for column in columns.values():
@@ -88,8 +82,8 @@ def _table(scene: BallScene, key: str, values: Sequence[float], found: Sweep) ->
     return SweepResult({key: tuple(values)}, columns, statuses, 0, 0.0, scene.model_dump(mode="json"), rows, notes)
 
 
-def _best(found: Sweep, which: str, si: float) -> dict[str, float]:
-    point = getattr(found, which)
+def _best(scan: Sweep, which: str, si: float) -> dict[str, float]:
+    point = getattr(scan, which)
     return {"value": point.value / si, "max_stress_MPa": 1e-6 * point.peak_pressure, "L10_Mrev": point.million_turns}
 
 
@@ -108,31 +102,22 @@ def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int
         allowed = running_accuracy(cast(ToleranceClass, tolerance_class), 1e-3 * row.bearing.bore_mm)
         if allowed.axial is None:
             raise ValueError(f"class {tolerance_class} sets no limit on axial runout; choose P2, P4 or P5")
-        found = design(
-            bench_of(row),
-            Lot(),
-            radial_limit=allowed.radial,
-            axial_limit=allowed.axial,
-            wanted=wanted,
-            seed=seed,
-            solved=SOLVED,
-        )
+        asked: dict[str, Any] = {"radial_limit": allowed.radial, "axial_limit": allowed.axial, "wanted": wanted}
+        limits = design(bench_of(row), Lot(), **asked, seed=seed, solved=SOLVED)
     except ValueError as error:
         raise InputError([f"--race-limits {tolerance_class}: {error}"]) from None
-    return {"class": tolerance_class, "wanted": wanted, **_limits(found)}
-
-
-def _limits(found: RaceLimits) -> dict[str, Any]:
     lengths = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "radial_limit", "axial_limit")
     return {
-        **{f"{name}_um": 1e6 * getattr(found, name) for name in lengths},
-        "yield": found.yielded,
-        "standard_error": found.standard_error,
-        "yield_in_proportion": found.proportional,
-        "homogenisation": {"radial": found.homogenisation[0], "axial": found.homogenisation[1]},
-        "bearings": found.bearings,
+        "class": tolerance_class,
+        "wanted": wanted,
+        **{f"{name}_um": 1e6 * getattr(limits, name) for name in lengths},
+        "yield": limits.yielded,
+        "standard_error": limits.standard_error,
+        "yield_in_proportion": limits.proportional,
+        "homogenisation": {"radial": limits.homogenisation[0], "axial": limits.homogenisation[1]},
+        "bearings": limits.bearings,
         "solved_in_full": SOLVED,
-        "seed": found.seed,
+        "seed": limits.seed,
     }
 
 
@@ -144,13 +129,21 @@ def _single(scene: BallScene, option: str) -> SingleRowScene:
 
 
 def run(
-    scene: BallScene, name: str, value: str, wanted: float, out: Path | None, source: Path, as_json: bool, quiet: bool
+    scene: BallScene,
+    name: str,
+    value: str,
+    wanted: float,
+    seed: int,
+    out: Path | None,
+    source: Path,
+    as_json: bool,
+    quiet: bool,
 ) -> int:
     """Carry out the study ``name`` over ``value``, print and write it; returns the exit code. Raises InputError."""
     folder, files = output_folder(out, "rbdyn ball", source) if out else None, [f"{name}.json"]
     table: SweepResult | None = None
     if name == "race_limits":
-        record = race_limits(scene, value, wanted)
+        record = race_limits(scene, value, wanted, seed)
     else:
         record, table = optimum_study(scene, name, axis_values(value, f"--{name}"))
     if folder:
@@ -172,8 +165,7 @@ def _print(record: dict[str, Any], table: SweepResult | None, quiet: bool) -> No
     for best, title in (("least_stress", "least stress"), ("longest_life", "longest life")):
         at = record[best]
         print(f"{title} at {at['value']:.4g}: {at['max_stress_MPa']:.0f} MPa, {at['L10_Mrev']:.4g} million turns")
-    for note in record["notes"] if not quiet else ():
-        print(f"note: {note}")
+    print_notes(record["notes"], quiet)
 
 
 def _print_limits(record: dict[str, Any]) -> None:

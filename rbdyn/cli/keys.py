@@ -214,11 +214,9 @@ def _values(node: Mapping[str, Any]) -> str:
 
 
 def _plural(values: str) -> str:
-    return re.sub(
-        "^(a list of |whole )?(number|text)",
-        lambda found: f"{(found[1] or '').replace('a list', 'lists')}{found[2]}s",
-        values,
-    )
+    if values.startswith("a list"):
+        return values.replace("a list", "lists", 1)
+    return re.sub("^(whole )?(number|text)", r"\1\2s", values)
 
 
 def _range(node: Mapping[str, Any]) -> str:
@@ -240,12 +238,12 @@ def _toml(value: Any) -> str:
 def command(word: Word = None, as_schema: AsSchema = False, as_json: Json = False) -> None:
     """Tell what every key of a scene means, its unit, range and default."""
     with guarded(as_json):
-        from rbdyn.scene import Scene
-        from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
+        run(kinds(), word, as_schema, as_json)
 
-        kinds: dict[str, type[BaseModel]] = {
-            "roller bearing": Scene,
-            "ball bearing": SingleRowScene,
-            "double-decker": DoubleDeckerScene,
-        }
-        run(kinds, word, as_schema, as_json)
+
+def kinds() -> dict[str, type[BaseModel]]:
+    """The kinds of scenes."""
+    from rbdyn.scene import Scene
+    from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
+
+    return {"roller bearing": Scene, "ball bearing": SingleRowScene, "double-decker": DoubleDeckerScene}

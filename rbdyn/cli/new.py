@@ -1,7 +1,5 @@
 """The command ``rbdyn new``. Physics is imported inside it, so that help comes at once."""
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib
@@ -10,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rbdyn.cli.options import Json
+from rbdyn.cli.options import Json, valued
 from rbdyn.cli.terminal import guarded, print_json
 from rbdyn.faults import InputError, one_line, refuse
 
@@ -18,6 +16,7 @@ if TYPE_CHECKING:
     from rbdyn.properties.catalogue import Designation, Envelope
 
 TEMPERATURE_C, OIL, CLEARANCE = 70.0, "ISO VG 68", "CN"
+LISTED = "as listed"
 # Limits of a number that is typed, and its unit.
 LIMITS = {
     "--speed": (-1e6, 1e6, "rpm"),
@@ -34,17 +33,19 @@ def new(
     designation: Annotated[
         list[str], typer.Argument(metavar="DESIGNATION", help="Bearing: NU210, NU 1010 M, 6208 C3, 7208B.")
     ],
-    speed: Annotated[float | None, typer.Option(metavar="RPM", help="Speed of the inner ring.")] = None,
-    load: Annotated[float | None, typer.Option(metavar="N", help="Radial load.")] = None,
-    preload: Annotated[float | None, typer.Option(metavar="N", help="Axial preload of a ball bearing.")] = None,
+    speed: Annotated[float | None, valued("RPM", "Speed of the inner ring.", "half the reference speed")] = None,
+    load: Annotated[float | None, valued("N", "Radial load.", "0.1 C")] = None,
+    preload: Annotated[
+        float | None, valued("N", "Axial preload of a ball bearing.", "what loads half of the balls")
+    ] = None,
     oil: Annotated[
         str, typer.Option(metavar="NAME", help='"ISO VG 32 PAO", "grease VG 100", 23699, "Jet Oil II".')
     ] = OIL,
     temperature: Annotated[float, typer.Option(metavar="C", help="Temperature of the oil.")] = TEMPERATURE_C,
-    clearance: Annotated[str | None, typer.Option(metavar="CLASS", help="C2, CN, C3 or C4; CN if left out.")] = None,
-    bore: Annotated[float | None, typer.Option(metavar="MM", help="Bore, where the table lacks the bearing.")] = None,
-    outside: Annotated[float | None, typer.Option(metavar="MM", help="Outside diameter.")] = None,
-    width: Annotated[float | None, typer.Option(metavar="MM", help="Width.")] = None,
+    clearance: Annotated[str | None, valued("CLASS", "C2, CN, C3 or C4.", "of DESIGNATION, else CN")] = None,
+    bore: Annotated[float | None, valued("MM", "Bore, where the table lacks the bearing.", LISTED)] = None,
+    outside: Annotated[float | None, valued("MM", "Outside diameter.", LISTED)] = None,
+    width: Annotated[float | None, valued("MM", "Width.", LISTED)] = None,
     as_json: Json = False,
 ) -> None:
     """Write a commented scene of a catalogue bearing, its interior estimated, on standard output."""
@@ -100,19 +101,19 @@ def _read(reader: Any, name: str, text: str, faults: list[str]) -> Any:
         return None
 
 
-def _misfits(named: Designation, speed: float | None, preload: float | None, clearance: str | None) -> list[str]:
+def _misfits(named: "Designation", speed: float | None, preload: float | None, clearance: str | None) -> list[str]:
     """Options that the bearing has no use for."""
-    found, rollers = [], named.kind == "cylindrical_roller"
+    faults, rollers = [], named.kind == "cylindrical_roller"
     if rollers and speed is not None and abs(speed) < 0.1:
-        found.append(f"--speed {speed:g}: a run is counted in shaft turns; give at least 0.1")
+        faults.append(f"--speed {speed:g}: a run is counted in shaft turns; give at least 0.1")
     if rollers and preload is not None:
-        found.append(f"--preload {preload:g}: is one of ball bearings; leave it out")
+        faults.append(f"--preload {preload:g}: is one of ball bearings; leave it out")
     if named.kind == "angular_contact_ball" and clearance is not None:
-        found.append(f"--clearance {clearance}: an angular contact bearing has a contact angle instead; leave it out")
-    return found
+        faults.append(f"--clearance {clearance}: an angular contact bearing has a contact angle instead; leave it out")
+    return faults
 
 
-def _envelope(named: Designation, sizes: dict[str, float | None]) -> Envelope:
+def _envelope(named: "Designation", sizes: dict[str, float | None]) -> "Envelope":
     """Boundary dimensions as typed or as the catalogue lists them. Raises ValueError, InputError."""
     from rbdyn.properties.catalogue import Envelope, envelope
 

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options that several commands share. Help tells the default of each: ``show_default`` where it is None."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,9 +11,14 @@ def flag(*names: str, says: str, **more: Any) -> Any:
     return typer.Option(*names, metavar="", help=says, **more)
 
 
-def folder_option(says: str) -> Any:
+def valued(metavar: str, says: str, default: str, *names: str, **more: Any) -> Any:
+    """An option with a value; ``default`` says what holds without it, where that is no plain value."""
+    return typer.Option(*names, metavar=metavar, help=says, show_default=default, **more)
+
+
+def folder_option(says: str, default: str = "nothing is written") -> Any:
     """``--out`` of a command that writes other files than ``Out`` says."""
-    return typer.Option(metavar="DIR", help=says)
+    return valued("DIR", says, default, "--out")
 
 
 def verbose_flag(says: str) -> Any:
@@ -26,9 +31,9 @@ def study_flag(name: str, studies: str) -> Any:
     return flag(name, says=f"{studies}, instead.")
 
 
-def count_option(least: int, says: str) -> Any:
+def count_option(least: int, says: str, default: int) -> Any:
     """A number of things to run."""
-    return typer.Option(min=least, max=100_000, metavar="N", help=says)
+    return valued("N", says, str(default), min=least, max=100_000)
 
 
 def _tell_version(wanted: bool) -> None:
@@ -41,11 +46,13 @@ def _tell_version(wanted: bool) -> None:
 
 Version = Annotated[bool, flag("--version", says="Print the version.", callback=_tell_version, is_eager=True)]
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to simulate.")]
-Set = Annotated[list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replace a key; repeatable.")]
-Turns = Annotated[float | None, typer.Option(help="Counted shaft turns [numerics.turns].")]
-Replicates = Annotated[int | None, typer.Option(help="Seeded replicates [numerics.replicates].")]
-Seed = Annotated[int | None, typer.Option(help="Seed [numerics.seed].")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all processors by default.")]
+Set = Annotated[
+    list[str] | None, valued("KEY.PATH=VALUE", "Replace a key; repeatable.", "the scene as it stands", "--set")
+]
+Turns = Annotated[float | None, valued("N", "Counted shaft turns.", "numerics.turns of the scene")]
+Replicates = Annotated[int | None, valued("N", "Seeded replicates.", "numerics.replicates of the scene")]
+Seed = Annotated[int | None, valued("N", "Seed of all random starts and spreads.", "numerics.seed of the scene")]
+Workers = Annotated[int | None, valued("N", "Threads.", "all processors", min=1)]
 Out = Annotated[Path | None, folder_option("Write result.json, history.csv and pictures here.")]
 Json = Annotated[bool, flag("--json", says="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, flag("--quiet", "-q", says="No progress, no notes.")]

@@ -3,15 +3,13 @@
 A result keeps no motion. It keeps scene and seed, and equal scenes give equal bits: the history is computed anew.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from rbdyn.cli.terminal import print_table
+from rbdyn.cli.terminal import print_notes, print_table
 from rbdyn.faults import refuse
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
@@ -26,6 +24,8 @@ LYAPUNOV_TURNS = 100.0
 # Fewer samples show no motion.
 FEWEST_SAMPLES = 32
 PEAKS = 5
+# Loads of which the largest is told.
+LOADS = {"pocket": "pocket_load", "dry_land": "land_load", "outer_race": "outer_load", "inner_race": "inner_load"}
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,11 @@ def write(
         files.append(name)
     if animate:
         progress(len(tasks) + 1, steps)
-        files += _animation(motion, folder)
+        from rbdyn.plots.animation import moving_bearing
+        from rbdyn.plots.player import player_html
+
+        files += [moving_bearing(motion, folder / "bearing").name, "bearing.html"]
+        (folder / "bearing.html").write_text(player_html(motion), encoding="utf-8")
     record = {**_record(request, motion), "notes": request.notes, "versions": versions()}
     if lyapunov:
         from rbdyn.dynamics.motion.lyapunov import lyapunov_exponent
@@ -105,7 +109,7 @@ def write(
     return record
 
 
-def _pictures(request: Request, motion: History) -> dict[str, Callable[[Path], object]]:
+def _pictures(request: Request, motion: "History") -> dict[str, Callable[[Path], object]]:
     from rbdyn import plots
 
     title = f"{request.turns:g} counted shaft turns, replicate {request.replicate + 1}"
@@ -121,16 +125,7 @@ def _pictures(request: Request, motion: History) -> dict[str, Callable[[Path], o
     }
 
 
-def _animation(motion: History, folder: Path) -> list[str]:
-    from rbdyn.plots.animation import moving_bearing
-    from rbdyn.plots.player import player_html
-
-    film = moving_bearing(motion, folder / "bearing")
-    (folder / "bearing.html").write_text(player_html(motion), encoding="utf-8")
-    return [film.name, "bearing.html"]
-
-
-def _record(request: Request, motion: History) -> dict[str, Any]:
+def _record(request: Request, motion: "History") -> dict[str, Any]:
     import numpy as np
 
     from rbdyn.dynamics.motion import orbit
@@ -152,22 +147,17 @@ def _record(request: Request, motion: History) -> dict[str, Any]:
             "standard_deviation": float(eccentricity.std()) * 1e6,
             "guide_clearance": None if clearance is None else clearance * 1e6,
         },
-        "largest": {
-            "pocket": _largest(orbit.largest(motion, motion.pocket_load)),
-            "dry_land": _largest(orbit.largest(motion, motion.land_load)),
-            "outer_race": _largest(orbit.largest(motion, motion.outer_load)),
-            "inner_race": _largest(orbit.largest(motion, motion.inner_load)),
-        },
+        "largest": {name: _largest(orbit.largest(motion, getattr(motion, loads))) for name, loads in LOADS.items()},
         "races": {race: _race(motion, race) for race in get_args(orbit.Race)},
         "life": _life(motion),
         "spectra": {
-            "eccentricity_um": _peaks(orbit.eccentricity_spectrum(motion), 1e6),
-            "cage_speed_rpm": _peaks(orbit.cage_speed_spectrum(motion), 30.0 / np.pi),
+            "eccentricity_um": _peaks(orbit.spectrum(motion, eccentricity), 1e6),
+            "cage_speed_rpm": _peaks(orbit.spectrum(motion, motion.cage_speed), 30.0 / np.pi),
         },
     }
 
 
-def _race(motion: History, race: Race) -> dict[str, float]:
+def _race(motion: "History", race: "Race") -> dict[str, float]:
     from rbdyn.dynamics.motion import orbit
 
     return {
@@ -178,24 +168,21 @@ def _race(motion: History, race: Race) -> dict[str, float]:
     }
 
 
-def _life(motion: History) -> dict[str, float | str | None]:
+def _life(motion: "History") -> dict[str, float | str | None]:
     """Of the contact loads shown; None where nothing is loaded or nothing turns."""
-    life = motion.life()
-    return {
-        **life.as_record(*motion.scene.operation.speeds),
-        "equivalent_load_N": life.equivalent_load,
-        "method": "ISO/TS 16281 reference life from the contact loads over time",
-    }
+    life, method = motion.life(), "ISO/TS 16281 reference life from the contact loads over time"
+    known = life.as_record(*motion.scene.operation.speeds)
+    return {**known, "equivalent_load_N": life.equivalent_load, "method": method}
 
 
-def _largest(hit: Largest) -> dict[str, float | int | None]:
+def _largest(hit: "Largest") -> dict[str, float | int | None]:
     """Where nothing ever touched there is no time and no roller."""
     touched = hit.force > 0.0
     roller = hit.roller + 1 if touched and hit.roller is not None else None
     return {"force_N": hit.force, "time_ms": hit.time * 1e3 if touched else None, "roller": roller}
 
 
-def _peaks(spectrum: Spectrum, unit: float) -> list[dict[str, float]]:
+def _peaks(spectrum: "Spectrum", unit: float) -> list[dict[str, float]]:
     return [{"frequency_Hz": f, "amplitude": unit * amplitude} for f, amplitude in spectrum.peaks(PEAKS)]
 
 
@@ -223,12 +210,8 @@ def print_record(record: dict[str, Any], quiet: bool, verbose: bool) -> None:
         chaos = record["lyapunov"]
         width = chaos["per_turn_half_width"]
         error = "error not estimated" if width is None else f"± {width:.2g} (95 %)"
-        rows.append(
-            (
-                f"largest Lyapunov exponent a shaft turn, over {chaos['turns']:g} turns",
-                f"{chaos['per_turn']:.3g} {error}",
-            )
-        )
+        words = f"largest Lyapunov exponent a shaft turn, over {chaos['turns']:g} turns"
+        rows.append((words, f"{chaos['per_turn']:.3g} {error}"))
     title = f"{record['turns']:g} shaft turns of replicate {record['replicate']}, seed {record['seed']}"
     print_table(title, ("figure", "value"), rows)
     if verbose:
@@ -236,6 +219,4 @@ def print_record(record: dict[str, Any], quiet: bool, verbose: bool) -> None:
             words, _, unit = name.rpartition("_")
             cells = [(f"{peak['frequency_Hz']:.0f}", f"{peak['amplitude']:.3g}") for peak in peaks]
             print_table("", (f"{words.replace('_', ' ')}: peaks [Hz]", f"amplitude [{unit}]"), cells)
-    if not quiet:
-        for note in record["notes"]:
-            print(f"note: {note}")
+    print_notes(record["notes"], quiet)

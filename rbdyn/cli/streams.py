@@ -19,18 +19,8 @@ from rbdyn.cli.loading import INTERRUPTED
 FAILED = 1
 # What tables and sentences hold beyond ASCII, for streams that have no more.
 PLAIN = {
-    "±": "+-",
-    "×": "x",
-    "−": "-",
-    "–": "-",
-    "µ": "u",
-    "°": " deg",
-    "²": "^2",
-    "³": "^3",
-    "≤": "<=",
-    "≥": ">=",
-    "█": "#",
-}
+    "±": "+-", "×": "x", "−": "-", "–": "-", "µ": "u", "°": " deg", "²": "^2", "³": "^3", "≤": "<=", "≥": ">=", "█": "#",
+}  # fmt: skip
 # Time [s] after which a swallowed Ctrl-C is raised again.
 AGAIN_S = 0.05
 
@@ -78,17 +68,17 @@ def run(app: Callable[[], object]) -> NoReturn:
 
 def _swallowed_interrupts() -> list[object]:
     """Where Ctrl-C falls into a callback, from which nothing can be raised: it is kept here and raised again soon."""
-    found: list[object] = []
+    swallowed: list[object] = []
     usual = sys.unraisablehook
 
     def hook(lost: Any) -> None:
         if lost.exc_type is not KeyboardInterrupt:
             return usual(lost)
-        found.append(lost.object)
+        swallowed.append(lost.object)
         threading.Timer(AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)).start()
 
     sys.unraisablehook = hook
-    return found
+    return swallowed
 
 
 def _standing() -> _Losing | None:
@@ -100,15 +90,15 @@ def _standing() -> _Losing | None:
             # Closed: the next file that is opened would be given its number. The lowest one free is the first closed.
             os.open(os.devnull, os.O_RDWR)
     codecs.register_error("rbdyn.plain", _plain)
-    found = None
+    losing = None
     for number, name in ((2, "stderr"), (1, "stdout")):
-        given, found = getattr(sys, name), None
+        given, losing = getattr(sys, name), None
         if given is getattr(sys, f"__{name}__"):
-            found = _Losing(number, "w", closefd=False)
+            losing = _Losing(number, "w", closefd=False)
             lines, encoding = (given.line_buffering, given.encoding) if given else (True, "utf-8")
-            stream = io.TextIOWrapper(io.BufferedWriter(found), encoding, "rbdyn.plain", line_buffering=lines)
+            stream = io.TextIOWrapper(io.BufferedWriter(losing), encoding, "rbdyn.plain", line_buffering=lines)
             setattr(sys, name, stream)
-    return found
+    return losing
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:

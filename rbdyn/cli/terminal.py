@@ -4,7 +4,7 @@ import errno
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
@@ -96,9 +96,9 @@ def output_folder(path: Path, command: str, source: Path) -> Path:
         digest = digest_of(source.read_bytes())
         # From the folder on, so that both can be moved, or mounted elsewhere, together.
         own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
-        found = json.loads(mark.read_text(encoding="utf-8")) if mark.exists() and len(os.listdir(path)) > 1 else own
-        if found["command"] != command or (own["file"] != found["file"] and digest != found["sha256"]):
-            whose = f"what {found['command']} made of {os.path.normpath(path / found['file'])}"
+        marked = json.loads(mark.read_text(encoding="utf-8")) if mark.exists() and len(os.listdir(path)) > 1 else own
+        if marked["command"] != command or (own["file"] != marked["file"] and digest != marked["sha256"]):
+            whose = f"what {marked['command']} made of {os.path.normpath(path / marked['file'])}"
             raise InputError([f"--out {path}: holds {whose}; name another folder or remove this one"])
         write_json(mark, own)
     except OSError as error:
@@ -121,6 +121,12 @@ def progress_bar(title: str, quiet: bool) -> Iterator[Callable[[int, int], None]
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def print_notes(notes: Iterable[str], quiet: bool) -> None:
+    """A line a note, unless ``quiet``."""
+    for note in () if quiet else notes:
+        print(f"note: {note}")
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -9,6 +9,7 @@
 """
 
 import functools
+import gc
 import hashlib
 import os
 import tempfile
@@ -23,6 +24,7 @@ from numba import njit
 from numba.core import types
 from numba.core.registry import CPUDispatcher
 
+from rbdyn.compiled.parts import PartCompiler, SettledCompiler
 from rbdyn.compiled.sources import compiled_digest
 
 # No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
@@ -32,8 +34,9 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 # it, for every lane is rounded by itself.
 VECTOR = 8 if get_host_cpu_features().get("avx512f") else 4
 # Calls of compiled code return tuples through memory and carry an error status: small functions must vanish.
-INLINED: dict[str, Any] = {**OPTIONS, "forceinline": True}
 WRAPPERS = ("no_cpython_wrapper", "no_cfunc_wrapper")
+PART: dict[str, Any] = {**OPTIONS, **dict.fromkeys(WRAPPERS, True), "pipeline_class": PartCompiler}
+INLINED: dict[str, Any] = {**PART, "forceinline": True}
 
 
 class Inner(CPUDispatcher):
@@ -41,6 +44,11 @@ class Inner(CPUDispatcher):
 
     A call from Python goes to a twin that has them, compiled when first called.
     """
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Compile once for all values of an argument: numba would do so for each constant anew."""
+        plain = types.unliteral
+        return super().get_call_template([plain(one) for one in args], {name: plain(one) for name, one in kws.items()})
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the twin."""
@@ -52,9 +60,23 @@ class Inner(CPUDispatcher):
         return numba.jit(**{**self.targetoptions, **dict.fromkeys(WRAPPERS, False)})(self.py_func)
 
 
+class Entry(CPUDispatcher):
+    """Machine code that Python calls."""
+
+    def compile(self, sig: Any) -> Any:
+        """Compile without looking for garbage: nearly nothing is, and the search takes a tenth of the time."""
+        enabled = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile(sig)
+        finally:
+            if enabled:
+                gc.enable()
+
+
 def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     make: Any = njit  # whose stubs leave these options out
-    compiled = make(**options, **dict.fromkeys(WRAPPERS, True))(function)
+    compiled = make(**options)(function)
     if isinstance(compiled, CPUDispatcher):  # a plain function where compiling is switched off
         compiled.__class__ = Inner
     return compiled
@@ -65,9 +87,14 @@ def kernel(function: Callable[..., Any]) -> Any:
     return _inner(function, INLINED)
 
 
+def settled_kernel(function: Callable[..., Any]) -> Any:
+    """``kernel`` with a ``reordered_sum``: its order is chosen here, the same for all callers."""
+    return _inner(function, {**INLINED, "pipeline_class": SettledCompiler})
+
+
 def routine(function: Callable[..., Any]) -> Any:
     """Compile a longer function that is called from several places and not copied into them."""
-    return _inner(function, OPTIONS)
+    return _inner(function, PART)
 
 
 def law(declaration: Callable[..., Any]) -> Any:
@@ -166,9 +193,12 @@ def entry(function: Callable[..., Any]) -> Any:
     previous = config.CACHE_DIR
     config.CACHE_DIR = str(cache_folder())
     try:
-        return njit(cache=True, nogil=True, **OPTIONS)(function)
+        compiled = njit(cache=True, nogil=True, **OPTIONS)(function)
     finally:
         config.CACHE_DIR = previous
+    if isinstance(compiled, CPUDispatcher):
+        compiled.__class__ = Entry
+    return compiled
 
 
 @functools.cache

@@ -4,8 +4,6 @@ Only what runs counts: modules that the roots import, directly or through others
 imports for typing. Editing a picture, a command or the description of a key leaves the hash as it was.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import re
@@ -22,7 +20,7 @@ _TYPING = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
 _IMPORT = re.compile(r"^[ \t]*from ([\w.]+) import (\([^)]*\)|.*)$", re.MULTILINE)
 # Where kernels are: what imports their decorators, and what gives a law its bodies.
 _KERNELS = re.compile(
-    r"^from rbdyn\.compiled\.kernel import .*\b(?:entry|kernel|law|routine|INLINED)\b|^@[\w.]+\.body\(", re.MULTILINE
+    r"^from rbdyn\.compiled\.kernel import .*\b(?:entry|\w*kernel|law|routine|INLINED)\b|^@[\w.]+\.body\(", re.MULTILINE
 )
 
 

@@ -8,10 +8,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.compiled.elementary import eighteenth_root, fast_exp, fast_log, reordered_sum, tenth_root
-from rbdyn.compiled.kernel import VECTOR, kernel, law
+from rbdyn.compiled.kernel import VECTOR, kernel, law, settled_kernel
 
 EXPONENT = 10.0 / 9.0
 # Below this an overlap is round-off; it keeps logarithms and roots finite.
@@ -42,17 +42,17 @@ class SlicedLineContact(NamedTuple):
     """Equal slices, each relieved by the roller's profile: Q = sum_k Q_whole(delta - P_k)/m."""
 
     whole: Any
-    relief: NDArray[np.float64]  # profile drop at the slice centres [m], padded to whole vectors
-    share: NDArray[np.float64]  # 1/m; 0 in the padding
+    relief: Array  # profile drop at the slice centres [m], padded to whole vectors
+    share: Array  # 1/m; 0 in the padding
 
 
 class TiltedLineContact(NamedTuple):
     """As sliced, between races tilted against each other: delta_k = delta + x_k theta cos(psi - psi_0) - P_k."""
 
     whole: Any
-    relief: NDArray[np.float64]  # [m]
-    share: NDArray[np.float64]
-    rise: NDArray[np.float64]  # x_k theta [m]
+    relief: Array  # [m]
+    share: Array
+    rise: Array  # x_k theta [m]
     direction_x: float  # cos and sin of psi_0, where the tilt is largest
     direction_y: float
 
@@ -98,7 +98,7 @@ def dowson_higginson(equivalent_modulus: float, length: float, gamma: float) -> 
 
 
 def sliced(
-    whole: Any, relief: NDArray[np.float64], position: NDArray[np.float64], tilt: float, direction: float
+    whole: Any, relief: Array, position: Array, tilt: float, direction: float
 ) -> SlicedLineContact | TiltedLineContact:
     """Cut a plain law into slices with profile drops and axial positions [m], tilted by ``tilt`` [rad].
 
@@ -237,7 +237,7 @@ def _(contact, k):
     return contact.rise[k]
 
 
-@kernel
+@settled_kernel
 def sum_of_slices(contact, overlap, nx, ny):
     """Load, stiffness, mean approach weighted by stiffness and mean rise weighted by load, of a sliced roller."""
     load = stiffness = weighted = raised = 0.0

@@ -7,15 +7,16 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rbdyn.arrays import Array
 
 
-def slice_centres(slices: int, length: float) -> NDArray[np.float64]:
+def slice_centres(slices: int, length: float) -> Array:
     """Axial positions of the slice centres from the roller's middle [m] (Chen et al. 2022, eq 2)."""
     return (-0.5 + (np.arange(1, slices + 1) - 0.5) / slices) * length
 
 
-def logarithmic_relief(position: NDArray[np.float64], diameter: float, length: float) -> NDArray[np.float64]:
+def logarithmic_relief(position: Array, diameter: float, length: float) -> Array:
     """Reference profile drop of ISO/TS 16281 at axial ``position`` [m], for rollers of l <= 2.5 D and longer.
 
     P(x) = 0.00035 D ln[1/(1 - (2x/l)^2)]; longer rollers keep a flat middle of l - 2.5 D and 0.0005 D.
@@ -26,7 +27,7 @@ def logarithmic_relief(position: NDArray[np.float64], diameter: float, length: f
     return np.asarray(-factor * diameter * np.log1p(-(inside**2)))
 
 
-def crowned_relief(position: NDArray[np.float64], crown_radius: float) -> NDArray[np.float64]:
+def crowned_relief(position: Array, crown_radius: float) -> Array:
     """Drop of a full crown, an exact circle of ``crown_radius`` [m]: R - sqrt(R^2 - x^2).
 
     Raises ValueError when the circle does not reach a position.
@@ -39,9 +40,7 @@ def crowned_relief(position: NDArray[np.float64], crown_radius: float) -> NDArra
     return np.asarray(squared / (crown_radius + np.sqrt(crown_radius**2 - squared)))
 
 
-def lundberg_relief(
-    position: NDArray[np.float64], length: float, design_load: float, equivalent_modulus: float
-) -> NDArray[np.float64]:
+def lundberg_relief(position: Array, length: float, design_load: float, equivalent_modulus: float) -> Array:
     """Drop that presses uniformly along the contact at ``design_load`` [N] (Lundberg 1939).
 
     P(x) = 2Q/(pi l E') ln[1/(1 - (2x/l)^2)] with E' of ``rbdyn.properties.materials.equivalent_modulus`` [Pa]: the surface
@@ -56,7 +55,7 @@ def lundberg_relief(
         return np.asarray(-factor * np.log1p(-(inside**2)))
 
 
-def table_relief(position: NDArray[np.float64], points: Sequence[tuple[float, float]]) -> NDArray[np.float64]:
+def table_relief(position: Array, points: Sequence[tuple[float, float]]) -> Array:
     """Drop by straight lines between measured ``points`` = ((x, drop), ...) [m].
 
     Points with all x >= 0 describe one half and are mirrored about the middle; others stand as given.

@@ -5,15 +5,15 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.compiled.elementary import fast_exp, fast_expm1, fast_log, fma
 from rbdyn.compiled.kernel import kernel, law
 
 SMALLEST_LOAD = 1e-30  # [N], keeps the logarithm finite
 LARGEST_SPEED_RATIO = 1e12  # slip over the speed scale of a surface; mu has long become constant
 
-Coefficient = Callable[[NDArray[np.float64], NDArray[np.float64]], Any]
+Coefficient = Callable[[Array, Array], Any]
 
 FEWEST_CELLS, MOST_CELLS = 12, 192
 # Step of the difference quotients, in cells: their error stays below 1e-6 of a derivative.
@@ -57,7 +57,7 @@ class TractionSurface(NamedTuple):
     goes as sqrt(Q). Cells are uniform. Past the table L lands on a constant within one cell, without a kink.
     """
 
-    cells: NDArray[np.float64]  # (slip cells x load cells, 16): polynomial of each, load fastest
+    cells: Array  # (slip cells x load cells, 16): polynomial of each, load fastest
     columns: int  # cells along sqrt(load)
     speed_density: float  # 1/u_0 [s/m]
     slip_density: float  # cells along ln(1 + x) [-]
@@ -206,7 +206,7 @@ def traction_surface(
     scale = _speed_scale(coefficient, largest_load, largest_slip)
     slips, loads = FEWEST_CELLS, FEWEST_CELLS
     while True:
-        grid = _Grid(coefficient, scale, largest_slip, smallest_load, largest_load, slips, loads)
+        grid = _Grid(coefficient, scale, largest_slip, (smallest_load, largest_load), (slips, loads))
         cells = _polynomials(grid.nodes())
         along, across = (grid.error(cells, *shift) for shift in ((0.5, 0.0), (0.0, 0.5)))
         error = max(along, across, grid.error(cells, 0.5, 0.5))
@@ -231,24 +231,18 @@ def _speed_scale(coefficient: Coefficient, load: float, largest_slip: float) -> 
 
 
 class _Grid:
-    """Nodes of a surface; positions i along the slip and j along the load count cells."""
+    """Nodes of a surface of ``size`` cells up to a ``slip`` [m/s] and between ``loads`` [N]; positions i along the slip and
+    j along the load count cells."""
 
     def __init__(
-        self,
-        coefficient: Coefficient,
-        scale: float,
-        largest_slip: float,
-        smallest_load: float,
-        largest_load: float,
-        slips: int,
-        loads: int,
+        self, coefficient: Coefficient, scale: float, slip: float, loads: tuple[float, float], size: tuple[int, int]
     ) -> None:
         self.coefficient, self.scale = coefficient, scale
-        self.slip_cell = math.log1p(largest_slip / scale) / slips
-        self.load_start = math.sqrt(smallest_load)
-        self.load_cell = (math.sqrt(largest_load) - self.load_start) / loads
-        self.i = np.arange(slips + 1.0)[:, np.newaxis]
-        self.j = np.arange(loads + 1.0)[np.newaxis, :]
+        self.slip_cell = math.log1p(slip / scale) / size[0]
+        self.load_start = math.sqrt(loads[0])
+        self.load_cell = (math.sqrt(loads[1]) - self.load_start) / size[1]
+        self.i = np.arange(size[0] + 1.0)[:, np.newaxis]
+        self.j = np.arange(size[1] + 1.0)[np.newaxis, :]
 
     def exact(self, i: Any, j: Any) -> tuple[Any, Any]:
         """The coefficient and x/(1 + x) at positions."""
@@ -263,7 +257,7 @@ class _Grid:
             raise ValueError("the traction coefficient must be positive and finite at every slip above zero")
         return np.log(mu / rise)
 
-    def nodes(self) -> NDArray[np.float64]:
+    def nodes(self) -> Array:
         """Value, slopes and twist of L at each node, (i, j, 4), with a row and two columns of landing."""
         i, j, d = self.i, self.j, DIFFERENCE
         low, high = np.maximum(i - d, 0.0), i + d  # no slip is smaller than rest
@@ -285,14 +279,14 @@ class _Grid:
         nodes[-1, :, 1::2] = 0.0
         return nodes
 
-    def error(self, cells: NDArray[np.float64], x: float, y: float) -> float:
+    def error(self, cells: Array, x: float, y: float) -> float:
         """Largest error at (x, y) of every cell within the table, as a share of the largest coefficient."""
         inside = cells.reshape(self.i.size, self.j.size + 1, 4, 4)[:-1, 1:-1]
-        found = x ** np.arange(4) @ inside @ y ** np.arange(4)
+        fitted = x ** np.arange(4) @ inside @ y ** np.arange(4)
         exact, rise = self.exact(self.i[:-1] + x, self.j[:, :-1] + y)
-        return float(np.abs(rise * np.exp(found) - exact).max() / exact.max())
+        return float(np.abs(rise * np.exp(fitted) - exact).max() / exact.max())
 
-    def surface(self, cells: NDArray[np.float64]) -> TractionSurface:
+    def surface(self, cells: Array) -> TractionSurface:
         """The law."""
         within = 1.0 - 1e-12  # the last position still lies in the last cell
         return TractionSurface(
@@ -307,7 +301,7 @@ class _Grid:
         )
 
 
-def _polynomials(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _polynomials(nodes: Array) -> Array:
     """Polynomial of each cell, (cells, 16), from value, slopes and twist at its corners, (i, j, 4) per cell size."""
     # Values and slopes at both ends of an edge, times this, are the coefficients of its cubic.
     cubic = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [-3.0, 3.0, -2.0, -1.0], [2.0, -2.0, 1.0, 1.0]])

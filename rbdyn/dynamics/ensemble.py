@@ -3,8 +3,6 @@
 Which thread takes a run, and in which order runs end, changes nothing in them: every run has its own state and seed.
 """
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Callable, Iterable
@@ -29,7 +27,7 @@ class CancelledError(Exception):
 class Stop:
     """Shared wish to stop; runs look at it every few thousand steps. A stop within another heeds both."""
 
-    outer: Stop | None = None
+    outer: "Stop | None" = None
     event: threading.Event = field(default_factory=threading.Event)
 
     def check(self) -> None:

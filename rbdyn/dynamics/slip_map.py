@@ -4,8 +4,6 @@ Every point is the same scene at another inner speed and radial load. A point th
 its cause, and the others go on. Finished points may be kept in a file, so that an interrupted map goes on there.
 """
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -67,7 +65,7 @@ class SlipMap(Record):
         """Points without figures."""
         return [point for point in self.points if not point.figures]
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """A row a point; figures with their 95 % errors."""
         import pandas as pd
 

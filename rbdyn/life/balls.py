@@ -8,8 +8,8 @@ Lubrication, cleanliness and the fatigue limit (a_ISO) are left out.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.life.ball_capacity import groove_ratio
 from rbdyn.life.turns import Life, Turning
 
@@ -42,12 +42,12 @@ def rated_capacities(
     return inner, outer
 
 
-def turning_race_load(loads: NDArray[np.float64]) -> float:
+def turning_race_load(loads: Array) -> float:
     """Equivalent ball load [N] of the race that turns against the load, from loads (samples, Z): the cube mean."""
     return float(np.mean(loads**LOAD_LIFE) ** (1.0 / LOAD_LIFE))
 
 
-def standing_race_load(loads: NDArray[np.float64]) -> float:
+def standing_race_load(loads: Array) -> float:
     """Equivalent ball load [N] of the race that stands against the load, from loads (samples, Z) at fixed places.
 
     A cube mean over the samples at each place, then a mean of the power 10/3 over the places.
@@ -56,12 +56,7 @@ def standing_race_load(loads: NDArray[np.float64]) -> float:
     return float(np.mean(damage**WEIBULL) ** (1.0 / RACE_EXPONENT))
 
 
-def row_life(
-    inner_load: NDArray[np.float64],
-    outer_load: NDArray[np.float64],
-    capacities: tuple[float, float],
-    turning: Turning = "inner",
-) -> Life:
+def row_life(inner_load: Array, outer_load: Array, capacities: tuple[float, float], turning: Turning = "inner") -> Life:
     """Life of a row from the loads on its balls, (Z,) or (samples, Z), on the inner and on the outer race [N].
 
     ``capacities``: of the inner and the outer race [N], by one of the functions above. ``turning``: the rings that
@@ -79,7 +74,7 @@ def row_life(
     return Life(million_turns, inner_equivalent, outer_equivalent, inner_capacity, outer_capacity)
 
 
-def _loads(loads: NDArray[np.float64], race: str) -> NDArray[np.float64]:
+def _loads(loads: Array, race: str) -> Array:
     array = np.atleast_2d(np.asarray(loads, dtype=np.float64))
     if array.ndim != 2 or array.size == 0:
         raise ValueError(f"{race} loads of shape {np.shape(loads)}: give (Z,) or (samples, Z)")

@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.life.roller_capacity import LAMINA_EXPONENT, LOAD_LIFE, REDUCTION, WEIBULL
 from rbdyn.life.turns import Life, Turning
 
@@ -35,7 +35,7 @@ def race_capacities(capacity: float, rollers: int, gamma: float, rows: int = 1) 
     return inner, outer
 
 
-def edge_stress(slices: int) -> NDArray[np.float64]:
+def edge_stress(slices: int) -> Array:
     """Factors on the lamina loads for stress at the roller's edges, one a lamina (ISO/TS 16281, formula 60).
 
     f_k = 1 - 0.01/ln[1.985 |2k - n - 1|/(2n - 2)]: 2.3 at the ends, 1 in the middle and for a single lamina. Meant
@@ -49,7 +49,7 @@ def edge_stress(slices: int) -> NDArray[np.float64]:
         return np.asarray(1.0 - 0.01 / np.log(1.985 * off_middle))
 
 
-def turning_race_load(loads: NDArray[np.float64]) -> NDArray[np.float64]:
+def turning_race_load(loads: Array) -> Array:
     """Equivalent lamina loads [N] of the race that turns against the load, from (samples, rollers, slices).
 
     Every point of it meets every load in turn: one fourth-power mean over samples and rollers.
@@ -57,9 +57,7 @@ def turning_race_load(loads: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.mean(loads**LOAD_LIFE, axis=(0, 1)) ** (1.0 / LOAD_LIFE))
 
 
-def standing_race_load(
-    loads: NDArray[np.float64], angle: NDArray[np.float64] | None = None, positions: int = 72
-) -> NDArray[np.float64]:
+def standing_race_load(loads: Array, angle: Array | None = None, positions: int = 72) -> Array:
     """Equivalent lamina loads [N] of the race that stands against the load, from (samples, rollers, slices).
 
     Each place on it meets its own loads: a fourth-power mean at each place over time, then a mean of the power 4.5
@@ -82,13 +80,13 @@ def standing_race_load(
 
 
 def reference_life(
-    inner: NDArray[np.float64],
-    outer: NDArray[np.float64],
+    inner: Array,
+    outer: Array,
     *,
     capacity: float,
     gamma: float,
     turning: Turning = "inner",
-    angle: NDArray[np.float64] | None = None,
+    angle: Array | None = None,
     positions: int = 72,
     edges: bool = True,
 ) -> ReferenceLife:
@@ -109,7 +107,7 @@ def reference_life(
         raise ValueError(f"angles of shape {np.shape(angle)} do not match loads of {inner.shape[:2]}")
     factor = edge_stress(slices) if edges else np.ones(slices)
 
-    def equivalent(loads: NDArray[np.float64], turns: bool) -> float:
+    def equivalent(loads: Array, turns: bool) -> float:
         lamina = turning_race_load(loads) if turns else standing_race_load(loads, angle, positions)
         whole = float(np.sum((factor * lamina) ** LAMINA_EXPONENT) ** (1.0 / LAMINA_EXPONENT))
         # A lamina bears the share n^(-7/9) of the capacity of its roller: referred here to the whole roller.
@@ -123,7 +121,7 @@ def reference_life(
     return ReferenceLife(life, inner_load, outer_load, inner_capacity, outer_capacity, capacity * life**-0.3)
 
 
-def _lamina_loads(loads: NDArray[np.float64], race: str) -> NDArray[np.float64]:
+def _lamina_loads(loads: Array, race: str) -> Array:
     array = np.asarray(loads, dtype=np.float64)
     if array.ndim == 2:
         array = array[:, :, None]

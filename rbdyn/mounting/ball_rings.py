@@ -29,13 +29,8 @@ def mounted_of(scene: BallScene) -> MountedRings | None:
     """Shaft, rings and housing of a mounted bearing; None where the scene tells no mounting."""
     if scene.mounting is None:
         return None
-    return mounted_rings(
-        scene.mounting,
-        scene.bearing,
-        scene.material("inner_ring"),
-        scene.material("outer_ring"),
-        *scene.operation.speeds,
-    )
+    materials = scene.material("inner_ring"), scene.material("outer_ring")
+    return mounted_rings(scene.mounting, scene.bearing, *materials, *scene.operation.speeds)
 
 
 def row_change(scene: SingleRowScene) -> GrooveChange:
@@ -63,17 +58,11 @@ def layer_changes(scene: DoubleDeckerScene, middle_speed: float) -> tuple[Groove
         return GrooveChange(inner, 0.0, 0.0), GrooveChange(middle_growth, 0.0, 0.0)
     rings = _pair(scene)
     still = scene.mounting is not None and not scene.mounting.rotation
-    middle = Ring(
-        raceway_radii(bearing.inner)[1],
-        raceway_radii(bearing.outer)[0],
-        scene.material("middle_ring"),
-        0.5 * sum(ring.temperature_rise for ring in (rings.inner, rings.outer) if ring is not None),
-        0.0 if still else middle_speed,
-    )
-    return (
-        _between(scene, bearing.inner, rings.inner, middle, rings),
-        _between(scene, bearing.outer, middle, rings.outer, rings),
-    )
+    races = raceway_radii(bearing.inner)[1], raceway_radii(bearing.outer)[0]
+    rise = 0.5 * sum(ring.temperature_rise for ring in (rings.inner, rings.outer) if ring is not None)
+    middle = Ring(*races, scene.material("middle_ring"), rise, 0.0 if still else middle_speed)
+    below, above = (bearing.inner, rings.inner, middle), (bearing.outer, middle, rings.outer)
+    return _between(scene, *below, rings), _between(scene, *above, rings)
 
 
 def changes(scene: BallScene) -> bool:
@@ -106,13 +95,8 @@ def growth_record(scene: BallScene, names: dict[str, GrooveChange]) -> dict[str,
 def _pair(scene: BallScene) -> RingPair:
     rings = mounted_of(scene)
     if rings is not None:
-        return RingPair(
-            rings.inner_ring,
-            rings.outer_ring,
-            rings.inner_pressure,
-            rings.outer_pressure,
-            rings.element_temperature_rise,
-        )
+        pressures = rings.inner_pressure, rings.outer_pressure
+        return RingPair(rings.inner_ring, rings.outer_ring, *pressures, rings.element_temperature_rise)
     (below, above), (inner_speed, outer_speed) = scene.outermost_rows, scene.operation.speeds
     inner_race, outer_race = raceway_radii(scene.bearing)
     inner = outer = None

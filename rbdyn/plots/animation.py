@@ -1,13 +1,11 @@
 """A moving picture of the bearing and its forces: GIF, or MP4 where ffmpeg is installed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from matplotlib import animation
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle, FancyArrowPatch, Patch, Polygon
+from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
 from rbdyn.plots.style import GREEN, GREY, INNER, OUTER, plt
@@ -31,7 +29,7 @@ LOOKS = {
 }
 
 
-def moving_bearing(history: History, stem: Path) -> Path:
+def moving_bearing(history: "History", stem: Path) -> Path:
     """Write ``stem``.mp4, or .gif where there is no ffmpeg: two shaft turns about the largest pocket force."""
     picture = drawing(history, TURNS, FRAMES_PER_TURN)
     figure = plt.figure(figsize=(6.0, 6.6), dpi=80)
@@ -52,22 +50,17 @@ def moving_bearing(history: History, stem: Path) -> Path:
         return []
 
     film = animation.FuncAnimation(figure, draw, frames=len(picture.time), blit=False)
-    if animation.writers.is_available("ffmpeg"):
-        path, writer = stem.with_suffix(".mp4"), animation.FFMpegWriter(fps=FRAMES_PER_SECOND)
-        film.save(path, writer=writer)
-    else:
-        path = stem.with_suffix(".gif")
-        film.save(path, writer=animation.PillowWriter(fps=FRAMES_PER_SECOND))
+    ffmpeg = animation.writers.is_available("ffmpeg")
+    path = stem.with_suffix(".mp4" if ffmpeg else ".gif")
+    film.save(path, writer=(animation.FFMpegWriter if ffmpeg else animation.PillowWriter)(fps=FRAMES_PER_SECOND))
     plt.close(figure)
     return path
 
 
 def _set_up(axis: Axes, picture: Drawing) -> None:
     side = picture.extent
-    axis.set_xlim(-side, side)
-    axis.set_ylim(side, -side)
+    axis.set(xlim=(-side, side), ylim=(side, -side), aspect="equal")
     axis.set_axis_off()
-    axis.set_aspect("equal")
     for reference in picture.references:
         _add(axis, reference.arrow)
         axis.text(reference.u, reference.v, reference.words, fontsize=8.5, va="center")
@@ -76,24 +69,21 @@ def _set_up(axis: Axes, picture: Drawing) -> None:
 
 
 def _add(axis: Axes, shape: Shape) -> None:
-    patch: Patch
     if shape.kind == "arrow":
-        patch = FancyArrowPatch(
-            shape.points[0], shape.points[1], arrowstyle="-|>", mutation_scale=9, shrinkA=0, shrinkB=0,
-            color=FORCES[shape.role], linewidth=2.2, zorder=5,
-        )  # fmt: skip
+        look: dict[str, Any] = {
+            "arrowstyle": "-|>",
+            "mutation_scale": 9,
+            "shrinkA": 0,
+            "shrinkB": 0,
+            "linewidth": 2.2,
+            "zorder": 5,
+        }
+        axis.add_patch(FancyArrowPatch(shape.points[0], shape.points[1], color=FORCES[shape.role], **look))
     elif shape.kind == "line":
-        (u, v), (p, q) = shape.points
-        axis.plot((u, p), (v, q), color="#59636d", linewidth=1.0)
-        return
+        axis.plot(*zip(*shape.points, strict=True), color="#59636d", linewidth=1.0)
     else:
         fill, edge = LOOKS[shape.role]
-        style = {"facecolor": fill, "edgecolor": edge, "linewidth": 0.9, "zorder": 2}
-        if shape.role == "land":
-            style["linestyle"] = "--"
-        patch = (
-            Circle(shape.points[0], shape.radius, **style)
-            if shape.kind == "circle"
-            else Polygon(shape.points, closed=True, **style)
-        )
-    axis.add_patch(patch)
+        line = "--" if shape.role == "land" else "-"
+        style: dict[str, Any] = {"facecolor": fill, "edgecolor": edge, "linewidth": 0.9, "linestyle": line, "zorder": 2}
+        circle = shape.kind == "circle"
+        axis.add_patch(Circle(shape.points[0], shape.radius, **style) if circle else Polygon(shape.points, **style))

@@ -1,25 +1,23 @@
 """One equilibrium of a ball bearing: loads and contact angles around it, and a section through the most loaded ball."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.plots.style import GREY, INNER, OUTER, Axes, plain, plt, save
 
 if TYPE_CHECKING:
     from rbdyn.quasistatic.result import BallResult
 
 Balls = Sequence[Mapping[str, float]]
-Vector = NDArray[np.float64]
 # How far the grooves are drawn to either side of the radial line [rad]; shoulders are not part of a scene.
 GROOVE = math.radians(62.0)
 RING_FILL = "#E4E4E4"
+LINE: dict[str, Any] = {"markersize": 3.5, "linewidth": 1.2}
 # Rings below and above the balls, by the title of a row.
 RINGS = {
     "": ("inner ring", "outer ring"),
@@ -28,7 +26,7 @@ RINGS = {
 }
 
 
-def pictures(result: BallResult, folder: Path) -> list[str]:
+def pictures(result: "BallResult", folder: Path) -> list[str]:
     """Draw loads.png, angles.png and section.png of an equilibrium; returns the names, none where nothing was found."""
     if not result.found:
         return []
@@ -39,14 +37,13 @@ def pictures(result: BallResult, folder: Path) -> list[str]:
     return ["loads.png", "angles.png", "section.png"]
 
 
-def column(balls: Balls, name: str) -> Vector:
+def column(balls: Balls, name: str) -> Array:
     """One figure of all balls."""
     return np.array([ball[name] for ball in balls])
 
 
-def closed(balls: Balls, name: str) -> Vector:
-    """The same, the first ball once more at the end."""
-    values = column(balls, name)
+def closed(values: Array) -> Array:
+    """Figures of all balls, the first ball once more at the end."""
     return np.append(values, values[0])
 
 
@@ -56,10 +53,10 @@ def loads(rows: Mapping[str, Balls], path: Path) -> None:
     for place, (title, balls) in enumerate(rows.items(), 1):
         axis: Any = figure.add_subplot(1, len(rows), place, projection="polar")
         axis.set_theta_zero_location("S")
-        azimuth = np.radians(closed(balls, "azimuth_deg"))
+        azimuth = np.radians(closed(column(balls, "azimuth_deg")))
         for race, colour in (("outer", OUTER), ("inner", INNER)):
-            load = closed(balls, f"{race}_load_N")
-            axis.plot(azimuth, load, "o-", color=colour, markersize=3.5, linewidth=1.2, label=f"{race} race")
+            load = closed(column(balls, f"{race}_load_N"))
+            axis.plot(azimuth, load, "o-", color=colour, label=f"{race} race", **LINE)
             if race == "inner":
                 axis.fill(azimuth, load, color=colour, alpha=0.12)
         axis.set_rlim(bottom=0.0)
@@ -91,19 +88,8 @@ def angles_on(
         angle = column(balls, f"{race}_angle_deg")
         if race == "inner":
             angle = np.where(column(balls, "inner_load_N") > 0.0, angle, np.nan)
-        axis.plot(
-            np.append(azimuth, 360.0),
-            np.append(angle, angle[0]),
-            f"{marks}-",
-            color=colour,
-            markersize=3.5,
-            linewidth=1.2,
-            label=labels[race],
-        )
-    axis.set_xlim(0.0, 360.0)
-    axis.set_xticks(range(0, 361, 60))
-    axis.set_xlabel("azimuth [°]")
-    axis.set_ylabel("contact angle [°]")
+        axis.plot(np.append(azimuth, 360.0), closed(angle), f"{marks}-", color=colour, label=labels[race], **LINE)
+    axis.set(xlim=(0.0, 360.0), xticks=range(0, 361, 60), xlabel="azimuth [°]", ylabel="contact angle [°]")
     plain(axis)
 
 
@@ -139,18 +125,16 @@ def _section_on(axis: Axes, ball: Mapping[str, float], drawing: Mapping[str, Any
     axis.plot([0.0, 0.0], [-0.72, 0.72], color=GREY, linewidth=0.8, linestyle=(0, (8, 3, 2, 3)), zorder=2)
     axis.annotate("", (0.0, 0.19), (0.0, 0.0), arrowprops={"arrowstyle": "->", "color": GREY}, zorder=4)
     axis.text(-0.015, 0.2, f"{ball['centrifugal_force_N']:.3g} N\ncentrifugal", color=GREY, fontsize=8, ha="right")
-    axis.set_xlim(-0.78, 0.78)
-    axis.set_ylim(-0.74, 0.74)
-    axis.set_aspect("equal")
+    axis.set(xlim=(-0.78, 0.78), ylim=(-0.74, 0.74), aspect="equal")
     axis.set_axis_off()
 
 
-def _along(angle: float) -> Vector:
+def _along(angle: float) -> Array:
     """Unit vector (axial, radial) at an angle from the radial direction."""
     return np.array([math.sin(angle), math.cos(angle)])
 
 
-def _groove(axis: Axes, centre: Vector, radius: float, side: float) -> None:
+def _groove(axis: Axes, centre: Array, radius: float, side: float) -> None:
     """A ring's section beyond its groove: ``side`` 1 above, -1 below."""
     turn = np.linspace(-GROOVE, GROOVE, 120)
     x, y = centre[0] + radius * np.sin(turn), centre[1] + side * radius * np.cos(turn)
@@ -170,14 +154,7 @@ def _contact(axis: Axes, ball: Mapping[str, float], race: str, angle: float, sid
     arc = 0.36 if race == "outer" else 0.3
     axis.plot(side * arc * np.sin(turn), side * arc * np.cos(turn), color=colour, linewidth=0.9, zorder=3)
     # Beside the line, on the side away from the radial line.
-    away = 1.0 if reach[0] >= 0.0 else -1.0
-    axis.text(
-        0.66 * reach[0] + 0.02 * away,
-        0.63 * reach[1],
-        f"{ball[f'{race}_angle_deg']:.2f}°\n{ball[f'{race}_load_N']:.4g} N",
-        color=colour,
-        fontsize=9,
-        ha="left" if away > 0.0 else "right",
-        va="center",
-        zorder=6,
-    )
+    away, side_of = (1.0, "left") if reach[0] >= 0.0 else (-1.0, "right")
+    words = f"{ball[f'{race}_angle_deg']:.2f}°\n{ball[f'{race}_load_N']:.4g} N"
+    place = 0.66 * reach[0] + 0.02 * away, 0.63 * reach[1]
+    axis.text(*place, words, color=colour, fontsize=9, ha=side_of, va="center", zorder=6)

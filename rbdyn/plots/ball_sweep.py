@@ -1,14 +1,12 @@
 """Sweeps of a ball bearing: angles, loads, pressure, life and stiffness over one key, maps over two."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.plots.ball import angles_on
 from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Line2D, plain, plt, save
 
@@ -31,42 +29,31 @@ ROUND_MAPS = (
 )
 
 
-def pictures(result: SweepResult, folder: Path) -> list[str]:
+def pictures(result: "SweepResult", folder: Path) -> list[str]:
     """Draw a sweep over one or two keys; returns the names, none where nothing was found or there are more keys.
 
     Over one key, or two of which the first has few values: angles.png, pressure_and_life.png and stiffness.png; azimuth.png over one.
     Over two: map.png.
     """
-    names: list[str] = []
     shape = result.shape
     if not any(status == "ok" for status in result.statuses) or len(shape) > 2 or shape[-1] < 2:
-        return names
-
-    def draw(name: str, drawn: Callable[[SweepResult, Path], None]) -> None:
-        drawn(result, folder / name)
-        names.append(name)
-
+        return []
+    drawn = {"angles.png": angles, "pressure_and_life.png": pressure_and_life, "stiffness.png": stiffness}
     if len(shape) == 2 and shape[0] > MOST_LINES:
-        draw("map.png", maps)
-        return names
-    draw("angles.png", angles)
-    draw("pressure_and_life.png", pressure_and_life)
-    draw("stiffness.png", stiffness)
-    if len(shape) == 1 and result.figures:
-        draw("azimuth.png", azimuth)
-    return names
+        drawn = {"map.png": maps}
+    elif len(shape) == 1 and result.figures:
+        drawn["azimuth.png"] = azimuth
+    for name, draw in drawn.items():
+        draw(result, folder / name)
+    return list(drawn)
 
 
 def label(key: str) -> str:
     """A key as an axis says it: its last part, the unit in brackets."""
-    name = key.rpartition(".")[2]
-    item = name.partition("[")[2].rstrip("]")
-    name = name.partition("[")[0]
-    for unit, shown in UNITS.items():
-        if name.endswith(unit):
-            name = f"{name.removesuffix(unit).replace('_', ' ')}{f' {item}' if item else ''} [{shown}]"
-            return name
-    return name.replace("_", " ") + (f" {item}" if item else "")
+    name, _, item = key.rpartition(".")[2].partition("[")
+    unit = next((unit for unit in UNITS if name.endswith(unit)), "")
+    words = f"{name.removesuffix(unit).replace('_', ' ')} {item.rstrip(']')}".rstrip()
+    return f"{words} [{UNITS[unit]}]" if unit else words
 
 
 UNITS = {
@@ -75,7 +62,7 @@ UNITS = {
 }  # fmt: skip
 
 
-def angles(result: SweepResult, path: Path) -> None:
+def angles(result: "SweepResult", path: Path) -> None:
     """Range of the contact angles of all balls, on both races."""
     rows = _rows(result)
     figure, axes = plt.subplots(1, len(rows), figsize=(5.8 * len(rows), 4.0), squeeze=False)
@@ -90,7 +77,7 @@ def angles(result: SweepResult, path: Path) -> None:
     save(figure, path)
 
 
-def pressure_and_life(result: SweepResult, path: Path) -> None:
+def pressure_and_life(result: "SweepResult", path: Path) -> None:
     """Peak Hertz pressure of both races, and L10; a dot where each is best."""
     rows = _rows(result)
     figure, axes = plt.subplots(len(rows), 2, figsize=(10.4, 3.8 * len(rows)), squeeze=False)
@@ -103,13 +90,14 @@ def pressure_and_life(result: SweepResult, path: Path) -> None:
             millions = pick(f"{prefix}L10_Mrev")
             life.plot(x, millions, color=GREEN, linestyle=style)
             _dot(life, x, millions, least=False)
-        _log_if_wide(life, result, f"{prefix}L10_Mrev")
+        if _wide(result.columns[f"{prefix}L10_Mrev"]):
+            life.set_yscale("log")
         _finish(pressure, result, "peak pressure [MPa]", title)
         _finish(life, result, "L10 [million turns]", title)
     save(figure, path)
 
 
-def stiffness(result: SweepResult, path: Path) -> None:
+def stiffness(result: "SweepResult", path: Path) -> None:
     """Diagonal stiffnesses of the inner ring: across and along the axis, and against tilting."""
     figure, (shift, tilt) = plt.subplots(1, 2, figsize=(10.4, 3.8))
     for x, style, _, pick in _lines(result):
@@ -124,10 +112,10 @@ def stiffness(result: SweepResult, path: Path) -> None:
     save(figure, path)
 
 
-def azimuth(result: SweepResult, path: Path) -> None:
+def azimuth(result: "SweepResult", path: Path) -> None:
     """Contact angles of every ball at some values of the key: inner above, outer below."""
-    (key, values), found = next(iter(result.keys.items())), [status == "ok" for status in result.statuses]
-    places = [place for place, good in enumerate(found) if good]
+    (key, values), solved = next(iter(result.keys.items())), [status == "ok" for status in result.statuses]
+    places = [place for place, good in enumerate(solved) if good]
     shown = [places[i] for i in np.unique(np.linspace(0, len(places) - 1, MOST_LINES).round().astype(int))]
     balls = [result.balls_at(place) for place in shown]
     rows = _rows(result)
@@ -144,13 +132,11 @@ def azimuth(result: SweepResult, path: Path) -> None:
     save(figure, path)
 
 
-def maps(result: SweepResult, path: Path) -> None:
+def maps(result: "SweepResult", path: Path) -> None:
     """A panel a figure over both keys; points without an equilibrium stay white."""
     rows = _rows(result)
     panels = [
-        (f"{prefix}{column}", f"{title} {text}".strip(), log)
-        for title, prefix in rows.items()
-        for column, text, log in MAPS
+        (prefix + name, f"{title} {text}".strip(), log) for title, prefix in rows.items() for name, text, log in MAPS
     ]
     panels += ROUND_MAPS
     across = 3 if len(rows) == 1 else len(MAPS)
@@ -158,7 +144,7 @@ def maps(result: SweepResult, path: Path) -> None:
     figure, axes = plt.subplots(lines, across, figsize=(4.7 * across, 3.8 * lines))
     (first, heights), (last, widths) = result.keys.items()
     for axis, (column, text, log) in zip(axes.ravel(), panels, strict=False):
-        values = np.where(np.isfinite(result.grid(column)), result.grid(column), np.nan)
+        values = _finite(result.grid(column))
         scale = "log" if log and _wide(values) else "linear"
         image = axis.pcolormesh(widths, heights, values, cmap="cividis", norm=scale, shading="nearest")
         figure.colorbar(image, ax=axis)
@@ -166,39 +152,35 @@ def maps(result: SweepResult, path: Path) -> None:
             lines_drawn = axis.contour(widths, heights, values, 6, colors="white", linewidths=0.6)
             axis.clabel(lines_drawn, fontsize=7, fmt="%.4g")
         axis.set_title(text, fontsize=10)
-        axis.set_xlabel(label(last))
-        axis.set_ylabel(label(first))
+        axis.set(xlabel=label(last), ylabel=label(first))
     for axis in axes.ravel()[len(panels) :]:
         axis.set_axis_off()
     save(figure, path)
 
 
-def _rows(result: SweepResult) -> dict[str, str]:
+def _rows(result: "SweepResult") -> dict[str, str]:
     """Title and prefix of the columns of each row of balls."""
     if "inner_load_max_N" in result.columns:
         return {"": ""}
     return {f"{name} row": f"{name}_row_" for name in ("inner", "outer")}
 
 
-def _lines(result: SweepResult) -> list[tuple[NDArray[np.float64], Any, str, Callable[[str], NDArray[np.float64]]]]:
+def _lines(result: "SweepResult") -> list[tuple[Array, Any, str, Callable[[str], Array]]]:
     """The last key's values, and for each value of the first of two: style, name, and what picks a column."""
     keys = list(result.keys.items())
     x = np.array(keys[-1][1], dtype=np.float64)
 
-    def picker(index: int | None) -> Callable[[str], NDArray[np.float64]]:
-        def pick(column: str) -> NDArray[np.float64]:
-            grid = result.grid(column)
-            shown = grid if index is None else grid[index]
-            return np.where(np.isfinite(shown), shown, np.nan)
-
-        return pick
+    def picker(*index: int) -> Callable[[str], Array]:
+        return lambda column: _finite(result.grid(column)[index])
 
     if len(keys) == 1:
-        return [(x, "-", "", picker(None))]
-    head = label(keys[0][0])
-    text, _, unit = head.partition(" [")
-    unit = unit.rstrip("]")
+        return [(x, "-", "", picker())]
+    text, _, unit = label(keys[0][0]).rstrip("]").partition(" [")
     return [(x, STYLES[i], f"{text} {value:.5g} {unit}".rstrip(), picker(i)) for i, value in enumerate(keys[0][1])]
+
+
+def _finite(values: Array) -> Array:
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 def _once(axis: Axes, name: str) -> str:
@@ -206,7 +188,7 @@ def _once(axis: Axes, name: str) -> str:
     return "" if name in axis.get_legend_handles_labels()[1] else name
 
 
-def _dot(axis: Axes, x: NDArray[np.float64], values: NDArray[np.float64], least: bool) -> None:
+def _dot(axis: Axes, x: Array, values: Array, least: bool) -> None:
     """Mark the best point, where there is one inside the range."""
     if not np.isfinite(values).any():
         return
@@ -220,20 +202,14 @@ def _dot(axis: Axes, x: NDArray[np.float64], values: NDArray[np.float64], least:
         )  # fmt: skip
 
 
-def _wide(values: NDArray[np.float64]) -> bool:
+def _wide(values: Array) -> bool:
     """Whether values span more than a factor of thirty."""
     good = values[np.isfinite(values) & (values > 0.0)]
     return bool(good.size and good.max() > 30.0 * good.min())
 
 
-def _log_if_wide(axis: Axes, result: SweepResult, column: str) -> None:
-    if _wide(result.columns[column]):
-        axis.set_yscale("log")
-
-
-def _finish(axis: Axes, result: SweepResult, ylabel: str, title: str) -> None:
-    axis.set_xlabel(label(list(result.keys)[-1]))
-    axis.set_ylabel(ylabel)
+def _finish(axis: Axes, result: "SweepResult", ylabel: str, title: str) -> None:
+    axis.set(xlabel=label(list(result.keys)[-1]), ylabel=ylabel)
     axis.set_title(title, fontsize=10)
     handles, _ = axis.get_legend_handles_labels()
     handles += [Line2D([], [], color=GREY, linestyle=style, label=name) for _, style, name, _ in _lines(result) if name]

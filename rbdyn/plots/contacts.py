@@ -1,7 +1,5 @@
 """Pictures of load, sliding and heat around the bearing, and of where the power goes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,39 +17,33 @@ if TYPE_CHECKING:
 SMALLEST_SHARE = 1e-4
 
 
-def _around(axis: Axes, history: History, values: np.ndarray, factor: float, colour: str, label: str) -> None:
+def _around(axis: Axes, history: "History", values: np.ndarray, factor: float, colour: str, label: str) -> None:
     profile = orbit.against_azimuth(history, values)
     degrees = np.degrees(profile.azimuth)
     axis.fill_between(degrees, factor * profile.low, factor * profile.high, color=colour, alpha=0.2, linewidth=0)
     axis.plot(degrees, factor * profile.mean, color=colour, linewidth=1.4, label=label)
-    axis.set_xlim(-180.0, 180.0)
-    axis.set_xticks(range(-180, 181, 60))
+    axis.set(xlim=(-180.0, 180.0), xticks=range(-180, 181, 60))
     plain(axis)
 
 
-def roller_loads(history: History, path: Path) -> None:
+def roller_loads(history: "History", path: Path) -> None:
     """Load of a roller on both races against azimuth: mean, and the band that holds nine tenths."""
     figure, axis = plt.subplots(figsize=(7.0, 4.2))
     _around(axis, history, history.outer_load, 1.0, OUTER, "outer race")
     _around(axis, history, history.inner_load, 1.0, INNER, "inner race")
     axis.set_ylim(bottom=0.0)
-    axis.set_xlabel("azimuth of the roller from the load [°]")
-    axis.set_ylabel("roller load [N]\nmean, and 5 % to 95 %")
+    axis.set(xlabel="azimuth of the roller from the load [°]", ylabel="roller load [N]\nmean, and 5 % to 95 %")
     axis.legend(fontsize=9)
     save(figure, path)
 
 
-def sliding(history: History, path: Path) -> None:
+def sliding(history: "History", path: Path) -> None:
     """Slip, pressure times sliding speed, and heat at both races against azimuth."""
     figure, axes = plt.subplots(3, 1, figsize=(7.0, 8.4), sharex=True)
+    pressed = orbit.pressure_velocity(history, "outer"), orbit.pressure_velocity(history, "inner")
     panels = (
         ("slip: ring less\nroller surface [m/s]", 1.0, history.outer_slip, history.inner_slip),
-        (
-            "Hertz pressure ×\nsliding speed [MPa·m/s]",
-            1e-6,
-            orbit.pressure_velocity(history, "outer"),
-            orbit.pressure_velocity(history, "inner"),
-        ),
+        ("Hertz pressure ×\nsliding speed [MPa·m/s]", 1e-6, pressed[0], pressed[1]),
         ("heat of a contact [W]", 1.0, history.outer_heat, history.inner_heat),
     )
     for axis, (label, factor, outer, inner) in zip(axes, panels, strict=True):

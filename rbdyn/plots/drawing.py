@@ -6,21 +6,18 @@ so is every play; rollers are drawn smaller than they are to make room. Then wha
 the drawing. The outer ring's centre is the origin. Paper coordinates: u to the right, v down, the load points down.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.motion.orbit import largest
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
 
-Array = NDArray[np.float64]
 
 # Of the true roller radius, and of the drawn one.
 ROLLER_SHARE, CAGE_SHARE, RING_SHARE = 0.62, 0.4, 0.45
@@ -98,7 +95,7 @@ class Drawing:
     def references(self) -> list[Reference]:
         """Arrows at the lower left that tell force from length."""
         left = -0.97 * self.extent
-        found = []
+        arrows = []
         for line, (role, words, longest, scale) in enumerate(
             (
                 ("outer_force", "outer race", RACE_ARROW, self.race_scale),
@@ -109,8 +106,8 @@ class Drawing:
             down = self.extent * (0.83 + 0.07 * line)
             force = tidy(0.8 * longest * self.pitch * scale)
             arrow = Shape("arrow", role, [(left, down), (left + force / scale, down)])
-            found.append(Reference(arrow, f"{words}, {force:g} N", left + 0.3 * self.pitch, down))
-        return found
+            arrows.append(Reference(arrow, f"{words}, {force:g} N", left + 0.3 * self.pitch, down))
+        return arrows
 
 
 def tidy(value: float) -> float:
@@ -119,7 +116,7 @@ def tidy(value: float) -> float:
     return max(digit * decade for digit in TIDY if digit * decade <= value * (1.0 + 1e-9))
 
 
-def drawing(history: History, turns: float, frames_per_turn: int, most_frames: int = 2000) -> Drawing:
+def drawing(history: "History", turns: float, frames_per_turn: int, most_frames: int = 2000) -> Drawing:
     """Frames at equal intervals from ``turns`` shaft turns about the largest pocket force."""
     scene, z = history.scene, history.scene.bearing.rollers
     interval = float(history.time[1] - history.time[0])
@@ -128,14 +125,14 @@ def drawing(history: History, turns: float, frames_per_turn: int, most_frames: i
     stride = max(round(per_turn / frames_per_turn), math.ceil(window / most_frames), 1)
     peak = round(largest(history, history.pocket_load).time / interval)
     first = min(max(peak - window // 2, 0), len(history.time) - window)
-    kept = slice(first, first + window, stride)
+    frames = slice(first, first + window, stride)
     sizes = _sizes(history)
     pitch = sizes["pitch"]
     place = np.arange(z) * (2.0 * np.pi / z)
-    x = history.roller_x[kept] - history.outer_x[kept, None]
-    y = history.roller_y[kept] - history.outer_y[kept, None]
-    lead = np.arctan2(y, x) - history.cage_angle[kept, None] - place
-    turned = np.cumsum(history.roller_spin, axis=0)[kept] * interval
+    x = history.roller_x[frames] - history.outer_x[frames, None]
+    y = history.roller_y[frames] - history.outer_y[frames, None]
+    lead = np.arctan2(y, x) - history.cage_angle[frames, None] - place
+    turned = np.cumsum(history.roller_spin, axis=0)[frames] * interval
     race = max(float(history.outer_load.max()), float(history.inner_load.max()), 1e-9)
     cage = max(float(np.abs(history.pocket_load).max()), float(history.land_load.max()), 1e-9)
     return Drawing(
@@ -145,19 +142,19 @@ def drawing(history: History, turns: float, frames_per_turn: int, most_frames: i
         cage_scale=cage / (CAGE_ARROW * pitch),
         turns=window * interval / scene.turn_s,
         start=first * interval / scene.turn_s,
-        outer_angle=scene.operation.speeds[1] * history.time[kept],
-        cage_x=1e3 * (history.cage_x - history.outer_x)[kept],
-        cage_y=1e3 * (history.cage_y - history.outer_y)[kept],
-        ring_x=1e3 * (history.ring_x - history.outer_x)[kept],
-        ring_y=1e3 * (history.ring_y - history.outer_y)[kept],
+        outer_angle=scene.operation.speeds[1] * history.time[frames],
+        cage_x=1e3 * (history.cage_x - history.outer_x)[frames],
+        cage_y=1e3 * (history.cage_y - history.outer_y)[frames],
+        ring_x=1e3 * (history.ring_x - history.outer_x)[frames],
+        ring_y=1e3 * (history.ring_y - history.outer_y)[frames],
         ahead=pitch * ((lead + np.pi) % (2.0 * np.pi) - np.pi),
         out=1e3 * np.hypot(x, y) - pitch,
         spin=turned,
-        **{name: getattr(history, name)[kept] for name in AS_SAMPLED},
+        **{name: getattr(history, name)[frames] for name in AS_SAMPLED},
     )
 
 
-def _sizes(history: History) -> dict[str, Any]:
+def _sizes(history: "History") -> dict[str, Any]:
     scene = history.scene
     pitch, true_roller = 0.5 * scene.bearing.pitch_diameter_mm, 0.5 * scene.bearing.roller_diameter_mm
     outer, inner = (1e3 * radius for radius in scene.geometry.raceways)
@@ -190,7 +187,7 @@ def shapes(d: Drawing, frame: int, magnification: float) -> list[Shape]:
     thick = RING_SHARE * d.roller
     cage = (m * float(d.cage_x[frame]), m * float(d.cage_y[frame]))
     ring = (m * float(d.ring_x[frame]), m * float(d.ring_y[frame]))
-    found = [
+    drawn = [
         Shape("circle", "ring", [(0.0, 0.0)], outer + thick),
         Shape("circle", "space", [(0.0, 0.0)], outer),
         Shape("circle", "ring", [_paper(ring)], inner),
@@ -200,20 +197,20 @@ def shapes(d: Drawing, frame: int, magnification: float) -> list[Shape]:
         ((0.0, 0.0), outer + 0.5 * thick, d.outer_angle[frame]),
         (ring, inner - 0.8 * thick, d.inner_angle[frame]),
     ):
-        found.append(Shape("circle", "mark", [_paper(_polar(middle, radius, float(angle)))], 0.3 * thick))
+        drawn.append(Shape("circle", "mark", [_paper(_polar(middle, radius, float(angle)))], 0.3 * thick))
     land = d.pitch + d.guide_side * (d.cage_half + m * d.guide_gap)
     if d.guide_side:
-        found.append(Shape("circle", "land", [_paper((0.0, 0.0) if d.guide_side > 0.0 else ring)], land))
-    found += [Shape("polygon", "cage", bar) for bar in _bars(d, frame, m, cage)]
+        drawn.append(Shape("circle", "land", [_paper((0.0, 0.0) if d.guide_side > 0.0 else ring)], land))
+    drawn += [Shape("polygon", "cage", bar) for bar in _bars(d, frame, m, cage)]
     for side in (-1.0, 1.0):
-        found.append(Shape("circle", "rim", [_paper(cage)], d.pitch + side * d.cage_half))
+        drawn.append(Shape("circle", "rim", [_paper(cage)], d.pitch + side * d.cage_half))
     arrows = []
     for j in range(d.rollers):
         angle = float(d.cage_angle[frame] + 2.0 * np.pi * j / d.rollers + m * d.ahead[frame, j] / d.pitch)
         centre = _polar((0.0, 0.0), d.pitch + m * float(d.out[frame, j]), angle)
         spoke = _polar(centre, 0.8 * d.roller, float(d.spin[frame, j]))
-        found.append(Shape("circle", "roller", [_paper(centre)], d.roller))
-        found.append(Shape("line", "spoke", [_paper(centre), _paper(spoke)]))
+        drawn.append(Shape("circle", "roller", [_paper(centre)], d.roller))
+        drawn.append(Shape("line", "spoke", [_paper(centre), _paper(spoke)]))
         for role, load, touch, away in (
             ("outer_force", d.outer_load, d.roller, 1.0),
             ("inner_force", d.inner_load, -d.roller, -1.0),
@@ -228,7 +225,7 @@ def shapes(d: Drawing, frame: int, magnification: float) -> list[Shape]:
             arrows.append(Shape("arrow", "cage_force", [_paper(centre), _paper(tip)]))
     if d.land_load[frame] > 0.0:
         arrows.append(_land_arrow(d, frame, cage, ring))
-    return found + arrows
+    return drawn + arrows
 
 
 def _land_arrow(d: Drawing, frame: int, cage: tuple[float, float], ring: tuple[float, float]) -> Shape:

@@ -1,7 +1,5 @@
 """Pictures of how the cage moves and what hits it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -21,22 +19,22 @@ POCKET_COLOURS = (BLUE, ORANGE, GREEN)
 SHOWN_ORDERS = 30.0
 
 
-def _guide_circle(axis: Axes, history: History) -> None:
+def _guide_circle(axis: Axes, history: "History") -> None:
     clearance = history.scene.guide_clearance_m
     if clearance is not None:
         angle = np.linspace(0.0, 2.0 * np.pi, 361)
         x, y = clearance * 1e6 * np.cos(angle), clearance * 1e6 * np.sin(angle)
-        axis.plot(x, y, "--", color=GREY, linewidth=0.9, label="guide clearance")
+        axis.plot(x, y, "--", color=GREY, linewidth=0.9, label="half of the diametral guide clearance")
 
 
 def _plane(axis: Axes) -> None:
     axis.set_aspect("equal", adjustable="datalim")
-    axis.set_xlabel("cage centre, along the load [µm]")
-    axis.set_ylabel("across [µm]")
+    axis.locator_params(nbins=6)
+    axis.set(xlabel="cage centre, along the load [µm]", ylabel="across [µm]")
     plain(axis)
 
 
-def cage_orbit(histories: Mapping[str, History], path: Path) -> None:
+def cage_orbit(histories: "Mapping[str, History]", path: Path) -> None:
     """Path of the cage centre about that of its guide: in the guide clearance above, enlarged below, a column each."""
     columns = len(histories)
     figure, axes = plt.subplots(2, columns, figsize=(4.8 * columns, 9.0), squeeze=False)
@@ -50,11 +48,14 @@ def cage_orbit(histories: Mapping[str, History], path: Path) -> None:
         _guide_circle(column[0], history)
         column[0].set_title(title)
         column[1].set_title("enlarged")
-    axes[0][0].legend(loc="upper right", fontsize=8)
+    # Below the figure, where no orbit runs.
+    figure.legend(
+        *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=3, fontsize=8
+    )
     save(figure, path)
 
 
-def _draw_pockets(axis: Axes, history: History) -> None:
+def _draw_pockets(axis: Axes, history: "History") -> None:
     order = np.argsort(-np.abs(history.pocket_load).max(axis=0))[:SHOWN_POCKETS]
     for pocket, colour in zip(sorted(order), POCKET_COLOURS, strict=False):
         load = history.pocket_load[:, pocket]
@@ -69,7 +70,7 @@ def _legend_above(axis: Axes) -> None:
     axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=SHOWN_POCKETS, frameon=False, fontsize=8)
 
 
-def pocket_forces(histories: Mapping[str, History], path: Path) -> None:
+def pocket_forces(histories: "Mapping[str, History]", path: Path) -> None:
     """Wall forces of the pockets with the largest forces over time, a panel each."""
     rows = len(histories)
     figure, axes = plt.subplots(rows, 1, figsize=(9.0, 3.0 * rows), squeeze=False, sharex=True)
@@ -81,7 +82,7 @@ def pocket_forces(histories: Mapping[str, History], path: Path) -> None:
     save(figure, path)
 
 
-def forces(history: History, path: Path) -> None:
+def forces(history: "History", path: Path) -> None:
     """Wall forces of the pockets with the largest forces, and the land's dry load, over time; the largest marked."""
     touched = bool(history.land_load.any())
     figure, axes = plt.subplots(1 + touched, 1, figsize=(9.0, 3.4 + 2.2 * touched), squeeze=False, sharex=True)
@@ -105,7 +106,7 @@ def forces(history: History, path: Path) -> None:
     save(figure, path)
 
 
-def _mark(axis: Axes, history: History, hit: orbit.Largest, sign: float, words: str) -> None:
+def _mark(axis: Axes, history: "History", hit: orbit.Largest, sign: float, words: str) -> None:
     axis.plot(hit.time * 1e3, sign * hit.force, "v" if sign > 0.0 else "^", color=VERMILION, markersize=7)
     late = hit.time > 0.75 * history.time[-1]
     axis.annotate(f"largest: {words}", (hit.time * 1e3, sign * hit.force), xytext=(-10 if late else 10, -3),
@@ -114,7 +115,7 @@ def _mark(axis: Axes, history: History, hit: orbit.Largest, sign: float, words: 
     axis.margins(y=0.12)
 
 
-def whirl(history: History, path: Path) -> None:
+def whirl(history: "History", path: Path) -> None:
     """Distribution of the instantaneous whirl ratio, with its median, its quartiles and the mean ratio."""
     edges, density = orbit.whirl_histogram(history)
     quantiles = orbit.whirl_quantiles(history)
@@ -124,14 +125,13 @@ def whirl(history: History, path: Path) -> None:
     axis.axvline(quantiles[0.5], color=BLUE, linewidth=1.4, label=f"median {quantiles[0.5]:.3g}")
     mean = orbit.whirl_ratio(history)
     axis.axvline(mean, color=VERMILION, linewidth=1.4, linestyle="--", label=f"mean {mean:.3g}")
-    axis.set_xlabel("whirl speed of the cage centre over mean cage speed [-]")
-    axis.set_ylabel("probability density [-]")
+    axis.set(xlabel="whirl speed of the cage centre over mean cage speed [-]", ylabel="probability density [-]")
     plain(axis)
     axis.legend(fontsize=8)
     save(figure, path)
 
 
-def section(history: History, path: Path) -> None:
+def section(history: "History", path: Path) -> None:
     """Poincare sections: the cage centre once a shaft turn and once a cage turn, on its orbit."""
     x, y = (1e6 * part for part in history.guide_eccentricity)
     figure, axes = plt.subplots(1, 2, figsize=(9.6, 5.4))
@@ -146,15 +146,15 @@ def section(history: History, path: Path) -> None:
     save(figure, path)
 
 
-def spectra(history: History, path: Path) -> None:
+def spectra(history: "History", path: Path) -> None:
     """Amplitude spectra of cage eccentricity and cage speed; cage, shaft and roller-passing frequency marked."""
     cage = abs(orbit.mean_cage_speed(history)) / (2.0 * np.pi)
     passing = cage * history.scene.bearing.rollers
     lines = {"cage": cage, "shaft": 1.0 / history.scene.turn_s, "roller passing": passing}
     figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.2), sharex=True)
     signals = (
-        (orbit.eccentricity_spectrum(history), 1e6, "eccentricity of the cage", "µm"),
-        (orbit.cage_speed_spectrum(history), 30.0 / np.pi, "cage speed", "rpm"),
+        (orbit.spectrum(history, orbit.eccentricity(history)), 1e6, "eccentricity of the cage", "µm"),
+        (orbit.spectrum(history, history.cage_speed), 30.0 / np.pi, "cage speed", "rpm"),
     )
     reach = min(SHOWN_ORDERS * cage, float(signals[0][0].frequency[-1]))
     for axis, (spectrum, factor, name, unit) in zip(axes, signals, strict=True):

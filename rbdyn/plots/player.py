@@ -1,15 +1,13 @@
 """A page of HTML that plays the motion of the bearing: no file beside it, nothing fetched, readable on paper."""
 
-from __future__ import annotations
-
 import html
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
 
 if TYPE_CHECKING:
@@ -24,7 +22,7 @@ TEMPLATE = Path(__file__).with_name("player.html")
 BEARING = Path(__file__).with_name("bearing.js")
 
 
-def player_html(history: History) -> str:
+def player_html(history: "History") -> str:
     """The page, of up to three shaft turns about the largest pocket force; rounded to 0.1 um, 1 mrad and four digits."""
     most_frames = MOST_NUMBERS // (PER_ROLLER * history.scene.bearing.rollers + PER_FRAME)
     picture = drawing(history, TURNS, FRAMES_PER_TURN, most_frames)
@@ -34,7 +32,7 @@ def player_html(history: History) -> str:
     return page.replace("{{FIRST_FRAME}}", _svg(picture)).replace("{{DATA}}", record.replace("<", "\\u003c"))
 
 
-def motion_record(history: History, d: Drawing) -> dict[str, Any]:
+def motion_record(history: "History", d: Drawing) -> dict[str, Any]:
     """What ``bearing.js`` draws: sizes [mm], and the motion as flat lists, frame after frame."""
     turn = 2.0 * np.pi
     scene = history.scene
@@ -67,12 +65,12 @@ def motion_record(history: History, d: Drawing) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _numbers(values: NDArray[np.float64], decimals: int) -> list[float]:
+def _numbers(values: Array, decimals: int) -> list[float]:
     """Flat, frame after frame; whole numbers without a point."""
     return [int(x) if x == int(x) else x for x in np.round(values, decimals).ravel().tolist()]
 
 
-def _digits(loads: NDArray[np.float64]) -> list[float]:
+def _digits(loads: Array) -> list[float]:
     """To a ten-thousandth of the largest: finer than a line is wide."""
     largest = float(np.abs(loads).max())
     return _numbers(loads, 3 - int(np.floor(np.log10(largest))) if largest > 0.0 else 0)

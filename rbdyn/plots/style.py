@@ -7,7 +7,8 @@ from typing import Literal
 
 import matplotlib
 import numpy as np
-from numpy.typing import NDArray
+
+from rbdyn.arrays import Array
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -37,7 +38,8 @@ def plain(axis: Axes) -> None:
 def save(figure: Figure, path: Path) -> None:
     """Fit the labels, write the file, let go of the figure."""
     figure.tight_layout()
-    figure.savefig(path, dpi=130)
+    # What stands outside the axes, such as a legend, needs a page fitted to it.
+    figure.savefig(path, dpi=130, bbox_inches="tight" if figure.legends else None)
     plt.close(figure)
 
 
@@ -66,7 +68,7 @@ def label_ends(axis: Axes, lines: Sequence[tuple[Sequence[tuple[float, float]], 
         taken.append(box)
 
 
-def _along(line: Line2D) -> NDArray[np.float64]:
+def _along(line: Line2D) -> Array:
     """Points all along a line, in pixels."""
     corners = line.get_transform().transform(line.get_xydata())
     share = np.linspace(0.0, 1.0, 40)[:, np.newaxis]

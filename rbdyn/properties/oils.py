@@ -161,8 +161,8 @@ NUMBERS = {"7808": "MIL-L-7808", "23699": "MIL-L-23699", "85734": "MIL-L-85734"}
 def oil_named(text: str) -> NamedOil:
     """The oil of a text such as "ISO VG 32", "VG 15 PAO", "grease VG 100 mineral", "23699" or "Jet Oil II". Raises ValueError."""
     plain = " ".join(text.split())
-    if found := NAMED.fullmatch(plain):
-        grease, grade, base = found.groups()
+    if graded := NAMED.fullmatch(plain):
+        grease, grade, base = graded.groups()
         bases = {name.lower(): name for name in BASE_OILS}
         if int(grade) in GRADES and (not base or base.lower() in bases):
             return NamedOil(f"ISO VG {int(grade)}", bases.get(base.lower()), bool(grease))

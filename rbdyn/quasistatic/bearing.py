@@ -8,23 +8,16 @@ from typing import Any
 import numpy as np
 
 from rbdyn.mounting.ball_rings import growth_record, row_change
+from rbdyn.quasistatic import result as told
 from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of, load_record, middle_record
 from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.remarks import Rating, overloads, remarks, sentences, tipping
-from rbdyn.quasistatic.result import (
-    BallResult,
-    DoubleDeckerReport,
-    RowReport,
-    ball_records,
-    displacement_record,
-    stiffness_record,
-)
+from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport, film_record, row_report
 from rbdyn.quasistatic.rivals import finite_search, plain_newton
 from rbdyn.quasistatic.roots import other_roots
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
-from rbdyn.quasistatic.row_report import film_record, row_report
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
@@ -58,41 +51,31 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | tuple[Solution, ..
     nothing = _nothing(scene, solution.status, took)
     if not solution.found:
         return nothing
-    rating, table = row_rating(scene, model), solution.figures[np.newaxis]
+    rating = Rating(scene.bearing, model, reference_capacities(scene.bearing), scene.operation.speeds)
+    table = solution.figures[np.newaxis]
     if why := overloads(table, [rating]):
         return replace(nothing, status=why[0])
     film = film_record(scene, rating, solution, ("inner_ring", "outer_ring"))
     report = row_report(rating, solution, film, load_record(solution.reaction))
     grown = growth_record(scene, {"inner_less_outer_race": row_change(scene)})
-    notes = [
-        *_oil_notes(scene),
-        *sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)]),
-    ]
+    notes = [] if scene.lubricant is None else list(scene.lubricant.estimates)
+    notes += sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
     others = _other_roots(scene, model, solution)
     if others:
         notes.append(
             f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load under this raceway control, see "
             "other_roots; this one is reached from one common cage speed"
         )
-    found = {"report": report, **grown, "other_roots": others, "notes": notes}
-    return replace(nothing, **found, rows=(solution,), ratings=(rating,))
-
-
-def _oil_notes(scene: BallScene) -> list[str]:
-    return [] if scene.lubricant is None else list(scene.lubricant.estimates)
-
-
-def row_rating(scene: SingleRowScene, model: RowModel) -> Rating:
-    """What pressure, life and remarks need of a single row."""
-    return Rating(scene.bearing, model, reference_capacities(scene.bearing), scene.operation.speeds)
+    figures = {"report": report, **grown, "other_roots": others, "notes": notes}
+    return replace(nothing, **figures, rows=(solution,), ratings=(rating,))
 
 
 def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> list[dict[str, Any]] | None:
     """Other equilibria, where the raceway control may have several; None where they are not looked for."""
     if scene.model.raceway_control not in SEVERAL_ROOTS or scene.model.solver != "convex":
         return None
-    found = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
-    return [{**displacement_record(root.displacement), "balls": ball_records(root.figures)} for root in found]
+    roots = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
+    return [{**told.displacement_record(root.displacement), "balls": told.ball_records(root.figures)} for root in roots]
 
 
 def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> BallResult:
@@ -112,7 +95,7 @@ def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> Ba
         Rating(above, model.outer, reference_capacities(above), (middle, operation.outer_speed)),
     )
     layers: dict[str, RowReport] = {}
-    notes = _oil_notes(scene)
+    notes = [] if scene.lubricant is None else list(scene.lubricant.estimates)
     for name, rating, row in zip(rings, ratings, rows, strict=True):
         if why := overloads(row.figures[np.newaxis], [rating]):
             return replace(nothing, status=f"{name} row {why[0]}")
@@ -120,11 +103,11 @@ def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> Ba
         notes += sentences(remarks(row.figures[np.newaxis], [rating], name))
     notes += sentences([tipping(solution.displacement[np.newaxis, 3:], scene)])
     grown = growth_record(
-        scene, dict(zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True))
+        scene, {"inner_less_middle_bore": model.changes[0], "middle_less_outer_race": model.changes[1]}
     )
     report = DoubleDeckerReport(
-        **displacement_record(solution.displacement),
-        stiffness=stiffness_record(solution.stiffness),
+        **told.displacement_record(solution.displacement),
+        stiffness=told.stiffness_record(solution.stiffness),
         reaction=load_record(solution.reaction),
         middle_ring=middle_record(model, solution),
         residual_N=solution.residual,

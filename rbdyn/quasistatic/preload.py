@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from rbdyn.arrays import Array
 from rbdyn.faults import validated
 from rbdyn.quasistatic.fatigue import reference_capacities, solution_life, turning_rings
 from rbdyn.quasistatic.remarks import Rating, pressures
@@ -34,8 +34,8 @@ class Case(NamedTuple):
     """One bearing under one load, ready to be solved."""
 
     rating: Rating
-    load: NDArray[np.float64]
-    given: NDArray[np.float64]
+    load: Array
+    given: Array
 
 
 @dataclass(frozen=True)
@@ -87,18 +87,18 @@ def sweep(case_at: Callable[[float], Case], values: Sequence[float], name: str, 
     for value in values:
         points.append(solved(value, case_at(value), start))
         start = points[-1].solution if points[-1].solution.found else None
-    found = [point for point in points if point.solution.found]
-    if len(found) < 3:
+    balanced = [point for point in points if point.solution.found]
+    if len(balanced) < 3:
         raise ValueError(
-            f"{name}: only {len(found)} of {len(points)} scanned values have an equilibrium; scan a range that has one"
+            f"{name}: only {len(balanced)} of {len(points)} scanned values have an equilibrium; scan a range that has one"
         )
 
     def refined(worth: Callable[[Point], float]) -> Point:
-        best = min(range(len(found)), key=lambda i: worth(found[i]))
-        low, high = found[max(best - 1, 0)].value, found[min(best + 1, len(found) - 1)].value
+        best = min(range(len(balanced)), key=lambda i: worth(balanced[i]))
+        low, high = balanced[max(best - 1, 0)].value, balanced[min(best + 1, len(balanced) - 1)].value
 
         def point_at(value: float) -> Point:
-            return solved(value, case_at(value), found[best].solution)
+            return solved(value, case_at(value), balanced[best].solution)
 
         def cost(value: float) -> float:
             point = point_at(value)
@@ -107,19 +107,21 @@ def sweep(case_at: Callable[[float], Case], values: Sequence[float], name: str, 
         # Brent's search in an interval, which needs no derivative.
         place = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 1e-4 * (high - low)}).x
         trial = point_at(float(place))
-        return trial if trial.solution.found and worth(trial) < worth(found[best]) else found[best]
+        return trial if trial.solution.found and worth(trial) < worth(balanced[best]) else balanced[best]
 
     least = refined(lambda point: point.peak_pressure)
     longest = refined(lambda point: -point.million_turns)
-    notes = _notes(found, least, longest, name, unit, scale)
+    notes = _notes(balanced, least, longest, name, unit, scale)
     return Sweep(tuple(points), least, longest, notes)
 
 
-def _notes(found: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float) -> tuple[str, ...]:
+def _notes(
+    points: Sequence[Point], least: Point, longest: Point, name: str, unit: str, scale: float
+) -> tuple[str, ...]:
     notes = []
-    span = found[-1].value - found[0].value
+    span = points[-1].value - points[0].value
     for goal, point in (("least peak stress", least), ("longest life", longest)):
-        for end, word in ((found[0].value, "lower"), (found[-1].value, "upper")):
+        for end, word in ((points[0].value, "lower"), (points[-1].value, "upper")):
             if abs(point.value - end) <= 1e-3 * span:
                 notes.append(
                     f"the {goal} lies at the {word} end of the range, {name} {scale * end:.4g} {unit}: it has no "

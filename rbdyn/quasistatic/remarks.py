@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
 from rbdyn.contact.static_limit import BALLS, dent_sentence
 from rbdyn.quasistatic.row.control import FixedShare, FrictionShare
@@ -21,8 +22,6 @@ STEEPEST = math.radians(80.0)
 OILED_FRICTION = 0.07
 # Makers allow angular contact bearings about this misalignment, deep groove ones up to three times as much [rad].
 TIPPED = 1e-3
-
-Vector = NDArray[np.float64]
 
 
 class Rating(NamedTuple):
@@ -47,18 +46,18 @@ class Remark(NamedTuple):
         return self.row + self.say(place)
 
 
-def pressures(balls: Vector, ratings: Sequence[Rating]) -> dict[str, Vector]:
+def pressures(balls: Array, ratings: Sequence[Rating]) -> dict[str, Array]:
     """Largest Hertz pressure (n,) on each race [Pa] of ``balls`` (n, Z, FIGURES)."""
-    found = {}
+    peaks = {}
     for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
         contact = PointContact(*np.array([getattr(rating.model, f"{race}_contact") for rating in ratings]).T)
-        found[race] = peak_pressure(contact, balls[:, :, place].max(axis=1))
-    return found
+        peaks[race] = peak_pressure(contact, balls[:, :, place].max(axis=1))
+    return peaks
 
 
-def overloads(balls: Vector, ratings: Sequence[Rating]) -> dict[int, str]:
+def overloads(balls: Array, ratings: Sequence[Rating]) -> dict[int, str]:
     """Points whose loads no contact can carry, and why: an ellipse as long as its groove is deep."""
-    found: dict[int, str] = {}
+    causes: dict[int, str] = {}
     for race, place in (("inner", INNER_LOAD), ("outer", OUTER_LOAD)):
         loads = balls[:, :, place]
         factor = np.array([getattr(rating.drawing, f"{race}_groove_factor") for rating in ratings])
@@ -68,11 +67,11 @@ def overloads(balls: Vector, ratings: Sequence[Rating]) -> dict[int, str]:
         for k in np.flatnonzero(half > groove).tolist():
             ball = f"the ball at {360.0 * loads[k].argmax() / loads.shape[1]:.0f} deg would bear {loads[k].max():.4g} N"
             why = f"over {2e3 * half[k]:.3g} mm across a groove of {1e3 * groove[k]:.3g} mm radius, which no contact can; lessen the load"
-            found.setdefault(k, f"overloaded: {ball} on the {race} race, {why}")
-    return found
+            causes.setdefault(k, f"overloaded: {ball} on the {race} race, {why}")
+    return causes
 
 
-def needed_friction(balls: Vector, ratings: Sequence[Rating]) -> Vector:
+def needed_friction(balls: Array, ratings: Sequence[Rating]) -> Array:
     """Largest friction coefficient (n,) that a contact needs to hold its part of the gyroscopic moment, 2 s M_g/(D Q)."""
     inner, outer = balls[:, :, INNER_LOAD], balls[:, :, OUTER_LOAD]
     controls = [rating.model.control for rating in ratings]
@@ -93,7 +92,7 @@ def needed_friction(balls: Vector, ratings: Sequence[Rating]) -> Vector:
     return np.where((inner > 0.0) & (outer > 0.0), needed, 0.0).max(axis=1)
 
 
-def remarks(balls: Vector, ratings: Sequence[Rating], name: str = "") -> list[Remark]:
+def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Remark]:
     """Remarks on n equilibria of a row, ``balls`` (n, Z, FIGURES); ``name`` of the row, where there are two."""
     row = f"{name} row: " if name else ""
     touching, angle = balls[:, :, INNER_LOAD] > 0.0, np.degrees(balls[:, :, INNER_ANGLE])
@@ -105,7 +104,7 @@ def remarks(balls: Vector, ratings: Sequence[Rating], name: str = "") -> list[Re
     shouldered = np.array([rating.drawing.contact_angle > 0.0 for rating in ratings])
     needed, (inner, outer) = needed_friction(balls, ratings), pressures(balls, ratings).values()
     # fmt: off
-    found = [
+    listed = [
         ("unloaded", clear == size, lambda k:
             "no ball touches the inner race, so nothing tells where the ring is; load it or take away clearance"),
         ("clear balls", (clear > 0) & (clear < size), lambda k: f"{clear[k]} of {size} balls are clear of the inner race"),
@@ -122,10 +121,10 @@ def remarks(balls: Vector, ratings: Sequence[Rating], name: str = "") -> list[Re
             "about that axis; raise the load or lower the speed"),
     ]
     # fmt: on
-    return [Remark(row + word, where, say, row) for word, where, say in found]
+    return [Remark(row + word, where, say, row) for word, where, say in listed]
 
 
-def tipping(tilts: Vector, scene: BallScene) -> Remark:
+def tipping(tilts: Array, scene: BallScene) -> Remark:
     """Remark on a ring that is free to tilt and does, from ``tilts`` (n, 2) [rad]."""
     held = np.array([value is not None for value in scene.operation.given[3:]])
     tilt = np.hypot(*np.where(held, 0.0, tilts).T)
@@ -136,6 +135,6 @@ def tipping(tilts: Vector, scene: BallScene) -> Remark:
     # fmt: on
 
 
-def sentences(found: Sequence[Remark]) -> list[str]:
+def sentences(given: Sequence[Remark]) -> list[str]:
     """What remarks say of the first equilibrium."""
-    return [remark.sentence(0) for remark in found if remark.where[0]]
+    return [remark.sentence(0) for remark in given if remark.where[0]]

@@ -1,17 +1,23 @@
-"""What an equilibrium of a ball bearing reports, saves and loads."""
+"""What an equilibrium of a ball bearing reports, saves and loads: angles, loads, stress, contacts, film, life."""
 
-from __future__ import annotations
-
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.quasistatic.remarks import Rating
+from rbdyn.arrays import Array
+from rbdyn.contact import point_film
+from rbdyn.contact.film_thickness import lambda_ratio
+from rbdyn.contact.hertz_point import PointContact, peak_pressure
+from rbdyn.properties.materials import equivalent_modulus
+from rbdyn.quasistatic.fatigue import solution_life, turning_rings
+from rbdyn.quasistatic.remarks import Rating, needed_friction
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.records.record import Record, outside_json, spread
+from rbdyn.records.words import Brief, Figure
 from rbdyn.result import SavedRecord
+from rbdyn.scene.ball import BallScene
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,7 +58,7 @@ class DoubleDeckerReport(Record):
     outer: RowReport
 
 
-class BallResult(SavedRecord, kw_only=True):
+class BallResult(Brief, SavedRecord, kw_only=True):
     """Equilibrium of a ball bearing, ``scene`` the resolved input; ``status``: "ok", or why there is none.
 
     ``report``: what was found, None where nothing was. ``ring_growth_um``, ``fits``: where the scene asks for growth or tells
@@ -93,7 +99,7 @@ class BallResult(SavedRecord, kw_only=True):
         return self.status == "ok"
 
     @property
-    def displacement(self) -> NDArray[np.float64]:
+    def displacement(self) -> Array:
         """(x, y, z [m], theta_x, theta_y [rad]) of the inner ring. Raises ValueError where there is no equilibrium."""
         report = self.reached
         place, tilt = report.displacement_mm, report.tilt_mrad
@@ -112,7 +118,21 @@ class BallResult(SavedRecord, kw_only=True):
         report = self.reached
         return {"": report} if isinstance(report, RowReport) else {"inner": report.inner, "outer": report.outer}
 
-    def table(self) -> pd.DataFrame:
+    def brief(self) -> tuple[str, list[Figure]]:
+        """Status and notes; of each row pressures, life and place, and the stiffness: exact figures of the model."""
+        figures = []
+        for name, row in self.row_reports.items() if self.report else ():
+            of_row = f"{name} row " if name else ""
+            figures += [
+                Figure(f"{of_row}pressure, {race} race", p, None, "MPa") for race, p in row.max_stress_MPa.items()
+            ]
+            figures.append(Figure(f"{of_row}life L10", row.life["L10_Mrev"], None, "million turns"))
+        for axis in "xyz" if self.report else "":
+            figures.append(Figure(f"displacement {axis}", 1e3 * self.reached.displacement_mm[axis], None, "µm"))
+            figures.append(Figure(f"stiffness {axis}", self.reached.stiffness[f"{axis}_N_per_um"], None, "N/µm"))
+        return f"{self.status}, {len(self.notes or ())} notes", figures
+
+    def table(self) -> "pd.DataFrame":
         """A row a ball: azimuth, angles, loads, centrifugal force, gyroscopic moment; units in the names."""
         import pandas as pd
 
@@ -120,13 +140,13 @@ class BallResult(SavedRecord, kw_only=True):
         return layers[""] if "" in layers else pd.concat(layers, names=["row", "ball"]).reset_index()
 
 
-def displacement_record(displacement: NDArray[np.float64]) -> dict[str, Any]:
+def displacement_record(displacement: Array) -> dict[str, Any]:
     """Displacement of a ring in mm and mrad."""
     x, y, z, tilt_x, tilt_y = (1e3 * float(value) for value in displacement)
     return {"displacement_mm": {"x": x, "y": y, "z": z}, "tilt_mrad": {"x": tilt_x, "y": tilt_y}}
 
 
-def ball_columns(balls: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+def ball_columns(balls: Array) -> dict[str, Array]:
     """A value a ball, (n, Z) each, named as ``BallResult.table`` names them."""
     size = balls.shape[1]
     return {
@@ -140,13 +160,13 @@ def ball_columns(balls: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def ball_records(figures: NDArray[np.float64]) -> list[dict[str, float]]:
+def ball_records(figures: Array) -> list[dict[str, float]]:
     """One record a ball, from the figures (Z, FIGURES) of ``solve_row``."""
     columns = ball_columns(figures[np.newaxis])
     return [{name: float(values[0, j]) for name, values in columns.items()} for j in range(len(figures))]
 
 
-def stiffness_record(stiffness: NDArray[np.float64]) -> dict[str, Any]:
+def stiffness_record(stiffness: Array) -> dict[str, Any]:
     """Diagonal stiffnesses and the whole matrix."""
     across, tilt = (np.diag(stiffness)[:3] * 1e-6).tolist(), (np.diag(stiffness)[3:] * 1e-3).tolist()
     return {
@@ -154,3 +174,72 @@ def stiffness_record(stiffness: NDArray[np.float64]) -> dict[str, Any]:
         **{f"tilt_{axis}_Nm_per_mrad": value for axis, value in zip("xy", tilt, strict=True)},
         "matrix_SI": stiffness.tolist(),
     }
+
+
+def row_report(rating: Rating, solution: Solution, film: dict[str, Any], reaction: dict[str, Any] | None) -> RowReport:
+    """Report of one row; ``film``: as ``film_record`` gives it."""
+    contacts = {"inner": rating.model.inner_contact, "outer": rating.model.outer_contact}
+    loads = {"inner": solution.inner_load, "outer": solution.outer_load}
+    life = solution_life(solution, rating.capacities, turning_rings(*rating.speeds))
+    return RowReport(
+        **displacement_record(solution.displacement),
+        balls=ball_records(solution.figures),
+        max_stress_MPa={race: 1e-6 * float(np.max(peak_pressure(contacts[race], loads[race]))) for race in contacts},
+        contacts={
+            race: {**contact_record(contacts[race], float(loads[race].max())), **film.get(race, {})}
+            for race in contacts
+        },
+        stiffness=stiffness_record(solution.stiffness),
+        life={**life.as_record(*rating.speeds), "method": "ISO/TS 16281"},
+        needed_friction=float(needed_friction(solution.figures[np.newaxis], [rating])[0]),
+        residual_N=solution.residual,
+        iterations=solution.steps,
+        searches=solution.searches,
+        reaction=reaction,
+    )
+
+
+def contact_record(contact: PointContact, load: float) -> dict[str, float]:
+    """Ellipse of a contact under a load [N]."""
+    grown = load ** (1.0 / 3.0)
+    semi_major, semi_minor = 1e3 * contact.semi_major * grown, 1e3 * contact.semi_minor * grown
+    return {
+        "load_N": load,
+        "semi_major_mm": semi_major,
+        "semi_minor_mm": semi_minor,
+        "area_mm2": math.pi * semi_major * semi_minor,
+    }
+
+
+def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tuple[str, str]) -> dict[str, Any]:
+    """Film of each race at its largest load, the thermal factor included, between ``rings``, the names of the inner and outer one.
+
+    Empty where the scene tells no oil, and where nothing turns or bears.
+    """
+    if scene.lubricant is None:
+        return {}
+    lubricant, drawing, model = scene.lubricant, rating.drawing, rating.model
+    ball, inner, outer = (scene.material(part) for part in ("ball", *rings))
+    gamma = drawing.gamma
+    entrainment = point_film.entrainment_speed(drawing.pitch_diameter, gamma, *rating.speeds)
+    oil, films = lubricant.in_service, {}
+    for race, contact, ring, side, loads in (
+        ("inner", model.inner_contact, inner, gamma, solution.inner_load),
+        ("outer", model.outer_contact, outer, -gamma, solution.outer_load),
+    ):
+        load = float(loads.max())
+        if entrainment == 0.0 or load == 0.0:
+            continue
+        rolling = point_film.RollingBall(
+            contact, point_film.rolling_radius(drawing.ball_diameter, side), equivalent_modulus(ball, ring), entrainment
+        )
+        heat = float(point_film.thermal_factor(rolling, oil, load))
+        central = float(point_film.central_film(rolling, oil, load)) * heat
+        roughness = lubricant.roller_roughness, lubricant.race_roughness
+        films[race] = {
+            "central_film_um": 1e6 * central,
+            "minimum_film_um": 1e6 * float(point_film.minimum_film(rolling, oil, load)) * heat,
+            "lambda_ratio": float(lambda_ratio(central, *roughness)),
+            "film_stiffness_N_per_um": 1e-6 * float(point_film.film_stiffness(rolling, oil, load)),
+        }
+    return films

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.quasistatic.row.control import Control, FixedShare, FrictionShare, Spinning
+from rbdyn.arrays import Array
+from rbdyn.quasistatic.row.control import Control, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.row import Row
 
@@ -16,9 +16,7 @@ SPEEDS = (0.7, 1.4)
 SAME = 1e-4
 
 
-def other_roots(
-    row: Row, control: Control, load: NDArray[np.float64], given: NDArray[np.float64], known: Solution
-) -> tuple[Solution, ...]:
+def other_roots(row: Row, control: Control, load: Array, given: Array, known: Solution) -> tuple[Solution, ...]:
     """Equilibria besides ``known``, found from those of other raceway controls and of slower and faster rings.
 
     A search, not a proof: an empty answer says that none of these starts leads elsewhere. None under one common cage speed,
@@ -26,27 +24,22 @@ def other_roots(
     """
     if not isinstance(control, FixedShare | FrictionShare):
         return ()
-    found = [known]
+    roots = [known]
     for start in _starts(row, control, load, given):
         root = solve(row, control, load, given, start)
-        if root.found and all(_differ(root, other) for other in found):
-            found.append(root)
-    return tuple(found[1:])
+        if root.found and all(_differ(root, other) for other in roots):
+            roots.append(root)
+    return tuple(roots[1:])
 
 
-def _starts(
-    row: Row, control: FixedShare | FrictionShare, load: NDArray[np.float64], given: NDArray[np.float64]
-) -> Sequence[Solution]:
-    neighbours: list[tuple[Row, Control]] = [(row, FixedShare(share, control.spinning)) for share in SHARES]
-    for factor in SPEEDS:
-        neighbours.append((row, control._replace(spinning=_turning(control.spinning, factor))))
+def _starts(row: Row, control: FixedShare | FrictionShare, load: Array, given: Array) -> Sequence[Solution]:
+    usual = control.spinning
+    neighbours: list[Control] = [FixedShare(share, usual) for share in SHARES]
+    turning = [usual._replace(inner_speed=k * usual.inner_speed, outer_speed=k * usual.outer_speed) for k in SPEEDS]
     # The sign of the moment that many texts have leads to the other side.
-    neighbours.append((row, control._replace(spinning=control.spinning._replace(turning=-control.spinning.turning))))
-    return [start for start in (solve(a, b, load, given) for a, b in neighbours) if start.found]
-
-
-def _turning(spinning: Spinning, factor: float) -> Spinning:
-    return spinning._replace(inner_speed=factor * spinning.inner_speed, outer_speed=factor * spinning.outer_speed)
+    turning.append(usual._replace(turning=-usual.turning))
+    neighbours += [control._replace(spinning=each) for each in turning]
+    return [start for start in (solve(row, each, load, given) for each in neighbours) if start.found]
 
 
 def _differ(one: Solution, other: Solution) -> bool:

@@ -1,1 +1,1 @@
-"""What is written down: records as JSON, and finished parts of a long command."""
+"""What is written down: records as JSON and in words, and finished parts of a long command."""

@@ -12,6 +12,8 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from types import UnionType
 from typing import Any, Literal, Self, Union, dataclass_transform, get_args, get_origin, get_type_hints
 
+from rbdyn.records.words import Brief
+
 # What fields are declared to be, of a class.
 _kinds: Callable[[Any], dict[str, Any]] = functools.cache(get_type_hints)
 
@@ -44,10 +46,13 @@ def outside_json(**options: Any) -> Any:
 @dataclass_transform(frozen_default=True, field_specifiers=(field, keyed, spread, derived, shown, outside_json))
 @dataclass(frozen=True)
 class Record:
-    """Base of all records, which makes frozen dataclasses of them; ``kw_only``: with named arguments only."""
+    """Base of all records, which makes frozen dataclasses of them; ``kw_only``: with named arguments only.
+
+    One that tells of itself in brief, before this base, keeps its own ``repr``.
+    """
 
     def __init_subclass__(cls, kw_only: bool = False) -> None:
-        dataclass(frozen=True, kw_only=kw_only)(cls)
+        dataclass(frozen=True, kw_only=kw_only, repr=not issubclass(cls, Brief))(cls)
 
     def __post_init__(self) -> None:
         for one in fields(self):

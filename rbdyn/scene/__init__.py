@@ -4,22 +4,20 @@ Keys carry their units; whatever a paper leaves out stands here as a default wit
 is compiled: ``rbdyn.dynamics.parameters.model`` turns a scene into the SI parameters of the kernels.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Self, cast
 
 from pydantic import Field, model_validator
 
 from rbdyn.faults import InputError
-from rbdyn.fields import or_refuse
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
 from rbdyn.scene.laws import Laws, Numerics
 from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
-from rbdyn.scene.mounting import Mounting, faults, material_of
+from rbdyn.scene.mounting import Mounting, material_of, misfits
 from rbdyn.scene.operation import Operation, Support
 from rbdyn.scene.reading import SceneFile
 from rbdyn.scene.uncertain import Uncertain
@@ -34,7 +32,18 @@ PROFILE_SLICES = 31
 
 
 class Scene(SceneFile):
-    """Everything a simulation of a cylindrical roller bearing needs. ``load`` of a ball bearing's file gives a BallScene."""
+    """Everything that decides a simulation of a cylindrical roller bearing, checked, with units in the names of the keys.
+
+    ``Scene.load("SCENE.toml")`` reads a file, ``Scene.from_dict(tables)`` or ``Scene(bearing={...}, cage={...}, ...)`` tables as
+    TOML gives them, ``scene.changed({"cage.mass_g": 50.0})`` is the scene with other values. Of a ball bearing all of them give a
+    BallScene. A scene never changes; ``scene.cage.mass_g`` reads a key. What is wrong is an InputError that names every key,
+    value and mend at once; ``rbdyn keys`` lists all keys. ``rbdyn.simulate(scene)`` runs it, ``rbdyn.history(scene, turns)`` gives
+    its motion, ``rbdyn.equilibrium(scene)`` is for balls.
+
+    bearing, cage, lubricant, operation : drawings, oil, speeds and loads; needed.
+    mounting, support : fits and temperatures, a flexible housing; none unless given.
+    materials, traction, model, numerics : with defaults.
+    """
 
     bearing: Bearing
     """The drawing of the bearing."""
@@ -72,98 +81,103 @@ class Scene(SceneFile):
     def _traction_of_oil(cls, data: Any) -> Any:
         return with_traction_of_oil(data)
 
-    @model_validator(mode="after")
-    def _assembles(self) -> Scene:
+    def faults(self) -> list[str]:
+        """What does not go together, each with a slip of the unit that may be its cause."""
+        faults = list(self._misfits())
+        faults += misfits(self.mounting, self.bearing) if self.mounting is not None else ()
+        faults += self._overload_faults()
+        slips = {note.partition(" = ")[0]: note for note in (self.unit_notes if faults else ())}
+        return ["; ".join([fault, *(slips[key] for key in slips if key in fault)]) for fault in faults]
+
+    def _misfits(self) -> Iterator[str]:
         bearing, cage, laws = self.bearing, self.cage, self.model
-        found = []
         chord = bearing.pitch_diameter_mm * math.sin(math.pi / bearing.rollers)
         web = chord - bearing.roller_diameter_mm - cage.pocket_clearance_mm
         if web <= 0.0:
-            found.append(
+            yield (
                 f"cage.pocket_clearance_mm = {cage.pocket_clearance_mm:g}: leaves no cross-bar between "
                 f"{bearing.rollers} pockets ({web:.4g} mm); make it smaller or take fewer rollers"
             )
         if laws.guide_land == "film" and cage.guidance != "roller":
             radial_um = 500.0 * (cage.guide_clearance_mm or 0.0)
             if laws.land_film_floor_um >= radial_um:
-                found.append(
+                yield (
                     f"model.land_film_floor_um = {laws.land_film_floor_um:g}: not below the radial guide clearance of "
                     f"{radial_um:g} um; lower it, widen cage.guide_clearance_mm or set model.guide_land = 'dry'"
                 )
         touching = cage.pocket_contact_length_mm
         if touching is not None and touching > bearing.roller_length_mm:
-            found.append(
+            yield (
                 f"cage.pocket_contact_length_mm = {touching:g}: a wall touches no more than the roller of "
                 f"{bearing.roller_length_mm:g} mm; shorten it or lengthen bearing.roller_length_mm"
             )
         floor, half_pocket_um = laws.pocket_film_floor_um, 500.0 * cage.pocket_clearance_mm
         if laws.pocket_film and floor >= half_pocket_um:
-            found.append(
+            yield (
                 f"model.pocket_film_floor_um = {floor:g}: not below half the pocket clearance of {half_pocket_um:g} um; "
                 "lower it or widen cage.pocket_clearance_mm"
             )
         if laws.slices == 1 and self.needs_slices:
-            found.append(
+            yield (
                 f"model.slices = 1 contradicts bearing.roller_profile = {bearing.roller_profile!r} with bearing.tilt_mrad = "
                 f"{bearing.tilt_mrad:g}: one slice shows neither profile nor tilt; leave model.slices out"
             )
         rheology = self.traction.rheology_oil or self.lubricant.oil
         if self.traction.model == "thermal_newtonian" and rheology not in RHEOLOGY_OILS:
-            found.append(
+            yield (
                 f"traction.model = 'thermal_newtonian': no constants of {rheology} are known; add traction.rheology_oil of an oil "
                 "alike, or take 'limiting_shear'"
             )
-        found += self._tilt_faults()
+        yield from self._tilt_faults()
         land = self.land_diameter_mm
         inner = bearing.pitch_diameter_mm - bearing.roller_diameter_mm
         outer = bearing.pitch_diameter_mm + bearing.roller_diameter_mm
         if cage.guidance != "roller" and not inner < land < outer:
-            found.append(
-                f"cage.land_diameter_mm = {land:g}: not between the raceways of {inner:g} and {outer:g} mm; mend it"
-            )
+            yield f"cage.land_diameter_mm = {land:g}: not between the raceways of {inner:g} and {outer:g} mm; mend it"
         numerics = self.numerics
         if numerics.turns * numerics.samples_per_turn < 2:
-            found.append(f"numerics.turns = {numerics.turns:g}: shorter than two samples; lengthen the run")
-        if self.mounting is not None:
-            found += faults(self.mounting, bearing)
-        found += self._overload_faults()
-        # A slip of the unit may be the cause of a fault.
-        slips = {note.partition(" = ")[0]: note for note in (self.unit_notes if found else ())}
-        return or_refuse(self, ["; ".join([fault, *(slips[key] for key in slips if key in fault)]) for fault in found])
+            yield f"numerics.turns = {numerics.turns:g}: shorter than two samples; lengthen the run"
 
-    def _overload_faults(self) -> list[str]:
+    def _overload_faults(self) -> Iterator[str]:
         """Whether the most loaded roller, by Stribeck 5 F/Z, would be flattened over more than its diameter."""
         bearing, load = self.bearing, self.operation.largest_load_N
         modulus = 1e-6 * equivalent_modulus(self.material("roller"), self.material("rings"))
         diameter, length = bearing.roller_diameter_mm, bearing.effective_length_mm
         radius = 0.5 * diameter * (1.0 - diameter / bearing.pitch_diameter_mm)
         width = math.sqrt(32.0 * 5.0 * load / bearing.rollers * radius / (math.pi * length * modulus))  # Hertz
-        if width < diameter:
-            return []
-        return [
-            f"operation.radial_load_N = {load:g}: a roller of {diameter:g} mm would be flattened over {width:.3g} mm, which none can; "
-            "lessen the load or check its unit"
-        ]
+        if width >= diameter:
+            yield (
+                f"operation.radial_load_N = {load:g}: a roller of {diameter:g} mm would be flattened over {width:.3g} mm, which "
+                "none can; lessen the load or check its unit"
+            )
 
-    def _tilt_faults(self) -> list[str]:
+    def _tilt_faults(self) -> Iterator[str]:
         """Whether a roller that bears the whole load between tilted races touches over less than a slice."""
         bearing = self.bearing
         share = max(bearing.inner_tilt_share, 1.0 - bearing.inner_tilt_share)
         tilt, length = abs(bearing.tilt) * share, bearing.effective_length
         load = self.operation.largest_load_N
         if tilt < 1e-12 or load == 0.0:  # by then the ends move less than an atom
-            return []
+            return
         from rbdyn.contact.hertz_line import palmgren
 
         stiffness = palmgren(equivalent_modulus(self.material("roller"), self.material("rings")), length).stiffness
         # Q = K/l int_0^c (tilt x)^(10/9) dx = (9/19) K/l tilt^(10/9) c^(19/9)
         touching = (19.0 / 9.0 * load * length / (stiffness * tilt ** (10.0 / 9.0))) ** (9.0 / 19.0)
-        if touching >= length / (self.model.slices or PROFILE_SLICES):
-            return []
-        return [
-            f"bearing.tilt_mrad = {bearing.tilt_mrad:g}: even under {load:g} N a roller would touch over "
-            f"{touching * 1e3:.2g} mm of {bearing.effective_length_mm:g} mm; lessen the tilt"
-        ]
+        if touching < length / (self.model.slices or PROFILE_SLICES):
+            yield (
+                f"bearing.tilt_mrad = {bearing.tilt_mrad:g}: even under {load:g} N a roller would touch over "
+                f"{touching * 1e3:.2g} mm of {bearing.effective_length_mm:g} mm; lessen the tilt"
+            )
+
+    @property
+    def summary(self) -> str:
+        """The scene in a line; the clearance is as drawn."""
+        bearing, point = self.bearing, self.operation
+        return (
+            f"{bearing.rollers} rollers of {bearing.roller_diameter_mm:g} x {bearing.roller_length_mm:g} mm, diametral clearance "
+            f"{bearing.radial_clearance_mm:g} mm, {point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N radial"
+        )
 
     @property
     def mounted_clearance_mm(self) -> float:
@@ -172,14 +186,14 @@ class Scene(SceneFile):
         return self.bearing.radial_clearance_mm if mounted is None else mounted.operating * 1e3
 
     @cached_property
-    def geometry(self) -> Geometry:
+    def geometry(self) -> "Geometry":
         """Radii, masses and speeds as mounted."""
         from rbdyn.scene.geometry import geometry_of
 
         return geometry_of(self)
 
     @cached_property
-    def mounted_clearance(self) -> MountedClearance | None:
+    def mounted_clearance(self) -> "MountedClearance | None":
         """What fits, temperatures and rotation do to the clearance; None where the scene tells no mounting."""
         if self.mounting is None:
             return None

@@ -1,20 +1,20 @@
 """One validated scene of a ball bearing: single row or double-decker, its load, its model."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal, Self, cast
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from rbdyn.faults import Strict
-from rbdyn.fields import SI, or_refuse
+from rbdyn.faults import Consistent, Strict
+from rbdyn.fields import SI
 from rbdyn.properties.materials import Material
 from rbdyn.scene.ball_bearing import BallBearing, BallRow, DoubleDecker
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
-from rbdyn.scene.form_errors import FormErrors, faults
+from rbdyn.scene.form_errors import FormErrors
+from rbdyn.scene.form_errors import misfits as form_faults
 from rbdyn.scene.lubricant import Lubricant
 from rbdyn.scene.mounting import Mounting, material_of
-from rbdyn.scene.mounting import faults as mounting_faults
+from rbdyn.scene.mounting import misfits as mounting_faults
 from rbdyn.scene.operation import Speed
 from rbdyn.scene.reading import SceneFile
 
@@ -48,7 +48,7 @@ class Prescribed(Strict):
 COMPONENTS = ("x", "y", "z", "tilt_x", "tilt_y")
 
 
-class BallOperation(Strict):
+class BallOperation(Consistent):
     """Speeds and load on the inner ring. x is radial, z axial; the outer ring is the reference."""
 
     inner_speed_rpm: Speed = 0.0
@@ -75,39 +75,35 @@ class BallOperation(Strict):
     """How far nut and spacer push the inner ring in after it touches; instead of preload_N."""
     inner_speed, outer_speed = SI("rpm"), SI("rpm")
 
-    @model_validator(mode="after")
-    def _consistent(self) -> BallOperation:
-        faults = []
+    def faults(self) -> Iterator[str]:
         if self.load_N is not None and (self.radial_load_N is not None or self.axial_load_N is not None):
-            faults.append(
+            yield (
                 "operation.load_N and operation.radial_load_N or axial_load_N contradict each other: give the one or the others"
             )
         if self.moment_Nm is not None and self.tilt == "fixed" and any(self.moment_Nm):
-            faults.append(
+            yield (
                 f"operation.moment_Nm = {self.moment_Nm}: has no effect on a ring whose tilt is fixed; leave it out or set "
                 "operation.tilt = 'free'"
             )
         if self.preload_um is not None:
             if self.preload_N:
-                faults.append(
+                yield (
                     f"operation.preload_um = {self.preload_um:g} and operation.preload_N = {self.preload_N:g} contradict each "
                     "other: preload by displacement or by force"
                 )
             if self.prescribed.z_mm is not None:
-                faults.append(
+                yield (
                     f"operation.preload_um = {self.preload_um:g} and operation.prescribed.z_mm = {self.prescribed.z_mm:g} "
                     "both prescribe the axial displacement; leave one out"
                 )
-        load = dict(zip(COMPONENTS, (*self.load, *self.moment), strict=True))
-        for name, value in zip(COMPONENTS, self.given, strict=True):
-            by_tilt = name.startswith("tilt") and self.tilt == "fixed"
-            by_nut = name == "z" and self.preload_um is not None
-            if value is not None and load[name] != 0.0 and not (by_tilt or by_nut):
-                faults.append(
-                    f"operation.prescribed: the {name} displacement is prescribed, so the load of {load[name]:g} along it would be "
+        for name, value, load in zip(COMPONENTS, self.given, (*self.load, *self.moment), strict=True):
+            if value is None or load == 0.0 or (name == "z" and self.preload_um is not None):
+                continue
+            if self.tilt == "free" or not name.startswith("tilt"):
+                yield (
+                    f"operation.prescribed: the {name} displacement is prescribed, so the load of {load:g} along it would be "
                     "lost; leave one out"
                 )
-        return or_refuse(self, faults)
 
     @property
     def speeds(self) -> tuple[float, float]:
@@ -178,7 +174,7 @@ class BallMaterials(Strict):
 
 
 class BallScene(SceneFile):
-    """Everything the equilibrium of a ball bearing needs."""
+    """Everything the equilibrium of a ball bearing needs; made, checked, changed and read as ``Scene`` tells."""
 
     bearing: BallBearing | DoubleDecker
     """The drawing: one row, or two rows with a ring between."""
@@ -195,15 +191,43 @@ class BallScene(SceneFile):
     mounting: Mounting | None = None
     """Fits, temperatures, shaft and housing."""
 
-    @model_validator(mode="after")
-    def _rings_known(self) -> Self:
-        return or_refuse(self, ring_faults(self))
+    def faults(self) -> Iterable[str]:
+        """One sentence for each diameter or oil that is missing, and for each that is told twice in different ways."""
+        if self.mounting is not None:
+            yield from _mounted_faults(self.mounting, self)
+        elif self.model.ring_expansion:
+            yield from _unmounted_faults(self)
+        inner, outer = self.outermost_rows
+        middle = None if inner is outer else self.bearing.middle  # type: ignore[union-attr]
+        if middle is not None and middle.speed_split == "torque_balance" and middle.speed_rpm is None:
+            if self.lubricant is None:
+                yield (
+                    "lubricant: missing; bearing.middle.speed_split = 'torque_balance' needs its viscosity, or set 'oil'"
+                )
+            for name, row in (("inner", inner), ("outer", outer)):
+                if row.contact_angle == 0.0:
+                    yield (
+                        f"bearing.{name}.contact_angle_deg = 0: has no load torque after Palmgren; set bearing.middle.speed_split"
+                        " = 'oil' or give bearing.middle.speed_rpm"
+                    )
 
     @property
     def outermost_rows(self) -> tuple[BallRow, BallRow]:
         """The row on the inner ring and that in the outer ring: one and the same but in a double-decker bearing."""
         bearing = self.bearing
         return (bearing.inner, bearing.outer) if isinstance(bearing, DoubleDecker) else (bearing, bearing)
+
+    @property
+    def summary(self) -> str:
+        """The scene in a line."""
+        point, rows = (
+            self.operation,
+            dict.fromkeys(f"{row.balls} x {row.ball_diameter_mm:g} mm" for row in self.outermost_rows),
+        )
+        loads = ", ".join(
+            f"{key} = {value}" for key, value in point.model_dump(exclude_unset=True).items() if "load" in key
+        )
+        return f"{self.bearing.kind}, balls {' and '.join(rows)}, {point.inner_speed_rpm:g} rpm, {loads or 'no load'}"
 
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:
@@ -223,12 +247,12 @@ class SingleRowScene(BallScene):
     bearing: BallBearing
     """The drawing of a single row."""
 
-    @model_validator(mode="after")
-    def _errors_fit(self) -> SingleRowScene:
-        row = self.bearing
+    def faults(self) -> Iterable[str]:
+        """Those of both kinds, else those of form errors."""
+        row, faults = self.bearing, super().faults()
         if self.errors is None:
-            return self
-        return or_refuse(self, faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm))
+            return faults
+        return tuple(faults) or form_faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm)
 
 
 class DoubleDeckerScene(BallScene):
@@ -237,78 +261,48 @@ class DoubleDeckerScene(BallScene):
     bearing: DoubleDecker
     """The drawing of two rows with a ring between."""
 
-    @model_validator(mode="after")
-    def _solvable(self) -> DoubleDeckerScene:
-        found = []
-        if self.errors is not None:
-            found.append("errors: form errors are followed for one row of balls only; take the table away")
-        if self.model.solver != "convex":
-            found.append(f"model.solver = {self.model.solver!r}: solves one row of balls only; leave it out for two")
-        return or_refuse(self, found)
+    def faults(self) -> Iterator[str]:
+        """Those of both kinds, else what is meant for one row."""
+        faults = list(super().faults())
+        yield from faults
+        if not faults and self.errors is not None:
+            yield "errors: form errors are followed for one row of balls only; take the table away"
+        if not faults and self.model.solver != "convex":
+            yield f"model.solver = {self.model.solver!r}: solves one row of balls only; leave it out for two"
 
 
-def ring_faults(scene: BallScene) -> list[str]:
-    """One sentence for each diameter or oil that is missing, and for each that is told twice in different ways."""
-    found = _unmounted_faults(scene) if scene.mounting is None else _mounted_faults(scene)
+def _unmounted_faults(scene: BallScene) -> Iterator[str]:
     inner, outer = scene.outermost_rows
-    middle = None if inner is outer else scene.bearing.middle  # type: ignore[union-attr]
-    if middle is not None and middle.speed_split == "torque_balance" and middle.speed_rpm is None:
-        if scene.lubricant is None:
-            found.append(
-                "lubricant: missing; bearing.middle.speed_split = 'torque_balance' needs its viscosity, or set 'oil'"
-            )
-        for name, row in (("inner", inner), ("outer", outer)):
-            if row.contact_angle == 0.0:
-                found.append(
-                    f"bearing.{name}.contact_angle_deg = 0: has no load torque after Palmgren; set bearing.middle.speed_split"
-                    " = 'oil' or give bearing.middle.speed_rpm"
-                )
-    return found
-
-
-def _unmounted_faults(scene: BallScene) -> list[str]:
-    if not scene.model.ring_expansion:
-        return []
-    inner, outer = scene.outermost_rows
-    turning, speed = (
-        scene.operation,
-        "turns; the growth of its ring needs it; add it, or set model.ring_expansion = false",
-    )
+    turning = scene.operation
+    speed = "turns; the growth of its ring needs it; add it, or set model.ring_expansion = false"
     prefix = ("bearing.", "bearing.") if inner is outer else ("bearing.inner.", "bearing.outer.")
-    found = []
     if turning.inner_speed_rpm != 0.0 and inner.bore_mm is None:
-        found.append(f"{prefix[0]}bore_mm: missing; the inner ring {speed}")
+        yield f"{prefix[0]}bore_mm: missing; the inner ring {speed}"
     paper = scene.model.ring_expansion_form == "paper"
     if turning.outer_speed_rpm != 0.0 and outer.outside_diameter_mm is None and not paper:
-        found.append(f"{prefix[1]}outside_diameter_mm: missing; the outer ring {speed}")
+        yield f"{prefix[1]}outside_diameter_mm: missing; the outer ring {speed}"
     if paper and inner is not outer and outer.bore_mm is None:
-        found.append(
+        yield (
             "bearing.outer.bore_mm: missing; model.ring_expansion_form = 'paper' takes it for the middle ring's; add it"
         )
-    return found
 
 
-def _mounted_faults(scene: BallScene) -> list[str]:
-    assert scene.mounting is not None
-    mounting = scene.mounting
+def _mounted_faults(mounting: Mounting, scene: BallScene) -> Iterator[str]:
     inner, outer = scene.outermost_rows
-    found = mounting_faults(mounting, scene.bearing)
+    yield from mounting_faults(mounting, scene.bearing)
     for key, mounted, row in (
         ("bore_mm", mounting.bore_mm, inner),
         ("outside_diameter_mm", mounting.outside_diameter_mm, outer),
     ):
         drawn = getattr(row, key)
         if drawn is not None and drawn != mounted:
-            found.append(
+            yield (
                 f"mounting.{key} = {mounted:g} and the bearing's {key} = {drawn:g} contradict each other: leave the bearing's out"
             )
     for row in {id(row): row for row in (inner, outer)}.values():
         if row.clearance_change_um != 0.0:
-            found.append(
+            yield (
                 f"clearance_change_um = {row.clearance_change_um:g} and [mounting] both tell what mounting changes; leave one out"
             )
     if scene.model.ring_expansion and scene.model.ring_expansion_form == "paper":
-        found.append(
-            "model.ring_expansion_form = 'paper' knows no fits; take [mounting] away or set it to 'thick_ring'"
-        )
-    return found
+        yield "model.ring_expansion_form = 'paper' knows no fits; take [mounting] away or set it to 'thick_ring'"

@@ -1,14 +1,13 @@
 """Drawing of a ball bearing: its row of balls, or two rows with a ring between."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from rbdyn.faults import Strict
-from rbdyn.fields import SI, OptionalSI, Positive, or_refuse
+from rbdyn.faults import Consistent, Strict
+from rbdyn.fields import SI, OptionalSI, Positive
 from rbdyn.scene.operation import Speed
 
 # How far a contact angle and a clearance that are both given may differ before they contradict each other.
@@ -17,7 +16,7 @@ AGREED_DEG = 0.2
 GrooveFactor = Annotated[float, Field(gt=0.5, le=1.0)]
 
 
-class BallRow(Strict):
+class BallRow(Consistent):
     """Geometry of one row of balls. Of contact angle and clearance one is given, or both that agree."""
 
     balls: Annotated[int, Field(ge=3, le=500)]
@@ -52,22 +51,20 @@ class BallRow(Strict):
     ball_diameter, pitch_diameter, groove_centre_distance = SI("mm"), SI("mm"), SI("mm")
     radial_clearance, bore, outside_diameter = OptionalSI("mm"), OptionalSI("mm"), OptionalSI("mm")
 
-    @model_validator(mode="after")
-    def _fits(self) -> BallRow:
-        faults = []
+    def faults(self) -> Iterator[str]:
         chord = self.pitch_diameter_mm * math.sin(math.pi / self.balls)
         if chord <= self.ball_diameter_mm:
-            faults.append(
+            yield (
                 f"balls = {self.balls}: balls of {self.ball_diameter_mm:g} mm do not fit on a pitch circle of "
                 f"{self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm; take fewer or smaller ones"
             )
         if self.ball_diameter_mm >= self.pitch_diameter_mm:
-            faults.append(
+            yield (
                 f"ball_diameter_mm = {self.ball_diameter_mm:g}: leaves no inner raceway on a pitch circle of "
                 f"{self.pitch_diameter_mm:g} mm; make the ball smaller"
             )
         # Only a contact angle that is known tells where the races are.
-        return or_refuse(self, faults + (self._clearance_faults() or self._ring_faults()))
+        yield from self._clearance_faults() or self._ring_faults()
 
     def _clearance_faults(self) -> list[str]:
         angle, clearance = self.contact_angle_deg, self.radial_clearance_mm
@@ -93,20 +90,18 @@ class BallRow(Strict):
             ]
         return []
 
-    def _ring_faults(self) -> list[str]:
-        faults = []
+    def _ring_faults(self) -> Iterator[str]:
         reach = self.ball_diameter_mm * math.cos(self.contact_angle)
         if self.bore_mm is not None and self.bore_mm >= self.pitch_diameter_mm - reach:
-            faults.append(
+            yield (
                 f"bore_mm = {self.bore_mm:g}: leaves no inner ring under a raceway of "
                 f"{self.pitch_diameter_mm - reach:.4g} mm; make it smaller"
             )
         if self.outside_diameter_mm is not None and self.outside_diameter_mm <= self.pitch_diameter_mm + reach:
-            faults.append(
+            yield (
                 f"outside_diameter_mm = {self.outside_diameter_mm:g}: leaves no outer ring over a raceway of "
                 f"{self.pitch_diameter_mm + reach:.4g} mm; make it larger"
             )
-        return faults
 
     @property
     def groove_centre_distance_mm(self) -> float:
@@ -170,7 +165,7 @@ class MiddleRing(Strict):
     speed, axial_offset = OptionalSI("rpm"), SI("mm")
 
 
-class DoubleDecker(Strict):
+class DoubleDecker(Consistent):
     """Two rows one inside the other; the ring between them floats."""
 
     kind: Literal["double_decker_ball"]
@@ -182,15 +177,13 @@ class DoubleDecker(Strict):
     middle: MiddleRing = MiddleRing()
     """The ring between the rows."""
 
-    @model_validator(mode="after")
-    def _nests(self) -> DoubleDecker:
+    def faults(self) -> Iterator[str]:
         below, above = self.inner.raceway_diameters_mm[1], self.outer.raceway_diameters_mm[0]
-        if below < above:
-            return self
-        raise ValueError(
-            f"bearing.outer.pitch_diameter_mm = {self.outer.pitch_diameter_mm:g}: leaves no middle ring between raceways of "
-            f"{below:.4g} and {above:.4g} mm; make it larger, or the inner row smaller"
-        )
+        if not below < above:
+            yield (
+                f"bearing.outer.pitch_diameter_mm = {self.outer.pitch_diameter_mm:g}: leaves no middle ring between raceways "
+                f"of {below:.4g} and {above:.4g} mm; make it larger, or the inner row smaller"
+            )
 
     @property
     def pitch_ratio(self) -> float:

@@ -1,16 +1,15 @@
 """Drawing of a roller bearing: bearing, cage, materials."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
 
-from rbdyn.faults import Strict
-from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive, or_refuse
+from rbdyn.faults import Consistent, Strict
+from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive
 
 # Keys that belong to one roller profile each.
 PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "table": "profile_table_mm_um"}
@@ -28,7 +27,7 @@ class Harmonic(Strict):
     amplitude, phase = SI("um"), SI("deg")
 
 
-class Bearing(Strict):
+class Bearing(Consistent):
     """Geometry of a cylindrical roller bearing. Clearances are diametral."""
 
     kind: Literal["cylindrical_roller"]
@@ -100,94 +99,85 @@ class Bearing(Strict):
         """
         return (self.pitch_diameter_mm - self.roller_diameter_mm, self.pitch_diameter_mm + self.roller_diameter_mm)
 
-    @model_validator(mode="after")
-    def _fits(self) -> Bearing:
-        faults = []
+    def faults(self) -> Iterator[str]:
         chord = self.pitch_diameter_mm * math.sin(math.pi / self.rollers)
         if chord <= self.roller_diameter_mm:
-            faults.append(
+            yield (
                 f"bearing.rollers = {self.rollers}: rollers of {self.roller_diameter_mm:g} mm do not fit on a pitch "
                 f"circle of {self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm; take fewer or smaller ones"
             )
         if self.roller_diameter_mm >= self.pitch_diameter_mm:
-            faults.append(
+            yield (
                 f"bearing.roller_diameter_mm = {self.roller_diameter_mm:g}: leaves no inner raceway on a pitch circle "
                 f"of {self.pitch_diameter_mm:g} mm; make the roller smaller"
             )
         if self.effective_length_mm > self.roller_length_mm:
-            faults.append(
+            yield (
                 f"bearing.effective_length_mm = {self.effective_length_mm:g}: contact longer than the roller of "
                 f"{self.roller_length_mm:g} mm; shorten it or lengthen bearing.roller_length_mm"
             )
         if abs(self.radial_clearance_mm) >= 0.1 * self.roller_diameter_mm:
-            faults.append(
+            yield (
                 f"bearing.radial_clearance_mm = {self.radial_clearance_mm:g}: out of proportion to a roller of "
                 f"{self.roller_diameter_mm:g} mm; give millimetres, below a tenth of the roller"
             )
-        return or_refuse(self, faults + self._profile_faults() + self._form_faults())
+        yield from self._profile_faults()
+        yield from self._form_faults()
 
-    def _profile_faults(self) -> list[str]:
-        faults = []
+    def _profile_faults(self) -> Iterator[str]:
         for profile, key in PROFILE_KEYS.items():
             value = getattr(self, key)
             if value is None and self.roller_profile == profile:
-                faults.append(f"bearing.{key}: missing; bearing.roller_profile = {profile!r} needs it")
+                yield f"bearing.{key}: missing; bearing.roller_profile = {profile!r} needs it"
             if value is not None and self.roller_profile != profile:
-                faults.append(
+                yield (
                     f"bearing.{key} and bearing.roller_profile = {self.roller_profile!r} contradict each other: take "
                     f"away the one or set the other to {profile!r}"
                 )
         half = 0.5 * self.roller_length_mm
         if self.crown_radius_mm is not None and self.crown_radius_mm <= half:
-            faults.append(
+            yield (
                 f"bearing.crown_radius_mm = {self.crown_radius_mm:g}: a crown of a roller of {self.roller_length_mm:g} mm "
                 f"needs a radius above {half:g} mm, commonly metres; enlarge it"
             )
-        for x, drop in self._points(faults):
+        points = self.profile_table_mm_um or []
+        if any(len(point) != 2 for point in points):
+            yield "bearing.profile_table_mm_um: each point is [position in mm, drop in um]; mend the list"
+            return
+        if any(b[0] <= a[0] for a, b in pairwise(points)):
+            yield "bearing.profile_table_mm_um: positions must rise from point to point; sort them"
+        for x, drop in points:
             if abs(x) > half:
-                faults.append(
+                yield (
                     f"bearing.profile_table_mm_um: point ({x:g} mm, {drop:g} um) lies beyond the roller's end at "
                     f"{half:g} mm; shorten the profile or lengthen bearing.roller_length_mm"
                 )
-        points = self._points([])
         reach = max((abs(x) for x, _ in points), default=math.inf)
         if reach < 0.5 * self.effective_length_mm:
-            faults.append(
+            yield (
                 f"bearing.profile_table_mm_um: ends at {reach:g} mm, within the contact of "
                 f"{0.5 * self.effective_length_mm:g} mm from the middle; carry the table on"
             )
-        return faults
 
-    def _points(self, faults: list[str]) -> list[list[float]]:
-        points = self.profile_table_mm_um or []
-        if any(len(point) != 2 for point in points):
-            faults.append("bearing.profile_table_mm_um: each point is [position in mm, drop in um]; mend the list")
-            return []
-        if any(b[0] <= a[0] for a, b in pairwise(points)):
-            faults.append("bearing.profile_table_mm_um: positions must rise from point to point; sort them")
-        return points
-
-    def _form_faults(self) -> list[str]:
-        faults = []
+    def _form_faults(self) -> Iterator[str]:
         errors = self.roller_diameter_errors_um
         if errors is not None and len(errors) != self.rollers:
-            faults.append(
+            yield (
                 f"bearing.roller_diameter_errors_um: {len(errors)} values for {self.rollers} rollers; give one a roller"
             )
         if errors is not None and self.roller_diameter_spread_um > 0.0:
-            faults.append(
+            yield (
                 "bearing.roller_diameter_errors_um and bearing.roller_diameter_spread_um contradict each other: give the "
                 "errors or their spread, not both"
             )
         limit = 0.01 * self.roller_diameter_mm * 1e3
         if errors is not None and any(abs(error) > limit for error in errors):
-            faults.append(
+            yield (
                 f"bearing.roller_diameter_errors_um: beyond {limit:g} um, a hundredth of the roller; give micrometres"
             )
-        return faults
 
 
-class Cage(Strict):
+class Cage(Consistent):
     """Cage and guide land. Clearances are diametral."""
 
     guidance: Literal["outer", "inner", "roller"]
@@ -231,16 +221,14 @@ class Cage(Strict):
     pocket_contact_length, land_width = OptionalSI("mm"), SI("mm")
     mass, inertia, imbalance = SI("g"), OptionalSI("kg_mm2"), SI("um")
 
-    @model_validator(mode="after")
-    def _sensible(self) -> Cage:
+    def faults(self) -> Iterator[str]:
         if self.pocket_clearance_mm > 5.0 or (self.guide_clearance_mm or 0.0) > 5.0:
-            raise ValueError("cage: clearances above 5 mm are not clearances; give millimetres")
-        if self.pocket_radial_clearance_mm is not None and self.guidance != "roller":
-            raise ValueError(
+            yield "cage: clearances above 5 mm are not clearances; give millimetres"
+        elif self.pocket_radial_clearance_mm is not None and self.guidance != "roller":
+            yield (
                 f"cage.pocket_radial_clearance_mm and cage.guidance = {self.guidance!r} contradict each other: lips hold "
                 "the cage only under guidance by the rollers; take away the one or set the other to 'roller'"
             )
-        return self
 
     @property
     def lip_clearance_mm(self) -> float | None:

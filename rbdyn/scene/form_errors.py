@@ -1,18 +1,16 @@
 """Form errors of a ball bearing: grooves and balls as measured, or drawn by a seed."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from rbdyn.faults import Strict
-from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI, or_refuse
+from rbdyn.faults import Consistent, Strict
+from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI
 from rbdyn.scene.bearing import Harmonic
 
 if TYPE_CHECKING:
-    from numpy import float64
-    from numpy.typing import NDArray
+    from rbdyn.arrays import Array
 
 Order = Annotated[int, Field(ge=1, le=2000)]
 # Beyond this share of the ball it is no form error but a slip of the unit.
@@ -47,7 +45,7 @@ class BallHarmonic(Strict):
     amplitude, phase = SI("um"), OptionalSI("deg")
 
 
-class FormErrors(Strict):
+class FormErrors(Consistent):
     """Form errors of grooves and balls, and how finely and how long the turning ring is followed.
 
     Each error of a groove is given by its harmonics, drawn at random, or both added.
@@ -90,30 +88,27 @@ class FormErrors(Strict):
     turns: Annotated[int, Field(ge=1, le=10_000)] = 8
     """Turns of the inner ring that are followed, since the cage does not come round with the ring."""
 
-    @model_validator(mode="after")
-    def _sensible(self) -> FormErrors:
-        faults = []
+    def faults(self) -> Iterator[str]:
         for key in GROOVES:
             drawn = getattr(self, f"{key}_random")
             if drawn is not None and drawn.lowest_order > drawn.highest_order:
-                faults.append(
+                yield (
                     f"errors.{key}_random.lowest_order = {drawn.lowest_order}: above highest_order = "
                     f"{drawn.highest_order}; swap them"
                 )
         if self.ball_diameter_errors_um is not None and self.ball_diameter_spread_um > 0.0:
-            faults.append(
+            yield (
                 "errors.ball_diameter_errors_um and errors.ball_diameter_spread_um contradict each other: give the "
                 "errors or their spread, not both"
             )
         highest = self.highest_order
         if 2 * highest >= self.steps:
-            faults.append(
+            yield (
                 f"errors.steps = {self.steps}: too few to show order {highest}, which needs more than two steps a "
                 f"wave; take at least {2 * highest + 1}"
             )
-        return or_refuse(self, faults)
 
-    def ball_diameter_errors(self, normal: NDArray[float64]) -> NDArray[float64]:
+    def ball_diameter_errors(self, normal: "Array") -> "Array":
         """Each ball's diameter less the nominal one [m], as given or with the spread of standard ``normal`` numbers."""
         import numpy as np
 
@@ -131,26 +126,22 @@ class FormErrors(Strict):
 GROOVES = tuple(key for key in FormErrors.model_fields if f"{key}_random" in FormErrors.model_fields)
 
 
-def faults(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diameter_mm: float) -> list[str]:
+def misfits(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diameter_mm: float) -> Iterator[str]:
     """What does not go with a row of ``balls`` on a pitch circle, one sentence each."""
-    found = []
     given = errors.ball_diameter_errors_um
     if given is not None and len(given) != balls:
-        found.append(f"errors.ball_diameter_errors_um: {len(given)} values for {balls} balls; give one a ball")
+        yield f"errors.ball_diameter_errors_um: {len(given)} values for {balls} balls; give one a ball"
     limit = LARGEST_ERROR * ball_diameter_mm * 1e3
     if any(abs(error) > limit for error in given or []) or errors.ball_diameter_spread_um > limit:
-        found.append(f"errors: ball diameters beyond {limit:g} um, a hundredth of the ball; give micrometres")
+        yield f"errors: ball diameters beyond {limit:g} um, a hundredth of the ball; give micrometres"
     for number, harmonic in enumerate(errors.ball_sphericity, 1):
         alien = [ball for ball in harmonic.balls or [] if ball > balls]
         if alien:
-            found.append(
-                f"errors.ball_sphericity[{number}].balls: ball {alien[0]} of {balls}; balls count from 1 to {balls}"
-            )
+            yield f"errors.ball_sphericity[{number}].balls: ball {alien[0]} of {balls}; balls count from 1 to {balls}"
     # A ball spins dm/(2 D) times a turn, or a little less.
     fastest = max((wave.order for wave in errors.ball_sphericity), default=0) * pitch_diameter_mm / ball_diameter_mm
     if fastest >= errors.steps:
-        found.append(
+        yield (
             f"errors.steps = {errors.steps}: too few to show errors.ball_sphericity on balls that spin "
             f"{0.5 * pitch_diameter_mm / ball_diameter_mm:.3g} times a turn; take at least {int(fastest) + 1}"
         )
-    return found

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.scene import Scene
 
 
@@ -32,7 +32,7 @@ class Geometry:
     clearance: float
     raceways: tuple[float, float]
     roller_radius: float
-    roller_radii: NDArray[np.float64] | None
+    roller_radii: Array | None
     roller_mass: float
     centrifugal_force: float
     land_radius: float
@@ -83,7 +83,7 @@ def geometry_of(scene: Scene) -> Geometry:
     )
 
 
-def _roller_radii(scene: Scene) -> NDArray[np.float64] | None:
+def _roller_radii(scene: Scene) -> Array | None:
     """A spread is drawn with the scene's seed, once for all replicates: it is one bearing that is simulated."""
     bearing = scene.bearing
     errors_um = bearing.roller_diameter_errors_um

@@ -1,23 +1,21 @@
 """Laws of each interaction, and numerics."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from rbdyn.faults import Strict
-from rbdyn.fields import SI, NonNegative, NotVanishing, Positive, or_refuse
+from rbdyn.faults import Consistent
+from rbdyn.fields import SI, NonNegative, NotVanishing, Positive, Share
 
 METAL_ON_METAL_ALPHA = 0.75  # [s/m]
 AUTO_WARM_UP_TURNS = 20.0
 # Batches of a turn that all replicates together may keep, 0.65 kB each; in one run they are longer where there would be more.
 MOST_KEPT, MOST_OF_A_RUN = 4_000_000, 20_000
-Restitution = Annotated[float, Field(gt=0.0, le=1.0), NotVanishing]
 
 
-class Laws(Strict):
+class Laws(Consistent):
     """The laws of each interaction and what they need. What is off is neither computed nor compiled."""
 
     line_contact: Literal["palmgren", "iso16281", "dowson_higginson", "houpert"] = "palmgren"
@@ -27,7 +25,7 @@ class Laws(Strict):
     is one."""
     race_damping: Literal["viscous", "hunt_crossley", "off"] = "viscous"
     """Damping of the races: a share of the critical one, Hunt and Crossley's, or none."""
-    race_damping_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.05
+    race_damping_ratio: Share = 0.05
     """Share of critical damping, engaged over race_damping_engagement_um (ADORE-style input 0.05; 0.1 elsewhere)."""
     race_damping_engagement_um: Positive = 0.1
     """Approach over which viscous damping sets in: about half a film thickness."""
@@ -44,7 +42,7 @@ class Laws(Strict):
     pocket_damping_alpha_s_m: NonNegative | None = None
     """Hunt and Crossley's alpha of the pocket walls; 0.75 where left out (restitution 1 - alpha v: 0.5 to 0.7 for steel
     on wetted bronze at 0.5 m/s), 0 is undamped."""
-    pocket_restitution: Restitution | None = None
+    pocket_restitution: Share | None = None
     """Restitution of roller and pocket wall at pocket_restitution_speed_m_s, instead of pocket_damping_alpha_s_m."""
     pocket_restitution_speed_m_s: Positive = 0.5
     """Impact speed at which pocket_restitution holds."""
@@ -55,17 +53,17 @@ class Laws(Strict):
     its floor."""
     pocket_film_floor_um: Positive = 0.8
     """Film thickness at which the pocket wall touches: the critical pocket film of ADORE-style inputs is 0.8 um."""
-    pocket_fill: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 1.0
+    pocket_fill: Share = 1.0
     """Share of a pocket wall that has oil; 1 is flooded."""
     guide_land: Literal["film", "dry", "off"] = "film"
     """Force of the guide land on the cage: short journal bearing over dry contact, dry contact alone, or none."""
     land_film_floor_um: Positive = 3.0
     """Film thickness below which the land touches: the critical film of ADORE-style inputs."""
-    land_fill: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 1.0
+    land_fill: Share = 1.0
     """Share of the land that is full of oil; 1 is flooded."""
     land_damping_alpha_s_m: NonNegative | None = None
     """Hunt and Crossley's alpha of the land's dry contact; 0.75 where left out, 0 is undamped."""
-    land_restitution: Restitution | None = None
+    land_restitution: Share | None = None
     """Restitution of cage and land at land_restitution_speed_m_s, instead of land_damping_alpha_s_m."""
     land_restitution_speed_m_s: Positive = 0.5
     """Impact speed at which land_restitution holds."""
@@ -90,19 +88,15 @@ class Laws(Strict):
         """Part of the damping engaged per approach [1/m]."""
         return 1e6 / self.race_damping_engagement_um
 
-    @model_validator(mode="after")
-    def _agrees(self) -> Laws:
-        faults = [
-            f"model.{part}_restitution and model.{part}_damping_alpha_s_m contradict each other: give one of them"
-            for part in ("pocket", "land")
-            if getattr(self, f"{part}_restitution") is not None
-            and getattr(self, f"{part}_damping_alpha_s_m") is not None
-        ]
+    def faults(self) -> Iterator[str]:
+        for part in ("pocket", "land"):
+            keys = f"{part}_restitution", f"{part}_damping_alpha_s_m"
+            if all(getattr(self, key) is not None for key in keys):
+                yield f"model.{keys[0]} and model.{keys[1]} contradict each other: give one of them"
         if self.pocket == "off" and self.pocket_film:
-            faults.append(
+            yield (
                 "model.pocket = 'off' and model.pocket_film = true contradict each other: drop the film or the 'off'"
             )
-        return or_refuse(self, faults)
 
     def alpha(self, part: str) -> float:
         """Hunt and Crossley's alpha [s/m] of 'pocket' or 'land', given or from its restitution."""
@@ -115,7 +109,7 @@ class Laws(Strict):
         return METAL_ON_METAL_ALPHA if given is None else float(given)
 
 
-class Numerics(Strict):
+class Numerics(Consistent):
     """Tolerance, length and replication of a run."""
 
     method: Literal["auto", "rk45", "rk43", "rosenbrock"] = "auto"
@@ -147,7 +141,7 @@ class Numerics(Strict):
     """Samples of the motion a shaft turn, for whirl and histories."""
     companion: bool = True
     """Repeat a share of the replicates at ten times the tolerance to estimate the numerical error."""
-    companion_share: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.25
+    companion_share: Share = 0.25
     """Share of the replicates that companion repeats."""
     step_budget_per_turn: Annotated[int, Field(ge=100)] = 100_000
     """Steps a shaft turn after which a run gives up, with where and why."""
@@ -167,11 +161,9 @@ class Numerics(Strict):
         """Batches for which each replicate and companion has memory."""
         return MOST_KEPT // (self.replicates + self.companions)
 
-    @model_validator(mode="after")
-    def _fits_into_memory(self) -> Numerics:
+    def faults(self) -> Iterator[str]:
         if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > self.most_batches:
-            raise ValueError(
+            yield (
                 f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have memory for "
                 f"{self.most_batches} turns each, warm-up included; take fewer turns or replicates"
             )
-        return self

@@ -1,16 +1,14 @@
 """The oil and the traction it gives."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
-from rbdyn.faults import Strict
-from rbdyn.fields import SI, Fraction, NonNegative, NotVanishing, Positive, or_refuse
+from rbdyn.faults import Consistent
+from rbdyn.fields import SI, Fraction, NonNegative, NotVanishing, Positive, Share
 from rbdyn.properties.lubricants import OILS, Oil, oil_at
 from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 
@@ -43,7 +41,7 @@ def _four_numbers(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-class Lubricant(Strict):
+class Lubricant(Consistent):
     """The oil, its temperature and where it is."""
 
     oil: OilName
@@ -76,32 +74,27 @@ class Lubricant(Strict):
     inputs have 10, which leaves the film whole and takes 5 to 19 % of the rolling resistance."""
     roller_roughness, race_roughness = SI("um"), SI("um")
 
-    @model_validator(mode="after")
-    def _known(self) -> Lubricant:
-        """Told once: by name, by grade with base oil and index, or by a data sheet."""
+    def faults(self) -> Iterator[str]:
+        """Whether it is told once: by name, by grade with base oil and index, or by a data sheet."""
         sheet = self.oil == "data_sheet"
         alien = {"viscosity_index"} if sheet else {"viscosities_C_mm2_s"} if self.oil.startswith(GRADE) else DATA_KEYS
         given = {key: value for key in DATA_KEYS if (value := getattr(self, key)) is not None}
-        found = [
-            f"lubricant.{key} = {given[key]}: lubricant.oil = {self.oil!r} tells that by itself; leave it out or name another"
-            for key in given
-            if key in alien
-        ]
-        needed = ("viscosities_C_mm2_s", "density_kg_m3") if sheet else ()
-        found += [
-            f"lubricant.{key}: missing; lubricant.oil = 'data_sheet' needs it" for key in needed if key not in given
-        ]
+        for key in (key for key in given if key in alien):
+            told = f"lubricant.{key} = {given[key]}: lubricant.oil = {self.oil!r} tells that by itself"
+            yield f"{told}; leave it out or name another"
+        for key in ("viscosities_C_mm2_s", "density_kg_m3") if sheet else ():
+            if key not in given:
+                yield f"lubricant.{key}: missing; lubricant.oil = 'data_sheet' needs it"
         points = self.viscosities_C_mm2_s or []
         if any(len(point) != 2 for point in points):
-            found.append("lubricant.viscosities_C_mm2_s: each point is [temperature in C, viscosity in mm2/s]; mend it")
+            yield "lubricant.viscosities_C_mm2_s: each point is [temperature in C, viscosity in mm2/s]; mend it"
         elif points:
             (cold, thick), (hot, thin) = sorted(points)
             if not (-60.0 <= cold < hot <= HOTTEST_C and thick > thin > 0.5):
-                found.append(
+                yield (
                     f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature, from -60 to {HOTTEST_C:g} C, to "
                     "no less than 0.5 mm2/s; mend them"
                 )
-        return or_refuse(self, found)
 
     @model_serializer(mode="wrap")
     def _without_empty_data(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -178,7 +171,7 @@ def with_traction_of_oil(scene: Any) -> Any:
     return {**scene, "traction": {**default, **traction}} if default else scene
 
 
-class Traction(Strict):
+class Traction(Consistent):
     """Traction of the races. The defaults are an ADORE-style set for a turbine-engine oil."""
 
     model: Literal["four_constant", "thermal_newtonian", "eyring", "limiting_shear", "coulomb", "off"] = "four_constant"
@@ -201,9 +194,9 @@ class Traction(Strict):
     oils that have none of their own."""
     eyring_stress_MPa: Positive = 5.0  # noqa: N815
     """Eyring stress: 3 to 10 MPa for mineral oils (Johnson and Tevaarwerk 1977)."""
-    limiting_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.07
+    limiting_shear_ratio: Share = 0.07
     """Shear stress over pressure at which limiting_shear yields: 0.05 to 0.10 (Bair and Winer 1979)."""
-    largest_shear_ratio: Annotated[float, Field(gt=0.0, le=1.0), NotVanishing] = 0.1
+    largest_shear_ratio: Share = 0.1
     """Cap on shear stress over pressure of thermal_newtonian and eyring, whose stress grows without bound past 1.5 GPa.
     """
     friction: Literal["film", "mixed"] = "film"
@@ -222,36 +215,31 @@ class Traction(Strict):
     """Slip over which friction changes sign, where it would otherwise jump."""
     eyring_stress = SI("MPa")
 
-    @model_validator(mode="after")
-    def _consistent(self) -> Traction:
-        faults = []
+    def faults(self) -> Iterator[str]:
         if self.constants is not None:
-            faults += self._constant_faults(*self.constants)
+            yield from self._constant_faults(*self.constants)
         elif self.model == "four_constant" and not self.mu_m > max(self.mu_0, self.mu_inf):
-            faults.append(
+            yield (
                 f"traction.mu_m = {self.mu_m:g}: the peak must lie above traction.mu_0 = {self.mu_0:g} and "
                 f"traction.mu_inf = {self.mu_inf:g}; raise it"
             )
         if self.friction == "mixed" and self.model in ("coulomb", "off"):
-            faults.append(
+            yield (
                 f"traction.friction = 'mixed': traction.model = '{self.model}' has no film; choose a model of a film "
                 "or set traction.friction = 'film'"
             )
-        return or_refuse(self, faults)
 
-    def _constant_faults(self, a: float, b: float, c: float, d: float) -> list[str]:
+    def _constant_faults(self, a: float, b: float, c: float, d: float) -> Iterator[str]:
         shown = f"traction.constants = [{a:g}, {b:g}, {c:g}, {d:g}]"
-        faults = []
         fields = type(self).model_fields
         rivals = [key for key in ("mu_0", "mu_m", "mu_inf", "u_m_m_s") if getattr(self, key) != fields[key].default]
         if rivals:
             keys = " and ".join(f"traction.{key} = {getattr(self, key):g}" for key in rivals)
-            faults.append(f"{shown}: contradicts {keys}; give the constants or the peak, not both")
+            yield f"{shown}: contradicts {keys}; give the constants or the peak, not both"
         if c <= 0.0:
-            faults.append(f"{shown}: the third, C, must be greater than 0; mend it")
+            yield f"{shown}: the third, C, must be greater than 0; mend it"
         elif smallest_traction(a, b, c, d) < 0.0:
-            faults.append(f"{shown}: (A + B u) exp(-C u) + D must not be below 0 at any slip u; mend them")
-        return faults
+            yield f"{shown}: (A + B u) exp(-C u) + D must not be below 0 at any slip u; mend them"
 
 
 def smallest_traction(a: float, b: float, c: float, d: float) -> float:

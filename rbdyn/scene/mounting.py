@@ -1,13 +1,12 @@
 """How a bearing is mounted: fits, temperatures, shaft and housing."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from typing import Annotated, Protocol
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from rbdyn.faults import Strict
-from rbdyn.fields import SI, NonNegative, Positive, or_refuse
+from rbdyn.faults import Consistent
+from rbdyn.fields import SI, NonNegative, Positive
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
 
@@ -30,7 +29,7 @@ def raceway_radii(bearing: Raceways) -> tuple[float, float]:
     return 0.5e-3 * inner, 0.5e-3 * outer
 
 
-class Mounting(Strict):
+class Mounting(Consistent):
     """Fits, temperatures, shaft and housing. With this table, bearing.radial_clearance_mm is that of the loose parts.
 
     Each temperature is that of a whole part.
@@ -70,21 +69,19 @@ class Mounting(Strict):
     bore, outside_diameter, shaft_bore, housing_diameter = SI("mm"), SI("mm"), SI("mm"), SI("mm")
     inner_interference, outer_interference = SI("um"), SI("um")
 
-    @model_validator(mode="after")
-    def _nests(self) -> Mounting:
-        faults = []
+    def faults(self) -> Iterator[str]:
         if self.shaft_bore_mm >= self.bore_mm:
-            faults.append(
+            yield (
                 f"mounting.shaft_bore_mm = {self.shaft_bore_mm:g}: leaves no shaft in a bearing bore of "
                 f"{self.bore_mm:g} mm; make it smaller, 0 for a solid shaft"
             )
         if self.outside_diameter_mm <= self.bore_mm:
-            faults.append(
+            yield (
                 f"mounting.outside_diameter_mm = {self.outside_diameter_mm:g}: not above the bore of "
                 f"{self.bore_mm:g} mm; make it larger"
             )
         if self.housing_diameter_mm <= self.outside_diameter_mm:
-            faults.append(
+            yield (
                 f"mounting.housing_diameter_mm = {self.housing_diameter_mm:g}: leaves no housing around a bearing of "
                 f"{self.outside_diameter_mm:g} mm; make it larger"
             )
@@ -94,37 +91,30 @@ class Mounting(Strict):
         ):
             interference = getattr(self, key)
             if abs(interference) > LARGEST_FIT * diameter * 1e3:
-                faults.append(
+                yield (
                     f"mounting.{key} = {interference:g}: out of proportion to a fit of {diameter:g} mm; give "
                     f"micrometres, at most {LARGEST_FIT * diameter * 1e3:g}"
                 )
-        return or_refuse(self, faults)
 
 
-def faults(mounting: Mounting, bearing: Raceways) -> list[str]:
+def misfits(mounting: Mounting, bearing: Raceways) -> Iterator[str]:
     """One sentence for each way in which the mounting does not suit the bearing."""
     inner, outer = bearing.raceway_diameters_mm
-    found = []
     if mounting.bore_mm >= inner:
-        found.append(
+        yield (
             f"mounting.bore_mm = {mounting.bore_mm:g}: leaves no inner ring under a raceway of {inner:g} mm; "
             "make it smaller"
         )
     if mounting.outside_diameter_mm <= outer:
-        found.append(
+        yield (
             f"mounting.outside_diameter_mm = {mounting.outside_diameter_mm:g}: leaves no outer ring over a raceway of "
             f"{outer:g} mm; make it larger"
         )
-    return found
 
 
 def material_of(chosen: MaterialName | CustomMaterial) -> Material:
     """A material in SI, from its name or its numbers."""
     if isinstance(chosen, CustomMaterial):
-        return Material(
-            chosen.elastic_modulus_GPa * 1e9,
-            chosen.poisson_ratio,
-            chosen.density_kg_m3,
-            chosen.thermal_expansion_1e_6_K * 1e-6,
-        )
+        modulus, expansion = chosen.elastic_modulus_GPa * 1e9, chosen.thermal_expansion_1e_6_K * 1e-6
+        return Material(modulus, chosen.poisson_ratio, chosen.density_kg_m3, expansion)
     return MATERIALS[chosen]

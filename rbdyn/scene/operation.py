@@ -1,22 +1,21 @@
 """Running conditions: speeds, loads, how they change over time, and the support of the outer ring."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from rbdyn.faults import Strict
-from rbdyn.fields import LIGHTEST_RING_KG, SI, InSI, NonNegative, Positive, or_refuse
+from rbdyn.faults import Consistent, Strict
+from rbdyn.fields import LIGHTEST_RING_KG, SI, InSI, NonNegative, Positive
 
 Speed = Annotated[float, Field(ge=-1e6, le=1e6)]
 Load = Annotated[float, Field(ge=0.0, le=1e7)]
 SLOWEST_RPM = 0.1
 
 
-class Schedule(Strict):
+class Schedule(Consistent):
     """Inner speed and radial load over time; before the first and after the last point values stay."""
 
     time_s: Annotated[list[NonNegative], Field(min_length=1)]
@@ -29,25 +28,22 @@ class Schedule(Strict):
     """"linear" and "smooth" (half cosines) run from point to point; "step" holds each value until the next time."""
     inner_speed = InSI[list[float] | None]("rpm")
 
-    @model_validator(mode="after")
-    def _matches(self) -> Schedule:
-        faults = []
+    def faults(self) -> Iterator[str]:
         times = self.time_s
         for i, (a, b) in enumerate(pairwise(times)):
             if b <= a:
-                faults.append(
+                yield (
                     f"operation.schedule.time_s: times must rise, but {b:g} s (point {i + 2}) follows {a:g} s; sort them"
                 )
         for key in ("inner_speed_rpm", "radial_load_N"):
             values = getattr(self, key)
             if values is not None and len(values) != len(times):
-                faults.append(f"operation.schedule.{key}: {len(values)} values for {len(times)} times; give one a time")
+                yield f"operation.schedule.{key}: {len(values)} values for {len(times)} times; give one a time"
         if self.inner_speed_rpm is None and self.radial_load_N is None:
-            faults.append("operation.schedule: schedules nothing; give inner_speed_rpm or radial_load_N")
-        return or_refuse(self, faults)
+            yield "operation.schedule: schedules nothing; give inner_speed_rpm or radial_load_N"
 
 
-class Operation(Strict):
+class Operation(Consistent):
     """Running conditions. The radial load acts on the inner ring along x.
 
     Shaft turns, in which runs are counted, are those at ``inner_speed_rpm`` (or ``outer_speed_rpm`` where the inner
@@ -73,14 +69,12 @@ class Operation(Strict):
     """Inner speed and radial load over time, instead of constant ones."""
     unbalance, gravity_direction = SI("g_mm"), SI("deg")
 
-    @model_validator(mode="after")
-    def _turns(self) -> Operation:
+    def faults(self) -> Iterator[str]:
         if max(abs(self.inner_speed_rpm), abs(self.outer_speed_rpm)) < SLOWEST_RPM:
-            raise ValueError(
+            yield (
                 f"operation.inner_speed_rpm = {self.inner_speed_rpm:g}: a run is counted in shaft turns; give at least "
                 f"{SLOWEST_RPM:g}, or turn the outer ring"
             )
-        return self
 
     @property
     def speeds(self) -> tuple[float, float]:

@@ -1,16 +1,32 @@
 """How a scene file is read."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
 from pathlib import Path
-from typing import Any, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
-from rbdyn.faults import Strict, read_toml, set_key, validated
+from rbdyn.faults import Consistent, put_key, read_toml, set_key, validated
+from rbdyn.records.record import plain
+from rbdyn.records.words import html_table
 
 T = TypeVar("T")
 
 
-class SceneFile(Strict):
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(Consistent)
+
+
+class Checked(ModelMetaclass):
+    """Tables given by keyword are checked as those of a file are, with the same messages."""
+
+    def __call__(self, **tables: Any) -> Any:
+        """The scene of these tables. Raises InputError with all faults at once."""
+        return cast(type[SceneFile], self).from_dict(tables, self.__name__)
+
+
+class SceneFile(Consistent, metaclass=Checked):
     """A scene that is read from TOML. Equal scenes of equal seed and version give equal bits."""
 
     @classmethod
@@ -24,7 +40,20 @@ class SceneFile(Strict):
         data = deepcopy(data)
         for override in overrides:
             set_key(data, override)
-        return validated(cls._of_kind(data), data, source)
+        scene = validated(cls._of_kind(data), data, source)
+        scene.once("_given", lambda: data)
+        return scene
+
+    def changed(self, changes: Mapping[str, Any]) -> Self:
+        """The scene with other values under dotted keys, as in ``scene.changed({"cage.mass_g": 50.0})``.
+
+        What was left out is worked out anew, as of a file with these values. Raises InputError with all faults at once, as a
+        file does.
+        """
+        data = deepcopy(self._tables)
+        for key, value in changes.items():
+            put_key(data, key, plain(value), f"changed {key!r}")
+        return self.from_dict(data, "changed scene")
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy, of whose changes nothing is left that the original worked out of itself."""
@@ -39,7 +68,37 @@ class SceneFile(Strict):
             self.__dict__[name] = make()
         return cast(T, self.__dict__[name])
 
+    @property
+    def _tables(self) -> dict[str, Any]:
+        """Tables as they were given, without what was left out."""
+        return self.once("_given", lambda: self.model_dump(exclude_unset=True))
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.summary}>"
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the keys that were given."""
+        rows = ((name, ", ".join(_leaves(table))) for name, table in self._tables.items())
+        return html_table(repr(self).strip("<>"), ("table", "keys given"), rows)
+
+    @property
+    def summary(self) -> str:
+        """The scene in a line."""
+        raise NotImplementedError
+
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:
         """The class that reads a scene of this kind."""
         return cls
+
+
+def _leaves(table: Any, prefix: str = "") -> Iterator[str]:
+    """'key = value' of everything in nested tables; of long lists only how many they hold."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            long = isinstance(value, list) and len(value) > 6
+            yield f"{prefix}{key} = {f'{len(value)} values' if long else value}"

@@ -15,6 +15,7 @@ from rbdyn.cli.app import app
 from rbdyn.cli.ball_studies import optimum_study, race_limits, runout_record
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.bearing import equilibrium
+from rbdyn.quasistatic.sweep.points import parsed
 from rbdyn.quasistatic.sweep.run import sweep
 from rbdyn.scene import Scene
 
@@ -183,3 +184,20 @@ def test_invariant_what_symmetry_makes_zero_is_told_as_zero(file, changes, zeros
     balls = record["balls"] if "balls" in record else record["inner"]["balls"] + record["outer"]["balls"]
     angles = np.array([[ball["inner_angle_deg"], ball["outer_angle_deg"]] for ball in balls])
     assert ((angles == 0.0) | (np.abs(angles) > 1e-9)).all() and (file[:4] != "deep" or (angles == 0.0).all())
+
+
+def test_unit_values_of_the_command_line():
+    """Unit: evenly spaced or listed values; anything else is refused in a sentence."""
+    assert parsed(["a.b=1:2:3", "c=4,-5"]) == {"a.b": [1.0, 1.5, 2.0], "c": [4.0, -5.0]}
+    for text in ("a", "=1,2", "a=1:2", "a=1:2:1", "a=1:2:x", "a=one"):
+        with pytest.raises(InputError, match="--sweep"):
+            parsed([text])
+    with pytest.raises(InputError, match="swept twice"):
+        parsed(["a=1", "a=2"])
+
+
+def test_command_line_prints_notes_of_points_unless_quiet():
+    """Command line: each note stands once, with how many points it is about and where the first is; none with --quiet."""
+    arguments = ["ball", str(SINGLE), "--sweep", "operation.axial_load_N=100,20000,40000"]
+    loud, quiet = (CliRunner().invoke(app, [*arguments, *more]).stdout for more in ((), ("--quiet",)))
+    assert "note: 2 points, the first at operation.axial_load_N = 20000: " in loud and "note" not in quiet

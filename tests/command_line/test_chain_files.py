@@ -33,7 +33,7 @@ def test_the_chains_of_the_bearing_meet_the_clearances_of_its_scene(solved):
     limits = {each["name"]: each["closing_link"] for each in read_toml(BEARING)["chain"]}
     for name, clearance in wanted.items():
         assert (limits[name]["lower_mm"] + limits[name]["upper_mm"]) / 2 == pytest.approx(clearance), name
-        assert solved[name].status == "ok: deviations allocated"
+        assert solved[name].status.startswith("ok: deviations allocated")
     assert solved["pocket"].worst_case_mm == pytest.approx((0.295, 0.305))
     assert solved["radial"].yields["as_given"] >= 0.9973 - 3 * solved["radial"].standard_errors["as_given"]
 

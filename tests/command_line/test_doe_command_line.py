@@ -93,7 +93,7 @@ def test_right_chain_is_accepted():
     assert shown.returncode == 0
     record = json.loads(shown.stdout)
     assert record["allocation"]["pocket_width"] == {
-        "nominal_mm": 9.29, "upper_mm": 0.0, "lower_mm": -0.005, "grade": None,
+        "nominal_mm": 9.29, "upper_mm": 0.0, "lower_mm": -0.005, "grade": None, "moved_mm": -0.01,
     }  # fmt: skip
     assert {"closing_link", "yield", "contributions", "allocation", "status"} <= set(record)
 

@@ -117,7 +117,16 @@ HEADER = ",".join(TABLE.columns)
 @pytest.mark.parametrize(
     ("table", "replace", "words"),
     [
-        (TABLE.drop(columns="power_loss_W"), ("", ""), "column 'power_loss_W' is missing; add it"),
+        (
+            TABLE.drop(columns="power_loss_W"),
+            ("", ""),
+            "column 'power_loss_W' is missing; add it, or rename the factor",
+        ),
+        (
+            TABLE.drop(columns="power_loss_W"),
+            ("", ""),
+            "to one of run, radial_clearance_mm, guide_clearance_mm, pocket",
+        ),
         (TABLE.head(4), ("", ""), "4 runs are too few for the linear model; give at least 5"),
         (TABLE.assign(guide_clearance_mm=0.15), ("", ""), "cannot tell B from the other terms"),
         (TABLE.assign(power_loss_W=9.0), ("", ""), "power_loss_W: all 20 values are 9, so there is nothing to fit"),
@@ -185,3 +194,58 @@ def test_a_run_that_is_stopped_says_what_is_kept(tmp_path, monkeypatch, kept):
     found = CliRunner().invoke(app, ["fit", str(path), *(["--out", str(tmp_path / "out")] if kept else [])])
     where = "finished runs are kept" if kept else "without --out no finished run is kept"
     assert found.exit_code == 1 and found.stderr == f"the scheduler is gone; {where}: start again\n"
+
+
+def fit_table(folder: Path, table: pd.DataFrame, *options: str) -> Result:
+    """The command on a table without a study."""
+    table.to_csv(folder / "mine.csv", index=False)
+    return CliRunner().invoke(app, ["fit", "--data", str(folder / "mine.csv"), *options])
+
+
+def test_a_table_of_ones_own_is_fitted_without_a_study(tmp_path):
+    """Closed form: y = 3 + 2 (a - 5)/5 - 4 b over a in 0..10, b in -1..1 has these coefficients, whatever else is in the table."""
+    a, b = (grid.ravel() for grid in np.meshgrid([0.0, 5.0, 10.0], [-1.0, 0.0, 1.0]))
+    y = 3.0 + 0.4 * (a - 5.0) - 4.0 * b + 1e-3 * np.sin(7.0 * a * b + b)
+    table = pd.DataFrame({"run": np.arange(9), "a": a, "b [N]": b, "who": "me", "y": y, "y_error": 1e-3})
+    shown = fit_table(tmp_path, table, "--response", "y", "--model", "linear", "--json", "--out", str(tmp_path / "out"))
+    assert shown.exit_code == 0, shown.output
+    record = json.loads(shown.stdout)["responses"]
+    assert list(record) == ["y"]
+    assert record["y"]["coefficients"] == pytest.approx({"1": 3.0, "A": 2.0, "B": -4.0}, abs=2e-3)
+    assert record["y"]["actual_coefficients"] == pytest.approx({"1": 1.0, "A": 0.4, "B": -4.0}, abs=2e-3)
+    assert json.loads((tmp_path / "out" / "fit.json").read_text())["responses"].keys() == {"y"}
+    one = fit_table(tmp_path, table, "--factor", "a", "--response", "y", "--model", "linear", "-q")
+    assert "factors a; responses y; coded -1 and +1 are the ends" in one.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ((), "name its factors by --factor NAME and its responses by --response NAME; it has run, radial_clearance_mm"),
+        (("--factor", "radial"), "--factor radial: is no column of"),
+        (("--response", "powr"), "; it has run, radial_clearance_mm, guide_clearance_mm, pocket_clearance_mm, impact"),
+        (("--response", "power_loss_W", "--model", "cubic"), "model = 'cubic': choose one of 'linear', 'interaction'"),
+        (("--factor", "power_loss_W", "--response", "impact_force_N"), "--factor power_loss_W: is 9 in every row of"),
+    ],
+)
+def test_bad_names_tell_the_columns(tmp_path, options, words):
+    table = TABLE.assign(power_loss_W=9.0) if "impact_force_N" in options else TABLE
+    shown = fit_table(tmp_path, table, *options)
+    assert shown.exit_code == 2 and words in shown.stderr and len(shown.stderr.splitlines()) == 1
+
+
+def test_a_study_of_a_table_needs_no_scene(tmp_path):
+    """What needs runs says that the scene is missing; names stand in one place only."""
+    text = study(tmp_path).read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith(("key = ", 'file = "cyl', "set = "))]
+    bare = tmp_path / "bare.toml"
+    bare.write_text("\n".join(lines).replace("[scene]", ""), encoding="utf-8")
+    both = [run(tmp_path, TABLE, "--json").stdout]
+    both.append(CliRunner().invoke(app, ["fit", str(bare), "--data", str(tmp_path / "table.csv"), "--json"]).stdout)
+    assert both[0] == both[1] and "coefficients" in both[0]
+    for command in ("fit", "study", "status"):
+        shown = CliRunner().invoke(app, [command, str(bare)])
+        assert shown.exit_code == 2 and "scene: missing; add [scene] with its file" in shown.stderr
+    twice = run(tmp_path, TABLE, "--factor", "a")
+    assert twice.exit_code == 2 and "study.toml says it; leave out one or the other" in twice.stderr
+    assert "nothing to fit; give STUDY.toml, or --data" in CliRunner().invoke(app, ["fit"]).stderr

@@ -96,7 +96,7 @@ def test_a_word_is_looked_up_in_names_and_descriptions():
     assert "cage.mass_g" not in shown and "model.land_film_floor_um" not in shown
     assert printed(rbdyn_app, "CAGE.MASS_G").splitlines()[2] == "cage.mass_g: number from 0.01 to 1e+06, g, required"
     assert "numerics.rtol: number from 1e-13 to 0.1, default 0.01" in printed(rbdyn_app, "rtol")
-    assert "factor[].key: text, required" in printed(doe_app, "factor")
+    assert "factor[].name: text, required" in printed(doe_app, "factor")
     assert "link[].capability: number above 0, default 1" in printed(doe_app, "capability")
 
 
@@ -138,3 +138,10 @@ def test_package_shows_its_names():
     """Command line: in a shell of Python the names of the library and its version complete."""
     assert {"Scene", "simulate", "equilibrium", "load", "__version__"} <= set(dir(rbdyn))
     assert all(getattr(rbdyn, name) is not None for name in rbdyn.__all__)
+
+
+def test_lists_of_lists_are_told_in_plain_words():
+    """Command line: values of nested lists, of whole numbers and of plain ones."""
+    values = {key.key: key.values for key in keys(SCENES)}
+    assert values["bearing.profile_table_mm_um"] == "a list of lists of numbers"
+    assert values["errors.ball_sphericity[].balls"] == "a list of whole numbers from 1"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 import time
 from datetime import datetime
 from pathlib import Path
@@ -13,6 +15,7 @@ from instant_runs import instantly
 from short_studies import short_study, silent
 
 from doe.report.steps.status import print_status
+from doe.running.at_work import at_work
 from doe.running.store import Point, Store
 from doe.study.runs import STORE, run_design
 from doe.study.status import study_status
@@ -99,3 +102,29 @@ def test_what_is_no_store_is_refused(tmp_path):
     assert shown.returncode == 2
     assert json.loads(shown.stdout)["faults"] == shown.stderr.strip().splitlines()
     assert "cannot be used as a store of runs" in shown.stderr
+
+
+def test_a_running_study_is_found_by_its_file(tmp_path, monkeypatch):
+    """Wherever its folder is; two are both named; a process that was killed counts no more."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = short_study(tmp_path)
+    far, other = tmp_path / "far", tmp_path / "other"
+
+    def asked() -> str:
+        shown = doe("status", str(path), "-q")
+        return shown.stdout + shown.stderr
+
+    assert "nothing has run yet in study_results" in asked()
+    with at_work(path, far):
+        assert str(far / STORE) in asked()
+        with at_work(path.parent / "cylindrical_roller.toml", other):
+            assert str(far / STORE) in asked()
+        with at_work(path, other):
+            assert f"runs in {far} and in {other}; name one of them by --out" in asked()
+    killed = f"from doe.running.at_work import *; import os\nwith at_work(Path({str(path)!r}), Path('x')): os._exit(0)"
+    subprocess.run([sys.executable, "-c", killed], check=True)
+    notes = tmp_path / "cache" / "rbdyn" / "at_work"
+    assert len(list(notes.iterdir())) == 1 and "study_results" in asked()
+    with at_work(path, far):
+        assert len(list(notes.iterdir())) == 1
+    assert not list(notes.iterdir())

@@ -13,7 +13,7 @@ import pytest
 from rbdyn.dynamics.forces.guide_land import NoGuide
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-SCRIPTS = sorted(path.stem for path in EXAMPLES.glob("*.py"))
+SCRIPTS = sorted(path.stem for path in EXAMPLES.glob("*.py") if path.stem != "in_a_notebook")
 
 
 @pytest.fixture(autouse=True)
@@ -43,6 +43,14 @@ def effort():
 def test_unit_script_imports(name):
     """Unit: importing a script runs nothing and finds all it needs."""
     assert script(name).__doc__
+
+
+def test_invariant_the_notebook_runs_and_its_rollers_bear_the_shaft():
+    """Invariant: all its cells run; over ten turns the rollers carry the 1300 N of the shaft, but for its own inertia."""
+    cells = script("in_a_notebook")
+    assert cells.carried == pytest.approx(1300.0, rel=0.01)
+    assert cells.scene.cage.mass_g == 50.0 and cells.drawn.cage.mass_g == 45.0
+    assert cells.figure.axes[0].get_ylabel() == "load on the inner race [N]"
 
 
 def test_unit_published_checks_are_whole():

@@ -79,7 +79,7 @@ def main(seconds: float, study: Path, out: Path, workers: int, whole: bool = Fal
         doe_study(study, out, workers, as_json=True)
         print(ran, file=sys.stderr)
         return
-    with guarded(as_json=True), keeping_runs(out):
+    with guarded(as_json=True), keeping_runs(out, study):
         runs = run_design(Study.load(study), output_folder(out, "doe", study), workers, lambda done, total: None)
         print_json({"values": runs.values.tolist(), "ran": ran})
 

@@ -7,15 +7,31 @@ import json
 import re
 from html.parser import HTMLParser
 from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from synthetic_study import FACTORS, RESPONSES, VERDICT, motion, summary
 
 from doe.report.html import html_report
 from doe.report.html.build import SCRIPTS
 from doe.report.markdown import markdown_report
-from doe.report.words import label, percentage, quantity, rounded_down, shown, with_error
+from doe.report.sections.answer import CLEARANCES
+from doe.report.sections.fits import _coefficient
+from doe.report.sections.plot import Plot
+from doe.report.sections.record import scalars
+from doe.report.study.plots import response_surface
+from doe.report.words import change, rounded_down
+from doe.study.edge import Outward
+from doe.study.runs import read_runs
+from doe.study.surfaces import fit_surfaces
+from doe.study_file import Study
+from rbdyn.plots.motion import cage_orbit
+from rbdyn.records.words import label, quantity, shown, with_error
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 VOID = {"meta", "input"}
 OPTIONAL = {
     "answer": ("pick", "gains", "statement", "chains"), "asked": ("asked",), "design": ("design",), "surfaces": ("fit",),
@@ -86,7 +102,7 @@ def test_answer_comes_first(page):
         "± 0.0040 mm",
         "The gain is real",
         "9.2400 0/-0.0050",
-        "+11.16 ± 0.65 %",
+        "11.16 ± 0.65 % less",
         "▲ better",
         "pocket 0.999976",
     ):
@@ -155,7 +171,7 @@ def test_pick_is_the_one_that_the_study_stands_by():
     assert "Why this point: by what manufacture leaves of it." in words
     kept = words[words.index("the simulation kept, without tolerances") :]
     # Its own simulated gain, not that of the pick.
-    assert "+11.16 ± 0.65 %" in kept[:400] and "5.5" not in kept[:200]
+    assert "11.16 ± 0.65 % less" in kept[:400] and "5.5" not in kept[:200]
 
 
 def test_tolerances_are_never_rounded_up():
@@ -238,7 +254,7 @@ def test_markdown_says_the_same_and_links_the_pictures():
         "**The gain is real",
         "9.2400 0/-0.0050",
         "a\\|b&lt;c",
-        "+11.16 ± 0.65 %",
+        "11.16 ± 0.65 % less",
     ):
         assert words in text
     assert text.index("## The answer") < text.index("## What was asked")
@@ -288,5 +304,63 @@ def test_names_and_numbers_are_written_for_people():
     assert [shown(x) for x in (None, True, 3, 24000.0, 1.23456e-5, float("inf"), [0.1, 2])] == [
         "", "yes", "3", "24000", "1.235e-05", "", "0.1, 2",
     ]  # fmt: skip
-    assert percentage({"percent": 9.963, "error_percent": 4.462}) == "+10.0 ± 4.5 %"
-    assert percentage({"percent": -3.0, "error_percent": None}) == "-3.00 %"
+    assert shown(-3.1e-17) == "0"
+    assert dict(scalars({"known": {"p": 5.6e-102, "df": 3}})) == {"known, p": "< 0.0001", "known, df": "3"}
+    assert _coefficient(-6.986e-05, 0.0086) == "-0.0001 ± 0.0086" and _coefficient(None, None) == "–"
+    assert change({"percent": 9.963, "error_percent": 4.462}) == "10.0 ± 4.5 % less"
+    assert change({"percent": -3.0, "error_percent": None}) == "3.00 % more"
+    assert change({"percent": -3.0, "error_percent": 0.5, "goal": "max"}) == "3.00 ± 0.50 % less"
+    assert change({"percent": 3.0, "error_percent": 0.5, "goal": "target"}) == "3.00 ± 0.50 % off target less"
+
+
+def test_cards_carry_units_and_say_what_a_clearance_is():
+    whole = summary()
+    words = " ".join(Outline(html_report(whole)).words)
+    assert len(re.findall(r"baseline [\d.]+ mm", words)) == len(whole["asked"]["factors"])
+    keys = [each["key"] for each in whole["asked"]["factors"]]
+    assert ("Clearances: " in words) == any(key in CLEARANCES for key in keys)
+
+
+def test_error_bars_end_at_the_frame():
+    plot = Plot((0.0, 10.0), (0.0, 1.0), ("", ""))
+    plot.cross((5.0, 0.5), (2.0, 7.0), "error")
+    places = [[plot.place(*point) for point in ends] for ends in (((3.0, 0.5), (7.0, 0.5)), ((5.0, 0.0), (5.0, 1.0)))]
+    drawn = [" ".join(f"{u:.1f},{v:.1f}" for u, v in ends) for ends in places]
+    assert [re.search(r'points="([^"]*)"', mark)[1] for mark in plot.marks] == drawn
+
+
+def test_beyond_the_edge_each_response_has_direction_and_unit():
+    gains = {"impact_force_N": (0.2, 0.4), "power_loss_W": (-0.5, 0.1), "cage_speed_rpm": (3.0, 1.0)}
+    told = Outward("guide_clearance_mm", "upper", 0.25, "µm", "simulation", gains, {"cage_speed_rpm": "max"}).sentence
+    assert "bound of the region, 0.25 mm; to be expected per µm" in told
+    assert (
+        "impact_force_N 0.20 ± 0.40 N less, power_loss_W 0.50 ± 0.10 W more, cage_speed_rpm 3.0 ± 1.0 rpm more" in told
+    )
+
+
+def test_pictures_keep_their_words_off_the_curves(monkeypatch, tmp_path):
+    """The legend of the orbits lies outside all axes; the surfaces name their third axis, and their ticks keep apart."""
+    from matplotlib.figure import Figure
+
+    kept = {}
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **options: kept.update({path: figure}))
+    orbit = SimpleNamespace(
+        guide_eccentricity=(np.linspace(-66e-6, -43e-6, 9), np.linspace(19e-6, 39e-6, 9)),
+        scene=SimpleNamespace(guide_clearance_m=75e-6),
+    )
+    cage_orbit({"baseline": orbit, "pick": orbit}, "orbit")
+    figure = kept["orbit"]
+    figure.canvas.draw()
+    (box,) = (legend.get_window_extent() for legend in figure.legends)
+    assert not any(box.overlaps(axis.get_window_extent()) for axis in figure.axes)
+    assert not any(axis.get_legend() for axis in figure.axes)
+    cage_orbit({"one": orbit}, "one")
+    kept["one"].canvas.draw()
+    for axis in [*figure.axes, *kept["one"].axes]:
+        boxes = [each.get_window_extent() for each in axis.get_xticklabels() if each.get_text()]
+        assert not any(one.overlaps(two.padded(18.0)) for one, two in pairwise(boxes))
+    study = Study.load(EXAMPLES / "clearance_study.toml")
+    response_surface(study, fit_surfaces(study, read_runs(study, EXAMPLES / "ccd_table4.csv"))[0], "surface")
+    for axis, held in zip(kept["surface"].axes, ("pocket clearance 0.3 mm", "guide clearance 0.15 mm"), strict=True):
+        assert axis.get_zlabel() == "impact force [N]" and held in axis.get_title()
+        assert all(len(ticks) <= 6 for ticks in (axis.get_xticks(), axis.get_yticks(), axis.get_zticks()))

@@ -4,44 +4,25 @@ from __future__ import annotations
 
 import base64
 import math
-import os
 import re
-import shutil
 from typing import Any
 
 import pytest
+from headless import as_wide_as, offline_browser, widths
 from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, motion, predicted, summary
 
 from doe.report.html import html_report
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-DRIVER = shutil.which("chromedriver")
 PICTURE = "return document.getElementById(arguments[0]).toDataURL()"
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     """One headless browser for all tests, with the page in a file."""
-    if CHROMIUM is None or DRIVER is None:
-        pytest.skip("no chromium with chromedriver is installed (Debian: apt install chromium chromium-driver)")
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for argument in ("--headless=new", "--disable-dev-shm-usage", "--window-size=1400,900"):
-        options.add_argument(argument)
-    if os.geteuid() == 0:
-        options.add_argument("--no-sandbox")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
-    driver.execute_cdp_cmd("Network.enable", {})
-    offline = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
-    driver.execute_cdp_cmd("Network.emulateNetworkConditions", offline)
     folder = tmp_path_factory.mktemp("report")
     (folder / "report.html").write_text(html_report(summary(), motion()), encoding="utf-8")
-    yield driver, folder
-    driver.quit()
+    with offline_browser() as driver:
+        yield driver, folder
 
 
 def opened(browser: Any, scheme: str = "light", motion: str = "reduce", name: str = "report.html") -> Any:
@@ -268,16 +249,10 @@ def test_prints_in_light_on_several_pages(browser):
 
 def test_narrow_screen_needs_no_sideways_scrolling(browser):
     page = opened(browser)
-    size = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": False}
-    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    try:
-        wide, room = page.execute_script(
-            "const root = document.documentElement; return [root.scrollWidth, root.clientWidth]"
-        )
+    with as_wide_as(page, 400):
+        wide, room = widths(page)
         assert wide == room <= 400
         assert page.find_element("css selector", ".tile").rect["y"] < 250
-    finally:
-        page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 def test_tables_sort_by_a_column(browser):
@@ -302,3 +277,21 @@ def test_without_scripts_tables_and_static_pictures_are_there(browser):
         assert not page.find_element("id", "surface").is_displayed()
     finally:
         driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+
+
+@pytest.mark.parametrize("width", [400, 1200])
+def test_wide_pictures_stay_legible(browser, width):
+    """Their smallest letters have 6 px at least: on a narrow page they scroll in a box of their own, and the page does not."""
+    page = opened(browser)
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        found = page.execute_script(
+            "return [...document.querySelectorAll('svg.wide')].map(each => [each.getBoundingClientRect().width"
+            " / each.viewBox.baseVal.width, each.parentElement.clientWidth, document.documentElement.scrollWidth])"
+        )
+    finally:
+        page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    assert len(found) >= 2
+    for scale, box, whole in found:
+        assert 10.0 * scale >= 6.0 and box <= whole <= width

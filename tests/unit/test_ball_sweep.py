@@ -10,10 +10,8 @@ import pytest
 from conftest import ROOT, lacking
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 from rbdyn import equilibrium
-from rbdyn.cli.app import app
 from rbdyn.faults import InputError
 from rbdyn.plots import ball as ball_pictures
 from rbdyn.plots import ball_sweep as pictures
@@ -22,7 +20,7 @@ from rbdyn.quasistatic.row.control import CommonCage, FixedShare, FrictionShare,
 from rbdyn.quasistatic.row.newton import RACE_CONTROL_LOST
 from rbdyn.quasistatic.sweep import run as sweeps
 from rbdyn.quasistatic.sweep.march import leaves, with_numbers
-from rbdyn.quasistatic.sweep.points import Axis, axes_of, parsed, snake
+from rbdyn.quasistatic.sweep.points import Axis, axes_of, snake
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.quasistatic.sweep.run import sweep
 from rbdyn.scene import BallScene
@@ -252,16 +250,6 @@ def test_unit_bad_sweeps_are_refused_in_a_sentence(keys, sentence):
     assert len(refused.value.faults) == 1 and sentence in refused.value.faults[0]
 
 
-def test_unit_values_of_the_command_line():
-    """Unit: evenly spaced or listed values; anything else is refused in a sentence."""
-    assert parsed(["a.b=1:2:3", "c=4,-5"]) == {"a.b": [1.0, 1.5, 2.0], "c": [4.0, -5.0]}
-    for text in ("a", "=1,2", "a=1:2", "a=1:2:1", "a=1:2:x", "a=one"):
-        with pytest.raises(InputError, match="--sweep"):
-            parsed([text])
-    with pytest.raises(InputError, match="swept twice"):
-        parsed(["a=1", "a=2"])
-
-
 def test_unit_saved_and_loaded(grid, tmp_path):
     """Unit: JSON brings all figures back; CSV is the table; balls have a row each."""
     grid.save(tmp_path / "sweep.json")
@@ -362,64 +350,3 @@ def test_oracle_a_sweep_has_the_notes_of_its_points(file, changes, keys, tmp_pat
     assert told == len(found.notes) >= 1
     found.save(tmp_path / "sweep.json")
     assert SweepResult.load(tmp_path / "sweep.json").notes == found.notes
-
-
-def test_command_line_prints_notes_of_points_unless_quiet():
-    """Command line: each note stands once, with how many points it is about and where the first is; none with --quiet."""
-    arguments = ["ball", str(EXAMPLE), "--sweep", f"{LOAD}=100,20000,40000"]
-    loud, quiet = (CliRunner().invoke(app, [*arguments, *more]).stdout for more in ((), ("--quiet",)))
-    assert f"note: 2 points, the first at {LOAD} = 20000: " in loud and "note" not in quiet
-
-
-@pytest.mark.parametrize(
-    ("scene", "keys"),
-    [
-        (scene_with(), {SPEED: np.linspace(5e3, 30e3, 40).tolist()}),
-        (scene_with("model.solver=newton"), {SPEED: np.linspace(5e3, 9e3, 12).tolist(), "bearing.balls": [15, 16]}),
-        (scene_with(file=DOUBLE), {LOAD: np.linspace(200.0, 900.0, 6).tolist()}),
-    ],
-    ids=["compiled", "another solver", "double-decker"],
-)
-def test_an_interrupted_sweep_goes_on_to_the_same_bits(scene, keys, tmp_path, monkeypatch):
-    """Unit: stopped by Ctrl-C, what is done is kept; the rest alone is solved, and no figure differs."""
-    monkeypatch.setattr(sweeps, "CHUNK", 7)
-    whole, path, seen = sweep(scene, keys), tmp_path / "sweep.part.npz", []
-
-    def stop(done, total):
-        seen.append(done)
-        if len(seen) == 3:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        sweep(scene, keys, stop, path)
-    assert path.exists()
-    path.with_name("other.npz").write_bytes(path.read_bytes())
-    resumed = sweep(scene, keys, None, path)
-    assert not path.exists()
-    for name, column in whole.columns.items():
-        assert np.array_equal(resumed.columns[name], column, equal_nan=True), name
-    assert (resumed.statuses, resumed.notes, resumed.cold) == (whole.statuses, whole.notes, whole.cold)
-    assert resumed.balls().equals(whole.balls())
-    # Of another sweep, or broken: all is solved.
-    other = path.with_name("other.npz")
-    assert sweep(scene, {**keys, SPEED: [5e3, 6e3]}, None, other).statuses
-    path.write_bytes(b"PK nonsense")
-    assert sweep(scene, keys, None, path).statuses == whole.statuses
-
-
-def test_a_resumed_sweep_solves_only_what_is_left(tmp_path, monkeypatch):
-    """Unit: the first points of a resumed sweep are not solved again."""
-    monkeypatch.setattr(sweeps, "CHUNK", 10)
-    path, seen = tmp_path / "sweep.part.npz", []
-
-    def stop(done, total):
-        seen.append(done)
-        if done == 30:
-            raise KeyboardInterrupt
-
-    keys = {SPEED: np.linspace(5e3, 30e3, 60).tolist()}
-    with pytest.raises(KeyboardInterrupt):
-        sweep(scene_with(), keys, stop, path)
-    seen.clear()
-    sweep(scene_with(), keys, lambda done, total: seen.append(done), path)
-    assert seen == [30, 40, 50, 60]

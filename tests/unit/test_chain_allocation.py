@@ -14,6 +14,8 @@ from doe.dimension_chain import grade_tolerances, solve
 from doe.dimension_chain.cost import cheapest, total_cost
 from doe.dimension_chain.intervals import total
 from doe.dimension_chain.links import Cost
+from doe.report.markdown import markdown_report
+from doe.report.steps.chain import print_chain
 from rbdyn.faults import InputError
 
 
@@ -197,3 +199,45 @@ def test_wrong_wishes_are_refused_with_key_value_and_mend(extra, wish, words):
         solve(chain([(1, 9.0, extra)], (8.9, 9.1), **wish), samples=10)
     assert len(caught.value.faults) == 1
     assert words in caught.value.faults[0]
+
+
+def test_given_deviations_stay_where_others_are_allocated():
+    """Closed form: of 0.04 mm the given part takes 0.004; 0.036 is left for the other, as with fixed = true."""
+    links = [(1, 9.22), (-1, 9.0, 0.0, -0.004)]
+    result = solve(chain(links, (0.20, 0.24)), samples=10)
+    part = by_name(result)
+    assert (part["b"].upper_mm, part["b"].lower_mm, part["b"].nominal_mm) == (0.0, -0.004, 9.0)
+    assert part["a"].tolerance_mm == pytest.approx(0.036) and result.worst_case_mm == pytest.approx((0.20, 0.24))
+    assert result.status == "ok: deviations allocated"
+    fixed = solve(chain([links[0], (*links[1], {"fixed": True})], (0.20, 0.24)), samples=10)
+    assert fixed.as_dict() == result.as_dict()
+    # Nor does a given one need what only an allocated one does.
+    costs = solve(chain([costly(1, 9.22, 1.0), links[1]], (0.20, 0.24), method="cost"), samples=10)
+    assert by_name(costs)["a"].tolerance_mm == pytest.approx(0.036) and costs.cost is not None
+
+
+def test_a_moved_nominal_is_marked(capsys):
+    """In the record, on the terminal and in the report; where none is moved, no column stands for it."""
+    moved = solve(chain([(1, 9.22), (-1, 9.0, 0.0, -0.004)], (0.20, 0.24)), samples=10)
+    record = moved.as_dict()["allocation"]
+    assert (record["a"]["moved_mm"], record["b"]["moved_mm"]) == (pytest.approx(0.016), 0.0)
+    print_chain("pocket", moved)
+    assert "nominal moved [mm]" in (printed := capsys.readouterr().out) and "+0.0160" in printed
+    report = markdown_report({"chains": {"pocket": moved.as_dict()}})
+    assert "nominal moved" in report and "+0.0160" in report
+    still = solve(chain([(1, 9.236), (-1, 9.0, 0.0, -0.004)], (0.20, 0.24)), samples=10)
+    print_chain("pocket", still)
+    assert "nominal moved" not in capsys.readouterr().out + markdown_report({"chains": {"pocket": still.as_dict()}})
+
+
+def test_tolerances_in_proportion_to_the_unit_say_that_they_are_no_grades(capsys):
+    links = [(1, 60.0), (-1, 10.0), (-1, 50.0)]
+    plain, grades = (
+        solve(chain(links, (-0.1, 0.1), method="iso286", grades=graded), samples=10) for graded in (False, True)
+    )
+    assert plain.status.endswith(
+        "in proportion to ISO 286's tolerance units (grades = true narrows them to its grades)"
+    )
+    print_chain("x", plain)
+    assert plain.status in capsys.readouterr().out
+    assert grades.status == "ok: deviations allocated" and all(part.grade for part in grades.allocation)

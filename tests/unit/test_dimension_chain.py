@@ -57,9 +57,16 @@ def test_the_printed_chain_is_refused_with_the_reason_and_the_nearest(tmp_path):
 @pytest.mark.parametrize("text", [PRINTED, POCKET.format(pocket="", roller="")])
 def test_right_tolerances_for_the_printed_limits(tmp_path, text):
     allocation = solve(read_chain(written(tmp_path, text)), samples=10).as_dict()["allocation"]
+    moved = 9.29 - read_chain(written(tmp_path, text)).link[0].nominal
     assert allocation == {
-        "pocket width": {"nominal_mm": 9.29, "upper_mm": 0.0, "lower_mm": -0.005, "grade": None},
-        "roller diameter": {"nominal_mm": 9.0, "upper_mm": 0.005, "lower_mm": 0.0, "grade": None},
+        "pocket width": {
+            "nominal_mm": 9.29,
+            "upper_mm": 0.0,
+            "lower_mm": -0.005,
+            "grade": None,
+            "moved_mm": pytest.approx(moved),
+        },
+        "roller diameter": {"nominal_mm": 9.0, "upper_mm": 0.005, "lower_mm": 0.0, "grade": None, "moved_mm": 0.0},
     }
 
 
@@ -247,7 +254,7 @@ FREE = [(1, 9.0), (-1, 8.0)]
         ([(1, 9.0, 0.1, 0.0, {"fixed": True})], {}, "fixed = true on every link"),
         ([(1, 9.0, 0.1), (1, 8.0, 0.1, 0.0)], {}, 'link "a": only one of upper_mm and lower_mm'),
         ([(1, 9.0, 0.1, 0.2)], {}, 'link "a": lower_mm = 0.2: exceeds upper_mm = 0.1'),
-        ([(1, 9.0, 0.1, 0.0), (1, 8.0)], {}, 'link "b": no deviations, while other links'),
+        ([(1, 9.0, 1.0, 0.0), (1, 8.0)], {}, "consume 1.0000 mm of the closing link's 1.0000 mm"),
         ([(1, 9.0), (1, -8.0)], {"method": "iso286"}, 'link "b": nominal_mm = -8: ISO 286'),
         ([(1, 9.0, {"mean_mm": 0.1})], {}, 'link "a": mean_mm = 0.1: needs deviations'),
         ([(1, 9.0, 0.1, 0.0, {"mean_mm": 0.2})], {}, 'link "a": mean_mm = 0.2: is a deviation from the nominal'),

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from doe.designs import central_composite
-from doe.designs.replicates import replicate_groups
+from doe.designs.design import replicate_groups
 from doe.response_surface import fit
 from doe.response_surface.comparison import compare
 from doe.response_surface.gaussian_process import fit_gaussian

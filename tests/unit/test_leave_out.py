@@ -198,7 +198,8 @@ def test_unit_compiled_code_grows_with_the_laws(outer, everything):
         run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
         run.to(0.0)
         sizes.append(instructions(bearing, run.carry.method))
-    assert 1000 < sizes[0] < 0.9 * sizes[1]
+    # By how much depends on what the compiler inlines: 2 % with numba 0.62, a tenth and more later.
+    assert 1000 < sizes[0] < sizes[1]
 
 
 def arrays_of(run):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rbdyn.faults import InputError, validated
 from rbdyn.quasistatic.runout.model import errors_of
 from rbdyn.quasistatic.runout.race_errors import ball_path, perfect, random_waviness, rolling, waviness
-from rbdyn.scene.form_errors import FormErrors, faults
+from rbdyn.scene.form_errors import FormErrors, misfits
 
 Z = 7
 TURNING = rolling(12.7e-3, 70e-3, math.radians(40.0))
@@ -142,10 +142,10 @@ def test_unit_errors_that_do_not_go_with_the_balls():
         "ball_diameter_errors_um": [0.0, 500.0],
         "ball_sphericity": [{"order": 2, "amplitude_um": 0.1, "balls": [9]}],
     }
-    found = faults(validated(FormErrors, table, "scene"), Z, 12.7, 70.0)
+    found = list(misfits(validated(FormErrors, table, "scene"), Z, 12.7, 70.0))
     assert [any(word in sentence for sentence in found) for word in ("one a ball", "ball 9 of 7", "hundredth")] == [
         True
     ] * 3
-    assert faults(validated(FormErrors, TABLE, "scene"), Z, 12.7, 70.0) == []
+    assert not list(misfits(validated(FormErrors, TABLE, "scene"), Z, 12.7, 70.0))
     coarse = validated(FormErrors, {"ball_sphericity": [{"order": 20, "amplitude_um": 0.1}], "steps": 100}, "scene")
-    assert "take at least 111" in faults(coarse, Z, 12.7, 70.0)[0]
+    assert "take at least 111" in next(misfits(coarse, Z, 12.7, 70.0))

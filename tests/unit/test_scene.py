@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import copy
 import math
+import pydoc
+from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn.faults import InputError, read_toml
-from rbdyn.scene import Scene
+from rbdyn.scene import BallScene, Scene
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 TABLE = {
     "bearing": {
         "kind": "cylindrical_roller",
@@ -389,3 +393,63 @@ def test_invariant_anything_is_taken_or_refused_in_sentences(section, draw):
         assert error.faults
         assert all(fault.startswith("s.toml: ") and "\n" not in fault for fault in error.faults)
         assert all(section in fault or "." in fault for fault in error.faults)
+
+
+def test_unit_a_changed_scene_is_that_of_a_changed_file():
+    """Unit: what follows from a key that was changed follows anew, and the first scene stays."""
+    first = Scene.from_dict(copy.deepcopy(TABLE))
+    changes = {"cage.mass_g": 50, "lubricant.oil": "ISO VG 68", "numerics.rtol": np.float64(1e-3)}
+    found = first.changed(changes)
+    wanted = [f"{key}={value!r}" if isinstance(value, str) else f"{key}={value}" for key, value in changes.items()]
+    assert found == Scene.from_dict(copy.deepcopy(TABLE), "scene", wanted) and found != first
+    assert first.changed({}) == first and first.cage.mass_g == 45.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"cage.mass_gg": 50.0}, "changed scene: cage.mass_gg: unknown key; did you mean mass_g?"),
+        ({"cage.mass_g": -1.0}, "changed scene: cage.mass_g = -1.0: must be at least 0.01"),
+        ({"cage.mass_g.x": 1.0}, "changed 'cage.mass_g.x': mass_g is a value, not a table; check the key path"),
+        ({"cage..x": 1.0}, "changed 'cage..x': write it as key.path=value"),
+    ],
+)
+def test_unit_a_bad_change_is_refused_as_in_a_file(changes, words):
+    """Unit: the same sentences."""
+    with pytest.raises(InputError) as caught:
+        Scene.from_dict(copy.deepcopy(TABLE)).changed(changes)
+    assert caught.value.faults == [words]
+
+
+def test_unit_tables_by_keyword_are_those_of_a_file():
+    """Unit: equal scenes, equal faults, and a ball bearing's tables give a scene of balls."""
+    assert Scene(**copy.deepcopy(TABLE)) == Scene.from_dict(copy.deepcopy(TABLE))
+    table = copy.deepcopy(TABLE)
+    table["cage"]["mas_g"] = table["cage"].pop("mass_g")
+    with pytest.raises(InputError) as caught:
+        Scene(**table)
+    assert set(caught.value.faults) == {
+        "Scene: cage.mass_g: missing; add it",
+        "Scene: cage.mas_g: unknown key; did you mean mass_g?",
+    }
+    balls = read_toml(EXAMPLES / "deep_groove_ball.toml")
+    assert isinstance(Scene(**balls), BallScene)
+
+
+@pytest.mark.parametrize("name", ["cylindrical_roller", "all_options", "deep_groove_ball", "double_decker"])
+def test_unit_a_notebook_shows_what_was_given(name):
+    """Unit: a line, and a table with every table of the file; no default among them."""
+    scene = Scene.load(EXAMPLES / f"{name}.toml")
+    assert len(repr(scene)) < 200 and repr(scene) == str(scene) and "mm" in repr(scene)
+    table = scene._repr_html_()
+    assert all(f">{key}</th>" in table for key in read_toml(EXAMPLES / f"{name}.toml"))
+    assert "step_budget_per_turn" not in table and len(table) < 3000
+
+
+def test_unit_help_tells_how_a_scene_is_made():
+    """Unit: what is typed first, and a signature without hundreds of defaults."""
+    shown = pydoc.plain(pydoc.render_doc(Scene))
+    assert all(
+        each in shown for each in ('Scene.load("SCENE.toml")', "scene.changed({", "rbdyn keys", "rbdyn.simulate(scene)")
+    )
+    assert len(shown.splitlines()[3]) < 900

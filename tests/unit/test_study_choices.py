@@ -51,8 +51,8 @@ def simulations(store: Store, retry: bool = False) -> Simulations:
 def test_gains_are_real_only_beyond_their_joint_error():
     """Closed form: for two responses the joint intervals are 2.2414 / 1.9600 times as wide."""
     text = statement([Gain("force", 9.0, 8.0), Gain("loss", 3.0, 1.0)])
-    assert "force +9.00 ± 9.15 %: inside its own noise: no gain is shown" in text
-    assert "loss +3.00 ± 1.14 %: real, more than its error" in text
+    assert "force 9.0 ± 9.1 % less: inside its own noise: no gain is shown" in text
+    assert "loss 3.0 ± 1.1 % less: real, more than its error" in text
     assert "a real loss" in statement([Gain("force", -9.0, 2.0)])
 
 

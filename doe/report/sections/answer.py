@@ -5,10 +5,18 @@ from typing import Any
 
 from doe.report.sections.blocks import Block, Section, Table, Tile, Tiles, Words
 from doe.report.sections.record import Factor, Record, factors, nearest, part, responses, scalars
-from doe.report.words import dimension, half_width, label, percentage, quantity, rounded_down, shown, with_error
+from doe.report.words import change, dimension, half_width, moved, rounded_down
+from rbdyn.records.words import label, quantity, shown, with_error
 
 # Characters above which a value is a sentence, to be broken.
 LONG = 40
+# What a clearance of the scene is, by its key.
+CLEARANCES = {
+    "bearing.radial_clearance_mm": "in the bearing diametral",
+    "cage.guide_clearance_mm": "of the cage in its guide diametral",
+    "cage.pocket_clearance_mm": "in the pocket its width less the roller diameter",
+    "cage.pocket_radial_clearance_mm": "at the pocket's lips radial",
+}
 VERDICTS = {"better": "▲ better", "worse": "▼ worse", "within error": "● within error"}
 LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"}
 
@@ -20,6 +28,8 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     blocks.append(Words(part(summary, "limits_sentence") or "", "statement"))
     if pick := part(summary, "pick"):
         blocks.append(Tiles([_tile(summary, each, pick) for each in factors(summary) if each.name in pick]))
+        if plays := [CLEARANCES[each.key] for each in factors(summary) if each.key in CLEARANCES]:
+            blocks.append(Words(f"Clearances: {', '.join(plays)}.", "note"))
     blocks += [Words(statement(summary), "statement"), _gains(summary), limits(summary, ("baseline", "pick"))]
     blocks += [Words(part(summary, "edge", "sentence") or ""), part_dimensions(summary)]
     reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
@@ -34,7 +44,7 @@ def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
         beneath.append(f"± {rounded_down(tolerance)} {factor.unit}".strip())
     baseline = part(summary, "confirmation", "baseline", "factors") or part(summary, "front", "baseline", "factors")
     if baseline and factor.name in baseline:
-        beneath.append(f"baseline {factor.text(baseline[factor.name])}")
+        beneath.append(f"baseline {factor.text(baseline[factor.name])} {factor.unit}".strip())
     return Tile(factor.words, factor.text(pick[factor.name]), factor.unit, beneath)
 
 
@@ -58,11 +68,11 @@ def _gains(summary: Record) -> Table:
     gains = part(summary, "gains") or {}
     columns = [part(summary, "confirmation", name, "responses") or {} for name in ("baseline", "pick")]
     rows = [
-        (label(name), *(_value(column.get(name)) for column in columns), percentage(gain), verdict(gain))
+        (label(name), *(_value(column.get(name)) for column in columns), change(gain), verdict(gain))
         for name, gain in gains.items()
     ]
-    header = ("response", "baseline", "pick", "gain", "verdict")
-    return Table("Gains confirmed by simulation (95 % intervals)", header, rows, text_columns=(4,))
+    header = ("response", "baseline", "pick", "change", "verdict")
+    return Table("Changes confirmed by simulation (95 % intervals)", header, rows, text_columns=(4,))
 
 
 def limits(summary: Record, names: Sequence[str] = ()) -> Table:
@@ -94,9 +104,10 @@ def part_dimensions(summary: Record) -> Table:
     chains = part(summary, "chains") or {}
     for name, chain in chains.items():
         for each, dimensions in allocation(chain).items():
-            rows.append((label(each), dimension(dimensions), dimensions.get("grade") or "", label(name)))
-    header = ("part", "dimension [mm]", "grade", "chain")
-    return Table("Part dimensions", header, rows, _yields(chains), text_columns=(2, 3))
+            told = (dimension(dimensions), dimensions.get("grade") or "", moved(dimensions))
+            rows.append((label(each), *told, label(name)))
+    header = ("part", "dimension [mm]", "grade", "nominal moved [mm]", "chain")
+    return Table("Part dimensions", header, rows, _yields(chains), text_columns=(2, 4))
 
 
 def allocation(chain: Record) -> dict[str, Any]:
@@ -208,16 +219,16 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         name = nearest(summary, part(summary, "front", "pick", "factors"), points) or "pick"
         found = part(points, name, "gains") or (part(summary, "gains") if name == "pick" else None) or {}
         rows = [
-            [label(each), percentage(gain), percentage(found.get(each) or {}), verdict(found.get(each) or {})]
+            [label(each), change(gain), change(found.get(each) or {}), verdict(found.get(each) or {})]
             for each, gain in predicted.items()
         ]
-        columns = ("response", "gain on the surfaces", "gain simulated", "verdict")
+        columns = ("response", "on the surfaces", "simulated", "verdict")
         caption = f"What the surfaces promised and the simulation kept, {name.replace('_', ' ')}"
         blocks.append(Table(caption, columns, rows, text_columns=(3,)))
     gained = {name.replace("_", " "): point["gains"] for name, point in points.items() if point.get("gains")}
     if gained:
         rows = [[name, *(_signed(gains.get(each)) for each in names)] for name, gains in gained.items()]
-        caption = "Gains over the baseline at every confirmed point"
+        caption = "Changes from the baseline at every confirmed point"
         note = "▲ better, ▼ worse, ● within its 95 % error."
         blocks.append(Table(caption, ["point", *(quantity(each)[0] for each in names)], rows, note))
     blocks.append(limits(summary))
@@ -228,7 +239,7 @@ def confirmation(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 def _signed(gain: Record | None) -> str:
     """A gain with the sign of its verdict."""
-    return f"{verdict(gain)[:1]} {percentage(gain)}" if gain else ""
+    return f"{verdict(gain)[:1]} {change(gain)}" if gain else ""
 
 
 def _value(found: Record | None) -> str:

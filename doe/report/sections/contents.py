@@ -8,7 +8,7 @@ from typing import Any
 from doe.report.sections import answer, bearing, ends, experiments, fits, fronts, parts
 from doe.report.sections.blocks import Block, Bullets, Section, Table, Words
 from doe.report.sections.record import Record, factors, responses
-from doe.report.words import quantity
+from rbdyn.records.words import quantity
 
 CHAPTERS = (
     answer.answer,

@@ -7,7 +7,7 @@ from doe.report.sections.answer import record_table
 from doe.report.sections.blocks import Block, Bullets, Section, Table
 from doe.report.sections.experiments import failure_table
 from doe.report.sections.record import Record, part
-from doe.report.words import label, shown
+from rbdyn.records.words import label, shown
 
 
 def reference(summary: Record, motion: Mapping[str, Any]) -> Section | None:

@@ -8,7 +8,7 @@ from doe.report.sections.answer import record_table
 from doe.report.sections.blocks import Block, Figures, Section, Table, Words
 from doe.report.sections.plots_of_fits import evaluation_plots
 from doe.report.sections.record import Record, factors, part, responses
-from doe.report.words import label, shown, with_error
+from rbdyn.records.words import label, shown, with_error
 
 # Longer tables are opened on demand.
 LONG = 40

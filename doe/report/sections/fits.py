@@ -7,7 +7,8 @@ from doe.report.sections.answer import record_table
 from doe.report.sections.blocks import Block, Bullets, Figures, Heading, Section, Table, Widget
 from doe.report.sections.plots_of_fits import diagnostic_plots
 from doe.report.sections.record import Record, factors, fits, part
-from doe.report.words import label, probability, shown
+from doe.report.words import probability
+from rbdyn.records.words import label, shown, with_error
 
 STATISTICS = (
     ("r2", "R²"), ("adjusted_r2", "adjusted R²"), ("predicted_r2", "predicted R²"), ("press", "PRESS"),
@@ -45,7 +46,7 @@ def _term(term: str, summary: Record) -> str:
 def _coefficient(value: float | None, error: float | None) -> str:
     if value is None:
         return "–"
-    return f"{shown(value)} ± {shown(error, 2)}" if error else shown(value)
+    return with_error(value, error)
 
 
 def _stationary(summary: Record, fitted: Record) -> Table:

@@ -8,7 +8,8 @@ from doe.report.sections.answer import record_table, tolerances
 from doe.report.sections.blocks import Block, Figures, Section, Table, Widget, Words
 from doe.report.sections.plots_of_fronts import Front
 from doe.report.sections.record import Record, factors, nearest, part, responses
-from doe.report.words import label, percentage, shown, with_error
+from doe.report.words import change
+from rbdyn.records.words import label, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400
@@ -90,9 +91,9 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(_picks(summary, names, marks))
     where = "of the pick without tolerances" if "without tolerances" in marks else "of the pick"
     if gains := record.get("predicted_gains"):
-        rows = [(label(name), percentage(gain), str(gain.get("verdict") or "")) for name, gain in gains.items()]
-        header = ("response", "gain", "verdict")
-        blocks.append(Table(f"Gains on the surfaces {where}", header, rows, text_columns=(2,)))
+        rows = [(label(name), change(gain), str(gain.get("verdict") or "")) for name, gain in gains.items()]
+        header = ("response", "change", "verdict")
+        blocks.append(Table(f"Changes on the surfaces {where}", header, rows, text_columns=(2,)))
     blocks.append(Words(record.get("statement") or ""))
     blocks += [_limits(record), tolerances(summary)]
     blocks.append(Words(part(summary, "tolerances_sentence") or ""))

@@ -8,7 +8,8 @@ from doe.report.sections.answer import allocation, record_table
 from doe.report.sections.blocks import Block, Figures, Heading, Section, Table, Words
 from doe.report.sections.plot import wide_svg
 from doe.report.sections.record import Record, part
-from doe.report.words import dimension, label, shown
+from doe.report.words import dimension, moved
+from rbdyn.records.words import label, shown
 
 # Keys of a chain that have a place of their own.
 SHOWN_KEYS = {"closing_link", "yield", "contributions", "allocation", "status"}
@@ -31,11 +32,11 @@ def _chain(name: str, chain: Record) -> list[Block]:
         blocks.append(Words(f"{status[:1].upper()}{status[1:]}."))
     shares = chain.get("contributions") or {}
     rows = [
-        (label(each), dimension(dimensions), dimensions.get("grade") or "",
+        (label(each), dimension(dimensions), dimensions.get("grade") or "", moved(dimensions),
          *(_percent(part(shares, each, kind)) for kind, _ in KINDS))
         for each, dimensions in allocation(chain).items()
     ]  # fmt: skip
-    header = ("part", "dimension [mm]", "grade", "share of variance", "share of worst case")
+    header = ("part", "dimension [mm]", "grade", "nominal moved [mm]", "share of variance", "share of worst case")
     blocks.append(Table(f"Parts of the chain {label(name)}", header, rows, text_columns=(2,)))
     if shares:
         blocks.append(

@@ -100,12 +100,12 @@ class Plot:
         self.marks.append(symbol(*self.place(*point), shape, role, radius, title))
 
     def cross(self, point: Point, error: tuple[float | None, float | None], role: str) -> None:
-        """Error bars of half-widths along x and y."""
+        """Error bars of half-widths along x and y, as far as the frame reaches."""
         x, y = point
-        if error[0]:
-            self.line([(x - error[0], y), (x + error[0], y)], role)
-        if error[1]:
-            self.line([(x, y - error[1]), (x, y + error[1])], role)
+        for along, ((low, high), half) in enumerate(zip((self.x, self.y), error, strict=True)):
+            if half:
+                ends = max(point[along] - half, low), min(point[along] + half, high)
+                self.line([(x, end) if along else (end, y) for end in ends], role)
 
     def bar(self, x: float, y: float, half: float, role: str, title: str = "") -> None:
         """An upright bar from zero, ``half`` wide to each side of x."""
@@ -151,8 +151,8 @@ def symbol(u: float, v: float, shape: str, role: str, radius: float = 5.5, title
 def wide_svg(width: float, height: float, words: str, drawn: Iterable[str], extra: str = "") -> str:
     """A picture across the page of marks that are ``drawn`` already; ``words`` describe it."""
     return (
-        f'<svg class="plot wide" viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(words)}"{extra}>'
-        f"{''.join(drawn)}</svg>"
+        f'<div class="scroll"><svg class="plot wide" viewBox="0 0 {width:g} {height:g}" role="img" '
+        f'aria-label="{escape(words)}"{extra}>{"".join(drawn)}</svg></div>'
     )
 
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from doe.report.words import label, quantity, shown
+from doe.report.words import probability
+from rbdyn.records.words import label, quantity, shown
 
 Record = Mapping[str, Any]
 # The efficiencies of a design go by a capital letter.
@@ -81,7 +82,10 @@ def scalars(record: Record, prefix: str = "") -> Iterator[tuple[str, str]]:
         if isinstance(value, Mapping):
             yield from scalars(value, f"{name}, ")
         elif value is not None and not (isinstance(value, list) and value and isinstance(value[0], dict | list)):
-            yield EFFICIENCY.sub(lambda found: f"{found[1].upper()}-efficiency [%]", name), shown(value)
+            yield (
+                EFFICIENCY.sub(lambda found: f"{found[1].upper()}-efficiency [%]", name),
+                probability(value) if key == "p" else shown(value),
+            )
 
 
 def nearest(summary: Record, place: Record | None, candidates: Mapping[str, Record]) -> str | None:

@@ -18,9 +18,12 @@ def chains_record(results: Mapping[str, ChainResult]) -> dict[str, Any]:
 
 def print_chain(name: str, chain: ChainResult, quiet: bool = False, verbose: bool = False) -> None:
     """Parts, contributions, closing link and yield of a dimension chain; verbosely also the yields by distribution."""
-    title = f"dimension chain {name}" + (": the nearest parts that meet the limits" if chain.refused else "")
-    rows = [(part.name, part.text, part.grade or "") for part in chain.allocation]
-    print_table(title, ("part", "dimension [mm]", "grade"), rows)
+    told = {"ok": ": parts that would fill the limits, which the given ones keep"}.get(chain.status, "")
+    title = f"dimension chain {name}" + (": the nearest parts that meet the limits" if chain.refused else told)
+    moved = [f"{part.moved_mm:+.4f}" if part.moved_mm else "" for part in chain.allocation]
+    rows = [(part.name, part.text, part.grade or "", *([by] if any(moved) else []))
+            for part, by in zip(chain.allocation, moved, strict=True)]  # fmt: skip
+    print_table(title, ("part", "dimension [mm]", "grade", *(["nominal moved [mm]"] if any(moved) else [])), rows)
     if quiet:
         return
     shares = [
@@ -33,6 +36,8 @@ def print_chain(name: str, chain: ChainResult, quiet: bool = False, verbose: boo
         quantiles = [(f"{100 * share:g} %", f"{size:.4f}") for share, size in chain.quantiles_mm.items()]
         print_table("quantiles of the closing link", ("share below", "size [mm]"), quantiles)
     _print_answer(chain)
+    if not chain.refused:
+        print(chain.status)
     if chain.selective is not None:
         _print_selective(chain, verbose)
 

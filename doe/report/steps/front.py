@@ -10,6 +10,7 @@ from doe.pareto.archive import dominates
 from doe.pareto.indicators import REFERENCE
 from doe.pareto.tolerance_aware import ToleranceAware
 from doe.report.steps.confirmation import gains_record, point_record
+from doe.report.words import change
 from doe.response_surface import Surface
 from doe.study.drawn import predict_all
 from doe.study.front import half_widths
@@ -145,15 +146,10 @@ def _print_convergence(record: dict[str, Any]) -> None:
 
 def _print_gains(whose: str, gains: dict[str, Any]) -> None:
     rows = [
-        (
-            name,
-            f"{gain['percent']:+.2f} ± {_number(gain['error_percent'])} %",
-            gain["verdict"],
-            f"± {_number(gain['single_run_scatter_percent'])} %",
-        )
+        (name, change(gain), gain["verdict"], f"± {_number(gain['single_run_scatter_percent'])} %")
         for name, gain in gains.items()
     ]
-    header = ("", "gain over the baseline", "verdict", "scatter of two single runs")
+    header = ("", "against the baseline", "verdict", "scatter of two single runs")
     print_table(f"predicted gains of {whose}", header, rows)
 
 

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from doe.report.words import quantity, shown
 from doe.study.robust import Robust
 from doe.unknown.decision import Share
+from rbdyn.records.words import quantity, shown
 
 # Gain in the chance of choosing rightly below which no measurement is proposed, and the share that is nearly all cases.
 WORTH, NEARLY_ALL = 0.02, 0.9

@@ -1,15 +1,18 @@
 """Where a study stands, on the terminal."""
 
+from pathlib import Path
 from typing import Any
 
 from rbdyn.cli.terminal import print_table
 
 
 def print_status(record: dict[str, Any], quiet: bool) -> None:
-    """A line of counts and one of time; unless ``quiet`` also who runs what, and why points failed."""
+    """A line of counts, one of where they were read and one of time; unless ``quiet`` also who runs what, and why points failed."""
     points = record["points"]
     counts = ", ".join(f"{points[kind]} {kind}" for kind in ("done", "failed", "running", "missing"))
     print(f"{record['study']}: {record['status']}; of {points['total']} design points {counts}")
+    read = "read from" if Path(record["store"]).exists() else "nothing has run yet in"
+    print(f"{read} {record['store']}")
     left = "not known yet" if record["left_s"] is None else _span(record["left_s"])
     print(f"time spent {_span(record['spent_s'])} of one thread; time left {left}")
     if quiet:

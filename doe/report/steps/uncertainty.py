@@ -4,10 +4,10 @@ import csv
 from pathlib import Path
 from typing import Any
 
-from doe.report.words import quantity, shown, with_error
 from doe.study.uncertainty import OutputRange, Uncertainty
 from doe.unknown.sensitivity import CONFIDENCE, Index
 from rbdyn.cli.terminal import print_table
+from rbdyn.records.words import quantity, shown, with_error
 from rbdyn.result import write_json
 
 FORMAT = "doe.uncertainty/1"

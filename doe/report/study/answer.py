@@ -15,6 +15,7 @@ from doe.study.confirmation import statement
 from doe.study.limits import limits_of
 from doe.study.whole import StudyResult
 from rbdyn.cli.terminal import print_table
+from rbdyn.records.words import improvement
 
 
 def print_outcome(outcome: StudyResult, quiet: bool) -> None:
@@ -60,15 +61,16 @@ def _print_answer(outcome: StudyResult) -> None:
     for gain in outcome.gains["pick"]:
         index = study.responses.index(gain.response)
         cells = [_value(each, index) for each in (outcome.baseline, outcome.pick)]
-        rows.append((gain.response, *cells, f"{gain.percent:+.2f} ± {gain.error:.2f} %", gain.verdict))
-    print_table("confirmed by simulation (95 % intervals)", ("", "baseline", "pick", "improvement", "verdict"), rows)
+        rows.append((gain.response, *cells, improvement(gain.percent, gain.error, gain.goal), gain.verdict))
+    print_table("confirmed by simulation (95 % intervals)", ("", "baseline", "pick", "change", "verdict"), rows)
     print(statement(outcome.gains["pick"]))
     _print_limits(outcome)
     print(f"pick: {outcome.pick.reason}")
     print(outcome.edge.sentence)
     for name, chain in outcome.chains.items():
         print_chain(name, chain)
-        print(chain.status)
+        if chain.refused:
+            print(chain.status)
     for group in grouped(outcome.failures):
         print(f"failed ({len(group['labels'])}): {', '.join(group['labels'])}: {group['cause']}")
 
@@ -110,12 +112,12 @@ def _print_other_points(outcome: StudyResult) -> None:
         (
             name.replace("_", " "),
             *(f"{x:.4g}" for x in each.point),
-            *(f"{gain.percent:+.2f} ± {gain.error:.2f} %" for gain in outcome.gains[name]),
+            *(improvement(gain.percent, gain.error, gain.goal) for gain in outcome.gains[name]),
         )
         for name, each in others.items()
     ]
     wanted = [gain.response for gain in outcome.gains["pick"]]
-    print_table("other points, improvements confirmed by simulation", ("", *study.factors, *wanted), rows)
+    print_table("other points, changes confirmed by simulation", ("", *study.factors, *wanted), rows)
 
 
 def _print_beside(reference: str, outcome: StudyResult) -> None:

@@ -8,12 +8,13 @@ import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
+from matplotlib.ticker import MaxNLocator
 
-from doe.report.words import label
 from doe.response_surface import Surface
 from doe.study.design import design_of
 from doe.study.whole import StudyResult
 from doe.study_file import Study
+from rbdyn.records.words import label, quantity
 
 
 def response_surface(study: Study, surface: Surface, path: Path) -> None:
@@ -45,13 +46,23 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
         axis.set_zlim(floor, top)
         axis.set_xlabel(label(study.factors[0]), labelpad=8)
         axis.set_ylabel(label(study.factors[panel]), labelpad=8)
-        limits = "".join(f", limit {bound:g} in red" for bound in _bounds(study, surface.name))
-        axis.set_title(f"({'abcdefg'[panel - 1]}) {label(surface.name)}{limits}")
+        axis.set_zlabel(label(surface.name))
+        rest = [place for place in range(1, factors) if place != panel]
+        held = [f"{quantity(study.factors[place])[0]} {_at_centre(study, place)}" for place in rest]
+        notes = [*held, *(f"limit {bound:g} in red" for bound in _bounds(study, surface.name))]
+        axis.set_title(f"({'abcdefg'[panel - 1]}) {', '.join(notes)}", fontsize=10)
         axis.tick_params(labelsize=8)
+        for one in (axis.xaxis, axis.yaxis, axis.zaxis):
+            one.set_major_locator(MaxNLocator(4))
         axis.view_init(elev=24, azim=-128)
-    figure.subplots_adjust(left=0.02, right=0.94, bottom=0.06, top=0.94, wspace=0.12)
+    figure.subplots_adjust(left=0.02, right=0.92, bottom=0.06, top=0.94, wspace=0.12)
     figure.savefig(path, dpi=130)
     plt.close(figure)
+
+
+def _at_centre(study: Study, place: int) -> str:
+    """The centre of a factor with its unit."""
+    return f"{study.centre[place]:g} {quantity(study.factors[place])[1]}".rstrip()
 
 
 def _bounds(study: Study, name: str) -> list[float]:
@@ -88,7 +99,10 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
         axis.set_xlabel(label(surfaces[i].name))
         axis.set_ylabel(label(surfaces[j].name))
         axis.grid(alpha=0.3)
-    axes[0][0].legend(fontsize=8)
     figure.tight_layout()
-    figure.savefig(path, dpi=130)
+    # Below the figure, where no point lies.
+    figure.legend(
+        *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=6, fontsize=8
+    )
+    figure.savefig(path, dpi=130, bbox_inches="tight")
     plt.close(figure)

@@ -79,7 +79,7 @@ def settings_record(study: Study) -> dict[str, Any]:
     scene = clearance.design_scenes(study, study.baseline[None])[0]
     return {
         "study_file": study.path.name,
-        "scene_file": study.file.scene.file,
+        "scene_file": study.scene.file,
         "scene": scene.model_dump(mode="json", exclude_none=True),
         "factors": [
             {

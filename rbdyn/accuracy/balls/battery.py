@@ -14,14 +14,13 @@ import numpy as np
 
 from rbdyn.accuracy.balls.cases import CONTROLS, LOADS, SCENES, SEED, Case, Problem, cases, posed
 from rbdyn.accuracy.balls.solvers import WHOLE, Success, causes, fared, success_table
-from rbdyn.accuracy.report import Progress, Report, Reporter, Table, record, records
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, records, reported
 from rbdyn.quasistatic.rivals.finite_search import loaded
 from rbdyn.quasistatic.rivals.full_system import system_of, unknowns
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.quasistatic.row.row import component_lengths
 from rbdyn.scene.ball import BallScene
 
-FORMAT = "rbdyn.accuracy.battery/1"
 # A tenth of a second and more for a scene they fail on.
 SLOW = {"MINPACK LM": 500, "finite search": 500}
 FAST = ("convex", "plain Newton")
@@ -52,39 +51,38 @@ def study(scene: BallScene, progress: Reporter | None = None, scenes: int = SCEN
     runs = {name: run(name, drawn[:size], problems, counted) for name, size in sizes.items()}
     ours = runs[OURS]
     by_control, by_load = _by_kind(ours, CONTROLS, _control), _by_kind(ours, LOADS, _load)
-    solvers = [_fared(name, found) for name, found in runs.items()]
-    others = {name: _elsewhere(found, ours) for name, found in runs.items() if name != OURS}
+    solvers = [_fared(name, series) for name, series in runs.items()]
+    others = {name: _elsewhere(series, ours) for name, series in runs.items() if name != OURS}
     refused = _refused_by_rule_a(runs["finite search"], problems)
-    sentence = conclusion(solvers)
-    return Report(
-        stem="battery",
-        record=record(
-            FORMAT,
-            scenes=scenes,
-            seed=SEED,
-            by_control=records(by_control),
-            by_load=records(by_load),
-            solvers=records(solvers),
-            another_equilibrium=others,
-            refused_by_rule_a=refused,
-            conclusion=sentence,
-        ),
-        tables=(
+    fewer = [f"{name} on the first {size}" for name, size in sizes.items() if size < scenes]
+    slow, sentence = f" ({', '.join(fewer)}: too slow for all)" if fewer else "", conclusion(solvers)
+    return reported(
+        "battery",
+        (
             success_table("convex solver, by raceway control", by_control, "control"),
             success_table("convex solver, by load", by_load, "load"),
             _steps_table(ours),
-            success_table(_title(sizes, scenes), solvers),
+            success_table(f"solvers on the same scenes{slow}", solvers),
             _share_table("solved by load", LOADS, runs, _load),
             _share_table("solved by raceway control", CONTROLS, runs, _control),
         ),
-        sentences=(
+        (
             *causes(solvers),
             *(f"{name}: {count} of its equilibria are others than ours" for name, count in others.items() if count),
             f"rule a as printed refuses {refused} of the equilibria that the finite search found, for their unloaded balls",
             sentence,
         ),
-        sheets={"battery": [_flat(r) for found in runs.values() for r in found]},
-        pictures={"battery": lambda path: _draw(runs, path)},
+        [_flat(r) for series in runs.values() for r in series],
+        lambda path: _draw(runs, path),
+        "rbdyn.accuracy.battery/1",
+        scenes=scenes,
+        seed=SEED,
+        by_control=records(by_control),
+        by_load=records(by_load),
+        solvers=records(solvers),
+        another_equilibrium=others,
+        refused_by_rule_a=refused,
+        conclusion=sentence,
     )
 
 
@@ -105,8 +103,7 @@ def run(name: str, drawn: Sequence[Case], problems: Sequence[Problem], counted: 
 
 def conclusion(rows: Sequence[Success]) -> str:
     """Who solves most, and how the others compare."""
-    ranked = sorted(rows, key=lambda row: -row.solved)
-    best, rest = ranked[0], ranked[1:]
+    best, *rest = sorted(rows, key=lambda row: -row.solved)
     others = ", ".join(f"{row.solver} {row.shown_share}" for row in rest)
     return (
         f"{best.solver} solves {best.shown_share} of {best.problems} random scenes, half of them within "
@@ -121,7 +118,7 @@ def _fared(name: str, runs: Sequence[Run]) -> Success:
 def _by_kind(runs: Sequence[Run], kinds: Sequence[str], kind_of: Callable[[Case], str]) -> list[Success]:
     """How the cases of each kind fared, of the kinds that were drawn."""
     groups = {kind: [r for r in runs if kind_of(r.case) == kind] for kind in kinds}
-    return [_fared(kind, found) for kind, found in groups.items() if found]
+    return [_fared(kind, series) for kind, series in groups.items() if series]
 
 
 def _elsewhere(runs: Sequence[Run], ours: Sequence[Run]) -> int:
@@ -140,8 +137,7 @@ def _refused_by_rule_a(runs: Sequence[Run], problems: Sequence[Problem]) -> int:
     for r, problem in zip(runs, problems, strict=False):
         if r.solution.found:
             system = system_of(problem.row, problem.load, problem.given)
-            lever = problem.row.lever
-            q = r.solution.displacement * component_lengths(lever)
+            q = r.solution.displacement * component_lengths(problem.row.lever)
             count += not loaded(system, unknowns(system, q, r.solution.balls))
     return count
 
@@ -151,29 +147,20 @@ def _steps_table(runs: Sequence[Run]) -> Table:
     cells = []
     for control in CONTROLS:
         own = [r.solution for r in runs if r.case.control == control]
-        if own:
-            steps = [solution.steps for solution in own]
-            continued = sum(solution.strides > 0 for solution in own)
-            cells.append((control, f"{np.median(steps):.0f}", f"{np.percentile(steps, 99.0):.0f}",
-                          f"{max(steps)}", f"{continued}"))  # fmt: skip
+        if steps := [solution.steps for solution in own]:
+            share = f"{np.median(steps):.0f}", f"{np.percentile(steps, 99.0):.0f}", f"{max(steps)}"
+            cells.append((control, *share, f"{sum(solution.strides > 0 for solution in own)}"))
     return Table("Newton steps of the convex solver", ("control", "median", "99 %", "most", "continued"), cells)
 
 
 def _share_table(title: str, kinds: Sequence[str], runs: dict[str, list[Run]], kind_of: Callable[[Case], str]) -> Table:
     """Share that each solver solves of the scenes of each kind."""
-    cells = []
-    for kind in kinds:
-        line = [kind]
-        for found in runs.values():
-            solved = [r.solution.found for r in found if kind_of(r.case) == kind]
-            line.append(f"{100.0 * np.mean(solved):.1f} %" if solved else "")
-        cells.append(line)
-    return Table(title, ("", *runs), cells)
 
+    def share(series: list[Run], kind: str) -> str:
+        solved = [r.solution.found for r in series if kind_of(r.case) == kind]
+        return f"{100.0 * np.mean(solved):.1f} %" if solved else ""
 
-def _title(sizes: dict[str, int], scenes: int) -> str:
-    fewer = [f"{name} on the first {size}" for name, size in sizes.items() if size < scenes]
-    return "solvers on the same scenes" + (f" ({', '.join(fewer)}: too slow for all)" if fewer else "")
+    return Table(title, ("", *runs), [[kind, *(share(series, kind) for series in runs.values())] for kind in kinds])
 
 
 def _flat(of: Run) -> dict[str, Any]:
@@ -198,16 +185,15 @@ def _draw(runs: dict[str, list[Run]], path: Path) -> None:
     from rbdyn.plots.style import label_ends, plain, plt, save
 
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
-    axis.set_xscale("log")
-    axis.set_xlabel("time of a call [us]")
-    axis.set_ylabel("share of scenes solved within it [%]")
-    axis.set_ylim(0.0, 103.0)
+    axis.set(
+        xscale="log", xlabel="time of a call [us]", ylabel="share of scenes solved within it [%]", ylim=(0.0, 103.0)
+    )
     plain(axis)
     ends: list[Named] = []
-    for (name, found), colour in zip(runs.items(), METHOD_COLOURS, strict=False):
-        solved = np.sort([run.solve_us for run in found if run.solution.found])
+    for (name, series), colour in zip(runs.items(), METHOD_COLOURS, strict=False):
+        solved = np.sort([run.solve_us for run in series if run.solution.found])
         if solved.size:
-            share = 100.0 * np.arange(1, solved.size + 1) / len(found)
+            share = 100.0 * np.arange(1, solved.size + 1) / len(series)
             axis.step(solved, share, where="post", color=colour, linewidth=2.0 if colour == "black" else 1.2)
             ends.append(([(float(solved[0]), float(share[0])), (float(solved[-1]), float(share[-1]))], name, colour))
     axis.margins(x=0.15)

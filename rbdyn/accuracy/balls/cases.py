@@ -9,8 +9,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.model import row_model
@@ -57,8 +57,8 @@ class Problem(NamedTuple):
 
     row: Row
     control: Control
-    load: NDArray[np.float64]
-    given: NDArray[np.float64]
+    load: Array
+    given: Array
 
 
 def cases(count: int = SCENES, seed: int = SEED, **model: Any) -> list[Case]:
@@ -73,14 +73,8 @@ def posed(case: Case, ball: Material | None = None, rings: Material | None = Non
     ball, rings = ball or steel, rings or steel
     prescribed = Prescribed.model_construct(**case.operation.get("prescribed", {}))
     operation = BallOperation.model_construct(**{**case.operation, "prescribed": prescribed})
-    built = row_model(
-        BallBearing.model_construct(**case.bearing),
-        BallModel.model_construct(**case.model),
-        ball,
-        rings,
-        rings,
-        *operation.speeds,
-    )
+    drawing, model = BallBearing.model_construct(**case.bearing), BallModel.model_construct(**case.model)
+    built = row_model(drawing, model, ball, rings, rings, *operation.speeds)
     load, given = np.array([*operation.load, *operation.moment]), np.array(operation.given, float)
     return Problem(built.row, built.control, load, given)
 

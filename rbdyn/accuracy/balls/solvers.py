@@ -7,6 +7,7 @@ first that compiles. Then the load and the speed of the scene are perturbed at r
 
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from rbdyn.accuracy.balls.cases import Problem
-from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, records, reported, tabled
 from rbdyn.faults import InputError, RunError
 from rbdyn.quasistatic.rivals import finite_search, limited, minpack, plain_newton
 from rbdyn.quasistatic.row import equilibrium
@@ -25,7 +26,6 @@ from rbdyn.scene.ball import BallScene, SingleRowScene
 
 # Below, a residual is rounding.
 ROUNDING = 1e-18
-FORMAT = "rbdyn.accuracy.solvers/1"
 LIMITS = (1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 64, 128, 256, 512)
 REPEATS = 5
 PERTURBATIONS = 200
@@ -101,34 +101,28 @@ def study(
     nearby = perturbed(scene, perturbations)
     rows = [_fared(name, solver, nearby, counted) for name, solver in WHOLE.items()]
     sentence, written = conclusion(attempts, rows), records(attempts)
-    return Report(
-        stem="solvers",
-        record=record(
-            FORMAT,
-            rows=written,
-            nearby=records(rows),
-            perturbations={
-                "count": perturbations,
-                "seed": SEED,
-                "load_decades": LOAD_DECADES,
-                "speed_decades": SPEED_DECADES,
-            },
-            conclusion=sentence,
-        ),
-        tables=(
+    drawn = {"count": perturbations, "seed": SEED, "load_decades": LOAD_DECADES, "speed_decades": SPEED_DECADES}
+    return reported(
+        "solvers",
+        (
             tabled("residual against time", _until_done(attempts), columns_of(Attempt)),
             success_table(f"{perturbations} seeded scenes nearby", rows),
         ),
-        sentences=(*causes(rows), sentence),
-        sheets={"solvers": written},
-        pictures={"solvers": lambda path: _draw(attempts, path)},
+        (*causes(rows), sentence),
+        written,
+        lambda path: _draw(attempts, path),
+        "rbdyn.accuracy.solvers/1",
+        rows=written,
+        nearby=records(rows),
+        perturbations=drawn,
+        conclusion=sentence,
     )
 
 
 def problem_of(scene: SingleRowScene) -> Problem:
     """What a solver takes of a scene."""
-    model = row_of(scene)
-    return Problem(model.row, model.control, load_of(scene), given_of(scene))
+    row, control, *_ = row_of(scene)
+    return Problem(row, control, load_of(scene), given_of(scene))
 
 
 def work_precision(problem: Problem, limits: Sequence[int], counted: Progress) -> list[Attempt]:
@@ -140,21 +134,21 @@ def work_precision(problem: Problem, limits: Sequence[int], counted: Progress) -
     attempts = []
     for name, solver in LIMITED.items():
         for limit in limits:
-            found, took = timed(solver, problem, REPEATS, limit=limit)
-            attempts.append(Attempt(name, limit, found.residual / scale, took, found.status))
+            solution, took = timed(solver, problem, REPEATS, limit=limit)
+            attempts.append(Attempt(name, limit, solution.residual / scale, took, solution.status))
             counted.step()
     return attempts
 
 
 def timed(solver: Solver, problem: Problem, repeats: int, **options: Any) -> tuple[Solution, float]:
     """Solution and shortest time [us] of ``repeats`` calls after a first."""
-    found = solver(*problem, **options)
+    solution = solver(*problem, **options)
     shortest = float("inf")
     for _ in range(repeats):
         began = time.perf_counter()
         solver(*problem, **options)
         shortest = min(shortest, time.perf_counter() - began)
-    return found, 1e6 * shortest
+    return solution, 1e6 * shortest
 
 
 def perturbed(scene: SingleRowScene, count: int, seed: int = SEED) -> list[Problem]:
@@ -180,21 +174,18 @@ def perturbed(scene: SingleRowScene, count: int, seed: int = SEED) -> list[Probl
     return problems
 
 
-def fared(name: str, found: Sequence[Solution], took_us: Sequence[float]) -> Success:
+def fared(name: str, solutions: Sequence[Solution], took_us: Sequence[float]) -> Success:
     """Summary of many solutions and their times [us]."""
-    why: dict[str, int] = {}
-    for solution in found:
-        if not solution.found:
-            why[solution.status] = why.get(solution.status, 0) + 1
+    why = Counter(solution.status for solution in solutions if not solution.found)
     return Success(
         name,
-        len(found),
-        sum(solution.found for solution in found) / len(found),
+        len(solutions),
+        sum(solution.found for solution in solutions) / len(solutions),
         float(np.median(took_us)),
         float(np.percentile(took_us, 99.0)),
         float(np.max(took_us)),
-        float(np.median([solution.steps for solution in found])),
-        dict(sorted(why.items(), key=lambda entry: -entry[1])),
+        float(np.median([solution.steps for solution in solutions])),
+        dict(why.most_common()),
     )
 
 
@@ -231,45 +222,41 @@ def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
 
 
 def _fared(name: str, solver: Solver, problems: Sequence[Problem], counted: Progress) -> Success:
-    found, times = [], []
+    solutions, times = [], []
     for problem in problems:
         solution, took = timed(solver, problem, 1)
-        found.append(solution)
+        solutions.append(solution)
         times.append(took)
         counted.step()
-    return fared(name, found, times)
+    return fared(name, solutions, times)
 
 
 def _until_done(attempts: Sequence[Attempt]) -> list[Attempt]:
     """Attempts of each solver up to the first that converges."""
-    kept: list[Attempt] = []
+    needed: list[Attempt] = []
     done: set[str] = set()
     for attempt in attempts:
         if attempt.solver not in done:
-            kept.append(attempt)
+            needed.append(attempt)
         if attempt.status == "ok":
             done.add(attempt.solver)
-    return kept
+    return needed
 
 
 def _draw(attempts: Sequence[Attempt], path: Path) -> None:
     """Residual of each solver stopped after more and more iterations, against its time."""
     from matplotlib.ticker import LogLocator
 
-    from rbdyn.accuracy.rollers.pictures import MARKS, METHOD_COLOURS, Named, logarithmic
+    from rbdyn.accuracy.rollers.pictures import logarithmic, method_lines
     from rbdyn.plots.style import label_ends, plt, save
 
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
     logarithmic(axis, "residual over the largest force", "time of a call [us]")
     axis.xaxis.set_major_locator(LogLocator(base=100.0, numticks=12))
-    ends: list[Named] = []
-    attempts = _until_done(attempts)
-    names = list(dict.fromkeys(attempt.solver for attempt in attempts))
-    for name, mark, colour in zip(names, MARKS, METHOD_COLOURS, strict=False):
-        points = [(max(a.residual, ROUNDING), a.solve_us) for a in attempts if a.solver == name]
-        axis.plot(*zip(*points, strict=True), mark, linestyle="-", color=colour, markersize=4.5,
-                  linewidth=2.0 if name == names[0] else 1.0)  # fmt: skip
-        ends.append((points, name, colour))
+    lines: dict[str, list[tuple[float, float]]] = {}
+    for a in _until_done(attempts):
+        lines.setdefault(a.solver, []).append((max(a.residual, ROUNDING), a.solve_us))
+    ends, _ = method_lines(axis, lines)
     axis.margins(0.12)
     label_ends(axis, ends)
     save(figure, path)

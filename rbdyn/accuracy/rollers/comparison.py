@@ -8,28 +8,16 @@ from typing import Any
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT
-from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, record, records, tabled
-from rbdyn.accuracy.rollers import method_bias
+from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, records, reported, tabled
+from rbdyn.accuracy.rollers import method_bias, trajectory
 from rbdyn.accuracy.rollers.equal_error import Speedup, times_faster
 from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, Stretch, compiled
-from rbdyn.accuracy.rollers.trajectory import (
-    DEFAULT_TURNS,
-    STARTS,
-    Error,
-    Reference,
-    agreement_record,
-    agreement_table,
-    difference,
-    reference,
-    starts_after_transient,
-    worst,
-)
+from rbdyn.accuracy.rollers.trajectory import DEFAULT_TURNS, STARTS, Error, Reference
 from rbdyn.dynamics.run import prepare
 from rbdyn.faults import RunError
 from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.methods/1"
 OK = "ok"
 # A run is timed again and again, at most so often and, past the first time, for so long.
 REPEATS, TIMED_S = 5, 0.1
@@ -77,10 +65,10 @@ def study(
 
 def trajectories(scene: Scene, progress: Reporter | None, turns: float, methods: Sequence[Method]) -> Report:
     """Error and time of every method at every setting. Raises as ``study``."""
-    stretches = starts_after_transient(scene, turns)
+    stretches = trajectory.starts_after_transient(scene, turns)
     compile_s = compiling(stretches[0], methods)
     counted = Progress(progress, STARTS + sum(len(method.settings) for method in methods))
-    known = reference(stretches, counted.step)
+    known = trajectory.reference(stretches, counted.step)
     attempts = []
     for method in methods:
         for attempt in attempts_of(method, stretches, known):
@@ -89,23 +77,20 @@ def trajectories(scene: Scene, progress: Reporter | None, turns: float, methods:
     ratios = speedups(attempts, known.floor(turns))
     sentences = conclusion(attempts, ratios, known.floor(turns), turns)
     written = records(attempts)
-    return Report(
-        stem="methods",
-        record=record(
-            FORMAT,
-            rows=written,
-            conclusion=" ".join(sentences),
-            turns=turns,
-            starts=STARTS,
-            reference=agreement_record(known),
-            resolved_m=known.floor(turns),
-            times_faster={name: asdict(ratio) for name, ratio in ratios.items()},
-            compile_s=compile_s,
-        ),
-        tables=(agreement_table(known), table(attempts, turns), ratio_table(ratios)),
-        sentences=(*sentences, f"{compile_s:.1f} s to load or compile, in none of the times"),
-        sheets={"methods": written},
-        pictures={"methods": lambda path: _draw(attempts, known.floor(turns), turns, path)},
+    return reported(
+        "methods",
+        (trajectory.agreement_table(known), table(attempts, turns), ratio_table(ratios)),
+        (*sentences, f"{compile_s:.1f} s to load or compile, in none of the times"),
+        written,
+        lambda path: _draw(attempts, known.floor(turns), turns, path),
+        rows=written,
+        conclusion=" ".join(sentences),
+        turns=turns,
+        starts=STARTS,
+        reference=known.as_dict(),
+        resolved_m=known.floor(turns),
+        times_faster={name: asdict(ratio) for name, ratio in ratios.items()},
+        compile_s=compile_s,
     )
 
 
@@ -140,10 +125,10 @@ def attempt(method: Method, setting: float, stretches: Sequence[Stretch], known:
         status, y, calls, seconds = run(method, stretch, setting)
         if y is None:
             return Attempt(method.name, label, status, None, None, seconds / stretch.turns * 1e3, None)
-        errors.append(difference(stretch, y, end))
+        errors.append(trajectory.difference(stretch, y, end))
         derivatives += calls
         cpu_s += timed(method, stretch, setting)
-    error = worst(errors)
+    error = trajectory.worst(errors)
     return Attempt(method.name, label, OK, error.position_m, error.scaled, cpu_s / turns * 1e3, derivatives / turns)
 
 
@@ -153,9 +138,9 @@ def run(method: Method, stretch: Stretch, setting: float) -> tuple[str, Any, int
     started = time.thread_time()
     try:
         y, calls = go()
-    except NotInstalledError:
-        raise
     except RunError as error:
+        if isinstance(error, NotInstalledError):
+            raise
         return f"failed: {error}", None, 0, time.thread_time() - started
     seconds = time.thread_time() - started
     if not np.isfinite(y).all():
@@ -183,12 +168,9 @@ def curve(attempts: Sequence[Attempt], method: str, floor: float) -> list[tuple[
 def speedups(attempts: Sequence[Attempt], floor: float) -> dict[str, Speedup]:
     """How many times faster ours is than each other method that shares errors with it."""
     ours = curve(attempts, OURS.name, floor)
-    found = {
-        name: times_faster(ours, curve(attempts, name, floor))
-        for name in dict.fromkeys(a.method for a in attempts)
-        if name != OURS.name
-    }
-    return {name: ratio for name, ratio in found.items() if ratio is not None}
+    others = dict.fromkeys(a.method for a in attempts if a.method != OURS.name)
+    ratios = {name: times_faster(ours, curve(attempts, name, floor)) for name in others}
+    return {name: ratio for name, ratio in ratios.items() if ratio is not None}
 
 
 def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: float, turns: float) -> list[str]:
@@ -229,28 +211,21 @@ def ratio_table(ratios: dict[str, Speedup]) -> Table:
 
 def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) -> None:
     """Position error of each method against the time of a shaft turn; crosses at the right edge failed."""
-    from rbdyn.accuracy.rollers.pictures import MARKS, METHOD_COLOURS, failed_at_the_edge, logarithmic
+    from rbdyn.accuracy.rollers.pictures import failed_at_the_edge, logarithmic, method_lines
     from rbdyn.plots.style import GREY, label_ends, plt, save
 
     figure, axis = plt.subplots(figsize=(8.6, 6.0))
-    logarithmic(
-        axis,
-        f"largest position error after {turns:g} shaft turns, worst of the starts [m]",
-        "processor time of a shaft turn [ms]",
-    )
-    ends = []
+    across = f"largest position error after {turns:g} shaft turns, worst of the starts [m]"
+    logarithmic(axis, across, "processor time of a shaft turn [ms]")
+    lines: dict[str, list[tuple[float, float]]] = {attempt.method: [] for attempt in attempts}
+    for a in attempts:
+        if a.position_error_m and a.turn_ms:
+            lines[a.method].append((a.position_error_m, a.turn_ms))
+    ends, colours = method_lines(axis, lines)
     failures: dict[str, tuple[list[float], str]] = {}
-    names = list(dict.fromkeys(attempt.method for attempt in attempts))
-    for name, mark, colour in zip(names, MARKS, METHOD_COLOURS, strict=False):
-        own = [attempt for attempt in attempts if attempt.method == name]
-        points = [(a.position_error_m, a.turn_ms) for a in own if a.position_error_m and a.turn_ms]
-        failed = [a.turn_ms for a in own if not a.position_error_m and a.turn_ms]
-        if points:
-            axis.plot(*zip(*points, strict=True), mark, linestyle="-", color=colour, markersize=4.5,
-                      linewidth=2.0 if name == names[0] else 1.0)  # fmt: skip
-            ends.append((points, name, colour))
-        if failed:
-            failures[name] = failed, colour
+    for a in attempts:
+        if not a.position_error_m and a.turn_ms and a.method in colours:
+            failures.setdefault(a.method, ([], colours[a.method]))[0].append(a.turn_ms)
     axis.margins(0.08)
     left, right = axis.get_xlim()
     if floor > left:

@@ -7,8 +7,9 @@ always holds the truth is too wide.
 """
 
 import math
+from typing import Any
 
-from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import FIGURES
@@ -16,7 +17,6 @@ from rbdyn.records.record import Record, shown
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.coverage/1"
 REPEATS = 200
 # Of the truth: replicates and turns counted over those of the scene at least, rtol at most, seed. It discards half as
 # many turns as it counts.
@@ -59,22 +59,12 @@ def study(scene: Scene, progress: Reporter | None = None, repeats: int = REPEATS
         f"{each * (scene.numerics.replicates + scene.numerics.companions):.0f}, and {100.0 * longer:.0f} % of the runs "
         "were lengthened.",
     ]
-    written = records(rows)
-    return Report(
-        stem="coverage",
-        record=record(
-            FORMAT,
-            rows=written,
-            pooled=pooled(rows),
-            repeats=repeats,
-            mean_turns=turns,
-            lengthened=longer,
-            conclusion=" ".join(sentences),
-        ),
-        tables=(tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, columns_of(Row)),),
-        sentences=sentences,
-        sheets={"coverage": written},
+    table, written = (
+        tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, columns_of(Row)),
+        records(rows),
     )
+    told: dict[str, Any] = {"pooled": pooled(rows), "repeats": repeats, "mean_turns": turns, "lengthened": longer}
+    return reported("coverage", (table,), sentences, written, rows=written, **told, conclusion=" ".join(sentences))
 
 
 def one_bearing(scene: Scene) -> Scene:

@@ -24,11 +24,11 @@ class Speedup:
 
 def front(curve: Curve) -> list[tuple[float, float]]:
     """The points that no other beats in both error and time, smallest error first."""
-    kept: list[tuple[float, float]] = []
+    unbeaten: list[tuple[float, float]] = []
     for error, time in sorted(curve):
-        if not kept or time < kept[-1][1]:
-            kept.append((error, time))
-    return kept
+        if not unbeaten or time < unbeaten[-1][1]:
+            unbeaten.append((error, time))
+    return unbeaten
 
 
 def times_faster(ours: Curve, theirs: Curve) -> Speedup | None:

@@ -1,7 +1,5 @@
 """What a scene makes the program hold: types of laws, state, parameters, compiled code, modules."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -28,7 +26,7 @@ class Footprint:
     instructions: int
 
 
-def footprint(scene: Scene, bearing: RollerBearing) -> Footprint:
+def footprint(scene: "Scene", bearing: "RollerBearing") -> Footprint:
     """Sizes for a scene whose bearing has been run. Raises KeyError where nothing was compiled for its laws."""
     from rbdyn.dynamics.integrators.method import explicit_method, method_of
     from rbdyn.dynamics.parameters.scales import layout_of
@@ -51,7 +49,7 @@ def _parts(parameters: Any) -> Iterator[Any]:
             yield from _parts(part)
 
 
-def instructions(bearing: RollerBearing, pair: Any) -> int:
+def instructions(bearing: "RollerBearing", pair: Any) -> int:
     """Instructions (of LLVM, optimised) that the time integration of a bearing by an explicit pair was compiled to.
 
     Raises KeyError where the integration was not yet compiled, or loaded, for these types of laws.
@@ -68,7 +66,7 @@ def instructions(bearing: RollerBearing, pair: Any) -> int:
     raise KeyError(kind)
 
 
-def added_modules(plain: Scene, scenes: Sequence[Scene]) -> list[tuple[str, ...]]:
+def added_modules(plain: "Scene", scenes: "Sequence[Scene]") -> list[tuple[str, ...]]:
     """Modules of this package that each scene loads and the plain one does not, found in a fresh interpreter.
 
     Raises RunError where that interpreter fails.
@@ -93,13 +91,8 @@ def printed(function: Callable[[], None], data: Any, fault: str, **environment: 
         check=False,
     )
     if run.returncode != 0:
-        raise RunError(f"{fault}: {last_line(run.stderr)}")
+        raise RunError(f"{fault}: {next(reversed(run.stderr.strip().splitlines()), 'no reason given')}")
     return run.stdout
-
-
-def last_line(text: str) -> str:
-    """What a process that failed had to say at the end."""
-    return next(reversed(text.strip().splitlines()), "no reason given")
 
 
 def print_added_modules() -> None:
@@ -119,7 +112,7 @@ def print_added_modules() -> None:
     print(json.dumps(added))
 
 
-def _build(scene: Scene) -> None:
+def _build(scene: "Scene") -> None:
     """Load what the simulation of a scene does, from its bearing to the report of its races."""
     from rbdyn.dynamics import simulate
 

@@ -59,7 +59,11 @@ def bias_rows(
                 step = fixed_step(scene, setting)
                 return FixedStepRun(scene, bearing, index, step, method.name == VELOCITY_VERLET.name)
 
-            label = f"rtol {setting:g}" if method.adaptive else f"{_steps(scene, setting):.0f} steps a turn"
+            label = (
+                f"rtol {setting:g}"
+                if method.adaptive
+                else f"{scene.turn_s / fixed_step(scene, setting):.0f} steps a turn"
+            )
             try:
                 rows.append(_row(scene, method.name, label, _replicates(scene, start), reference))
             except RunError as error:
@@ -102,10 +106,6 @@ def table(rows: Sequence[Row], sought: float = SOUGHT) -> Table:
     return tabled(
         f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors", rows, {**columns_of(Row), **biases}
     )
-
-
-def _steps(scene: Scene, contact_times: float) -> float:
-    return scene.turn_s / fixed_step(scene, contact_times)
 
 
 def _replicates(scene: Scene, start: Callable[[int], Run]) -> list[Replicate]:

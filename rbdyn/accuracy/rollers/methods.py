@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbdyn.accuracy.rollers.fixed_step import runge_kutta_4, steps_of, velocity_of, velocity_verlet
 from rbdyn.accuracy.rollers.right_hand_side import BudgetSpent, RightHandSide
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, NOW
@@ -22,8 +22,6 @@ from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
-
-Array = NDArray[np.float64]
 
 # Right-hand sides a turn past which a method counts as failed.
 BUDGET_PER_TURN = 4_000_000
@@ -37,9 +35,9 @@ class Stretch:
 
     scene: Scene
     bearing: RollerBearing
-    start: NDArray[np.float64]
+    start: Array
     turns: float
-    scale: NDArray[np.float64]
+    scale: Array
 
     @property
     def duration(self) -> float:
@@ -149,12 +147,12 @@ def by_scipy(name: str, function: Callable[[Stretch], Any] = compiled) -> Callab
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")
                 try:
-                    found = solve_ivp(right_hand_side, (0.0, stretch.duration), stretch.start, **options)
+                    solution = solve_ivp(right_hand_side, (0.0, stretch.duration), stretch.start, **options)
                 except (BudgetSpent, ValueError) as error:  # its LU refuses a Jacobian that is not finite
                     raise RunError(_why(error)) from None
-            if not found.success:
-                raise RunError(str(found.message))
-            return Arrived(found.y[:, -1], right_hand_side.calls)
+            if not solution.success:
+                raise RunError(str(solution.message))
+            return Arrived(solution.y[:, -1], right_hand_side.calls)
 
         return go
 
@@ -185,12 +183,12 @@ def by_cvode(name: str) -> Callable[..., Callable[[], Arrived]]:
 
         def go() -> Arrived:
             solver.init_step(0.0, stretch.start)
-            found = solver.step(stretch.duration, tstop=stretch.duration)
+            solution = solver.step(stretch.duration, tstop=stretch.duration)
             if spent:
                 raise RunError(_why(spent[0]))
-            if not found.success:
-                raise RunError(str(found.message))
-            return Arrived(found.y, right_hand_side.calls)
+            if not solution.success:
+                raise RunError(str(solution.message))
+            return Arrived(solution.y, right_hand_side.calls)
 
         return go
 

@@ -1,63 +1,32 @@
 """What each option of a scene costs: nanoseconds a right-hand side with it and without it, the time to compile it, and
 what it adds to state, parameters, compiled code and loaded modules.
 
-An option is a few assignments to the scene. Each is run in turn with the scene as it is, so that both see the same
-machine; a median over replicates is taken of the processor time per right-hand side, the integrator's own work included.
+An option is a few assignments to the scene (``variants.toml``). Each is run in turn with the scene as it is, so that both
+see the same machine; a median over replicates is taken of the processor time per right-hand side, the integrator's own
+work included.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 
-from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, record, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, reported, tabled
 from rbdyn.accuracy.rollers.footprint import Footprint, added_modules, footprint
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
-from rbdyn.faults import InputError, set_key
+from rbdyn.faults import InputError, read_toml, set_key
 from rbdyn.records.record import Record, derived, outside_json
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.options/1"
 TURNS, DISCARDED = 10, 2
 REPEATS = 3
-# What stands in the scene of Chen et al. 2022 is taken away; what does not is added, in a usual size.
-OPTIONS: dict[str, tuple[str, ...]] = {
-    "contact law of ISO/TS 16281": ('model.line_contact="iso16281"',),
-    "contact law of Houpert": ('model.line_contact="houpert"',),
-    "contact law of Dowson and Higginson": ('model.line_contact="dowson_higginson"',),
-    "logarithmic profile, 31 slices": ('bearing.roller_profile="logarithmic"',),
-    "tilt, 31 slices": ("bearing.tilt_mrad=0.5",),
-    "unequal rollers": ("bearing.roller_diameter_spread_um=0.5",),
-    "two-lobed outer race": ("bearing.outer_waviness=[{order=2,amplitude_um=10.0}]",),
-    "wavy inner race, with clock": ("bearing.inner_waviness=[{order=11,amplitude_um=0.2}]",),
-    "traction by pressure and temperature": ('traction.model="thermal_newtonian"',),
-    "mixed friction": ('traction.friction="mixed"',),
-    "dry traction": ('traction.model="coulomb"',),
-    "without traction": ('traction.model="off"',),
-    "without race damping": ('model.race_damping="off"',),
-    "without rolling resistance": ('model.rolling_resistance="off"',),
-    "starved inlets": ("lubricant.inlet_distance=10.0",),
-    "pocket film": ("model.pocket_film=true",),
-    "rigid pocket bars": ('model.pocket_bar_stiffness_N_m="rigid"',),
-    "without pockets": ('model.pocket="off"',),
-    "guidance on the inner ring": ('cage.guidance="inner"',),
-    "guidance by the rollers": ('cage.guidance="roller"',),
-    "dry land": ('model.guide_land="dry"',),
-    "without land": ('model.guide_land="off"',),
-    "cage imbalance": ("cage.imbalance_um=20.0",),
-    "outer ring turns": ("operation.outer_speed_rpm=3000.0",),
-    "outer ring on a support": ("support.stiffness_N_m=2e7", "support.damping_N_s_m=2e3"),
-    "rotating load, with clock": ("operation.rotating_load_N=100.0",),
-    "speed and load by schedule": (
-        "operation.schedule={time_s=[0.0,0.01],inner_speed_rpm=[20000.0,24000.0],radial_load_N=[1000.0,1300.0]}",
-    ),
-    "gravity": ("operation.gravity_m_s2=9.81",),
-    "without drag": ('model.drag="off"',),
-}
+VARIANTS = Path(__file__).with_name("variants.toml")
+OPTIONS: dict[str, list[str]] = read_toml(VARIANTS)["options"]
 
 
 class OptionCost(Record):
@@ -123,7 +92,7 @@ def option_costs(
                 run = run_replicate(one, parameters, replicate, one.numerics.rtol, Stop())
                 times[which].append(run.cpu_s / run.derivatives * 1e9)
                 gap = run.power_gap if which == 0 else gap
-        with_ns, without_ns = (float(np.median(found)) for found in times)
+        with_ns, without_ns = (float(np.median(series)) for series in times)
         holds = footprint(option, bearing)
         rows.append(OptionCost(name, with_ns, without_ns, gap, compile_s, needed, holds, plain_holds))
         counted.step()
@@ -156,10 +125,6 @@ def study(scene: Scene, progress: Reporter | None = None, options: Mapping[str, 
         f"{row['without_instructions']} instructions compiled (LLVM)"
         for row in rows[:1]
     ]
-    return Report(
-        stem="options",
-        record=record(FORMAT, options=rows),
-        tables=(tabled("nanoseconds a right-hand side; what the option adds to the program", costs, COLUMNS),),
-        sentences=plain,
-        sheets={"options": [row | {"modules": " ".join(row["modules"])} for row in rows]},
-    )
+    table = tabled("nanoseconds a right-hand side; what the option adds to the program", costs, COLUMNS)
+    sheet = [row | {"modules": " ".join(row["modules"])} for row in rows]
+    return reported("options", (table,), plain, sheet, options=rows)

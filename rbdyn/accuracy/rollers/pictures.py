@@ -1,6 +1,6 @@
 """Error against run time: error to the right, time upwards, both logarithmic; lower left is better."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +16,13 @@ MARKS = ("o", "s", "D", "^", "v", "P", "X", "<", ">", "h")
 METHOD_COLOURS = ("black", GREEN, SKY, BLUE, PURPLE, VERMILION, ORANGE, "#8C510A", GREY, "#7A6BB0")
 SMALLEST_BIAS = 1e-6
 
-Named = tuple[Sequence[tuple[float, float]], str, str]  # points, text and colour of a line
+Points = Sequence[tuple[float, float]]
+Named = tuple[Points, str, str]  # points, text and colour of a line
 
 
 def logarithmic(axis: Axes, across: str, up: str) -> None:
     """Both axes logarithmic, named."""
-    axis.set_xscale("log")
-    axis.set_yscale("log")
-    axis.set_xlabel(across)
-    axis.set_ylabel(up)
+    axis.set(xscale="log", yscale="log", xlabel=across, ylabel=up)
     axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
     axis.yaxis.set_minor_formatter(NullFormatter())
@@ -51,6 +49,18 @@ def biases_at_work(
     )
     label_ends(axis, ends)
     save(figure, path)
+
+
+def method_lines(axis: Axes, lines: Mapping[str, Points]) -> tuple[list[Named], dict[str, str]]:
+    """A line a method, the first of them bold, where it has points: what ``label_ends`` takes, and the colours of all."""
+    colours, first = dict(zip(lines, METHOD_COLOURS, strict=False)), next(iter(lines))
+    ends: list[Named] = []
+    for (name, points), mark in zip(lines.items(), MARKS, strict=False):
+        if points:
+            axis.plot(*zip(*points, strict=True), mark, linestyle="-", color=colours[name], markersize=4.5,
+                      linewidth=2.0 if name == first else 1.0)  # fmt: skip
+            ends.append((points, name, colours[name]))
+    return ends, colours
 
 
 def failed_at_the_edge(axis: Axes, failures: dict[str, tuple[list[float], str]]) -> None:

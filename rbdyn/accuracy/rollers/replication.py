@@ -11,11 +11,11 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbdyn.accuracy.judgement import NORMAL, SOUGHT, about, percent
-from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, record, records, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, flat, records, reported, tabled
 from rbdyn.accuracy.rollers.tolerances import OUTPUTS
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
@@ -24,7 +24,6 @@ from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.records.record import Record, shown
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.replicates/1"
 POOL = 32
 TURNS = (10.0, 20.0, 40.0, 80.0)
 COUNTS = (2, 4, 8, 16, 32)
@@ -76,27 +75,24 @@ def study(
     slopes = {name: slope(turns, [values[length][name] for length in turns]) for name in OUTPUTS}
     sentences = conclusion(rows, slopes, scene, pool, sought)
     written = records(rows)
-    return Report(
-        stem="replicates",
-        record=record(
-            FORMAT,
-            rows=written,
-            slopes={name: asdict(one) for name, one in slopes.items()},
-            conclusion=" ".join(sentences),
-            pool=pool,
-            sought=sought,
-            discard_turns=scene.numerics.warm_up_turns,
-        ),
-        tables=(tabled("95 % half-widths, relative", rows, COLUMNS),),
-        sentences=sentences,
-        sheets={"replicates": [flat(row, "half_width") for row in written]},
-        pictures={"replicates": lambda path: _draw(rows, path)},
+    return reported(
+        "replicates",
+        (tabled("95 % half-widths, relative", rows, COLUMNS),),
+        sentences,
+        [flat(row, "half_width") for row in written],
+        lambda path: _draw(rows, path),
+        rows=written,
+        slopes={name: asdict(one) for name, one in slopes.items()},
+        conclusion=" ".join(sentences),
+        pool=pool,
+        sought=sought,
+        discard_turns=scene.numerics.warm_up_turns,
     )
 
 
 def pool_of_runs(
     scene: Scene, turns: Sequence[float], pool: int, progress: Reporter | None = None
-) -> tuple[dict[float, dict[str, NDArray[np.float64]]], dict[float, float]]:
+) -> tuple[dict[float, dict[str, Array]], dict[float, float]]:
     """Per length the outputs of every replicate, and the mean processor time of one [s], discarded turns included.
 
     The window of the impact force is the shortest length throughout: over another the force would be another figure.
@@ -114,7 +110,7 @@ def pool_of_runs(
 
 
 def replication_rows(
-    values: dict[float, dict[str, NDArray[np.float64]]], cpu_s: dict[float, float], counts: Sequence[int]
+    values: dict[float, dict[str, Array]], cpu_s: dict[float, float], counts: Sequence[int]
 ) -> list[Row]:
     """Expected half-widths of means over each number of replicates of each length."""
     return [
@@ -129,13 +125,13 @@ def replication_rows(
     ]
 
 
-def expected_half_width(sample: NDArray[np.float64], count: int) -> float:
+def expected_half_width(sample: Array, count: int) -> float:
     """Half-width for ``count`` replicates that scatter as the whole sample does, over the sample's mean."""
     relative = float(sample.std(ddof=1) / (abs(sample.mean()) or 1.0))
     return student_factor(count - 1) * relative / math.sqrt(count)
 
 
-def slope(turns: Sequence[float], samples: Sequence[NDArray[np.float64]]) -> Slope:
+def slope(turns: Sequence[float], samples: Sequence[Array]) -> Slope:
     """Least squares of log scatter over log turns; ln s scatters by 1/sqrt(2 (n - 1)) for n normal values.
 
     The lengths share their beginnings, so their scatters do not err independently and the half-width is a rough one.
@@ -160,15 +156,15 @@ def conclusion(
     """Whether the error falls as it should, and what the scene's choice among the rows buys, as far as the scatter of
     ``pool`` replicates is known."""
     sentences = []
-    for name, found in slopes.items():
+    for name, fall in slopes.items():
         verdict = {
             True: "as independent turns do",
             False: "not as independent turns do (-0.5)",
-            None: f"undecided: errors of {found.half_width:.2g} hide a difference of {abs(found.power + 0.5):.2g}; a pool "
-            f"of about {about(1.0 + (pool - 1) * (found.half_width / SLOPE_ERROR) ** 2)} replicates tells",
-        }[found.as_expected]
+            None: f"undecided: errors of {fall.half_width:.2g} hide a difference of {abs(fall.power + 0.5):.2g}; a pool "
+            f"of about {about(1.0 + (pool - 1) * (fall.half_width / SLOPE_ERROR) ** 2)} replicates tells",
+        }[fall.as_expected]
         sentences.append(
-            f"{name}: scatter falls with counted turns to the power {found.power:.2f} ± {found.half_width:.2f}, {verdict}."
+            f"{name}: scatter falls with counted turns to the power {fall.power:.2f} ± {fall.half_width:.2f}, {verdict}."
         )
     sentences += [_choice(name, rows, scatter_error(pool), sought) for name in OUTPUTS]
     numerics = scene.numerics

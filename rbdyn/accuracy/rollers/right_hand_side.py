@@ -4,13 +4,11 @@ from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, RollerBearing, derivative
 from rbdyn.dynamics.forces.race_lanes import scratch
-
-Array = NDArray[np.float64]
 
 
 class BudgetSpent(Exception):  # noqa: N818

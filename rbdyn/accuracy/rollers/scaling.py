@@ -10,10 +10,11 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, record, records, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, records, reported, tabled
 from rbdyn.accuracy.rollers.footprint import printed
 from rbdyn.accuracy.rollers.option_cost import with_options
 from rbdyn.dynamics.ensemble import Stop
@@ -25,7 +26,6 @@ from rbdyn.faults import InputError
 from rbdyn.records.record import Record
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.scaling/1"
 ROLLERS = (10, 20, 30, 50, 70, 100)
 SLICES = (1, 11, 31, 61, 101, 201)
 MEMORY_TURNS = (40, 4000)
@@ -151,7 +151,7 @@ def _times(scenes: dict[int, Scene], step: Callable[[], None]) -> list[Point]:
             runs[size].append(run_replicate(scene, bearings[size], 0, scene.numerics.rtol, Stop()))
             if repeat == REPEATS - 1:
                 step()
-    return [_point(size, scenes[size].turn_s, found) for size, found in runs.items()]
+    return [_point(size, scenes[size].turn_s, series) for size, series in runs.items()]
 
 
 def _point(size: int, turn_s: float, runs: list[Replicate]) -> Point:
@@ -210,63 +210,51 @@ def study(scene: Scene, progress: Reporter | None = None) -> Report:
     return report(scaling(scene, progress=progress))
 
 
-def report(found: Scaling) -> Report:
+def report(measured: Scaling) -> Report:
     """Tables, fits and picture of what was measured."""
-    tables = [tabled("", points, {kind: ("size", ""), **COLUMNS}) for kind, points in found.points.items()]
+    tables = [tabled("", points, {kind: ("size", ""), **COLUMNS}) for kind, points in measured.points.items()]
     sentences = [
         f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f}); "
         f"as a power: n^{line.exponent:.2f}"
-        for kind, line in found.lines.items()
+        for kind, line in measured.lines.items()
     ]
     sentences += [
         f"{memory.turns} counted turns: at most {memory.peak_MiB:.1f} MiB in a process of its own"
-        for memory in found.memory
+        for memory in measured.memory
     ]
-    points = {kind: records(sizes) for kind, sizes in found.points.items()}
-    return Report(
-        stem="scaling",
-        record=record(
-            FORMAT,
-            **points,
-            fits={kind: asdict(line) for kind, line in found.lines.items()},
-            memory=records(found.memory),
-        ),
-        tables=tables,
-        sentences=sentences,
-        sheets={"scaling": [{"of": kind, **point} for kind, sizes in points.items() for point in sizes]},
-        pictures={"scaling": lambda path: _draw(found, path)},
+    points: dict[str, Any] = {kind: records(sizes) for kind, sizes in measured.points.items()}
+    fits = {kind: asdict(line) for kind, line in measured.lines.items()}
+    sheet = [{"of": kind, **point} for kind, sizes in points.items() for point in sizes]
+    memory = records(measured.memory)
+    return reported(
+        "scaling", tables, sentences, sheet, lambda path: _draw(measured, path), **points, fits=fits, memory=memory
     )
 
 
-def _draw(found: Scaling, path: Path) -> None:
+def _draw(measured: Scaling, path: Path) -> None:
     """A panel a size, with the fitted line, and a panel of memory."""
     from rbdyn.plots.style import BLUE, GREY, plain, plt, save
 
     figure, axes = plt.subplots(1, 3, figsize=(12.0, 3.8), width_ratios=(1.0, 1.0, 0.6))
-    for axis, (kind, line) in zip(axes, found.lines.items(), strict=False):
-        points = found.points[kind]
+    for axis, (kind, line) in zip(axes, measured.lines.items(), strict=False):
+        points = measured.points[kind]
         size = np.array([point.size for point in points])
         ends = np.array([0.0, size.max()])
         axis.plot(ends, 1e-3 * (line.fixed_ns + line.each_ns * ends), color=GREY, linewidth=1.0)
         axis.plot(size, [1e-3 * point.rhs_ns for point in points], "o", color=BLUE, markersize=5)
-        axis.set_title(
-            f"{line.fixed_ns:.0f} ns + {line.each_ns:.3g} ns each, r² = {line.r2:.4f}; "
-            f"power n$^{{{line.exponent:.2f}}}$",
-            fontsize=9,
-        )
-        axis.set_xlabel(kind if kind == "rollers" else "slices of a roller")
-        axis.set_ylabel("time of a right-hand side [µs]")
+        law = f"{line.fixed_ns:.0f} ns + {line.each_ns:.3g} ns each, r² = {line.r2:.4f}"
+        axis.set_title(f"{law}; power n$^{{{line.exponent:.2f}}}$", fontsize=9)
+        across = kind if kind == "rollers" else "slices of a roller"
+        axis.set(xlabel=across, ylabel="time of a right-hand side [µs]", xlim=(-0.03 * size.max(), 1.05 * size.max()))
         if size[0] == 1:
             whole = (1.0, 1e-3 * points[0].rhs_ns)
             axis.annotate("whole roller", whole, xytext=(8, -4), textcoords="offset points", fontsize=8)
-        axis.set_xlim(-0.03 * size.max(), 1.05 * size.max())
         axis.set_ylim(bottom=0.0)
         plain(axis)
-    bars = axes[-1].bar([f"{one.turns}" for one in found.memory], [one.peak_MiB for one in found.memory], 0.5,
+    bars = axes[-1].bar([f"{one.turns}" for one in measured.memory], [one.peak_MiB for one in measured.memory], 0.5,
                         color=BLUE)  # fmt: skip
     axes[-1].bar_label(bars, fmt="%.0f", fontsize=9)
-    axes[-1].set_xlabel("counted shaft turns")
-    axes[-1].set_ylabel("largest memory of the process [MiB]")
+    axes[-1].set(xlabel="counted shaft turns", ylabel="largest memory of the process [MiB]")
     axes[-1].margins(x=0.3, y=0.12)
     plain(axes[-1])
     save(figure, path)

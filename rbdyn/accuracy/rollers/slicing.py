@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from rbdyn.accuracy.judgement import SOUGHT, check_replicates, percent, undecided
-from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, record, records, tabled
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, flat, records, reported, tabled
 from rbdyn.accuracy.rollers.option_cost import with_options
-from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of
+from rbdyn.accuracy.rollers.tolerances import NEGLIGIBLE, Bias, bias_columns, bias_of, first_within
 from rbdyn.contact.hertz_line import line_load
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import race_contact_law, roller_bearing
@@ -23,7 +23,6 @@ from rbdyn.faults import InputError
 from rbdyn.records.record import shown
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.slices/1"
 COUNTS = (5, 9, 15, 21, 31, 61, 121, 241)
 FINE = 1001  # the most a scene may have
 LOADS = 40
@@ -50,18 +49,18 @@ def study(
     chosen = conclusion(rows, scene, sought)
     numerics, written, finest = scene.numerics, records(rows), rows[-1]
     title = f"bias against {finest.slices} slices, 95 % errors"
-    return Report(
-        stem="slices",
-        record=record(
-            FORMAT, rows=written, conclusion=chosen, turns=numerics.turns, replicates=numerics.replicates, sought=sought
-        ),
-        tables=(tabled(title, rows, {**columns_of(Row), **bias_columns(sought, finest)}),),
-        sentences=(
-            chosen,
-            f"{numerics.replicates} replicates of {numerics.turns:g} turns; load errors against {FINE} slices",
-        ),
-        sheets={"slices": [flat(row) for row in written]},
-        pictures={"slices": lambda path: _draw(rows, path, sought)},
+    runs = f"{numerics.replicates} replicates of {numerics.turns:g} turns; load errors against {FINE} slices"
+    return reported(
+        "slices",
+        (tabled(title, rows, {**columns_of(Row), **bias_columns(sought, finest)}),),
+        (chosen, runs),
+        [flat(row) for row in written],
+        lambda path: _draw(rows, path, sought),
+        rows=written,
+        conclusion=chosen,
+        turns=numerics.turns,
+        replicates=numerics.replicates,
+        sought=sought,
     )
 
 
@@ -143,13 +142,7 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
         f"{good[0].rhs_ns:.0f} ns a right-hand side. The scene has {scene.slices}."
     )
     compared = [row for row in good if row is not rows[-1]]
-    chosen = next((row for row in compared if row.verdict(sought) == "within"), None)
-    hidden = [
-        found
-        for row in compared
-        if row.verdict(sought) == "undecided" and (chosen is None or row.slices < chosen.slices)
-        for found in row.hidden(f"{row.slices} slices", sought)
-    ]
+    chosen, hidden = first_within(compared, lambda row: f"{row.slices} slices", sought)
     sentences = [fewest]
     if chosen is not None:
         sentences.append(

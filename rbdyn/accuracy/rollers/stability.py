@@ -6,19 +6,21 @@ runs once more at a tenth of the tolerance, to see whether tightening mends it.
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from string import Template
+from typing import Any
 
-from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, record, records, tabled
-from rbdyn.accuracy.rollers.option_cost import with_options
+from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
+from rbdyn.accuracy.rollers.option_cost import VARIANTS, with_options
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.method import held_by_stability, largest_eigenvalue
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
-from rbdyn.faults import InputError, RunError
+from rbdyn.faults import InputError, RunError, read_toml
 from rbdyn.records.record import Record, finite, shown
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.stability/1"
 LARGEST_GAP = 0.01
 TURNS, DISCARDED = 5, 2
 # What a case may end with. All but "open" say what to do; "refused" and "stopped" do so in their reason.
@@ -54,51 +56,18 @@ class Ending(Record):
 
 
 def cases(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Extreme variants of a scene, by name."""
+    """Extreme variants of a scene, by name (``variants.toml``)."""
     operation, bearing = scene.operation, scene.bearing
     rpm = operation.inner_speed_rpm or operation.outer_speed_rpm
-    run_s = (TURNS + DISCARDED) * scene.turn_s
-    pitch = bearing.pitch_diameter_mm * max(100.0 / bearing.rollers, 1.0)
-
-    def speeds(first: float) -> str:
-        return f"operation.schedule={{time_s=[0.0,{run_s!r}],inner_speed_rpm=[{first!r},{rpm!r}]}}"
-
-    return {
-        "as given": (),
-        "100 000 rpm": ("operation.inner_speed_rpm=100000.0",),
-        "10 rpm": ("operation.inner_speed_rpm=10.0", "numerics.turns=2", "numerics.discard_turns=1"),
-        "no load": ("operation.radial_load_N=0.0",),
-        "20 times the load": (f"operation.radial_load_N={20.0 * operation.radial_load_N!r}",),
-        "no clearance": ("bearing.radial_clearance_mm=0.0",),
-        "preload of 20 um": ("bearing.radial_clearance_mm=-0.02",),
-        "pocket clearance of 1 um": ("cage.pocket_clearance_mm=0.001",),
-        "pocket clearance of 2 mm": ("cage.pocket_clearance_mm=2.0",),
-        "guide clearance of 1 um": ("cage.guide_clearance_mm=0.001", "model.land_film_floor_um=0.1"),
-        "guide clearance of 2 mm": ("cage.guide_clearance_mm=2.0",),
-        "cage of 0.1 g": ("cage.mass_g=0.1",),
-        "cage of 5 kg": ("cage.mass_g=5000.0",),
-        "ceramic rollers": ('materials.roller="silicon_nitride"',),
-        "traction slope of 10 s/m": ('traction.model="four_constant"', "traction.constants=[-0.05,5.0,100.0,0.05]"),
-        "dry friction": ('traction.model="coulomb"',),
-        "2 rollers": ("bearing.rollers=2",),
-        "100 rollers": ("bearing.rollers=100", f"bearing.pitch_diameter_mm={pitch!r}"),
-        "reversal": (speeds(-rpm),),
-        "start from rest": (speeds(0.0),),
-        "oil at -20 C": ("lubricant.temperature_C=-20.0",),
-        "oil at 300 C": ("lubricant.temperature_C=300.0",),
-        "films down to 1 nm": (
-            "model.pocket_film=true",
-            "model.pocket_film_floor_um=0.001",
-            "model.land_film_floor_um=0.001",
-        ),
-        "undamped contacts": (
-            'model.race_damping="off"',
-            "model.pocket_damping_alpha_s_m=0.0",
-            "model.land_damping_alpha_s_m=0.0",
-        ),
-        "rtol 1e-12": ("numerics.rtol=1e-12", "numerics.turns=2", "numerics.discard_turns=1"),
-        "1000 turns": ("numerics.turns=1000",),
+    figures = {
+        "rpm": rpm,
+        "back": -rpm,
+        "run_s": (TURNS + DISCARDED) * scene.turn_s,
+        "heavy": 20.0 * operation.radial_load_N,
+        "pitch": bearing.pitch_diameter_mm * max(100.0 / bearing.rollers, 1.0),
     }
+    listed = read_toml(VARIANTS)["extremes"]
+    return {name: tuple(Template(each).substitute(figures) for each in told) for name, told in listed.items()}
 
 
 def battery(
@@ -173,15 +142,12 @@ def study(scene: Scene, progress: Reporter | None = None) -> Report:
 def report(rows: Sequence[Ending]) -> Report:
     """Table of the endings, and every reason."""
     unexplained = sum(row.unexplained for row in rows)
-    written = record(FORMAT, largest_gap=LARGEST_GAP, cases=records(rows))
-    if unexplained:
-        written["status"] = f"{unexplained} of {len(rows)} cases neither close nor tell why"
-    title = f"extreme scenes; closed: power balance within {100.0 * LARGEST_GAP:g} %"
-    return Report(
-        stem="stability",
-        record=written,
-        tables=(tabled(title, rows, columns_of(Ending)),),
-        sentences=[f"{row.case}: {row.reason}" for row in rows if row.reason],
-        sheets={"stability": [row | {"assignments": " ".join(row["assignments"])} for row in records(rows)]},
-        failed=unexplained > 0,
+    written = records(rows)
+    status: dict[str, Any] = (
+        {"status": f"{unexplained} of {len(rows)} cases neither close nor tell why"} if unexplained else {}
     )
+    table = tabled(f"extreme scenes; closed: power balance within {100.0 * LARGEST_GAP:g} %", rows, columns_of(Ending))
+    sentences = [f"{row.case}: {row.reason}" for row in rows if row.reason]
+    sheet = [row | {"assignments": " ".join(row["assignments"])} for row in written]
+    told = reported("stability", (table,), sentences, sheet, **status, largest_gap=LARGEST_GAP, cases=written)
+    return replace(told, failed=unexplained > 0)

@@ -6,7 +6,8 @@ after everything was compiled.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -61,6 +62,21 @@ class Bias(Record):
         ]
 
 
+B = TypeVar("B", bound=Bias)
+
+
+def first_within(rows: Iterable[B], name: Callable[[B], str], sought: float) -> tuple[B | None, list[Difference]]:
+    """The first row, cheapest first, shown to be within what is sought, and what errors hide of those before."""
+    hidden: list[Difference] = []
+    for row in rows:
+        verdict = row.verdict(sought)
+        if verdict == "within":
+            return row, hidden
+        if verdict == "undecided":
+            hidden += row.hidden(name(row), sought)
+    return None, hidden
+
+
 class Row(Bias):
     """One tolerance: processor time per shaft turn [ms] and per right-hand side [ns] (medians over replicates),
     steps per turn, largest relative power gap."""
@@ -112,14 +128,7 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
     """
     reference = rows[-1]
     closing = [row for row in rows[:-1] if row.power_gap <= NEGLIGIBLE]
-    verdicts = [row.verdict(sought) for row in closing]
-    chosen = closing[verdicts.index("within")] if "within" in verdicts else None
-    open_rows = [
-        row
-        for row, verdict in zip(closing, verdicts, strict=True)
-        if verdict == "undecided" and (chosen is None or row.rtol > chosen.rtol)
-    ]
-    hidden = [found for row in open_rows for found in row.hidden(f"rtol {row.rtol:g}", sought)]
+    chosen, hidden = first_within(closing, lambda row: f"rtol {row.rtol:g}", sought)
     rest = undecided(hidden, scene, sought) if hidden else ""
     if chosen is None:
         return rest or (
@@ -146,12 +155,12 @@ def bias_of(runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Bias:
     return Bias(value, bias, bias_error)
 
 
-def table(found: StatisticsBias, sought: float = SOUGHT) -> Table:
+def table(biases: StatisticsBias, sought: float = SOUGHT) -> Table:
     """Table for the terminal; failed tolerances at the end."""
-    reference = found.rows[-1]
+    reference = biases.rows[-1]
     title = f"bias against rtol {reference.rtol:g}, 95 % errors"
-    ran = tabled(title, found.rows, {**columns_of(Row), **bias_columns(sought, reference)})
-    failed = [(f"{rtol:g}", "failed", *[""] * (len(ran.header) - 2)) for rtol in found.failures]
+    ran = tabled(title, biases.rows, {**columns_of(Row), **bias_columns(sought, reference)})
+    failed = [(f"{rtol:g}", "failed", *[""] * (len(ran.header) - 2)) for rtol in biases.failures]
     return ran._replace(cells=[*ran.cells, *failed])
 
 

@@ -5,7 +5,7 @@ turn only, and every span has its own floor below which the reference itself is 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rbdyn.accuracy.report import Table
 from rbdyn.accuracy.rollers.methods import DOP853, OURS, Method, Stretch
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
@@ -20,8 +21,6 @@ from rbdyn.dynamics.run import Run
 from rbdyn.faults import InputError
 from rbdyn.records.record import Record
 from rbdyn.scene import Scene
-
-Array = NDArray[np.float64]
 
 DEFAULT_TURNS, LONGEST_TURNS = 0.25, 1.0
 SPANS = (0.25, 0.5, 1.0)  # shaft turns after which the two references are compared
@@ -46,6 +45,11 @@ class Reference(Record):
     ends: Sequence[Array]
     agreement: dict[float, Error]
 
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form: the methods, and how far they are apart."""
+        agreement = [{"turns": span, **error.as_dict()} for span, error in self.agreement.items()]
+        return {"methods": {OURS.name: OUR_REFERENCE_RTOL, DOP853.name: THEIR_REFERENCE_RTOL}, "agreement": agreement}
+
     def floor(self, turns: float) -> float:
         """Position error [m] below which a stretch of ``turns`` resolves nothing: that of the next longer span."""
         return RESOLVED * next(e.position_m for span, e in self.agreement.items() if span >= turns)
@@ -62,12 +66,12 @@ def starts_after_transient(scene: Scene, turns: float = DEFAULT_TURNS, starts: i
     scale = absolute_tolerance(scene, bearing, 1.0)
     # The clock runs exactly in every method; its scale only has to be a number.
     scale[~np.isfinite(scale)] = 1.0
-    found = []
+    stretches = []
     for replicate in range(starts):
         run = Run(scene, bearing, replicate, scene.numerics.rtol, Stop())
         run.to(SETTLE_TURNS)
-        found.append(Stretch(scene, bearing, run.carry.y.copy(), turns, scale))
-    return found
+        stretches.append(Stretch(scene, bearing, run.carry.y.copy(), turns, scale))
+    return stretches
 
 
 def positions(scene: Scene) -> NDArray[np.int64]:
@@ -109,19 +113,11 @@ def end_of(method: Method, stretch: Stretch, setting: float) -> Array:
     return method.ready(stretch, setting)().y
 
 
-def agreement_table(found: Reference) -> Table:
+def agreement_table(known: Reference) -> Table:
     """How far the references are apart after each span."""
-    cells = [(f"{span:g}", f"{e.position_m:.2g}", f"{e.scaled:.2g}") for span, e in found.agreement.items()]
+    cells = [(f"{span:g}", f"{e.position_m:.2g}", f"{e.scaled:.2g}") for span, e in known.agreement.items()]
     return Table(
         f"the two references: {OURS.name} at {OUR_REFERENCE_RTOL:g}, {DOP853.name} at {THEIR_REFERENCE_RTOL:g}",
         ("turns", "positions apart [m]", "worst component over its scale"),
         cells,
     )
-
-
-def agreement_record(found: Reference) -> dict[str, Any]:
-    """JSON of the references."""
-    return {
-        "methods": {OURS.name: OUR_REFERENCE_RTOL, DOP853.name: THEIR_REFERENCE_RTOL},
-        "agreement": [{"turns": span, **asdict(error)} for span, error in found.agreement.items()],
-    }

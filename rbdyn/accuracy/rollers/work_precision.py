@@ -10,7 +10,8 @@ from rbdyn.accuracy.rollers.methods import COMPILED
 from rbdyn.accuracy.rollers.trajectory import DEFAULT_TURNS
 from rbdyn.scene import Scene
 
-FORMAT = "rbdyn.accuracy/1"
+# Of the record of the trajectories, what stands in that of the study.
+MOTION = ("rows", "conclusion", "turns", "starts", "reference", "resolved_m", "times_faster", "compile_s")
 
 
 def study(
@@ -25,35 +26,30 @@ def study(
     Raises InputError, RunError where a reference fails, KeyboardInterrupt.
     """
     motion = comparison.trajectories(scene, progress, turns, COMPILED)
-    found = tolerances.statistics_bias(scene, rtols, progress)
-    chosen = tolerances.conclusion(found.rows, scene, sought)
-    numerics, rows = scene.numerics, records(found.rows)
+    biases = tolerances.statistics_bias(scene, rtols, progress)
+    chosen = tolerances.conclusion(biases.rows, scene, sought)
+    numerics, rows = scene.numerics, records(biases.rows)
     agreement, trajectories, _ = motion.tables
-    return Report(
-        stem="accuracy",
-        record=record(
-            FORMAT,
-            rows=rows,
-            sought=sought,
-            failures={f"{rtol:g}": why for rtol, why in found.failures.items()},
-            conclusion=chosen,
-            turns=numerics.turns,
-            replicates=numerics.replicates,
-            trajectory={key: motion.record[key] for key in _MOTION},
-        ),
-        tables=(agreement, trajectories, tolerances.table(found, sought)),
-        sentences=(
-            *motion.sentences,
-            chosen,
-            *(f"rtol {rtol:g} failed: {why}" for rtol, why in found.failures.items()),
-            f"{numerics.replicates} replicates of {numerics.turns:g} turns",
-        ),
-        sheets={"accuracy": [flat(row) for row in rows], "trajectory": motion.record["rows"]},
-        pictures={"accuracy": lambda path: _draw(found.rows, path, sought), "trajectory": motion.pictures["methods"]},
+    failures = {f"{rtol:g}": why for rtol, why in biases.failures.items()}
+    told = record(
+        "rbdyn.accuracy/1",
+        rows=rows,
+        sought=sought,
+        failures=failures,
+        conclusion=chosen,
+        turns=numerics.turns,
+        replicates=numerics.replicates,
+        trajectory={key: motion.record[key] for key in MOTION},
     )
-
-
-_MOTION = ("rows", "conclusion", "turns", "starts", "reference", "resolved_m", "times_faster", "compile_s")
+    sentences = *motion.sentences, chosen, *(f"rtol {rtol} failed: {why}" for rtol, why in failures.items())
+    return Report(
+        "accuracy",
+        told,
+        (agreement, trajectories, tolerances.table(biases, sought)),
+        (*sentences, f"{numerics.replicates} replicates of {numerics.turns:g} turns"),
+        {"accuracy": [flat(row) for row in rows], "trajectory": motion.record["rows"]},
+        {"accuracy": lambda path: _draw(biases.rows, path, sought), "trajectory": motion.pictures["methods"]},
+    )
 
 
 def _draw(rows: Sequence[tolerances.Row], path: Any, sought: float) -> None:

@@ -1,18 +1,17 @@
 """A time history of one replicate, on request: motions, and every contact's load, slip and heat, at uniform samples."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.observe import OBSERVED, observe
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.dynamics.run import Run
+from rbdyn.records.words import Brief, Figure
 from rbdyn.scene import Scene
 
 if TYPE_CHECKING:
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 
     from rbdyn.life.rollers import ReferenceLife
 
-Array = NDArray[np.float64]
 # Numbers of a history, 0.8 GB: with its table and pictures 2 GB. 1000 turns of 10 rollers at 512 samples are 0.7e8.
 MOST_NUMBERS = 1e8
 # Fields that are columns of cage and inner ring in the state, and those that are rows of ``observe``, in their order.
@@ -28,8 +26,8 @@ BODIES = ("cage_x", "cage_y", "cage_angle", "cage_vx", "cage_vy", "cage_speed", 
 SEEN = ("outer_load", "inner_load", "pocket_load", "outer_slip", "inner_slip", "outer_heat", "inner_heat")
 
 
-@dataclass(frozen=True)
-class History:
+@dataclass(frozen=True, repr=False)
+class History(Brief):
     """Samples at equal intervals after the discarded turns. Arrays over (samples,) or (samples, rollers); SI.
 
     ``azimuth``: of the rollers from the load direction [rad], growing without bound; ``pocket_load``: contact and
@@ -69,13 +67,25 @@ class History:
             return self.cage_x - self.ring_x, self.cage_y - self.ring_y
         return self.cage_x - self.outer_x, self.cage_y - self.outer_y
 
-    def life(self) -> ReferenceLife:
+    def brief(self) -> tuple[str, list[Figure]]:
+        """Samples and turns; extremes of forces and of the cage's place, and its mean speed."""
+        x, y = self.guide_eccentricity
+        figures = [
+            Figure("largest pocket force", float(np.abs(self.pocket_load).max(initial=0.0)), None, "N"),
+            Figure("largest race load", float(self.inner_load.max(initial=0.0)), None, "N"),
+            Figure("largest cage eccentricity", 1e6 * float(np.hypot(x, y).max(initial=0.0)), None, "µm"),
+            Figure("mean cage speed", float(self.cage_speed.mean()) * 30.0 / np.pi, None, "rpm"),
+        ]
+        turns = np.ptp(self.time) / self.scene.turn_s
+        return f"{len(self.time)} samples over {turns:.3g} shaft turns of one replicate", figures
+
+    def life(self) -> "ReferenceLife":
         """Reference rating life of ISO/TS 16281 from the loads of this history."""
         from rbdyn.dynamics.motion.rating import rating_life
 
         return rating_life(self.scene, self.azimuth, self.inner_load, self.outer_load)
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """A row a sample, units in the column names."""
         import pandas as pd
 
@@ -88,12 +98,10 @@ class History:
             "inner_ring_y_um": self.ring_y * 1e6,
             "land_N": self.land_load,
         }
-        for name, unit in (("pocket_load", "N"), ("outer_load", "N"), ("inner_load", "N")):
+        for name in ("pocket_load", "outer_load", "inner_load", "outer_slip", "inner_slip"):
+            unit = "N" if name.endswith("_load") else "m_s"
             for j, values in enumerate(getattr(self, name).T):
                 columns[f"{name.removesuffix('_load')}_{j + 1}_{unit}"] = values
-        for name in ("outer_slip", "inner_slip"):
-            for j, values in enumerate(getattr(self, name).T):
-                columns[f"{name}_{j + 1}_m_s"] = values
         return pd.DataFrame(columns)
 
 

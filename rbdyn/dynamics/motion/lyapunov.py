@@ -8,8 +8,8 @@ import math
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators.records import DERIVATIVES
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -18,8 +18,6 @@ from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.records.record import Record, derived, keyed, outside_json
 from rbdyn.scene import Scene
-
-Array = NDArray[np.float64]
 
 RENORMALISE_TURNS = 0.1
 # In the norm of the error control: lengths in approaches of a race contact (about a micrometre), speeds likewise.
@@ -53,12 +51,7 @@ class LyapunovExponent(Record):
 
 
 def lyapunov_exponent(
-    scene: Scene,
-    turns: float = 100.0,
-    replicate: int = 0,
-    separation: float = SEPARATION,
-    rtol: float = RTOL,
-    stop: Stop | None = None,
+    scene: Scene, turns: float = 100.0, replicate: int = 0, separation: float = SEPARATION, rtol: float = RTOL
 ) -> LyapunovExponent:
     """Largest Lyapunov exponent over ``turns`` counted shaft turns, after the discarded ones. Raises RunError.
 
@@ -68,7 +61,7 @@ def lyapunov_exponent(
     """
     started = time.perf_counter()
     scene = with_numerics(scene, turns=turns + ALIGN_TURNS)
-    bearing, stop = roller_bearing(scene), stop or Stop()
+    bearing, stop = roller_bearing(scene), Stop()
     leader = Run(scene, bearing, replicate, rtol, stop)
     follower = Run(scene, bearing, replicate, rtol, stop)
     begin = scene.numerics.warm_up_turns

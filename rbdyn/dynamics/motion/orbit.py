@@ -4,8 +4,6 @@ Functions of a ``History``; SI throughout. All work on its samples, so nothing f
 seen, and the largest forces are those of this one replicate, not those of a result (which keeps every step).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -13,13 +11,13 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.film_thickness import hertz_pressure
 from rbdyn.dynamics.parameters.race_traction import rolling_contacts
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
 
-Array = NDArray[np.float64]
 Race = Literal["outer", "inner"]
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -30,36 +28,32 @@ TAIL = 0.01
 SEGMENT_SHARE = 0.5
 
 
-def _guide_velocity(history: History) -> tuple[Array, Array]:
-    """Velocity of the centre of the guiding ring [m/s], by central differences: it is not among the samples."""
-    inner = history.scene.cage.guidance == "inner"
-    x, y = (history.ring_x, history.ring_y) if inner else (history.outer_x, history.outer_y)
-    return np.gradient(x, history.time), np.gradient(y, history.time)
-
-
-def eccentricity(history: History) -> Array:
+def eccentricity(history: "History") -> Array:
     """Distance of the cage centre from that of its guide [m], (samples,)."""
     return np.hypot(*history.guide_eccentricity)
 
 
-def whirl_speed(history: History) -> Array:
+def whirl_speed(history: "History") -> Array:
     """Instantaneous whirl speed psi' = (x vy - y vx)/(x^2 + y^2) of the cage centre about its guide [rad/s], (samples,).
 
     Zero where the centres coincide. Close to the centre it grows without bound: take quantiles, not moments.
     """
     x, y = history.guide_eccentricity
-    guide_vx, guide_vy = _guide_velocity(history)
+    inner = history.scene.cage.guidance == "inner"
+    guide = (history.ring_x, history.ring_y) if inner else (history.outer_x, history.outer_y)
+    # Not among the samples: by central differences.
+    guide_vx, guide_vy = (np.gradient(place, history.time) for place in guide)
     moment = x * (history.cage_vy - guide_vy) - y * (history.cage_vx - guide_vx)
     square = x * x + y * y
     return np.divide(moment, square, out=np.zeros_like(square), where=square > 0.0)
 
 
-def mean_cage_speed(history: History) -> float:
+def mean_cage_speed(history: "History") -> float:
     """Angle that the cage turned over the time it took [rad/s]."""
     return float((history.cage_angle[-1] - history.cage_angle[0]) / (history.time[-1] - history.time[0]))
 
 
-def whirl_ratio(history: History) -> float:
+def whirl_ratio(history: "History") -> float:
     """Mean whirl speed over mean cage speed: 1 when the cage centre goes round with the cage, 0 when it stays.
 
     The mean of psi' over time is the angle gone round the guide's centre over the time; that form has no pole.
@@ -70,18 +64,18 @@ def whirl_ratio(history: History) -> float:
     return float(turned) / mean_cage_speed(history)
 
 
-def whirl_ratios(history: History) -> Array:
+def whirl_ratios(history: "History") -> Array:
     """Instantaneous whirl speed over mean cage speed, (samples,)."""
     return whirl_speed(history) / mean_cage_speed(history)
 
 
-def whirl_quantiles(history: History) -> dict[float, float]:
+def whirl_quantiles(history: "History") -> dict[float, float]:
     """Quantiles of the instantaneous whirl ratio."""
     values = np.quantile(whirl_ratios(history), QUANTILES)
     return dict(zip(QUANTILES, values.tolist(), strict=True))
 
 
-def whirl_histogram(history: History, bins: int = 60) -> tuple[Array, Array]:
+def whirl_histogram(history: "History", bins: int = 60) -> tuple[Array, Array]:
     """Probability density of the instantaneous whirl ratio: bin edges (bins + 1,), density (bins,).
 
     The bins hold all but one in a hundred samples at either end; the density is that of all samples.
@@ -94,7 +88,7 @@ def whirl_histogram(history: History, bins: int = 60) -> tuple[Array, Array]:
     return edges, count / (values.size * np.diff(edges))
 
 
-def poincare(history: History, turn_of: Literal["shaft", "cage"]) -> tuple[Array, Array]:
+def poincare(history: "History", turn_of: Literal["shaft", "cage"]) -> tuple[Array, Array]:
     """Poincare section: cage centre about its guide [m] once a turn of shaft or cage, x and y, each (turns,).
 
     A periodic orbit is a point, a quasi-periodic one a closed curve, a chaotic one a cloud. The section lies at the
@@ -132,7 +126,7 @@ class Spectrum(NamedTuple):
         return [(float(self.frequency[i]), float(self.amplitude[i])) for i in highest]
 
 
-def spectrum(history: History, values: Array) -> Spectrum:
+def spectrum(history: "History", values: Array) -> Spectrum:
     """Amplitude spectrum of a sampled signal without its mean, by Welch's method (Welch 1967) with Hann's window.
 
     A sine has its amplitude at its frequency, and up to 15 % less where that lies between two frequencies.
@@ -143,16 +137,6 @@ def spectrum(history: History, values: Array) -> Spectrum:
     segment = max(int(SEGMENT_SHARE * len(values)), 2)
     frequency, power = welch(values, 1.0 / interval, "hann", segment, scaling="spectrum")
     return Spectrum(frequency, np.sqrt(2.0 * power))
-
-
-def eccentricity_spectrum(history: History) -> Spectrum:
-    """Amplitudes of the cage's eccentricity [m]."""
-    return spectrum(history, eccentricity(history))
-
-
-def cage_speed_spectrum(history: History) -> Spectrum:
-    """Amplitudes of the cage's speed [rad/s]."""
-    return spectrum(history, history.cage_speed)
 
 
 @dataclass(frozen=True)
@@ -169,7 +153,7 @@ class Profile:
     samples: NDArray[np.int64]
 
 
-def against_azimuth(history: History, values: Array, bins: int = 72) -> Profile:
+def against_azimuth(history: "History", values: Array, bins: int = 72) -> Profile:
     """Bin values (samples, rollers) by the azimuth at which each roller stood."""
     share = (history.azimuth / (2.0 * np.pi) + 0.5) % 1.0
     place = np.minimum((share * bins).astype(np.int64), bins - 1).ravel()
@@ -185,7 +169,7 @@ def against_azimuth(history: History, values: Array, bins: int = 72) -> Profile:
     return Profile(centres, figures[0], figures[1], figures[2], samples)
 
 
-def contact_pressure(history: History, race: Race) -> Array:
+def contact_pressure(history: "History", race: Race) -> Array:
     """Hertz pressure p = sqrt(Q E'/(2 pi l R)) in the middle of the contact of plain cylinders [Pa], (samples, rollers).
 
     E' = 2/((1 - nu1^2)/E1 + (1 - nu2^2)/E2), l the effective length, R the reduced radius (Johnson 1985, 4.2c). A
@@ -195,7 +179,7 @@ def contact_pressure(history: History, race: Race) -> Array:
     return np.asarray(hertz_pressure(rolling_contacts(history.scene)[race], load))
 
 
-def pressure_velocity(history: History, race: Race) -> Array:
+def pressure_velocity(history: "History", race: Race) -> Array:
     """Hertz pressure times sliding speed [W/m^2], (samples, rollers): friction over it is the heat per area."""
     slip = history.outer_slip if race == "outer" else history.inner_slip
     return contact_pressure(history, race) * np.abs(slip)
@@ -209,7 +193,7 @@ class Largest(NamedTuple):
     roller: int | None
 
 
-def largest(history: History, loads: Array) -> Largest:
+def largest(history: "History", loads: Array) -> Largest:
     """Largest absolute value of loads (samples,) or (samples, rollers).
 
     The vertex of the parabola through the largest sample and its neighbours, which makes good most of what lies

@@ -3,16 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.forces.slice_loads import slice_loads
 from rbdyn.dynamics.parameters.model import race_contact_law
 from rbdyn.life.roller_capacity import dynamic_capacity
 from rbdyn.life.rollers import ReferenceLife, reference_life
 from rbdyn.life.turns import Turning
 from rbdyn.scene import Scene
-
-Array = NDArray[np.float64]
 
 
 def rating_life(scene: Scene, azimuth: Array, inner_load: Array, outer_load: Array) -> ReferenceLife:

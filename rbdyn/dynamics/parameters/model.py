@@ -3,8 +3,6 @@
 What only some scenes need is imported where it is built: a scene without it never loads it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -239,7 +237,7 @@ def _cage(scene: Scene) -> BalancedCage | UnbalancedCage:
     return UnbalancedCage(cage.mass, inertia, cage.imbalance)
 
 
-def _outer_ring(scene: Scene) -> HeldRing | SupportedRing:
+def _outer_ring(scene: Scene) -> "HeldRing | SupportedRing":
     support, start = scene.support, layout_of(scene).support
     if support is None or start is None:
         return HeldRing()
@@ -253,7 +251,7 @@ def _gravity(scene: Scene) -> NoGravity | Gravity:
     return Gravity(size * math.cos(direction), size * math.sin(direction)) if size > 0.0 else NoGravity()
 
 
-def _drive(scene: Scene) -> SteadyDrive | TwoSpeedDrive | ClockedDrive:
+def _drive(scene: Scene) -> "SteadyDrive | TwoSpeedDrive | ClockedDrive":
     operation, clock = scene.operation, layout_of(scene).clock
     inner, outer = operation.speeds
     load = float(operation.radial_load_N)

@@ -1,7 +1,5 @@
 """From a scene to the traction law of one race, and how thick its film is."""
 
-from __future__ import annotations
-
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -138,7 +136,7 @@ def _surface(scene: Scene, contact: RollingContact, oil: Oil, largest_load: floa
     return fit.surface
 
 
-def _rheology(scene: Scene, oil: Oil) -> Rheology:
+def _rheology(scene: Scene, oil: Oil) -> "Rheology":
     from rbdyn.contact.rheology import Eyring, LimitingShear, thermal_newtonian
 
     table = scene.traction

@@ -20,9 +20,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rbdyn.arrays import Array
 
 # Joined batches are 1 + MEMORIES (tau - 1) batches long: independent batches stay as they are.
 MEMORIES = 8.0
@@ -83,9 +82,9 @@ def autocorrelation_time(series: Sequence[Array]) -> float:
         covariance = np.append(covariance, 0.0)
     couples = covariance.reshape(-1, 2).sum(axis=1)
     positive = len(couples) if (couples > 0.0).all() else int(np.argmin(couples > 0.0))
-    kept = np.minimum.accumulate(couples[:positive])
+    monotone = np.minimum.accumulate(couples[:positive])
     weights = 1.0 - 2.0 * np.arange(positive) / longest
-    return max(1.0, float(2.0 * (weights * kept).sum() / covariance[0] - 1.0))
+    return max(1.0, float(2.0 * (weights * monotone).sum() / covariance[0] - 1.0))
 
 
 def student_half_width(values: Array) -> float | None:

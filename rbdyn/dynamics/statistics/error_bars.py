@@ -3,28 +3,20 @@
 import math
 from collections.abc import Sequence
 
+from rbdyn.dynamics.statistics import metrics
 from rbdyn.dynamics.statistics.drift import TESTED, slow_change
-from rbdyn.dynamics.statistics.metrics import (
-    CAGE_SLIP,
-    CAGE_SPEED,
-    IMPACT_CONTACT_FORCE,
-    IMPACT_FORCE,
-    POWER_LOSS,
-    WHIRL_DEVIATION_RATIO,
-    Replicate,
-    quantity,
-)
+from rbdyn.dynamics.statistics.metrics import Replicate, quantity
 from rbdyn.dynamics.statistics.transient import Start, start_of_counting
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
 FIGURES = {
-    "impact_force_N": (IMPACT_FORCE, 1.0),
-    "impact_contact_force_N": (IMPACT_CONTACT_FORCE, 1.0),
-    "whirl_deviation_ratio": (WHIRL_DEVIATION_RATIO, 1.0),
-    "power_loss_W": (POWER_LOSS, 1.0),
-    "cage_speed_rpm": (CAGE_SPEED, 30.0 / math.pi),
-    "cage_slip": (CAGE_SLIP, 1.0),
+    "impact_force_N": (metrics.IMPACT_FORCE, 1.0),
+    "impact_contact_force_N": (metrics.IMPACT_CONTACT_FORCE, 1.0),
+    "whirl_deviation_ratio": (metrics.WHIRL_DEVIATION_RATIO, 1.0),
+    "power_loss_W": (metrics.POWER_LOSS, 1.0),
+    "cage_speed_rpm": (metrics.CAGE_SPEED, 30.0 / math.pi),
+    "cage_slip": (metrics.CAGE_SLIP, 1.0),
 }
 # A slip near nothing has no relative error worth a word; the cage speed tells of it.
 JUDGED = {
@@ -59,17 +51,11 @@ def quantities(
     """
     steady = scene.operation.schedule is None
     since = runs[0].first if since is None else since
-    return {
-        name: quantity(
-            figure,
-            runs,
-            companions,
-            scene.numerics.rtol,
-            slow_change(figure, TESTED.get(name, figure), runs, since, steady=steady),
-            unit,
-        )
-        for name, (figure, unit) in FIGURES.items()
-    }
+    told = {}
+    for name, (figure, unit) in FIGURES.items():
+        slow = slow_change(figure, TESTED.get(name, figure), runs, since, steady=steady)
+        told[name] = quantity(figure, runs, companions, scene.numerics.rtol, slow, unit)
+    return told
 
 
 def error_notes(scene: Scene, figures: dict[str, Quantity], fault: str | None) -> list[str]:

@@ -1,21 +1,17 @@
 """From what one replicate kept, batch by batch, to the figures that are reported."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.forces.equations import LOAD, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.bias import companion_error
 from rbdyn.result import Quantity
-
-Array = NDArray[np.float64]
 
 SLOWEST_CAGE = 1e-6  # [rad/s]
 
@@ -46,9 +42,9 @@ class Replicate:
     derivatives: int
     cpu_s: float
     method: str = "rk45"
-    stiffness: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    stiffness: Array = field(default_factory=lambda: np.zeros(3))
 
-    def counted_from(self, first: int) -> Replicate:
+    def counted_from(self, first: int) -> "Replicate":
         """The same run, counted from another batch."""
         return replace(self, first=first)
 
@@ -57,17 +53,8 @@ class Replicate:
         """Time counted [s]."""
         return float(self.durations[self.first :].sum())
 
-    @property
-    def impact_windows(self) -> Array:
-        """Largest force of a roller on a pocket wall, by contact and film, of each whole window [N]."""
-        return self._windows(POCKET_LOAD)
-
-    @property
-    def contact_windows(self) -> Array:
-        """Largest roller/cage contact load of each whole window [N]."""
-        return self._windows(POCKET_CONTACT_LOAD)
-
-    def _windows(self, force: int) -> Array:
+    def windows(self, force: int) -> Array:
+        """Largest load of each whole impact window [N], by its place in the load vector."""
         forces = self.largest[self.first :, force]
         whole = len(forces) // self.per_window
         return forces[: whole * self.per_window].reshape(whole, self.per_window).max(axis=1)
@@ -75,7 +62,7 @@ class Replicate:
     @property
     def impact_force(self) -> float:
         """Mean over the windows of the largest force on a pocket wall [N]."""
-        return float(self.impact_windows.mean())
+        return float(self.windows(POCKET_LOAD).mean())
 
     @property
     def whirl_deviation_ratio(self) -> float:
@@ -88,16 +75,11 @@ class Replicate:
         return self._figure(POWER_LOSS)
 
     @property
-    def cage_speed(self) -> float:
-        """Mean cage speed [rad/s]."""
-        return float(self.cage_angle[self.first :].sum()) / self.duration
-
-    @property
     def cage_slip(self) -> float:
         """1 - cage speed over kinematic cage speed."""
         return self._figure(CAGE_SLIP)
 
-    def _figure(self, figure: Figure) -> float:
+    def _figure(self, figure: "Figure") -> float:
         return float(figure.of_sums(figure.moments(self).sum(axis=0)))
 
     def _works(self) -> tuple[float, float, float]:
@@ -162,16 +144,16 @@ def _slip(sums: Array) -> Array:
     return np.where(known, 1.0 - turned / np.where(known, rolling, 1.0), 0.0)
 
 
-def _counted(windows: Array) -> Array:
-    return np.column_stack((np.ones(len(windows)), windows))
+def _windowed(force: int) -> Callable[[Replicate], Array]:
+    return lambda run: np.column_stack((np.ones(len(windows := run.windows(force))), windows))
 
 
 def _timed(values: Callable[[Replicate], Array]) -> Callable[[Replicate], Array]:
     return lambda run: np.column_stack((run.durations, values(run)))[run.first :]
 
 
-IMPACT_FORCE = Figure(lambda run: _counted(run.impact_windows), mean)
-IMPACT_CONTACT_FORCE = Figure(lambda run: _counted(run.contact_windows), mean)
+IMPACT_FORCE = Figure(_windowed(POCKET_LOAD), mean)
+IMPACT_CONTACT_FORCE = Figure(_windowed(POCKET_CONTACT_LOAD), mean)
 WHIRL_DEVIATION_RATIO = Figure(lambda run: run.whirl[run.first :], _deviation_ratio)
 POWER_LOSS = Figure(_timed(lambda run: run.work[:, :SHAFT].sum(axis=1)), mean)
 CAGE_SPEED = Figure(_timed(lambda run: run.cage_angle), mean)
@@ -193,19 +175,10 @@ def work_done(runs: Sequence[Replicate]) -> dict[str, float]:
     }
 
 
-def missing_power(runs: Sequence[Replicate]) -> float:
-    """Power [W] that the balance misses on the mean of all replicates."""
-    return abs(sum(run.missing_work for run in runs)) / sum(run.duration for run in runs)
+Runs = Sequence[Replicate]
 
 
-def quantity(
-    figure: Figure,
-    runs: Sequence[Replicate],
-    companions: Sequence[Replicate],
-    rtol: float,
-    slow: float,
-    unit: float = 1.0,
-) -> Quantity:
+def quantity(figure: Figure, runs: Runs, companions: Runs, rtol: float, slow: float, unit: float = 1.0) -> Quantity:
     """A figure with its 95 % errors, times ``unit``.
 
     Statistical: batch means over all replicates (``rbdyn.dynamics.statistics.batch_means``) and, as root sum of squares, the
@@ -221,6 +194,7 @@ def quantity(
         times_fewer = sum(run.duration for run in runs) / sum(run.duration for run in companions)
         numerical = companion_error(ours, float(figure.of_sums(sums)), times_fewer, rtol)
     if figure is POWER_LOSS:
-        numerical = math.hypot(missing_power(runs), numerical or 0.0)
+        missing = abs(sum(run.missing_work for run in runs)) / sum(run.duration for run in runs)
+        numerical = math.hypot(missing, numerical or 0.0)
     statistical, numerical = (None if x is None else unit * x for x in (statistical, numerical))
     return Quantity(unit * ours.value, statistical, numerical, ours.effective_samples)

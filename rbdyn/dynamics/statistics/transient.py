@@ -12,14 +12,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.forces.equations import POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics.batch_means import autocorrelation_time
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
-
-Array = NDArray[np.float64]
 
 GROUP = 5
 # Means of five batches without which nothing can be said.
@@ -63,12 +61,6 @@ def series_of(runs: Sequence[Replicate]) -> dict[str, Array]:
     }
 
 
-def transient_of(runs: Sequence[Replicate]) -> int | None:
-    """Batches of the longest transient of impact force, whirl and power loss; None where the run is too short to tell."""
-    known = [batches for series in series_of(runs).values() if (batches := find_transient(series)) is not None]
-    return max(known, default=None)
-
-
 class Start(NamedTuple):
     """Where counting starts: batch, transient found in the whole run [shaft turns] (None where the run is too short or
     follows a schedule), and what a result has to say about both."""
@@ -83,7 +75,8 @@ def start_of_counting(scene: Scene, runs: Sequence[Replicate]) -> Start:
     numerics, run = scene.numerics, runs[0]
     if scene.operation.schedule is not None:
         return Start(run.first, None, ())
-    transient = transient_of(runs)
+    known = [batches for series in series_of(runs).values() if (batches := find_transient(series)) is not None]
+    transient = max(known, default=None)  # the longest; None where the run is too short to tell
     if transient is None:
         fewest = GROUP * FEWEST_GROUPS * run.durations[0] / scene.turn_s
         note = f"the run is too short to show its transient: {fewest:g} shaft turns are needed; lengthen numerics.turns"

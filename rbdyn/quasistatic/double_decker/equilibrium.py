@@ -15,11 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare
 from rbdyn.quasistatic.row.equilibrium import OK, Solution, solve, without_noise
 from rbdyn.quasistatic.row.row import Row, component_lengths
-
-Vector = NDArray[np.float64]
 
 # Newton on the middle ring: force left over, relative to the largest force, and where rounding allows no better.
 AIM, ACCEPTED = 1e-11, 1e-8
@@ -29,6 +28,10 @@ SHARES = (0.5, 0.1, 0.9)
 # Step of the differences, in deflections of the most loaded contact: truncation and rounding both near 1e-7.
 DIFFERENCE = 1e-3
 LOST = "the middle ring found no equilibrium; give a displacement that the bearing can reach, or loads"
+
+
+# Inner and outer row nearby.
+Start = tuple[Solution, Solution] | None
 
 
 class Layer(NamedTuple):
@@ -65,10 +68,10 @@ class DoubleDeckerSolution(NamedTuple):
 
     inner: Solution
     outer: Solution
-    displacement: Vector
-    middle_displacement: Vector
-    middle_load: Vector
-    reaction: Vector
+    displacement: Array
+    middle_displacement: Array
+    middle_load: Array
+    reaction: Array
     residual: float
     steps: int
     status: str
@@ -81,7 +84,7 @@ class DoubleDeckerSolution(NamedTuple):
         return self.status == OK
 
     @property
-    def stiffness(self) -> Vector:
+    def stiffness(self) -> Array:
         """Stiffness (5, 5) of both layers in series: ``reaction`` by ``displacement`` while the middle ring follows.
 
         Computed when asked for: it takes ten more solves of the inner row.
@@ -92,11 +95,11 @@ class DoubleDeckerSolution(NamedTuple):
         whole = (self.outer.stiffness + onto_by @ to_inner)[np.ix_(free, free)]
         follows = np.zeros((5, 5))
         follows[free] = np.linalg.lstsq(whole, onto_by[free], rcond=1e-12)[0]
-        found = self.inner.stiffness @ (np.eye(5) - to_inner @ follows)
-        return without_noise(found, np.abs(found).max())
+        joint = self.inner.stiffness @ (np.eye(5) - to_inner @ follows)
+        return without_noise(joint, np.abs(joint).max())
 
 
-def outer_friction(layer: Layer, solution: Solution) -> Vector:
+def outer_friction(layer: Layer, solution: Solution) -> Array:
     """Friction forces (Z,) [N] at the outer race that take their part of the gyroscopic moments, T_o = lambda_o M_g/D."""
     control = layer.control
     if isinstance(control, CommonCage):
@@ -112,7 +115,7 @@ def outer_friction(layer: Layer, solution: Solution) -> Vector:
     return 2.0 * (1.0 - share) * solution.gyroscopic_moment / control.spinning.ball_diameter
 
 
-def load_on_middle_ring(stack: Stack, solution: Solution) -> Vector:
+def load_on_middle_ring(stack: Stack, solution: Solution) -> Array:
     """Load (5,) at P2 [N, N m] that the inner layer's balls put on the middle ring.
 
     On each groove Q_o (sin, cos) - T_o (cos, -sin), axial and radial, and the couple -f_o D T_o of friction about the
@@ -128,7 +131,7 @@ def load_on_middle_ring(stack: Stack, solution: Solution) -> Vector:
     return carried(stack.arm_1).T @ at_groove
 
 
-def carried(arm: float) -> Vector:
+def carried(arm: float) -> Array:
     """Matrix (5, 5) from the displacement of a plane to that of one ``arm`` [m] along the axis; its transpose brings a
     load back."""
     matrix = np.eye(5)
@@ -137,11 +140,7 @@ def carried(arm: float) -> Vector:
 
 
 def solve_double_decker(
-    stack: Stack,
-    load: Vector,
-    given: Vector | None = None,
-    middle_given: Vector | None = None,
-    start: tuple[Solution, Solution] | None = None,
+    stack: Stack, load: Array, given: Array | None = None, middle_given: Array | None = None, start: Start = None
 ) -> DoubleDeckerSolution:
     """Equilibrium under ``load`` (5,) [N, N m] on the inner ring, at P0.
 
@@ -168,16 +167,16 @@ def solve_double_decker(
     best: DoubleDeckerSolution | None = None
     for first in starts:
         middle = np.where(free, first, middle_given)
-        found = _follow(stack, load, given, free, middle, start)
-        if found.found:
-            return found
-        if best is None or found.residual < best.residual:
-            best = found
+        reached = _follow(stack, load, given, free, middle, start)
+        if reached.found:
+            return reached
+        if best is None or reached.residual < best.residual:
+            best = reached
     assert best is not None
     return best
 
 
-def _shared_out(stack: Stack, load: Vector, given: Vector, middle_given: Vector, share: float) -> Vector:
+def _shared_out(stack: Stack, load: Array, given: Array, middle_given: Array, share: float) -> Array:
     """Displacement of the middle ring where each row takes its ``share`` of what is prescribed, and the load of the rest."""
     inner = solve(*stack.inner, load, (1.0 - share) * given)
     there = np.where(np.isnan(middle_given), share * given, middle_given)
@@ -185,24 +184,19 @@ def _shared_out(stack: Stack, load: Vector, given: Vector, middle_given: Vector,
 
 
 def _follow(
-    stack: Stack,
-    load: Vector,
-    given: Vector,
-    free: NDArray[np.bool_],
-    middle: Vector,
-    start: tuple[Solution, Solution] | None,
+    stack: Stack, load: Array, given: Array, free: NDArray[np.bool_], middle: Array, start: Start
 ) -> DoubleDeckerSolution:
     """Newton on the free components of the middle ring's displacement, guarded by the length of what is left over."""
     to_inner = carried(stack.arm_0)
     held = ~np.isnan(given)
     unit = component_lengths(stack.outer.row.lever)
 
-    def rows(middle: Vector, inner: Solution | None, outer: Solution | None) -> tuple[Solution, Solution, Vector]:
+    def rows(middle: Array, inner: Solution | None, outer: Solution | None) -> tuple[Solution, Solution, Array]:
         inner = solve(*stack.inner, load, np.where(held, given - to_inner @ middle, np.nan), inner)
         outer = solve(*stack.outer, np.zeros(5), middle, outer)
         return inner, outer, (load_on_middle_ring(stack, inner) - outer.reaction) / unit
 
-    def length(left: Vector, inner: Solution, outer: Solution) -> float:
+    def length(left: Array, inner: Solution, outer: Solution) -> float:
         return float(np.linalg.norm(left[free])) if inner.found and outer.found else np.inf
 
     inner, outer, left = rows(middle, start[0] if start else None, start[1] if start else None)
@@ -230,7 +224,7 @@ def _largest(inner: Solution, outer: Solution) -> float:
     return float(max(inner.outer_load.max(initial=0.0), outer.outer_load.max(initial=0.0), 1e-12))
 
 
-def _relative_by_middle(stiffness: Vector, held: NDArray[np.bool_], to_inner: Vector) -> Vector:
+def _relative_by_middle(stiffness: Array, held: NDArray[np.bool_], to_inner: Array) -> Array:
     """How the inner row's displacement follows the middle ring: held components against it, the others in balance."""
     follows = np.zeros((5, 5))
     follows[held] = -to_inner[held]
@@ -241,7 +235,7 @@ def _relative_by_middle(stiffness: Vector, held: NDArray[np.bool_], to_inner: Ve
     return follows
 
 
-def _onto_by_relative(stack: Stack, inner: Solution) -> Vector:
+def _onto_by_relative(stack: Stack, inner: Solution) -> Array:
     """Derivative (5, 5) of the load on the middle ring by the inner row's displacement, balls in balance."""
     row = stack.inner.row
     deflection = (max(float(inner.outer_load.max()), 1e-6) / row.outer_stiffness) ** (2.0 / 3.0)
@@ -258,7 +252,7 @@ def _onto_by_relative(stack: Stack, inner: Solution) -> Vector:
 
 
 def _result(
-    stack: Stack, free: NDArray[np.bool_], inner: Solution, outer: Solution, onto: Vector, steps: int
+    stack: Stack, free: NDArray[np.bool_], inner: Solution, outer: Solution, onto: Array, steps: int
 ) -> DoubleDeckerSolution:
     to_inner = carried(stack.arm_0)
     left = (onto - outer.reaction)[free & (np.arange(5) < 3)]

@@ -4,22 +4,16 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.hertz_point import PointContact
 from rbdyn.fields import RPM
 from rbdyn.life import ball_capacity
 from rbdyn.mounting.ball_rings import layer_changes
 from rbdyn.mounting.ring_growth import GrooveChange
+from rbdyn.quasistatic.double_decker import speed_split
 from rbdyn.quasistatic.double_decker.equilibrium import DoubleDeckerSolution, Layer, Stack
-from rbdyn.quasistatic.double_decker.speed_split import (
-    LayerFriction,
-    SpeedSplit,
-    Status,
-    balanced_split,
-    load_torque,
-    oil_share,
-)
+from rbdyn.quasistatic.double_decker.speed_split import LayerFriction, SpeedSplit, Status
 from rbdyn.quasistatic.result import displacement_record
 from rbdyn.quasistatic.row.model import RowModel, contacts, row_model
 from rbdyn.records.record import finite
@@ -37,7 +31,7 @@ class DoubleDeckerModel(NamedTuple):
     stack: Stack
     inner: RowModel
     outer: RowModel
-    middle_given: NDArray[np.float64]
+    middle_given: Array
     split: SpeedSplit
     changes: tuple[GrooveChange, GrooveChange]
 
@@ -45,16 +39,14 @@ class DoubleDeckerModel(NamedTuple):
 def double_decker_of(scene: DoubleDeckerScene) -> DoubleDeckerModel:
     """Both rows of a scene, its rings grown as far as the scene asks for."""
     below, above, middle = scene.bearing.inner, scene.bearing.outer, scene.bearing.middle
-    ball, ring = scene.material("ball"), scene.material("middle_ring")
+    ball, inner_ring, ring, outer_ring = (
+        scene.material(p) for p in ("ball", "inner_ring", "middle_ring", "outer_ring")
+    )
     inner_speed, outer_speed = scene.operation.speeds
     split = middle_speed(scene)
     changes = layer_changes(scene, split.speed)
-    inner = row_model(
-        below, scene.model, ball, scene.material("inner_ring"), ring, inner_speed, split.speed, changes[0]
-    )
-    outer = row_model(
-        above, scene.model, ball, ring, scene.material("outer_ring"), split.speed, outer_speed, changes[1]
-    )
+    inner = row_model(below, scene.model, ball, inner_ring, ring, inner_speed, split.speed, changes[0])
+    outer = row_model(above, scene.model, ball, ring, outer_ring, split.speed, outer_speed, changes[1])
     diameter = below.ball_diameter
     back = (below.outer_groove_factor - 0.5) * diameter
     offset = middle.axial_offset
@@ -84,10 +76,10 @@ def middle_speed(scene: DoubleDeckerScene) -> SpeedSplit:
         share = (middle.speed - outer_speed) / whole if whole != 0.0 else math.nan
         return SpeedSplit(middle.speed, share, math.nan, "given")
     if middle.speed_split == "oil":
-        share = oil_share(1.0, scene.bearing.pitch_ratio)
+        share = speed_split.oil_share(1.0, scene.bearing.pitch_ratio)
         status: Status = "shared" if whole != 0.0 else "no relative speed"
         return SpeedSplit(outer_speed + share * whole, share, math.nan, status)
-    return balanced_split(*layer_frictions(scene), inner_speed, outer_speed)
+    return speed_split.balanced_split(*layer_frictions(scene), inner_speed, outer_speed)
 
 
 def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFriction]:
@@ -101,13 +93,8 @@ def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFrict
     frictions = []
     for (under, over, row), factor in zip(rows, (middle.inner_oil_factor, middle.outer_oil_factor), strict=True):
         materials = (scene.material(part) for part in ("ball", f"{under}_ring", f"{over}_ring"))
-        torque = load_torque(
-            math.hypot(x, y),
-            axial,
-            row.contact_angle,
-            row.pitch_diameter,
-            static_capacity(row, contacts(row, *materials)),
-        )
+        capacity = static_capacity(row, contacts(row, *materials))
+        torque = speed_split.load_torque(math.hypot(x, y), axial, row.contact_angle, row.pitch_diameter, capacity)
         frictions.append(LayerFriction(row.pitch_diameter, viscosity, torque, factor))
     return frictions[0], frictions[1]
 
@@ -131,7 +118,7 @@ def middle_record(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> d
     }
 
 
-def load_record(load: NDArray[np.float64]) -> dict[str, Any]:
+def load_record(load: Array) -> dict[str, Any]:
     """Load (5,) on a ring."""
     force, moment = load[:3].tolist(), load[3:].tolist()
     return {"load_N": dict(zip("xyz", force, strict=True)), "moment_Nm": dict(zip("xy", moment, strict=True))}

@@ -14,6 +14,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from rbdyn.fields import RPM
+
 OIL_BATH = 3.3
 ANGULAR_CONTACT = (0.001, 0.33)
 # Y0 of P0 = 0.5 Fr + Y0 Fa for a single angular contact ball bearing (ISO 76), by contact angle [deg].
@@ -21,8 +23,6 @@ AXIAL_FACTORS = {15: 0.46, 20: 0.42, 25: 0.38, 30: 0.33, 35: 0.29, 40: 0.26, 45:
 # Below nu n = 2000 (mm^2/s rpm) the oil's torque no longer follows the speed.
 SLOWEST_TERM = 160.0
 HALVINGS = 200
-
-RPM = math.pi / 30.0
 Status = Literal["given", "shared", "inner layer stands", "outer layer stands", "undetermined", "no relative speed"]
 
 
@@ -76,14 +76,9 @@ def static_equivalent_load(radial_load: float, axial_load: float, contact_angle:
 
 
 def load_torque(
-    radial_load: float,
-    axial_load: float,
-    contact_angle: float,
-    pitch_diameter: float,
-    static_capacity: float,
-    factors: tuple[float, float] = ANGULAR_CONTACT,
+    radial_load: float, axial_load: float, contact_angle: float, pitch_diameter: float, static_capacity: float
 ) -> float:
-    """Palmgren's torque of the load M1 = f1 P1 dm [N m], f1 = z (P0/C0)^y with ``factors`` = (z, y).
+    """Palmgren's torque of the load M1 = f1 P1 dm [N m], f1 = z (P0/C0)^y of angular contact ball bearings.
 
     P1 = 0.9 Fa cot(alpha0) - 0.1 Fr, but not below Fr. Loads and capacity [N], angle [rad], diameter [m].
     Raises ValueError unless angle and capacity are positive.
@@ -94,7 +89,7 @@ def load_torque(
             "both must be greater than 0"
         )
     radial, axial = abs(radial_load), abs(axial_load)
-    scale, exponent = factors
+    scale, exponent = ANGULAR_CONTACT
     rating = static_equivalent_load(radial, axial, contact_angle) / static_capacity
     friction_load = max(0.9 * axial / math.tan(contact_angle) - 0.1 * radial, radial)
     return scale * rating**exponent * friction_load * pitch_diameter

@@ -21,31 +21,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.rivals.full_system import Stop, System, rival
-from rbdyn.quasistatic.rivals.levenberg_marquardt import (
-    CONVERGED,
-    EXHAUSTED,
-    NO_DESCENT,
-    NOT_FINITE,
-    STATIONARY,
-    Damping,
-    levenberg_marquardt,
-)
+from rbdyn.quasistatic.rivals.levenberg_marquardt import CONVERGED, EXHAUSTED, SENTENCES, Damping, levenberg_marquardt
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
 from rbdyn.quasistatic.row.place import groove_centre
 from rbdyn.quasistatic.row.row import Row
-from rbdyn.quasistatic.row.space import Vector
 
 UNLOADED_BALLS = 5  # besides the outcomes of Levenberg-Marquardt
-SENTENCES = {
-    STATIONARY: "stood at a least sum of squares that is no equilibrium",
-    NO_DESCENT: "found no step that lessens the residuals",
-    NOT_FINITE: "met forces that are not finite",
-    EXHAUSTED: "did not converge in its iterations",
-    UNLOADED_BALLS: "found unloaded balls, which rule a refuses",
-}
+ENDS = {**SENTENCES, UNLOADED_BALLS: "found unloaded balls, which rule a refuses"}
 
 
 class Search(NamedTuple):
@@ -59,7 +45,7 @@ class Search(NamedTuple):
 SEARCH, DAMPING = Search(), Damping()
 
 
-def search_points(row: Row, search: Search = SEARCH) -> Vector:
+def search_points(row: Row, search: Search = SEARCH) -> Array:
     """Starting places (searches, Z, 2) of the balls [m], in the order in which they are tried."""
     size = np.hypot(row.axial, row.radial)
     out = np.stack((row.axial, row.radial), axis=1) / size[:, np.newaxis]
@@ -71,7 +57,7 @@ def search_points(row: Row, search: Search = SEARCH) -> Vector:
     return np.array([radius * (out + search.step * (k * tangent + m * out)) for k, m in steps])
 
 
-def offset_distances(points: Vector, balls: Vector) -> Vector:
+def offset_distances(points: Array, balls: Array) -> Array:
     """Distance [m] of the mean of each set of starting places from the mean place of the ``balls`` found (eq 19)."""
     return np.asarray(np.linalg.norm(points.mean(axis=1) - balls[:, :2].mean(axis=0), axis=1))
 
@@ -144,5 +130,5 @@ def solve(
     u = np.zeros(system.size)
     most = damping.iterations * len(points) if limit is None else limit
     outcome, searches, iterations, residual = _search(control, system, damping, points, most, strict, u)
-    status = OK if outcome == CONVERGED else f"none of {searches} searches converged; the last {SENTENCES[outcome]}"
+    status = OK if outcome == CONVERGED else f"none of {searches} searches converged; the last {ENDS[outcome]}"
     return Stop(u, status, iterations, residual, searches)

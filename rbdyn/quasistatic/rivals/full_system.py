@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry, routine
 from rbdyn.quasistatic.row.ball import ball_forces, deflection
 from rbdyn.quasistatic.row.control import Control
@@ -19,7 +20,7 @@ from rbdyn.quasistatic.row.equilibrium import FIGURES, Solution, fill_figures, s
 from rbdyn.quasistatic.row.place import groove_centre
 from rbdyn.quasistatic.row.ring import LOADED, assemble
 from rbdyn.quasistatic.row.row import Row
-from rbdyn.quasistatic.row.space import STEPS, Task, Vector, posed, space
+from rbdyn.quasistatic.row.space import STEPS, Task, posed, space
 
 
 class System(NamedTuple):
@@ -30,8 +31,8 @@ class System(NamedTuple):
     """
 
     row: Row
-    load: Vector
-    held: Vector
+    load: Array
+    held: Array
     free: NDArray[np.int64]
 
     @property
@@ -40,22 +41,15 @@ class System(NamedTuple):
         return 2 * self.row.cosine.size + self.free.size
 
 
-def system_of(row: Row, load: Vector, given: Vector | None = None) -> System:
+def system_of(row: Row, load: Array, given: Array | None = None) -> System:
     """The system of ``equilibrium.solve(row, ..., load, given)``."""
     force, free, held = posed(row, load, given)
     return System(row, force, held, np.flatnonzero(free))
 
 
-def unknowns(system: System, q: Vector, balls: Vector) -> Vector:
+def unknowns(system: System, q: Array, balls: Array) -> Array:
     """Vector of the unknowns with the ring at ``q`` (5,) [m] and the balls at ``balls`` (Z, 2 or more)."""
     return np.concatenate((balls[:, :2].ravel(), q[system.free]))
-
-
-def ring_of(system: System, u: Vector) -> Vector:
-    """Displacement (5,) of the ring [m] in the unknowns ``u``."""
-    q = system.held.copy()
-    q[system.free] = u[2 * system.row.cosine.size :]
-    return q
 
 
 @routine
@@ -125,7 +119,7 @@ def _finish(task: Any, at: Any, figures: Any) -> None:
 class Stop(NamedTuple):
     """Where a solver of the full system stopped: at the unknowns ``u``, "ok" or why there, with the ``residual`` [N] there."""
 
-    u: Vector
+    u: Array
     status: str
     steps: int
     residual: float
@@ -137,7 +131,7 @@ def rival(search: Callable[..., Stop]) -> Callable[..., Solution]:
 
     @functools.wraps(search)
     def solve(
-        row: Row, control: Control, load: Vector, given: Vector | None = None, start: Any = None, **options: Any
+        row: Row, control: Control, load: Array, given: Array | None = None, start: Any = None, **options: Any
     ) -> Solution:
         system = system_of(row, load, given)
         return _solution_at(control, system, search(control, system, start, **options))
@@ -149,7 +143,8 @@ def _solution_at(control: Control, system: System, stop: Stop) -> Solution:
     row, z, u = system.row, system.row.cosine.size, stop.u
     at, figures = space(z), np.zeros((z, FIGURES))
     at.counts[STEPS] = stop.steps
-    at.q[:], at.balls[:, :2] = ring_of(system, u), u[: 2 * z].reshape(z, 2)
+    at.q[:], at.balls[:, :2] = system.held, u[: 2 * z].reshape(z, 2)
+    at.q[system.free] = u[2 * z :]
     # Nothing is solved any more: which components are free does not matter.
     _finish(Task(control, row, system.load, np.ones_like(system.load)), at, figures)
     return solution_of(row, at, figures, stop.status, stop.residual, stop.searches)

@@ -19,6 +19,12 @@ from rbdyn.quasistatic.row.elimination import eliminate
 from rbdyn.quasistatic.row.newton import ACCEPTED
 
 CONVERGED, STATIONARY, NO_DESCENT, NOT_FINITE, EXHAUSTED = range(5)
+SENTENCES = {
+    STATIONARY: "stood at a least sum of squares that is no equilibrium",
+    NO_DESCENT: "found no step that lessens the residuals",
+    NOT_FINITE: "met forces that are not finite",
+    EXHAUSTED: "did not converge in its iterations",
+}
 
 
 class Damping(NamedTuple):

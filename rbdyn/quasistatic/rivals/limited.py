@@ -22,7 +22,7 @@ def _within(task: Any, limit: int, at: Any) -> bool:
     enough = roughly(task) if rules(task.control) else 0.0
     arrived = march(task, 0.0, enough, min(limit, CONVEX_MARCH), at)
     if not arrived and limit > at.counts[STEPS]:
-        go_to(at, q, balls)
+        go_to(q, balls, at.q, at.balls)
         arrived = descend(task, 0.0, True, limit - at.counts[STEPS], at)
     if not arrived or not rules(task.control):
         return arrived

@@ -9,12 +9,12 @@ import math
 
 import numpy as np
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.rivals.full_system import Stop, System, evaluate, rival
 from rbdyn.quasistatic.rivals.plain_newton import unloaded
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.row.newton import ACCEPTED
-from rbdyn.quasistatic.row.space import Vector
 
 EVALUATIONS = 1000
 # As tight as MINPACK takes without a warning; the residual decides.
@@ -30,13 +30,13 @@ def solve(control: Control, system: System, start: None, limit: int = EVALUATION
     residual, jacobian = np.zeros(system.size), np.zeros((system.size, system.size))
     calls = 0
 
-    def function(u: Vector) -> Vector:
+    def function(u: Array) -> Array:
         nonlocal calls
         calls += 1
         evaluate(control, system, u, residual, jacobian)
         return residual.copy()
 
-    def derivative(u: Vector) -> Vector:
+    def derivative(u: Array) -> Array:
         evaluate(control, system, u, residual, jacobian)
         return jacobian.copy()
 

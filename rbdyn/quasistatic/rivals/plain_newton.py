@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.rivals.full_system import Stop, System, forces, rival, unknowns
 from rbdyn.quasistatic.row.control import Control
@@ -16,7 +17,7 @@ from rbdyn.quasistatic.row.elimination import eliminate
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
 from rbdyn.quasistatic.row.newton import ACCEPTED
 from rbdyn.quasistatic.row.row import component_lengths
-from rbdyn.quasistatic.row.space import Vector, space
+from rbdyn.quasistatic.row.space import space
 from rbdyn.quasistatic.row.start import settle_all
 
 STEPS = 100
@@ -63,7 +64,7 @@ def iterate(control: Any, system: Any, limit: int, u: Any) -> tuple[int, int, fl
     return outcome, limit, worst
 
 
-def unloaded(system: System) -> Vector:
+def unloaded(system: System) -> Array:
     """Unknowns of the unloaded geometry: the ring where it just touches, seated by a hair along its load, and every ball
     where it rests for this ring, orbiting with the cage."""
     row, at = system.row, space(system.row.cosine.size)

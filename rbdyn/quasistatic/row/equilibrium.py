@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry, routine
 from rbdyn.quasistatic.row.ball import ball_forces, spring
 from rbdyn.quasistatic.row.control import Control
@@ -12,7 +13,7 @@ from rbdyn.quasistatic.row.newton import CONVERGED, NOT_CONVEX_MINIMUM, find
 from rbdyn.quasistatic.row.place import groove_centre
 from rbdyn.quasistatic.row.ring import INNER_DEPTH, LOADED, OUTER_DEPTH, RING, TAKEN, unbalance
 from rbdyn.quasistatic.row.row import Row, component_lengths
-from rbdyn.quasistatic.row.space import STEPS, STRIDES, Space, Task, Vector, posed, space
+from rbdyn.quasistatic.row.space import STEPS, STRIDES, Space, Task, posed, space
 
 # Figures of a ball.
 INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, FIGURES = range(7)
@@ -36,17 +37,17 @@ class Solution(NamedTuple):
     ``searches``: starting values that the finite search tried; None for a solver that searches for none.
     """
 
-    displacement: Vector
-    balls: Vector
-    depths: Vector
-    inner_load: Vector
-    outer_load: Vector
-    inner_angle: Vector
-    outer_angle: Vector
-    centrifugal_force: Vector
-    gyroscopic_moment: Vector
-    reaction: Vector
-    stiffness: Vector
+    displacement: Array
+    balls: Array
+    depths: Array
+    inner_load: Array
+    outer_load: Array
+    inner_angle: Array
+    outer_angle: Array
+    centrifugal_force: Array
+    gyroscopic_moment: Array
+    reaction: Array
+    stiffness: Array
     status: str
     residual: float
     steps: int
@@ -59,7 +60,7 @@ class Solution(NamedTuple):
         return self.status == OK
 
     @property
-    def figures(self) -> Vector:
+    def figures(self) -> Array:
         """(Z, FIGURES): figures of the balls, as ``solve_row`` gives them."""
         return np.stack(self[3:9], axis=1)
 
@@ -120,7 +121,7 @@ def solve_row(task: Any, warm: bool, at: Any, figures: Any) -> tuple[int, float]
 
 
 def solve(
-    row: Row, control: Control, load: Vector, given: Vector | None = None, start: Solution | None = None
+    row: Row, control: Control, load: Array, given: Array | None = None, start: Solution | None = None
 ) -> Solution:
     """Equilibrium of a row under ``load`` (Fx, Fy, Fz [N], Mx, My [N m]) on the inner ring.
 
@@ -140,7 +141,7 @@ def solve(
 
 
 def solution_of(
-    row: Row, at: Space, figures: Vector, status: str, residual: float, searches: int | None = None
+    row: Row, at: Space, figures: Array, status: str, residual: float, searches: int | None = None
 ) -> Solution:
     """What a solve left, in the units and names of a Solution."""
     unit = component_lengths(row.lever)

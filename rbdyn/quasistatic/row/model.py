@@ -4,8 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.hertz_point import PointContact, ball_on_race
 from rbdyn.mounting.ball_rings import row_change
 from rbdyn.mounting.ring_growth import UNCHANGED, GrooveChange
@@ -112,22 +112,15 @@ def control_of(
 
 def row_of(scene: SingleRowScene) -> RowModel:
     """The row of a single-row scene, its rings grown as far as the scene asks for."""
-    return row_model(
-        scene.bearing,
-        scene.model,
-        scene.material("ball"),
-        scene.material("inner_ring"),
-        scene.material("outer_ring"),
-        *scene.operation.speeds,
-        row_change(scene),
-    )
+    ball, inner, outer = (scene.material(part) for part in ("ball", "inner_ring", "outer_ring"))
+    return row_model(scene.bearing, scene.model, ball, inner, outer, *scene.operation.speeds, row_change(scene))
 
 
-def load_of(scene: BallScene) -> NDArray[np.float64]:
+def load_of(scene: BallScene) -> Array:
     """Load on the inner ring, (Fx, Fy, Fz [N], Mx, My [N m])."""
     return np.array([*scene.operation.load, *scene.operation.moment])
 
 
-def given_of(scene: BallScene) -> NDArray[np.float64]:
+def given_of(scene: BallScene) -> Array:
     """Prescribed displacements [m, rad], NaN where the load rules."""
     return np.array(scene.operation.given, float)

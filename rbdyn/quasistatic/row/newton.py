@@ -9,7 +9,7 @@ where they end.
 import math
 from typing import Any
 
-from rbdyn.compiled.kernel import entry, kernel, routine
+from rbdyn.compiled.kernel import kernel, routine
 from rbdyn.quasistatic.row.ball import rules
 from rbdyn.quasistatic.row.elimination import eliminate
 from rbdyn.quasistatic.row.ring import ENERGY, LARGEST, LOADED, RING, assemble, ball_step, follow, unbalance
@@ -94,9 +94,8 @@ def descend(task: Any, strength: float, convex: bool, limit: int, at: Any) -> bo
                 return worst <= ACCEPTED * sums[LARGEST]
             continue
         at.counts[STEPS] += 1
-        at.old_q[:] = at.q
-        at.old_balls[:] = at.balls
-        at.old_work[:] = at.work
+        go_to(at.q, at.balls, at.old_q, at.old_balls)
+        copy(at.work, at.old_work)
         before, energy, scale = total, sums[ENERGY], 1.0
         shortest = SHORTEST_CONVEX if convex else SHORTEST_FULL
         better = False
@@ -114,7 +113,7 @@ def descend(task: Any, strength: float, convex: bool, limit: int, at: Any) -> bo
                 damping = 0.1 * damping if damping > 1e-9 * unit else 0.0
             continue
         # No step helps: rounding has been reached, or the matrix misleads.
-        go_to(at, at.old_q, at.old_balls)
+        go_to(at.old_q, at.old_balls, at.q, at.balls)
         total, worst = weighed(task, strength, False, at)
         if worst <= ACCEPTED * sums[LARGEST]:
             return True
@@ -170,8 +169,7 @@ def march(task: Any, strength: float, enough: float, limit: int, at: Any) -> boo
             return False
         at.counts[STEPS] += 1
         floor = worst <= ACCEPTED * sums[LARGEST]
-        at.old_q[:] = at.q
-        at.old_balls[:] = at.balls
+        go_to(at.q, at.balls, at.old_q, at.old_balls)
         follow(row, bound(row, at, FURTHEST), at.work, at)
         total, worst = weighed(task, strength, True, at)
         if total < 0.25 * best:
@@ -186,10 +184,19 @@ def march(task: Any, strength: float, enough: float, limit: int, at: Any) -> boo
 
 
 @routine
-def go_to(at: Any, q: Any, balls: Any) -> None:
-    """Put ring and balls to ``q`` and ``balls``."""
-    at.q[:] = q
-    at.balls[:] = balls
+def copy(table: Any, into: Any) -> None:
+    """Copy a table. Row by row: assigned to a slice, it would bring numba's strings with it, seconds of compiling."""
+    for j in range(table.shape[0]):
+        for i in range(table.shape[1]):
+            into[j, i] = table[j, i]
+
+
+@routine
+def go_to(q: Any, balls: Any, to_q: Any, to_balls: Any) -> None:
+    """Put ring and balls ``to_q`` and ``to_balls`` where ``q`` and ``balls`` are."""
+    for i in range(RING):
+        to_q[i] = q[i]
+    copy(balls, to_balls)
 
 
 @routine
@@ -202,15 +209,15 @@ def bring_in(task: Any, at: Any) -> bool:
         ahead = min(reached + stride, 1.0)
         arrived = march(task, ahead, 0.0, CONTINUED_STEPS, at)
         if not arrived:
-            go_to(at, q, balls)
+            go_to(q, balls, at.q, at.balls)
             arrived = descend(task, ahead, False, CONTINUED_STEPS, at)
         if arrived:
             if ahead == 1.0:
                 return True
             reached, stride = ahead, 2.0 * stride
-            q[:], balls[:] = at.q, at.balls
+            go_to(at.q, at.balls, q, balls)
         else:
-            go_to(at, q, balls)
+            go_to(q, balls, at.q, at.balls)
             stride *= 0.25
             if stride < SMALLEST_STRIDE:
                 return False
@@ -228,7 +235,7 @@ def start_afresh(task: Any, at: Any) -> None:
     settle_all(task.row, at)
 
 
-@entry
+@routine
 def find(task: Any, warm: bool, at: Any) -> int:
     """Equilibrium of one row. ``at`` holds the start where ``warm``, and the prescribed displacements always.
 
@@ -244,20 +251,20 @@ def find(task: Any, warm: bool, at: Any) -> int:
         # Most often a rough minimum is start enough.
         if march(task, 0.0, roughly(task), CONVEX_MARCH, at) and march(task, 1.0, 0.0, FULL_STEPS, at):
             return CONVERGED
-        go_to(at, q, balls)
+        go_to(q, balls, at.q, at.balls)
     if not march(task, 0.0, 0.0, CONVEX_MARCH, at):
-        go_to(at, q, balls)
+        go_to(q, balls, at.q, at.balls)
         if not descend(task, 0.0, True, CONVEX_STEPS, at) and not march(task, 0.0, 0.0, FULL_STEPS, at):
             return NOT_CONVEX_MINIMUM
     if not rules(task.control):
         return CONVERGED
-    q[:], balls[:] = at.q, at.balls
+    go_to(at.q, at.balls, q, balls)
     if march(task, 1.0, 0.0, FULL_STEPS, at):
         return CONVERGED
-    go_to(at, q, balls)
+    go_to(q, balls, at.q, at.balls)
     if descend(task, 1.0, False, FULL_STEPS, at):
         return CONVERGED
-    go_to(at, q, balls)
+    go_to(q, balls, at.q, at.balls)
     if bring_in(task, at):
         return CONVERGED
     return RACE_CONTROL_LOST

@@ -172,7 +172,8 @@ def assemble(task: Any, strength: float, mixed: bool, at: Any) -> None:
     # Arrays are taken out of their tuple once: inside the loop that would count references.
     control, row, load, q, balls, work = task.control, task.row, task.load, at.q, at.balls, at.work
     matrix, vector, sums = at.matrix, at.vector, at.sums
-    vector[:] = load
+    for i in range(RING):
+        vector[i] = load[i]
     matrix[:, :] = 0.0
     sums[:] = 0.0
     for j in range(row.cosine.size):

@@ -3,7 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rbdyn.arrays import Array
 
 
 class Row(NamedTuple):
@@ -18,12 +19,12 @@ class Row(NamedTuple):
     that stores less the work of the force [J].
     """
 
-    cosine: NDArray[np.float64]
-    sine: NDArray[np.float64]
-    axial: NDArray[np.float64]
-    radial: NDArray[np.float64]
-    inner_reach: NDArray[np.float64]
-    outer_reach: NDArray[np.float64]
+    cosine: Array
+    sine: Array
+    axial: Array
+    radial: Array
+    inner_reach: Array
+    outer_reach: Array
     inner_stiffness: float
     outer_stiffness: float
     lever: float
@@ -33,7 +34,7 @@ class Row(NamedTuple):
     rest_energy: float
 
 
-def component_lengths(lever: float) -> NDArray[np.float64]:
+def component_lengths(lever: float) -> Array:
     """What makes lengths of (x, y, z, theta_x, theta_y) and forces of (Fx, Fy, Fz, Mx, My): times and over (1, 1, 1, R, R)."""
     return np.array([1.0, 1.0, 1.0, lever, lever])
 

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.ring import BALL, BALL_WORK, RING, SUMS
 from rbdyn.quasistatic.row.row import Row, component_lengths
 
-Vector = NDArray[np.float64]
 # Counters: Newton steps, continuations, starts from nothing.
 STEPS, STRIDES, COLD_STARTS, COUNTERS = range(4)
 
@@ -22,8 +22,8 @@ class Task(NamedTuple):
 
     control: Control
     row: Row
-    load: Vector
-    free: Vector
+    load: Array
+    free: Array
 
 
 class Space(NamedTuple):
@@ -35,18 +35,18 @@ class Space(NamedTuple):
     """
 
     counts: NDArray[np.int64]
-    q: Vector
-    balls: Vector
-    matrix: Vector
-    vector: Vector
-    table: Vector
-    step: Vector
-    sums: Vector
-    work: Vector
-    old_q: Vector
-    old_balls: Vector
-    old_work: Vector
-    base: Vector
+    q: Array
+    balls: Array
+    matrix: Array
+    vector: Array
+    table: Array
+    step: Array
+    sums: Array
+    work: Array
+    old_q: Array
+    old_balls: Array
+    old_work: Array
+    base: Array
 
 
 def space(balls: int) -> Space:
@@ -56,7 +56,7 @@ def space(balls: int) -> Space:
     return Space(np.zeros(COUNTERS, np.int64), *(np.zeros(shape) for shape in shapes))
 
 
-def posed(row: Row, load: Vector, given: Vector | None) -> tuple[Vector, Vector, Vector]:
+def posed(row: Row, load: Array, given: Array | None) -> tuple[Array, Array, Array]:
     """``load`` and ``free`` of a ``Task`` from load and prescribed displacements of ``equilibrium.solve``, and those displacements.
 
     The last (5,) in m, 0 where the load rules.

@@ -8,14 +8,13 @@ Z equal balls all orders of a groove cancel but n = kZ +- 1, which shift and til
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.faults import RunError
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.row import Row
 
-Array = NDArray[np.float64]
 # Error of one ball in the differences [m]: far below any deflection, far above the solver's round-off.
 SMALL_ERROR = 1e-8
 CHANGES = ("axial", "radial", "inner_reach", "outer_reach")

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.runout.linear import LinearResponse
 from rbdyn.quasistatic.runout.race_errors import RaceErrors, Turning, Waviness
 
-Array = NDArray[np.float64]
 Waves = NDArray[np.complex128]
 # Kinds of race errors in the order of all arrays here.
 RACES = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway")

@@ -13,12 +13,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.runout.roundness import diameter, least_squares_circle, minimum_zone
 
-Array = NDArray[np.float64]
 # Places round the face where the axial indicator may stand.
 PLACES = 72
 
@@ -94,11 +93,11 @@ def error_motion(angle: Array, reading: Array) -> float:
     wave = np.column_stack((np.cos(angle), np.sin(angle)))
     ones, none = np.ones((len(angle), 1)), np.zeros((len(angle), 1))
     level = (reading - reading.mean()) / scale
-    found = linprog(
+    optimum = linprog(
         [0.0, 0.0, 1.0, -1.0],
         A_ub=np.vstack((np.hstack((-wave, -ones, none)), np.hstack((wave, none, ones)))),
         b_ub=np.concatenate((-level, level)),
         bounds=[(None, None)] * 4,
         method="highs",
     )
-    return scale * float(np.ptp(level - wave @ found.x[:2]))
+    return scale * float(np.ptp(level - wave @ optimum.x[:2]))

@@ -6,16 +6,8 @@ import numpy as np
 
 from rbdyn.faults import InputError
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
-from rbdyn.quasistatic.runout.race_errors import (
-    PERFECT,
-    RaceErrors,
-    Turning,
-    Waviness,
-    ball_path,
-    random_waviness,
-    rolling,
-    waviness,
-)
+from rbdyn.quasistatic.runout import race_errors
+from rbdyn.quasistatic.runout.race_errors import PERFECT, RaceErrors, Waviness, waviness
 from rbdyn.quasistatic.runout.tolerance_design import Bench
 from rbdyn.quasistatic.runout.turn import Followed, follow
 from rbdyn.scene.ball import BallScene, SingleRowScene
@@ -39,7 +31,7 @@ def follow_ring(scene: BallScene) -> Followed:
         many = f"errors.steps = {steps}, errors.turns = {turns}: of {balls} balls these make {places} places"
         raise InputError([f"{many}, more than the {MOST_PLACES} that memory has room for; take fewer steps or turns"])
     test = bench_of(row)
-    path = ball_path(errors_of(row.errors, balls), test.turning, steps, turns)
+    path = race_errors.ball_path(errors_of(row.errors, balls), test.turning, steps, turns)
     return follow(test.row, test.control, test.load, path, turns, test.given)
 
 
@@ -50,18 +42,12 @@ def bench_of(scene: BallScene, face_radius: float | None = None, steps: int = 12
     Raises InputError for two rows.
     """
     row = single_row(scene)
-    model = row_of(row)
-    bottom = model.row.lever - model.row.inner_groove_radius
-    return Bench(
-        row=model.row,
-        control=model.control,
-        load=load_of(row),
-        turning=turning_of(row),
-        face_radius=bottom if face_radius is None else face_radius,
-        steps=steps,
-        turns=turns,
-        given=given_of(row),
-    )
+    model, bearing, (inner, outer) = row_of(row), row.bearing, row.operation.speeds
+    sizes = bearing.ball_diameter, bearing.pitch_diameter, bearing.contact_angle
+    # Turns are those of the inner ring against the outer, which stands where neither turns.
+    turning = race_errors.rolling(*sizes, outer / (inner - outer) if inner != outer else 0.0)
+    radius = model.row.lever - model.row.inner_groove_radius if face_radius is None else face_radius
+    return Bench(model.row, model.control, load_of(row), turning, radius, steps, turns, given_of(row))
 
 
 def single_row(scene: BallScene) -> SingleRowScene:
@@ -69,15 +55,6 @@ def single_row(scene: BallScene) -> SingleRowScene:
     if not isinstance(scene, SingleRowScene):
         raise InputError(["bearing.kind = 'double_decker_ball': runout is followed for one row of balls only"])
     return scene
-
-
-def turning_of(scene: SingleRowScene) -> Turning:
-    """Turns of the parts while the inner ring makes one against the outer; the outer ring stands where neither turns."""
-    bearing, (inner, outer) = scene.bearing, scene.operation.speeds
-    against = inner - outer
-    return rolling(
-        bearing.ball_diameter, bearing.pitch_diameter, bearing.contact_angle, outer / against if against != 0.0 else 0.0
-    )
 
 
 def errors_of(errors: FormErrors, balls: int) -> RaceErrors:
@@ -105,4 +82,6 @@ def _form(given: list[Harmonic], drawn: RandomWaviness | None, draw: np.random.G
     form = waviness(*((wave.order, wave.amplitude, wave.phase) for wave in given))
     if drawn is None:
         return form
-    return form.plus(random_waviness(drawn.lowest_order, drawn.highest_order, drawn.height, drawn.decay, draw))
+    return form.plus(
+        race_errors.random_waviness(drawn.lowest_order, drawn.highest_order, drawn.height, drawn.decay, draw)
+    )

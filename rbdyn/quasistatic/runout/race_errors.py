@@ -13,8 +13,6 @@ Ball plane of one ball, origin in the centre of curvature of the outer groove (a
 Outer errors stay with the outer ring, inner errors turn with the inner ring, balls travel with the cage.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -22,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rbdyn.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -47,11 +45,11 @@ class Waviness:
         trace = self.at(np.linspace(0.0, 2.0 * math.pi, max(fine, 720), endpoint=False))
         return float(np.ptp(trace))
 
-    def scaled(self, factor: float) -> Waviness:
+    def scaled(self, factor: float) -> "Waviness":
         """The same form, ``factor`` times as high."""
         return Waviness(self.order, factor * self.amplitude, self.phase)
 
-    def plus(self, other: Waviness) -> Waviness:
+    def plus(self, other: "Waviness") -> "Waviness":
         """Both together."""
         return Waviness(
             np.concatenate((self.order, other.order)),

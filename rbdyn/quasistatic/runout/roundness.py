@@ -4,10 +4,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-Array = NDArray[np.float64]
+from rbdyn.arrays import Array
+
 STEPS = 60
 
 
@@ -94,7 +94,9 @@ def minimum_zone(points: Array) -> Zone:
     size = float(np.ptp(points, axis=0).max())
     if len(corners) < 3:
         return zone_about(points, *corners.mean(axis=0))
-    normal, offset = _half_planes(corners)
+    along = np.roll(corners, -1, axis=0) - corners
+    normal = np.column_stack((along[:, 1], -along[:, 0])) / np.hypot(*along.T)[:, np.newaxis]
+    offset = (normal * corners).sum(axis=1)
     best = least_squares_circle(points)
     if np.any(normal @ (best.x, best.y) > offset):
         best = zone_about(points, *points.mean(axis=0))
@@ -114,12 +116,6 @@ def minimum_zone(points: Array) -> Zone:
     return best
 
 
-def _half_planes(corners: Array) -> tuple[Array, Array]:
-    along = np.roll(corners, -1, axis=0) - corners
-    normal = np.column_stack((along[:, 1], -along[:, 0])) / np.hypot(*along.T)[:, np.newaxis]
-    return normal, (normal * corners).sum(axis=1)
-
-
 def _best_step(points: Array, zone: Zone, normal: Array, offset: Array, trust: float) -> tuple[Array, float]:
     """Step of the centre that makes the linearised zone narrowest, and the width it promises."""
     away = points - (zone.x, zone.y)
@@ -134,13 +130,13 @@ def _best_step(points: Array, zone: Zone, normal: Array, offset: Array, trust: f
     outside = np.hstack((directions, 0.0 * ones, ones))
     within = np.hstack((normal, np.zeros((len(normal), 2))))
     room = (offset - normal @ (zone.x, zone.y)) / scale
-    found = linprog(
+    optimum = linprog(
         [0.0, 0.0, 1.0, -1.0],
         A_ub=np.vstack((inside, outside, within)),
         b_ub=np.concatenate((-reading[:, 0], reading[:, 0], np.maximum(room, 0.0))),
         bounds=[(-trust / scale, trust / scale)] * 2 + [(None, None)] * 2,
         method="highs",
     )
-    if not found.success:
+    if not optimum.success:
         return np.zeros(2), zone.width
-    return scale * found.x[:2], float(scale * found.fun)
+    return scale * optimum.x[:2], float(scale * optimum.fun)

@@ -6,12 +6,12 @@ and the design is confirmed on a fresh lot, in proportion and in full.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.row import Row
 from rbdyn.quasistatic.runout.linear import LinearResponse, linear_response
@@ -19,7 +19,6 @@ from rbdyn.quasistatic.runout.lots import RACES, Lot, Parts, Readings, bearing_e
 from rbdyn.quasistatic.runout.race_errors import Turning, ball_path
 from rbdyn.quasistatic.runout.turn import follow
 
-Array = NDArray[np.float64]
 # Bisections of a size: to a ten-thousandth.
 HALVINGS = 14
 REFINEMENTS = 3
@@ -111,26 +110,15 @@ def design(
     response = linear_response(bench.row, bench.control, bench.load, bench.given)
     parts, read = _lot(bench, lot, response, bearings, seed)
     allowed = np.array([radial_limit, axial_limit])
-
-    def widest(sway_share: float) -> Array:
-        shares = np.array([1.0, outer_share, sway_share, sway_share * outer_share])
-        from_races = np.tensordot(shares, read.radial, 1), np.tensordot(shares, read.face, 1)
-
-        def passes(size: float) -> bool:
-            radial = np.ptp(size * from_races[0] + read.radial_balls, axis=1)
-            face = np.ptp(size * from_races[1] + read.face_balls, axis=1)
-            return float(((radial <= radial_limit) & (face <= axial_limit)).mean()) >= wanted
-
-        return _widest(passes, radial_limit) * shares
-
-    limits = max((widest(share) for share in sway_shares), key=lambda found: float(found.prod()))
+    shares = (np.array([1.0, outer_share, share, share * outer_share]) for share in sway_shares)
+    limits = max((_widest(each, read, allowed, wanted) for each in shares), key=lambda tried: float(tried.prod()))
     for _ in range(REFINEMENTS if solved else 0):
         # Runout all but follows the size of the races: its quantile is brought to the limit. That of the lot is known in
         # proportion, and from a few bearings how much larger the full one is.
-        shares = (np.column_stack(runouts(read, limits)) / allowed).max(axis=1)
+        reached = (np.column_stack(runouts(read, limits)) / allowed).max(axis=1)
         full = (full_lot(bench, parts, limits, solved) / allowed).max(axis=1)
-        larger = np.quantile(full, wanted) / np.quantile(shares[:solved], wanted)
-        limits = limits / float(larger * np.quantile(shares, wanted))
+        larger = np.quantile(full, wanted) / np.quantile(reached[:solved], wanted)
+        limits = limits / float(larger * np.quantile(reached, wanted))
     # A design is best on the lot that it was fitted to: count it on another.
     parts, read = _lot(bench, lot, response, bearings, seed + 1)
     radial, face = runouts(read, limits)
@@ -180,19 +168,26 @@ def _lot(bench: Bench, lot: Lot, response: LinearResponse, bearings: int, seed: 
     return parts, readings(parts, response, bench.turning, bench.steps, bench.turns, bench.face_radius)
 
 
-def _widest(passes: Callable[[float], bool], scale: float) -> float:
-    """Largest size that still passes, by bisection from ``scale``."""
+def _widest(shares: Array, read: Readings, allowed: Array, wanted: float) -> Array:
+    """Largest limits in these shares with which the share ``wanted`` keeps what is ``allowed``, by bisection."""
+    radial_races, face_races = np.tensordot(shares, read.radial, 1), np.tensordot(shares, read.face, 1)
+
+    def passes(size: float) -> bool:
+        radial = np.ptp(size * radial_races + read.radial_balls, axis=1)
+        face = np.ptp(size * face_races + read.face_balls, axis=1)
+        return float(((radial <= allowed[0]) & (face <= allowed[1])).mean()) >= wanted
+
     if not passes(0.0):
         raise ValueError("the balls alone fail the class; take better balls or a wider class")
-    low, high = 0.0, scale
+    low, high = 0.0, float(allowed[0])
     while passes(high):
-        if high > 1e6 * scale:
+        if high > 1e6 * allowed[0]:
             raise ValueError("no order of these race errors reaches the ring; let the lot have more orders")
         low, high = high, 2.0 * high
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if passes(middle) else (low, middle)
-    return low
+    return low * shares
 
 
 def compare(bench: Bench, parts: Parts, read: Readings, limits: Array, allowed: Array, count: int) -> FullCheck:

@@ -1,13 +1,11 @@
 """The path of a ring that turns over form errors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.faults import RunError
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.ring import RING
@@ -19,8 +17,6 @@ from rbdyn.quasistatic.runout.walk import FIGURES, LARGEST_LOAD, RESIDUAL, walk
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -42,7 +38,7 @@ class Followed:
         """Runout of the path; ``face_radius``: where an axial indicator touches [m]."""
         return runout(self.path, self.turns, face_radius)
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """One line a step; units in the names."""
         import pandas as pd
 

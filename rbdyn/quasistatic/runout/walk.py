@@ -5,7 +5,7 @@ from typing import Any
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.row.ball import spring
 from rbdyn.quasistatic.row.newton import CONVERGED, find
-from rbdyn.quasistatic.row.ring import INNER_DEPTH, LOADED, OUTER_DEPTH, unbalance
+from rbdyn.quasistatic.row.ring import INNER_DEPTH, LOADED, OUTER_DEPTH, RING, unbalance
 from rbdyn.quasistatic.row.space import STEPS
 
 # Figures of a step.
@@ -32,7 +32,8 @@ def walk(task: Any, changes: Any, at: Any, path: Any, figures: Any) -> tuple[int
         newton_steps += at.counts[STEPS]
         if outcome != CONVERGED:
             return step, newton_steps
-        path[step] = at.q
+        for i in range(RING):
+            path[step, i] = at.q[i]
         largest = row.centrifugal_force
         for j in range(size):
             inner, _ = spring(at.balls[j, INNER_DEPTH], row.inner_stiffness)

@@ -4,18 +4,17 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.life.balls import LOAD_LIFE, RACE_EXPONENT, WEIBULL
 from rbdyn.quasistatic.fatigue import turning_rings
 from rbdyn.quasistatic.remarks import Rating, pressures
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, OUTER_ANGLE, OUTER_LOAD
 
-Vector = NDArray[np.float64]
-Columns = dict[str, Vector]
+Columns = dict[str, Array]
 
 
-def ring_columns(displacement: Vector, reaction: Vector, stiffness: Vector) -> Columns:
+def ring_columns(displacement: Array, reaction: Array, stiffness: Array) -> Columns:
     """Place of the ring, load that it takes and diagonal stiffnesses, from arrays (n, 5), (n, 5), (n, 5, 5) in SI."""
     columns = {f"{axis}_mm": 1e3 * displacement[:, i] for i, axis in enumerate("xyz")}
     columns |= {f"tilt_{axis}_mrad": 1e3 * displacement[:, 3 + i] for i, axis in enumerate("xy")}
@@ -27,7 +26,7 @@ def ring_columns(displacement: Vector, reaction: Vector, stiffness: Vector) -> C
     }
 
 
-def row_columns(balls: Vector, ratings: Sequence[Rating]) -> Columns:
+def row_columns(balls: Array, ratings: Sequence[Rating]) -> Columns:
     """Angles, loads, pressures and life of a row, from ``balls`` (n, Z, FIGURES) and as many ratings.
 
     A ball that lies on the outer race alone has no inner angle: its part in the extremes is left out, and NaN stands for ball 1.
@@ -58,7 +57,7 @@ def row_columns(balls: Vector, ratings: Sequence[Rating]) -> Columns:
         }
 
 
-def lives(inner_load: Vector, outer_load: Vector, ratings: Sequence[Rating]) -> Vector:
+def lives(inner_load: Array, outer_load: Array, ratings: Sequence[Rating]) -> Array:
     """L10 [1e6 turns] from loads (n, Z) [N]: ``life.row_life`` for many; infinite without a load."""
     standing = {"inner": "outer", "outer": "inner", "both": ""}
     damage = np.zeros(len(ratings))

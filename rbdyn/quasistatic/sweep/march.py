@@ -5,13 +5,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry, kernel, law
 from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.equilibrium import FIGURES, solve_row
 from rbdyn.quasistatic.row.newton import CONVERGED
 from rbdyn.quasistatic.row.ring import RING, TAKEN
 from rbdyn.quasistatic.row.row import Row
-from rbdyn.quasistatic.row.space import COLD_STARTS, STEPS, Task, Vector
+from rbdyn.quasistatic.row.space import COLD_STARTS, STEPS, Task
 
 # Fields of ``Row`` that change from point to point: arrays over the balls, then numbers.
 PLACES, NUMBERS = Row._fields[2:6], Row._fields[6:]
@@ -25,12 +26,12 @@ class Points(NamedTuple):
     ``load, given`` (n, 5): tilts and moments count over the lever; ``free`` (n, 5) is 1 where the load rules.
     """
 
-    places: Vector
-    numbers: Vector
-    race_control: Vector
-    load: Vector
-    given: Vector
-    free: Vector
+    places: Array
+    numbers: Array
+    race_control: Array
+    load: Array
+    given: Array
+    free: Array
 
 
 class Found(NamedTuple):
@@ -38,11 +39,11 @@ class Found(NamedTuple):
     (n, Z, FIGURES) of the balls, ``residual`` [N], ``outcome``, ``steps`` and ``cold`` (n,): whether the start was not the point
     before."""
 
-    displacement: Vector
-    taken: Vector
-    matrix: Vector
-    figures: Vector
-    residual: Vector
+    displacement: Array
+    taken: Array
+    matrix: Array
+    figures: Array
+    residual: Array
     outcome: NDArray[np.int64]
     steps: NDArray[np.int64]
     cold: NDArray[np.int64]
@@ -105,9 +106,10 @@ def march_through(
             if not warm or task.free[i] == 0.0:
                 at.q[i] = points.given[k, i]
         found.outcome[k], found.residual[k] = solve_row(task, warm, at, found.figures[k])
-        found.displacement[k] = at.q
-        found.taken[k] = at.sums[TAKEN:]
-        found.matrix[k] = at.matrix
+        for i in range(RING):
+            found.displacement[k, i], found.taken[k, i] = at.q[i], at.sums[TAKEN + i]
+            for m in range(RING):
+                found.matrix[k, i, m] = at.matrix[i, m]
         found.steps[k], found.cold[k] = at.counts[STEPS], at.counts[COLD_STARTS]
         warm = found.outcome[k] == CONVERGED
     return warm

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.remarks import Remark
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.result import whole_file
@@ -29,10 +30,10 @@ class Partial(NamedTuple):
             return {}
         try:
             with np.load(self.path, allow_pickle=False) as file:
-                found = dict(file)
+                arrays = dict(file)
         except (OSError, ValueError, zipfile.BadZipFile):
             return {}
-        return found if str(found.pop("key", "")) == self.key else {}
+        return arrays if str(arrays.pop("key", "")) == self.key else {}
 
     def write(self, arrays: Mapping[str, Any]) -> None:
         """Keep arrays in place of those before, whole or not at all. Raises OSError."""
@@ -53,7 +54,7 @@ class Solved(NamedTuple):
 
     status: str
     figures: dict[str, float]
-    balls: dict[str, NDArray[np.float64]]
+    balls: dict[str, Array]
     remarks: list[Remark]
     rows: tuple[Solution, ...]
     cold: bool
@@ -61,9 +62,8 @@ class Solved(NamedTuple):
 
 def as_text(points: list[Solved]) -> str:
     """The points as JSON, every number with all its digits."""
-    return json.dumps(
-        [(*point[:3], [_said(one) for one in point.remarks], *point[4:]) for point in points], default=_list
-    )
+    told = [(*point[:3], [(one.word, one.sentence(0)) for one in point.remarks], *point[4:]) for point in points]
+    return json.dumps(told, default=np.ndarray.tolist)
 
 
 def from_text(text: str) -> list[Solved]:
@@ -73,21 +73,9 @@ def from_text(text: str) -> list[Solved]:
             status,
             figures,
             {name: np.array(values) for name, values in balls.items()},
-            [Remark(word, np.array([True]), functools.partial(_as_said, said)) for word, said in remarks],
+            [Remark(word, np.array([True]), functools.partial(lambda said, _: said, said)) for word, said in remarks],
             tuple(Solution._make(np.array(x) if isinstance(x, list) else x for x in row) for row in rows),
             cold,
         )
         for status, figures, balls, remarks, rows, cold in json.loads(text)
     ]
-
-
-def _said(remark: Remark) -> tuple[str, str]:
-    return remark.word, remark.sentence(0)
-
-
-def _as_said(sentence: str, _: int) -> str:
-    return sentence
-
-
-def _list(array: NDArray[Any]) -> Any:
-    return array.tolist()

@@ -33,9 +33,9 @@ def parsed(texts: Sequence[str]) -> dict[str, list[float]]:
     """``key=start:stop:count`` (evenly spaced) or ``key=a,b,c`` as the command line has them. Raises InputError."""
     keys: dict[str, list[float]] = {}
     for text in texts:
-        key, found, values = text.partition("=")
+        key, sign, values = text.partition("=")
         key = key.strip()
-        if not found or not key:
+        if not sign or not key:
             raise InputError([f"--sweep {text}: write it as key=start:stop:count or key=a,b,c"])
         if key in keys:
             raise InputError([f"--sweep {text}: {key} is swept twice; give all its values at once"])

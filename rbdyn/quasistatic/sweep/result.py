@@ -1,7 +1,5 @@
 """What a sweep reports, saves and loads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.result import ball_columns, ball_records
 from rbdyn.records.record import finite, plain
 from rbdyn.result import read_record, versions, write_json
@@ -33,12 +32,12 @@ class SweepResult:
     """
 
     keys: dict[str, tuple[float, ...]]
-    columns: dict[str, NDArray[np.float64]]
+    columns: dict[str, Array]
     statuses: tuple[str, ...]
     cold: int
     wall_s: float
     scene: dict[str, Any]
-    figures: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = field(default_factory=dict, repr=False)
+    figures: dict[str, list[tuple[NDArray[np.int64], Array]]] = field(default_factory=dict, repr=False)
     notes: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -74,11 +73,11 @@ class SweepResult:
         first = ", ".join(f"{key} = {value:g}" for key, value in self.at(places[0]).items())
         return f"{'1 point' if len(places) == 1 else f'{len(places)} points, the first'} at {first}"
 
-    def grid(self, column: str) -> NDArray[np.float64]:
+    def grid(self, column: str) -> Array:
         """A column over the grid, one axis a key. Raises KeyError for an unknown one."""
         return self.columns[column].reshape(self.shape)
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """A row a point: keys, figures, status, and what its notes are about."""
         import pandas as pd
 
@@ -89,7 +88,7 @@ class SweepResult:
         about = ["; ".join(each) for each in words]
         return pd.DataFrame({**self._places(), **self.columns, "status": self.statuses, "notes": about})
 
-    def balls(self) -> pd.DataFrame:
+    def balls(self) -> "pd.DataFrame":
         """A row a ball and point: keys, row of balls, ball from 1, then as ``BallResult.table``.
 
         Points that failed have none. Raises RuntimeError for a loaded sweep, which does not know its balls.
@@ -100,15 +99,15 @@ class SweepResult:
             raise RuntimeError("a loaded sweep does not know its balls; run it again")
         frames = []
         places = self._places()
-        found = np.array([status == OK for status in self.statuses])
+        solved = np.array([status == OK for status in self.statuses])
         for name, groups in self.figures.items():
             for points, balls in groups:
-                kept = points[found[points]]
+                good = points[solved[points]]
                 size = balls.shape[1]
-                columns = {key: np.repeat(values[kept], size) for key, values in places.items()}
-                columns["row"] = np.full(kept.size * size, name)
-                columns["ball"] = np.tile(np.arange(1, size + 1), kept.size)
-                shown = ball_columns(balls[found[points]])
+                columns = {key: np.repeat(values[good], size) for key, values in places.items()}
+                columns["row"] = np.full(good.size * size, name)
+                columns["ball"] = np.tile(np.arange(1, size + 1), good.size)
+                shown = ball_columns(balls[solved[points]])
                 frames.append(pd.DataFrame(columns | {key: value.ravel() for key, value in shown.items()}))
         return pd.concat(frames, ignore_index=True)
 
@@ -116,10 +115,10 @@ class SweepResult:
         """Records of the balls of a point, by row; as those of ``BallResult``. Raises RuntimeError as ``balls``."""
         if not self.figures:
             raise RuntimeError("a loaded sweep does not know its balls; run it again")
-        found = {}
+        records = {}
         for name, groups in self.figures.items():
-            found[name] = ball_records(next(balls[points == place] for points, balls in groups if place in points)[0])
-        return found
+            records[name] = ball_records(next(balls[points == place] for points, balls in groups if place in points)[0])
+        return records
 
     def points(self) -> list[dict[str, Any]]:
         """A record a point, None where a figure is infinite or was not found."""
@@ -160,12 +159,12 @@ class SweepResult:
             write_json(path, self.as_dict())
 
     @classmethod
-    def load(cls, path: Path | str) -> SweepResult:
+    def load(cls, path: Path | str) -> "SweepResult":
         """Read a sweep saved as JSON. Raises InputError when the file is missing or not such a sweep."""
         return read_record(path, FORMAT, "sweep", cls._of_json)
 
     @classmethod
-    def _of_json(cls, data: dict[str, Any]) -> SweepResult:
+    def _of_json(cls, data: dict[str, Any]) -> "SweepResult":
         keys = {key: tuple(values) for key, values in data["keys"].items()}
         points = data["points"]
         names = dict.fromkeys(name for point in points for name in point if name not in (*keys, "status"))

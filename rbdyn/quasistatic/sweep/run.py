@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.remarks import Rating, Remark, overloads, remarks, tipping
@@ -24,7 +25,7 @@ from rbdyn.quasistatic.row.newton import CONVERGED
 from rbdyn.quasistatic.row.ring import RING
 from rbdyn.quasistatic.row.space import space
 from rbdyn.quasistatic.sweep.figures import Columns, ring_columns, row_columns
-from rbdyn.quasistatic.sweep.march import LEVER, Found, Points, empty, leaves, march_through
+from rbdyn.quasistatic.sweep.march import LEVER, Points, empty, leaves, march_through
 from rbdyn.quasistatic.sweep.partial import Partial, Solved, as_text, from_text
 from rbdyn.quasistatic.sweep.points import Axis, axes_of, scenes, snake
 from rbdyn.quasistatic.sweep.result import SweepResult
@@ -44,8 +45,7 @@ LOAD_KEYS = (
 # Points between two reports of progress, and two looks for Ctrl-C.
 CHUNK = 2000
 Progress = Callable[[int, int], None]
-Vector = NDArray[np.float64]
-Group = tuple[NDArray[np.int64], Vector]
+Group = tuple[NDArray[np.int64], Array]
 
 
 class Walked(NamedTuple):
@@ -53,7 +53,7 @@ class Walked(NamedTuple):
 
     columns: Columns
     statuses: list[str]
-    balls: Mapping[str, Sequence[Vector] | Vector]
+    balls: Mapping[str, Sequence[Array] | Array]
     cold: int
     remarks: list[tuple[int, Remark]]
 
@@ -101,14 +101,14 @@ def sweep(
 
 
 def grouped(
-    found: Sequence[tuple[int, Remark]], visited: NDArray[np.int64], statuses: Sequence[str]
+    told: Sequence[tuple[int, Remark]], visited: NDArray[np.int64], statuses: Sequence[str]
 ) -> list[dict[str, Any]]:
     """Notes by what they are about: the sentence of the first point in the table, and the points, counted from 0.
 
-    ``found``: remarks, each with the place of its first point on the walk; ``visited``: the table's place of each point walked.
+    ``told``: remarks, each with the place of its first point on the walk; ``visited``: the table's place of each point walked.
     """
     groups: dict[str, list[tuple[int, int, Remark]]] = {}
-    for first, remark in found:
+    for first, remark in told:
         for k in np.flatnonzero(remark.where).tolist():
             if statuses[first + k] == OK:
                 groups.setdefault(remark.word, []).append((int(visited[first + k]), k, remark))
@@ -119,7 +119,7 @@ def grouped(
     return notes
 
 
-def _sorted(balls: Sequence[Vector] | Vector, back: NDArray[np.int64]) -> list[Group]:
+def _sorted(balls: Sequence[Array] | Array, back: NDArray[np.int64]) -> list[Group]:
     """Arrays (Z, 6) in the order of the table, those of equal Z together."""
     if isinstance(balls, np.ndarray):
         return [(np.arange(len(balls)), balls[back])]
@@ -137,12 +137,12 @@ def _march(
     model, points, ratings = _packed(scene, axes, order)
     row, size, count = model.row, model.row.cosine.size, len(order)
     found, at, warm, done = empty(count, size), space(size), False, 0
-    if kept := partial.read():
+    if left := partial.read():
         for name, array in found._asdict().items():
-            array[: len(kept[name])] = kept[name]
+            array[: len(left[name])] = left[name]
         for name, array in at._asdict().items():
-            array[:] = kept[f"start_{name}"]
-        warm, done = bool(kept["warm"]), int(kept["done"])
+            array[:] = left[f"start_{name}"]
+        warm, done = bool(left["warm"]), int(left["done"])
     whole: dict[str, Any] = {"done": 0}
     try:
         for first in range(done, count, CHUNK):
@@ -158,14 +158,17 @@ def _march(
         if whole["done"]:
             partial.write(whole | {name: array[: whole["done"]] for name, array in found._asdict().items()})
         raise
-    *ring, balls = resolved(found.displacement, found.taken, found.matrix, found.figures, points.numbers[:, LEVER])
-    columns = _columns(points, found, ring, balls, ratings)
+    solved = resolved(found.displacement, found.taken, found.matrix, found.figures, points.numbers[:, LEVER])
+    (displacement, taken, matrix, balls), units = solved, _units(points.numbers)
+    displacement = displacement / units
+    stiffness = matrix * units[:, :, np.newaxis] * units[:, np.newaxis, :]
+    columns = ring_columns(displacement, taken * units, stiffness) | row_columns(balls, ratings)
+    columns |= {"residual_N": found.residual, "iterations": found.steps.astype(float)}
     statuses = [OK if outcome == CONVERGED else SENTENCES.get(outcome, LOST) for outcome in found.outcome.tolist()]
     for k, why in overloads(balls, ratings).items():
         if statuses[k] == OK:
             statuses[k] = why
-    tilts = (ring[0] / _units(points.numbers))[:, 3:]
-    notes = [(0, remark) for remark in (*remarks(balls, ratings), tipping(tilts, scene))]
+    notes = [(0, remark) for remark in (*remarks(balls, ratings), tipping(displacement[:, 3:], scene))]
     return Walked(columns, statuses, {"row": balls}, int(found.cold.sum()), notes)
 
 
@@ -209,29 +212,19 @@ def _packed(
     return made, points, list(ratings)
 
 
-def _units(numbers: Vector) -> Vector:
+def _units(numbers: Array) -> Array:
     """(n, 5): what tilts count over."""
     units = np.ones((len(numbers), RING))
     units[:, 3:] = numbers[:, [LEVER]]
     return units
 
 
-def _columns(points: Points, found: Found, ring: Sequence[Vector], balls: Vector, ratings: Sequence[Rating]) -> Columns:
-    units, (displacement, taken, matrix) = _units(points.numbers), ring
-    return {
-        **ring_columns(displacement / units, taken * units, matrix * units[:, :, np.newaxis] * units[:, np.newaxis, :]),
-        **row_columns(balls, ratings),
-        "residual_N": found.residual,
-        "iterations": found.steps.astype(float),
-    }
-
-
 def _one_by_one(
     scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress, partial: Partial
 ) -> Walked:
     """Any bearing, through ``rbdyn.equilibrium``."""
-    kept = partial.read()
-    solved = from_text(str(kept["points"])) if kept else []
+    left = partial.read()
+    solved = from_text(str(left["points"])) if left else []
     points = list(scenes(scene, axes, order))
     try:
         for place in range(len(solved), len(points)):
@@ -269,21 +262,21 @@ def _solve(scene: BallScene, before: tuple[Solution, ...]) -> Solved:
     return Solved(result.status, figures, balls, [one for one in remarks if one.where[0]], result.rows, not started)
 
 
-def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Vector], list[Remark]]:
+def _figures(scene: BallScene, result: BallResult) -> tuple[dict[str, float], dict[str, Array], list[Remark]]:
     """Figures of one point, what is known of each ball by row, and remarks."""
     report = result.reached
     assert report.reaction is not None
     reaction = np.array([*report.reaction["load_N"].values(), *report.reaction["moment_Nm"].values()])
     stiffness = np.array(report.stiffness["matrix_SI"])
     columns = ring_columns(result.displacement[np.newaxis], reaction[np.newaxis], stiffness[np.newaxis])
-    balls, found = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
+    balls, notes = {}, [tipping(result.displacement[np.newaxis, 3:], scene)]
     names = ("row",) if len(result.rows) == 1 else ("inner", "outer")
     for name, rating, solution in zip(names, result.ratings, result.rows, strict=True):
         balls[name] = solution.figures
-        found += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
+        notes += remarks(solution.figures[np.newaxis], [rating], name.removeprefix("row"))
         prefix = "" if name == "row" else f"{name}_row_"
         columns |= {f"{prefix}{key}": value for key, value in row_columns(balls[name][np.newaxis], [rating]).items()}
     figures = {name: float(value[0]) for name, value in columns.items()}
     if isinstance(report, DoubleDeckerReport):
         figures["middle_ring_speed_rpm"] = report.middle_ring["speed_rpm"]
-    return {**figures, "residual_N": report.residual_N, "iterations": float(report.iterations)}, balls, found
+    return {**figures, "residual_N": report.residual_N, "iterations": float(report.iterations)}, balls, notes

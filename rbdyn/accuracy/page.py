@@ -1,0 +1,118 @@
+"""The page of measured figures: the studies of the shipped examples, part by part, as one file of Markdown.
+
+``measured.toml`` lists the parts and the commands that each is measured by. A part that is not run keeps its former tables
+with their date and says so; one that fails keeps them and says why.
+"""
+
+import re
+import shlex
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Callable, Collection, Mapping
+from contextlib import AbstractContextManager
+from datetime import date
+from itertools import pairwise
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from rbdyn.accuracy import study
+from rbdyn.accuracy.choice import chosen_study
+from rbdyn.accuracy.report import Report, Reporter, processor
+from rbdyn.faults import InputError, RunError
+from rbdyn.result import versions, whole_file
+from rbdyn.scene import Scene
+
+NEVER = "*Not measured yet.*\n"
+BAR = r"\|"  # within a cell
+
+
+def measure(
+    path: Path, wanted: Collection[str], bar: Callable[[str], AbstractContextManager[Reporter]]
+) -> dict[str, dict[str, Any]]:
+    """Run the ``wanted`` parts, all where none is named, and write the page after each; returns by part what came of it.
+
+    ``bar(title)`` gives the progress of a part. Commands are run where the process stands: paths of scenes are those of the
+    repository. Raises InputError for a part that is none, KeyboardInterrupt.
+    """
+    whole = tomllib.loads(Path(__file__).with_name("measured.toml").read_text(encoding="utf-8"))
+    commands = {part["name"]: part["commands"] for part in whole["part"]}
+    if unknown := [name for name in wanted if name not in commands]:
+        raise InputError([f"--part {name}: is none; the parts are {', '.join(commands)}" for name in unknown])
+    old = path.read_text(encoding="utf-8") if path.exists() else ""
+    today = date.today().isoformat()
+    blocks = {name: _kept(old, name, f"not run for the page of {today}") for name in commands}
+    found: dict[str, dict[str, Any]] = {name: {"status": "kept"} for name in commands}
+    _write(path, whole, blocks)  # before hours of running, lest there be no such folder
+    for name in [name for name in commands if name in wanted or not wanted]:
+        started = time.perf_counter()
+        try:
+            with bar(name) as progress, TemporaryDirectory() as folder:
+                output = "\n\n".join(_told(line, folder, progress) for line in commands[name])
+        except (InputError, RunError, OSError) as error:
+            found[name] = {"status": f"failed: {error}"}
+            blocks[name] = _kept(old, name, f"failed on {today}: {error}")
+        else:
+            found[name] = {"status": "ok", "seconds": time.perf_counter() - started}
+            on = ", ".join((processor(), *(f"{key} {value}" for key, value in versions().items())))
+            blocks[name] = f"*Measured {today}; times include compiling; {on}.*\n\n{output}\n"
+        _write(path, whole, blocks)
+    return found
+
+
+def _write(path: Path, whole: Mapping[str, Any], blocks: Mapping[str, str]) -> None:
+    with whole_file(path) as new:
+        new.write_text(_page(whole, blocks), encoding="utf-8")
+
+
+def _page(whole: Mapping[str, Any], blocks: Mapping[str, str]) -> str:
+    sections = [f"# {whole['title']}\n\n{whole['words']}"]
+    for part in whole["part"]:
+        commands = "\n".join(part["commands"])
+        block = f"<!-- {part['name']} -->\n{blocks[part['name']]}<!-- /{part['name']} -->\n"
+        sections.append(f"## {part['title']}\n\n{part['words']}\n```sh\n{commands}\n```\n\n{block}")
+    return "\n".join(sections)
+
+
+def _kept(page: str, name: str, why: str) -> str:
+    """What the page tells of a part, with its date in the first line, and ``why`` it is not from today."""
+    found = re.search(f"<!-- {name} -->\n(.*?)<!-- /{name} -->\n", page, re.DOTALL)
+    if found is None or found[1] == NEVER:
+        return NEVER
+    first, _, rest = re.sub(r"\*Kept: .*\*\n", "", found[1]).partition("\n")
+    return f"{first}\n*Kept: {' '.join(why.split())}.*\n{rest}"
+
+
+def _told(line: str, folder: str, progress: Reporter) -> str:
+    """A command, how long it took and what it tells; ``TMP`` in it is the ``folder``."""
+    started = time.perf_counter()
+    output = _run(line.replace(" TMP", f" {folder}"), progress)
+    return f"`{line}`, {time.perf_counter() - started:.3g} s:\n\n{output}"
+
+
+def _run(line: str, progress: Reporter) -> str:
+    """What a command tells, as Markdown: tables of a study, of any other command what it prints. Raises RunError where it
+    fails, InputError.
+    """
+    program, *words = shlex.split(line)
+    if (program, words[0]) == ("rbdyn", "accuracy"):
+        sets = [value for option, value in pairwise(words) if option == "--set"]
+        flags = {word[2:]: True for word in words if word.startswith("--") and word != "--set"}
+        scene = Scene.load(words[1], sets)
+        return _markdown(study(chosen_study(flags, {}, scene), scene, progress))
+    called = words if program == "python" else ["-m", program, *words]
+    ended = subprocess.run([sys.executable, *called], capture_output=True, text=True, check=False)
+    if ended.returncode:
+        raise RunError(f"{line}: ended with {ended.returncode}, {(ended.stderr.splitlines() or [''])[-1]}")
+    return f"```text\n{ended.stdout.rstrip()}\n```"
+
+
+def _markdown(report: Report) -> str:
+    tables = []
+    for table in report.tables:
+        rows = (table.header, ["---"] * len(table.header), *table.cells)
+        lines = (f"| {' | '.join(each.replace('|', BAR) for each in row)} |" for row in rows)
+        tables.append("\n".join((f"**{table.title}**\n", *lines)))
+    return "\n\n".join((*tables, *report.sentences))

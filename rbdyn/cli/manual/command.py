@@ -1,0 +1,35 @@
+"""The command ``rbdyn manual``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rbdyn.cli.options import Json, folder_option
+from rbdyn.cli.terminal import guarded, hand_over
+
+# Entry points by which packages that stand on this one add their part: functions that return a ``Part``.
+GROUP = "rbdyn.manual"
+
+
+def manual(
+    context: typer.Context,
+    out: Annotated[Path, folder_option("Write manual.html here.")] = Path("manual"),
+    as_json: Json = False,
+) -> None:
+    """Write the manual as one page that opens from disk: own bearing, keys, commands, equations, what is left out."""
+    with guarded(as_json):
+        from importlib.metadata import entry_points
+
+        from rbdyn.cli.keys import kinds
+        from rbdyn.cli.manual.page import page
+        from rbdyn.cli.manual.part import Part
+        from rbdyn.result import whole_file
+
+        own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds())
+        text = page([own, *(each.load()() for each in sorted(entry_points(group=GROUP)))])
+        out.mkdir(parents=True, exist_ok=True)
+        path = out / "manual.html"
+        with whole_file(path) as new:
+            new.write_text(text, encoding="utf-8")
+        hand_over(lambda: {"status": "ok", "page": str(path)}, as_json, lambda: None, out, [path.name])

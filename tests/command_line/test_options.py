@@ -1,0 +1,50 @@
+"""Options of all commands: each has a help text, and help tells its default."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+import typer.main
+from typer.testing import CliRunner
+
+from doe.cli import app as doe_app
+from rbdyn.cli.app import app as rbdyn_app
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+APPS = {"rbdyn": rbdyn_app, "doe": doe_app}
+OPTIONS = [
+    pytest.param(app, command, option, id=f"{name} {command} {option.name}")
+    for name, app in APPS.items()
+    for command, known in typer.main.get_command(app).commands.items()
+    for option in known.params
+]
+
+
+@pytest.mark.parametrize(("app", "command", "option"), OPTIONS)
+def test_every_option_has_help_and_tells_its_default(app, command, option):
+    """Command line: one that takes a value says what holds without it, in words where there is no plain value."""
+    assert option.help and option.help.endswith((".", ".)"))
+    # Help is rich text, which swallows what stands in square brackets.
+    assert not re.search(r"\[\w+\.\w+\]", option.help)
+    if option.param_type_name == "option" and not option.is_flag and not option.required:
+        assert option.default is not None or isinstance(option.show_default, str), option.name
+
+
+def test_defaults_stand_in_the_help_as_printed(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    printed = CliRunner().invoke(rbdyn_app, ["simulate", "--help"]).output
+    assert "[default: (numerics.turns of the scene)]" in printed and "[default: (all processors)]" in printed
+    assert "[default: (STUDY_results)]" in CliRunner().invoke(doe_app, ["study", "--help"]).output
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [((), 2, "--seed 3: nothing is drawn here"), (("--race-limits", "P4"), 0, '"seed": 3')],
+)
+def test_balls_are_drawn_by_a_seed_of_the_command(tmp_path, options, code, words):
+    scene = str(EXAMPLES / "angular_contact_ball.toml")
+    axial = [each for key in ("bearing.bore_mm=40.0", "operation.radial_load_N=0.0") for each in ("--set", key)]
+    shown = CliRunner().invoke(rbdyn_app, ["ball", scene, *axial, *options, "--seed", "3", "--json"])
+    assert shown.exit_code == code and words in shown.stdout, shown.output
+    assert code or json.loads(shown.stdout)["class"] == "P4"

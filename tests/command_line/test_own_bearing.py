@@ -1,0 +1,65 @@
+"""The manual's own bearing, step by step: its commands run, and what it quotes is what they print."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import doe.manual
+
+CHAPTER = Path(doe.manual.__file__).with_name("20_own_bearing.md")
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+# Figures are those of one machine; on another the motion parts from them within a turn, and errors scatter.
+CLOSE = 0.15
+
+
+def told(line):
+    """Words of a line without its numbers, and its numbers; errors, and gains that are little more, are left out."""
+    bare = re.sub(r"± \S+|\+\d\S*", "", " ".join(line.split()))
+    return NUMBER.sub("#", bare), [float(each) for each in NUMBER.findall(bare)]
+
+
+def blocks():
+    """Fenced blocks of the chapter: language, text."""
+    return re.findall(r"^```(\w+)\n(.*?)^```$", CHAPTER.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_own_bearing_runs_as_told(tmp_path):
+    """Command line: every step of the chapter in order; the limit is put where it says; quoted lines are printed."""
+    printed, quoted = "", 0
+    for language, text in blocks():
+        if language == "sh":
+            command, _, into = text.strip().partition(" > ")
+            program, *words = shlex.split(command)
+            ran = subprocess.run([sys.executable, "-m", program, *words], cwd=tmp_path, capture_output=True, text=True)
+            assert ran.returncode == 0, ran.stderr
+            printed = ran.stdout
+            if into:
+                (tmp_path / into).write_text(printed, encoding="utf-8")
+        elif text.startswith("[[response]]"):
+            study = tmp_path / "study.toml"
+            whole = study.read_text(encoding="utf-8")
+            assert whole.count(text.replace("upper = 150.0\n", "")) == 1
+            study.write_text(whole.replace(text.replace("upper = 150.0\n", ""), text), encoding="utf-8")
+        else:
+            lines = dict(map(told, printed.splitlines()))
+            for line in text.splitlines():
+                words, numbers = told(line)
+                assert lines[words] == pytest.approx(numbers, rel=CLOSE), line
+                quoted += 1
+    assert quoted > 15
+
+
+def test_own_bearing_starts_as_told(tmp_path):
+    """Command line: the scene of the first step has the lines that the chapter quotes."""
+    (_, first), (_, quoted) = blocks()[:2]
+    _, *words = shlex.split(first.partition(" > ")[0])
+    ran = subprocess.run([sys.executable, "-m", "rbdyn", *words], cwd=tmp_path, capture_output=True, text=True)
+    for line in quoted.splitlines():
+        assert line in ran.stdout.splitlines()

@@ -1,0 +1,28 @@
+"""The manual as it is installed: the parts of both floors, found by what pyproject.toml declares."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+from typer.main import get_command
+
+from rbdyn.cli.app import app
+from rbdyn.cli.keys import kinds
+from rbdyn.cli.manual import command
+from rbdyn.cli.manual.part import Part
+
+ROOT = Path(__file__).parents[2]
+
+
+def declared() -> dict[str, str]:
+    """Entry points of the manual."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    return project["entry-points"][command.GROUP]
+
+
+def parts() -> list[Part]:
+    """Parts in the order of the page."""
+    own = Part("rbdyn", Path(command.__file__).with_name("prose"), get_command(app), kinds())
+    return [own, *(EntryPoint(name, value, command.GROUP).load()() for name, value in declared().items())]

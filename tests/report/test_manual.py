@@ -1,0 +1,196 @@
+"""``rbdyn manual``: every key, command, equation and public name is there, and what its prose names exists."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import json
+import os
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from manual_parts import ROOT, declared, parts
+
+import rbdyn
+from rbdyn.cli.keys import keys, lines
+from rbdyn.cli.manual.docstrings import markdown
+from rbdyn.cli.manual.page import page, rendered
+
+# A command with its options, as prose and code write it.
+CALL = re.compile(r"\b(rbdyn|doe) (?!=)([a-z]+)\b((?: [^\s`|]+)*)")
+VOID = {"meta", "input"}
+
+
+class Read(HTMLParser):
+    """Keys, links, sources and headings of a page, its text, and elements that are left open."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.keys: list[str] = []
+        self.links: list[str] = []
+        self.sources: list[str] = []
+        self.headings: list[str] = []
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.feed(text)
+        self.text = " ".join("".join(self.words).split())
+
+    def handle_starttag(self, tag, attrs):
+        found = dict(attrs)
+        self.keys += [found["id"]] if "id" in found else []
+        self.links += [found["href"]] if "href" in found else []
+        self.sources += [found["src"]] if "src" in found else []
+        self.open += [] if tag in VOID else [tag]
+        self.headings += [""] if re.fullmatch("h[1-6]", tag) else []
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if not {"style", "script"} & set(self.open):
+            self.words.append(data)
+        if any(re.fullmatch("h[1-6]", tag) for tag in self.open):
+            self.headings[-1] += data
+
+
+@pytest.fixture(scope="module")
+def floors():
+    """The parts of both packages."""
+    return parts()
+
+
+@pytest.fixture(scope="module")
+def manual(floors):
+    """The page, read."""
+    return Read(page(floors))
+
+
+def test_page_is_whole_and_needs_nothing_else(manual):
+    """Report: one file; every link of it leads to a place on it; nothing is left open or to be filled in."""
+    assert manual.open == [] and manual.sources == []
+    assert len(set(manual.keys)) == len(manual.keys)
+    assert {link for link in manual.links if not link.startswith("#")} == set()
+    assert {link[1:] for link in manual.links} <= set(manual.keys)
+    assert "{{" not in manual.text
+
+
+def test_every_key_is_told(manual, floors):
+    """Report: name, unit, range, default and meaning of each key that the keys commands know."""
+    found = [key for part in floors for key in keys(part.kinds)]
+    assert len(found) > 300
+    for key in found:
+        assert key.key in manual.headings, key.key
+        told = lines(key)[0].removeprefix(f"{key.key}: ")
+        assert f"{key.key} {told} {key.description}" in manual.text, key.key
+
+
+def test_every_command_is_told_with_its_options(manual, floors):
+    """Report: usage, what it does and every option of each command of both programs."""
+    told = 0
+    for part in floors:
+        for name, command in part.commands.commands.items():
+            assert f"{part.package} {name}" in manual.headings
+            assert " ".join(command.help.split()) in manual.text
+            for option in command.params:
+                if option.param_type_name == "option":
+                    says = rf"{option.opts[0]}\b.{{0,40}}: {re.escape(option.help[:30])}"
+                    assert re.search(says, manual.text), says
+                    told += 1
+    assert told > 60
+
+
+def test_every_module_with_an_equation_is_there(manual):
+    """Report: a module whose docstring, or that of anything in it, has an equation or a source stands there with it."""
+    told = 0
+    for path in [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.py")]:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        named = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef | ast.FunctionDef)]
+        texts = {getattr(node, "name", ""): ast.get_docstring(node) or "" for node in (tree, *named)}
+        if any(" = " in text or re.search("Sources?: ", text) for text in texts.values()):
+            module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+            assert module in manual.headings
+            assert Read(rendered(f"# x\n\n{markdown(texts[''])}", "x")[1]).text.removeprefix("x") in manual.text
+            told += 1
+    assert told > 70
+    for words in (
+        "(k^2+1) E - 2 K)/[(k^2-1) E] = F",
+        "F_R/(E' R l) = 1.42 sqrt(U W)/(1 + r^10)^0.1",
+        "boundary: float # mu_b [-]",
+    ):
+        assert words in manual.text
+
+
+def test_every_public_name_is_told(manual):
+    """Report: what the packages hand on, with what it says of itself; methods that a class inherits too."""
+    for name in rbdyn.__all__:
+        assert f"rbdyn.{name}" in manual.headings
+    for package in ("doe.designs", "doe.response_surface", "doe.pareto", "doe.dimension_chain", "doe.study_file"):
+        home = importlib.import_module(package)
+        tree = ast.parse(Path(home.__file__).read_text(encoding="utf-8"))
+        names = [alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names]
+        assert names
+        for name in names:
+            first = getattr(home, name).__doc__.split("\n\n")[0].replace("`", "")
+            assert any(heading.endswith(f".{name}") for heading in manual.headings), name
+            assert " ".join(first.split()) in manual.text, name
+    for words in ("table(self) -> pd.DataFrame: A row a figure", "save(self, path: Path | str) -> None: Write JSON"):
+        assert words in manual.text
+
+
+def test_prose_names_commands_and_options_that_exist(floors):
+    """Report: every command that prose or README names is one, with the options that stand behind it."""
+    known = {part.package: part.commands.commands for part in floors}
+    prose = [path for part in floors for path in part.prose.glob("*.md")]
+    calls = 0
+    for path in [ROOT / "README.md", ROOT / "examples" / "measured.md", *prose]:
+        code = re.findall(r"```sh\n(.*?)```", text := path.read_text(encoding="utf-8"), re.DOTALL)
+        for program, name, rest in CALL.findall("\n".join((*code, *re.findall("`([^`]+)`", text)))):
+            assert name in known[program], f"{path.name}: {program} {name}"
+            options = {each for option in known[program][name].params for each in option.opts}
+            for option in re.findall(r"(?<!\S)--?[a-z][a-z-]*", rest):
+                assert option in options, f"{path.name}: {program} {name} {option}"
+            calls += 1
+    assert calls > 30
+
+
+def test_command_writes_the_page_and_nothing_else(tmp_path, command, floors):
+    """Command line: the declared entry points bring both floors in; equal bytes in any process; one JSON object."""
+    meta = tmp_path / f"rbdyn-{rbdyn.__version__}.dist-info"
+    meta.mkdir()
+    (meta / "METADATA").write_text(f"Metadata-Version: 2.1\nName: rbdyn\nVersion: {rbdyn.__version__}\n")
+    lines = "\n".join(f"{name} = {value}" for name, value in declared().items())
+    (meta / "entry_points.txt").write_text(f"[rbdyn.manual]\n{lines}\n")
+    where = os.pathsep.join((str(tmp_path), str(ROOT)))
+    ran = command("manual", "--out", tmp_path / "out", "--json", PYTHONPATH=where, PYTHONHASHSEED="7")
+    assert ran.returncode == 0, ran.stderr
+    assert json.loads(ran.stdout) == {"status": "ok", "page": str(tmp_path / "out" / "manual.html")}
+    assert os.listdir(tmp_path / "out") == ["manual.html"]
+    assert (tmp_path / "out" / "manual.html").read_text(encoding="utf-8") == page(floors)
+
+
+def test_command_refuses_a_file_for_a_folder(tmp_path, command):
+    """Command line: one sentence with the mend, exit code 2."""
+    (tmp_path / "taken").write_text("")
+    ran = command("manual", "--out", tmp_path / "taken")
+    assert ran.returncode == 2
+    assert len(ran.stderr.splitlines()) == 1 and "check the path" in ran.stderr
+
+
+def test_readme_is_short_and_leads_somewhere():
+    """Report: at most 120 lines; one command each to run and to test; every link and every room of its map is there."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    for title in ("Run", "Test"):
+        section = text.split(f"\n## {title}\n")[1].split("\n## ")[0]
+        assert len(re.findall(r"^```sh\n[^\n]+\n```$", section, re.MULTILINE)) == section.count("```") / 2 == 1
+    links = re.findall(r"\]\(([^)]+)\)", text)
+    rooms = re.findall("`([a-z_/.]+)`", text.split("## Map of the house")[1].split("\n## ")[0])
+    for place in [*links, *(room for room in rooms if "/" in room)]:
+        assert (ROOT / place).exists(), place
+    for room in (room for room in rooms if "/" not in room):
+        assert [*ROOT.glob(f"*/{room}"), *ROOT.glob(f"*/*/{room}")], room
+    parts_named = re.findall(r"\| `([a-z]+)` \|$", text, re.MULTILINE)
+    page_parts = (ROOT / "examples" / "measured.md").read_text(encoding="utf-8")
+    assert len(parts_named) > 5 and all(f"<!-- {name} -->" in page_parts for name in parts_named)
