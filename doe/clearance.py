@@ -36,10 +36,11 @@ SIMULATION = "rbdyn.dynamics.simulate"
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
 # Confirmation runs use seeds that no design run has.
 CONFIRMATION_SEEDS = 1_000_000
-# So do the evaluations of a direct front, one each.
+# So do the evaluations of a direct front, one each, and the input sets of an uncertainty.
 DIRECT_SEEDS = 2_000_000
 # And the runs of an adaptive search.
 ADAPTIVE_SEEDS = 4_000_000
+INPUT_SEEDS = 3_000_000
 # Of a motion that goes into a report.
 ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
@@ -274,11 +275,16 @@ def attempt_text(text: str, version: str) -> Ran:
 
 
 def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
+    """`figures` of the study's responses."""
+    return figures(study.responses, results)
+
+
+def figures(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
     """Values, 95 % statistical half-widths (NaN where there is none), and about how many independent values are behind
     each, each of shape (runs, responses)."""
     from rbdyn.dynamics.statistics.batch_means import MOST_BATCHES
 
-    quantities = [[record[name] for name in study.responses] for record in (result.as_dict() for result in results)]
+    quantities = [[record[name] for name in names] for record in (result.as_dict() for result in results)]
     keys = "value", "statistical_error", "effective_samples"
     values, errors, samples = ([[quantity[key] for quantity in row] for row in quantities] for key in keys)
     behind = np.minimum(np.array(samples), MOST_BATCHES).astype(np.int64)

@@ -13,12 +13,13 @@ with Loading():
     from doe.commands.new import new
     from doe.commands.status import status
     from doe.commands.study import study
+    from doe.commands.uncertainty import uncertainty
     from rbdyn.cli import streams
     from rbdyn.cli.options import Version
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 
-for command in (new, study, status, design, fit, front, chain, keys):
+for command in (new, study, status, design, fit, front, chain, uncertainty, keys):
     app.command()(command)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from doe.commands.options import Adaptive, Direct, Quiet, Retry, Scheduler, StudyOut, StudyPath, Verbose
+from doe.commands.options import Adaptive, Direct, Quiet, Retry, Robust, Scheduler, StudyOut, StudyPath, Verbose
 from doe.commands.steps import keeping_runs
 from rbdyn.cli.options import Json, Workers
 from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json, progress_bar
@@ -22,6 +22,7 @@ def study(
     retry: Retry = False,
     direct: Direct = False,
     adaptive: Adaptive = False,
+    robust: Robust = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -37,7 +38,8 @@ def study(
         output_folder(folder, "doe", path)
         from doe.study.finished import finished, inputs_digest
 
-        if not (verbose or retry) and (record := finished(folder, inputs_digest(loaded, direct, adaptive))):
+        digest = inputs_digest(loaded, direct, adaptive, robust)
+        if not (verbose or retry) and (record := finished(folder, digest)):
             if not as_json:
                 print((folder / "answer.txt").read_text(encoding="utf-8"), end="")
                 print(f"finished before, nothing has changed since: {folder} holds {', '.join(record['files'])}")
@@ -54,7 +56,7 @@ def study(
             bars.close()
             return bars.enter_context(progress_bar(title, quiet or as_json))
 
-        outcome = run_study(loaded, folder, workers, progress, scheduler, retry, direct, adaptive)
+        outcome = run_study(loaded, folder, workers, progress, scheduler, retry, direct, adaptive, robust)
         bars.close()
         record = write(outcome, folder)
         if not as_json:

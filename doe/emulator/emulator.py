@@ -65,21 +65,27 @@ class Emulator:
 
     def predict(self, points: ArrayLike) -> tuple[Array, Array]:
         """Mean and standard deviation (n,) of the response without scatter at points (n, k)."""
-        at, given, runs = np.asarray(points, float), self.hyperparameters, self.solution
-        columns, across = model_matrix(at, self.terms), given.variance * correlation(at, self.points, given.lengths)
+        columns, across = self._beside(np.asarray(points, float))
         inside, left = self._explained(columns, across)
-        variance = given.variance - (inside**2).sum(axis=0) + (left**2).sum(axis=0)
-        return columns @ runs.coefficients + across @ runs.weights, np.sqrt(variance.clip(0.0))
+        variance = self.hyperparameters.variance - (inside**2).sum(axis=0) + (left**2).sum(axis=0)
+        return columns @ self.solution.coefficients + across @ self.solution.weights, np.sqrt(variance.clip(0.0))
+
+    def mean(self, points: ArrayLike) -> Array:
+        """Mean (n,) of the response at points (n, k), for a fraction of the time of ``predict``."""
+        columns, across = self._beside(np.asarray(points, float))
+        return np.asarray(columns @ self.solution.coefficients + across @ self.solution.weights)
 
     def covariance(self, points: ArrayLike, other: ArrayLike) -> Array:
         """Covariance (n, m) of what is not known of the response at points (n, k) and (m, k)."""
         first, second, given = np.asarray(points, float), np.asarray(other, float), self.hyperparameters
-        (inside, left), (inside_other, left_other) = (
-            self._explained(model_matrix(at, self.terms), given.variance * correlation(at, self.points, given.lengths))
-            for at in (first, second)
-        )
+        (inside, left), (inside_other, left_other) = (self._explained(*self._beside(at)) for at in (first, second))
         between = given.variance * correlation(first, second, given.lengths)
         return between - inside.T @ inside_other + left.T @ left_other
+
+    def _beside(self, points: Array) -> tuple[Array, Array]:
+        """Trend columns (n, p) at points (n, k), and covariances (n, runs) with the runs."""
+        given = self.hyperparameters
+        return model_matrix(points, self.terms), given.variance * correlation(points, self.points, given.lengths)
 
     def _explained(self, columns: Array, across: Array) -> tuple[Array, Array]:
         """What the runs explain (n, m) and what the trend leaves open (p, m) at m points, as square roots."""

@@ -10,7 +10,7 @@ from rbdyn.compiled.sources import source_digest
 from rbdyn.result import versions
 
 
-def inputs_digest(study: Study, direct: bool, adaptive: bool = False) -> str:
+def inputs_digest(study: Study, direct: bool, adaptive: bool = False, robust: bool = False) -> str:
     """Hash of all that the files of a study depend on: the study, the files it names, the code, what was asked."""
     named = [study.scene.file, *(chain.file for chain in study.file.chain)]
     named += [] if study.file.reference is None else [study.file.reference.file]
@@ -18,7 +18,7 @@ def inputs_digest(study: Study, direct: bool, adaptive: bool = False) -> str:
     for text in (
         study.path.name,
         study.file.model_dump_json(),
-        json.dumps([direct, adaptive, versions()], sort_keys=True),
+        json.dumps([direct, adaptive, robust, versions()], sort_keys=True),
         source_digest("rbdyn.dynamics.simulate", "doe.study"),
     ):
         digest.update(text.encode())

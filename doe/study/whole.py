@@ -29,6 +29,7 @@ from doe.study.front import find_front
 from doe.study.goals import check_goals
 from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
 from doe.study.reference import Beside, beside
+from doe.study.robust import Robust, check_robust, declared, judge
 from doe.study.runs import STORE, Runs, run_design
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
@@ -42,7 +43,8 @@ class StudyResult:
 
     ``inputs`` is the hash of all it follows from. ``confirmed`` and ``gains`` by name of the point, "baseline" (without
     gains) and "pick" first; ``tried`` counts the points simulated as the pick until one kept its limits. ``tolerances`` is
-    None where the study asks for none, ``direct``, ``adaptive`` and ``direct_pick``, of either, unless it was run.
+    None where the study asks for none, ``direct``, ``adaptive`` and ``direct_pick``, of either, unless it was run, ``robust``
+    where nothing is declared as unknown and it was not wanted.
     """
 
     study: Study
@@ -54,6 +56,7 @@ class StudyResult:
     direct: Direct | None
     adaptive: Adaptive | None
     direct_pick: DirectPick | None
+    robust: Robust | None
     edge: Edge
     tried: int
     confirmed: Mapping[str, Confirmed]
@@ -118,16 +121,20 @@ def run_study(
     retry: bool = False,
     direct: bool = False,
     adaptive: bool = False,
+    robust: bool = False,
 ) -> StudyResult:
     """All of it; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster to run on.
 
-    ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself,
-    ``adaptive``: in few runs. Raises
+    ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself, ``adaptive``: in
+    few runs. ``robust``: judge the pick over what is not known, which is also done where something is declared so. Raises
     InputError, RunError, KeyboardInterrupt.
     """
     clock = _Clock()
-    inputs = inputs_digest(study, direct, adaptive)
+    inputs = inputs_digest(study, direct, adaptive, robust)
     check_goals(study)
+    robust = robust or declared(study)
+    if robust:
+        check_robust(study)
     reference = check_study(study, adaptive)
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry)
     clock.lap("design_s")
@@ -146,6 +153,8 @@ def run_study(
         ends, ask = getattr(searched, "edges", None), simulations if searched else None
         edge = edge_of(study, surfaces, confirmed["pick"], chosen.front.points, at, ask, ends)
         clock.lap("confirmation_s")
+        judged = judge(study, confirmed["pick"].point, simulations) if robust else None
+        clock.lap("robust_s")
     pick = confirmed["pick"].point
     local = None if searched is None else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])
     wished = study.file.tolerances
@@ -154,7 +163,7 @@ def run_study(
     if reference is not None:
         reference = reference.only(runs.places)
     others = {name: each for name, each in confirmed.items() if name != "baseline"}
-    lost = () if searched is None else searched.failures
+    lost = (*(() if searched is None else searched.failures), *(() if judged is None else judged.failures))
     return StudyResult(
         study=study,
         inputs=inputs,
@@ -165,6 +174,7 @@ def run_study(
         direct=searched if isinstance(searched, Direct) else None,
         adaptive=searched if isinstance(searched, Adaptive) else None,
         direct_pick=chosen.direct,
+        robust=judged,
         edge=edge,
         tried=chosen.tried,
         confirmed=confirmed,

@@ -114,6 +114,21 @@ class Adaptive(Strict):
     """Keys of the scene that are replaced, as "key=value"."""
 
 
+class Robust(Strict):
+    """Whether the pick beats the baseline over what is not known of the scene, with --robust."""
+
+    points: Annotated[int, Field(ge=32, le=1024)] = 256
+    """Input sets, a power of two; the baseline and the pick are simulated at each."""
+    settle: Annotated[float, Field(ge=0.0, le=4.0)] = 0.5
+    """Further simulations, as a share of the first, spent on the input sets where a gain is in doubt."""
+
+    @model_validator(mode="after")
+    def _power_of_two(self) -> Self:
+        odd = self.points & (self.points - 1)
+        wanted = 2 ** (self.points.bit_length() - 1)
+        return or_refuse(self, [f"points = {self.points}: no power of two; take {wanted}"] if odd else [])
+
+
 class Tolerances(Strict):
     """Widest tolerances of the factors about the pick."""
 

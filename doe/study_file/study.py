@@ -12,10 +12,11 @@ from doe.arrays import Array
 from doe.designs.design import to_actual, to_coded
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Design, Factor, Name
-from doe.study_file.front_section import Adaptive, Direct, Front, Goal, Tolerances
+from doe.study_file.front_section import Adaptive, Direct, Front, Goal, Robust, Tolerances
 from doe.study_file.table import COUNT, LABELS, Table, read_table
 from rbdyn.faults import InputError, Strict, read_toml, validated
 from rbdyn.fields import or_refuse
+from rbdyn.scene.uncertain import Uncertain
 
 
 class SceneFile(Strict):
@@ -88,6 +89,10 @@ class StudyFile(Strict):
     """The search on the simulator, with --direct."""
     adaptive: Adaptive = Adaptive()
     """The search with emulators, with --adaptive."""
+    robust: Robust = Robust()
+    """The judgement over unknown inputs, with --robust."""
+    uncertain: Uncertain | None = None
+    """What is not known of the scene; replaces what the scene says of it."""
     tolerances: Tolerances | None = None
     """The widest tolerances of the factors about the pick; none where left out."""
     confirmation: Confirmation = Confirmation()

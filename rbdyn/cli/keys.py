@@ -47,6 +47,7 @@ class Key(NamedTuple):
     default: Any
     required: bool
     description: str
+    unknown: str
 
 
 def run(kinds: Mapping[str, type[BaseModel]], word: str | None, as_schema: bool, as_json: bool) -> None:
@@ -83,6 +84,7 @@ def lines(key: Key) -> list[str]:
     return [
         f"{key.key}: {head}",
         *textwrap.wrap(key.description, WIDTH, initial_indent="    ", subsequent_indent="    "),
+        *textwrap.wrap(key.unknown, WIDTH, initial_indent="    ", subsequent_indent="    "),
     ]
 
 
@@ -153,6 +155,7 @@ def _models(roots: Any) -> list[type[BaseModel]]:
             if each not in found:
                 found[each] = None
                 waiting += [field.annotation for field in each.model_fields.values()]
+                waiting.append(each.__annotations__.get("__pydantic_extra__"))
         else:
             waiting += getattr(each, "__args__", ())
     return list(found)
@@ -165,6 +168,8 @@ def _target(node: Mapping[str, Any]) -> str:
 def _keys_of(tables: Mapping[str, Any], name: str, prefix: str, file: str) -> Iterator[Key]:
     """Keys of a table and of the tables in it."""
     table = tables[name]
+    if isinstance(free := table.get("additionalProperties"), dict):
+        yield from _keys_of(tables, _target(free), f'{prefix}"TABLE.KEY".', file)
     for key, node in table["properties"].items():
         inner = [each for each in node.get("anyOf", [node]) if each.get("type") != "null"]
         whole = f"{prefix}{key}"
@@ -176,9 +181,17 @@ def _keys_of(tables: Mapping[str, Any], name: str, prefix: str, file: str) -> It
             filter(None, [*map(_values, plain), *("a list of tables" if m else "a table" for _, m in nested)])
         )
         default = None if nested and not plain else node.get("default")
-        yield Key(whole, file, _unit(key), values, default, required, node["description"])
+        yield Key(whole, file, _unit(key), values, default, required, node["description"], _unknown(whole))
         for each, mark in nested:
             yield from _keys_of(tables, _target(each), f"{whole}{mark}.", file)
+
+
+def _unknown(key: str) -> str:
+    """Over which range a key may lie that nobody knows, and why."""
+    from rbdyn.scene.uncertain import documented
+
+    ranges = [f"{each.words}: {each.reason}" for each in documented() if each.key == key]
+    return f"Where not known: {'; or '.join(ranges)}." if ranges else ""
 
 
 def _unit(key: str) -> str:

@@ -7,9 +7,9 @@ is compiled: ``rbdyn.dynamics.parameters.model`` turns a scene into the SI param
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self, cast
+from typing import TYPE_CHECKING, Annotated, Any, Self, cast
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from rbdyn.faults import InputError
 from rbdyn.properties.materials import Material, equivalent_modulus
@@ -20,6 +20,7 @@ from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_tract
 from rbdyn.scene.mounting import Mounting, material_of, misfits
 from rbdyn.scene.operation import Operation, Support
 from rbdyn.scene.reading import SceneFile
+from rbdyn.scene.uncertain import Uncertain
 from rbdyn.scene.units import unit_notes
 
 if TYPE_CHECKING:
@@ -64,6 +65,8 @@ class Scene(SceneFile):
     """The laws of each interaction."""
     numerics: Numerics = Numerics()
     """Tolerance, length and replication of a run."""
+    uncertain: Annotated[Uncertain | None, Field(exclude=True)] = None
+    """What is not known of all this; no run depends on it."""
 
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:

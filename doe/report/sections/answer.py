@@ -23,7 +23,9 @@ LIMITS = {"kept": "✓ kept", "broken": "✗ broken", "undecided": "? undecided"
 
 def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     """Clearances, gains, whether they are real, and the parts to make."""
-    blocks: list[Block] = [Words(part(summary, "limits_sentence") or "", "statement")]
+    robust = part(summary, "robust") or {"sentences": []}
+    blocks: list[Block] = [Words(each, "statement") for each in robust["sentences"]]
+    blocks.append(Words(part(summary, "limits_sentence") or "", "statement"))
     if pick := part(summary, "pick"):
         blocks.append(Tiles([_tile(summary, each, pick) for each in factors(summary) if each.name in pick]))
         if plays := [CLEARANCES[each.key] for each in factors(summary) if each.key in CLEARANCES]:

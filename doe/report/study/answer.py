@@ -9,6 +9,7 @@ import numpy as np
 from doe.clearance import direct_run
 from doe.report.steps.adaptive import adaptive_sentence
 from doe.report.steps.chain import print_chain
+from doe.report.steps.robust import robust_sentences
 from doe.report.words import rounded_down
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
@@ -32,7 +33,9 @@ def print_outcome(outcome: StudyResult, quiet: bool) -> None:
 
 
 def print_verdict(outcome: StudyResult) -> None:
-    """What became of the limits: the first that is to be read."""
+    """Whether the pick is better over what is not known, and what became of the limits: the first that is to be read."""
+    if outcome.robust is not None:
+        print("\n".join(robust_sentences(outcome.robust)))
     if outcome.limits_sentence:
         print(outcome.limits_sentence)
 

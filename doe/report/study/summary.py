@@ -10,6 +10,7 @@ from doe.report.steps.confirmation import confirmation_record, direct_record, ga
 from doe.report.steps.design import runs_record
 from doe.report.steps.fit import fit_record
 from doe.report.steps.front import front_record, predicted_record
+from doe.report.steps.robust import robust_record
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
 from doe.study.design import evaluation
@@ -61,6 +62,8 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         record["adaptive"] = adaptive_record(study, outcome.adaptive)
     if outcome.direct_pick is not None:
         record["direct" if outcome.adaptive is None else "adaptive"]["chosen"] = _chosen_record(outcome.direct_pick)
+    if outcome.robust is not None:
+        record["robust"] = robust_record(outcome.robust)
     if outcome.tolerances is not None:
         record["tolerances"] = outcome.tolerances.as_dict(study.factors)
         record["tolerances_sentence"] = outcome.tolerances.sentence

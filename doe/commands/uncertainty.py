@@ -1,0 +1,55 @@
+"""``doe uncertainty``."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from doe.commands.options import Quiet, Retry, Scheduler
+from doe.commands.steps import keeping_runs
+from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
+from rbdyn.cli.terminal import guarded, hand_over, output_folder, progress_bar
+
+
+def uncertainty(
+    path: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene of a roller bearing.")],
+    points: Annotated[
+        int | None, valued("N", "Input sets to start from, a power of two.", "128", min=16, max=512)
+    ] = None,
+    target: Annotated[str, typer.Option(metavar="SHARE", help="How well the ends of a range are to be known.")] = "10%",
+    overrides: Set = None,
+    out: Annotated[
+        Path | None, folder_option("Folder of results and of the store of finished runs.", "SCENE_uncertainty")
+    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Tell what is not known of a scene, what that does to every output, and which input decides."""
+    folder = out or Path(f"{path.stem}_uncertainty")
+    with guarded(as_json), keeping_runs(folder, path), ExitStack() as bars:
+        from doe.clearance import Simulations
+        from doe.report.steps.uncertainty import print_uncertainty, record_of, write
+        from doe.running.store import Store
+        from doe.study.runs import STORE
+        from doe.study.uncertainty import check_points, find_uncertainty
+        from rbdyn.dynamics.target import target_of
+
+        check_points(points)
+        accuracy = target_of(target)
+        output_folder(folder, "doe", path)
+        with Store(folder / STORE, path.stem) as store:
+            simulations = Simulations(
+                store,
+                workers,
+                scheduler,
+                retry,
+                lambda title: bars.enter_context(progress_bar(title, quiet or as_json)),
+            )
+            found = find_uncertainty(path, overrides or (), simulations, points, accuracy)
+        bars.close()
+        files = write(found, folder)
+        hand_over(lambda: record_of(found), as_json, lambda: print_uncertainty(found), folder, files)

@@ -1,0 +1,148 @@
+"""What is not known of a scene, on the terminal, as JSON, as tables and as a picture."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+from doe.study.uncertainty import OutputRange, Uncertainty
+from doe.unknown.sensitivity import CONFIDENCE, Index
+from rbdyn.cli.terminal import print_table
+from rbdyn.records.words import quantity, shown, with_error
+from rbdyn.result import write_json
+
+FORMAT = "doe.uncertainty/1"
+# Inputs that a sentence names, and the smallest share that it is worth.
+NAMED, WORTH = 2, 0.1
+
+
+def record_of(found: Uncertainty) -> dict[str, Any]:
+    """JSON record of ``doe uncertainty``."""
+    keys = [each.key for each in found.inputs]
+    sets = found.sets
+    return {
+        "format": FORMAT,
+        "scene": str(found.path),
+        "responses": {name: _output(each, keys) for name, each in found.outputs.items()},
+        "inputs": [
+            {"key": each.key, "law": each.law.model_dump(exclude_none=True), "reason": each.reason}
+            for each in found.inputs
+        ],
+        "screened": dict(found.screened),
+        "runs": len(sets.outputs),
+        "failed": len(sets.failures) + len(sets.impossible),
+        "seed": found.seed,
+        "notes": list(found.notes),
+    }
+
+
+def _output(output: OutputRange, keys: list[str]) -> dict[str, Any]:
+    spread, indices = output.spread, output.indices
+    return {
+        **output.nominal.as_dict(),
+        "input": {"low": spread.low, "median": spread.median, "high": spread.high, "errors": list(spread.errors)},
+        "variance": spread.variance,
+        "first": None if indices is None else dict(zip(keys, map(list, indices.first), strict=True)),
+        "total": None if indices is None else dict(zip(keys, map(list, indices.total), strict=True)),
+        "floor": None if output.floor is None else list(output.floor),
+        "q2": spread.q2,
+        "ceiling": spread.ceiling,
+        "trusted": spread.by_emulator,
+    }
+
+
+def sentence(name: str, output: OutputRange, keys: list[str]) -> str:
+    """'impact force 87.1 ± 0.4 N; 60 to 132 N over what is not known; the bar stiffness makes 87 % of that'."""
+    words, unit = quantity(name)
+    nominal, spread = output.nominal, output.spread
+    head = f"{words} {with_error(nominal.value, nominal.error)} {unit}".rstrip()
+    ends = f"{shown(spread.low)} to {shown(spread.high)} {unit}".rstrip()
+    if spread.hidden:
+        return f"{head}; noise of the simulation hides what the inputs do"
+    return f"{head}; {ends} in 90 % of the cases over what is not known; {_decides(output, keys)}"
+
+
+def _decides(output: OutputRange, keys: list[str]) -> str:
+    if output.indices is None or output.floor is None:
+        return "which input makes it cannot be told"
+    floor = output.floor.high
+    ranked = sorted(zip(output.indices.total, keys, strict=True), reverse=True)
+    above = [(index, key) for index, key in ranked if index.value > max(floor, WORTH)][:NAMED]
+    return " and ".join(f"{key} makes {100.0 * index.value:.0f} %" for index, key in above) or "no input stands out"
+
+
+def print_uncertainty(found: Uncertainty) -> None:
+    """A sentence an output, a table of shares, what was left out."""
+    keys = [each.key for each in found.inputs]
+    for name, output in found.outputs.items():
+        print(sentence(name, output, keys))
+    rows = [
+        (key, *(_share(output.indices.total[place] if output.indices else None) for output in found.outputs.values()))
+        for place, key in enumerate(keys)
+    ]
+    floor = ("an input that does nothing", *(_share(output.floor) for output in found.outputs.values()))
+    title = f"share of the variance that is left while an input is unknown [%], {100.0 * CONFIDENCE:.0f} % intervals"
+    print_table(title, ("input", *(quantity(name)[0] for name in found.outputs)), [*rows, floor])
+    parts = [
+        (quantity(name)[0], *(f"{100.0 * share:.1f}" for share in output.spread.variance.values()))
+        for name, output in found.outputs.items()
+    ]
+    print_table("what a single run's variance comes from [%]", ("output", "simulation", "integration", "inputs"), parts)
+    if found.screened:
+        most = max(found.screened, key=lambda key: found.screened[key])
+        print(
+            f"{len(found.screened)} more inputs stay as they are: in a screening none made more than "
+            f"{100.0 * found.screened[most]:.2g} % of an output's variance ({most})"
+        )
+    for note in found.notes:
+        print(f"note: {note}")
+
+
+def _share(index: Index | None) -> str:
+    return "" if index is None else f"{100.0 * index.value:.0f} ({100.0 * index.low:.0f} to {100.0 * index.high:.0f})"
+
+
+def write(found: Uncertainty, folder: Path) -> list[str]:
+    """uncertainty.json, input_sets.csv and uncertainty.png; returns their names."""
+    write_json(folder / "uncertainty.json", record_of(found))
+    keys = [each.key for each in found.inputs]
+    with (folder / "input_sets.csv").open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow([*keys, *found.outputs])
+        for values, outputs in zip(found.sets.inputs, found.sets.outputs.tolist(), strict=True):
+            table.writerow([*(values[key] for key in keys), *outputs])
+    draw(found, folder / "uncertainty.png")
+    return ["uncertainty.json", "input_sets.csv", "uncertainty.png"]
+
+
+def draw(found: Uncertainty, path: Path) -> None:
+    """A column an output: above the runs of the input sets with the scene's own value, below what each input makes of them."""
+    from rbdyn.plots.style import BLUE, GREY, ORANGE, plain, plt, save
+
+    keys = [each.key.partition(".")[2] for each in found.inputs]
+    count = len(found.outputs)
+    figure, axes = plt.subplots(2, count, figsize=(3.4 * count + 2.0, 3.0 + 0.28 * len(keys)), squeeze=False,
+                                height_ratios=(1.0, 0.14 * len(keys) + 0.3))  # fmt: skip
+    for column, (name, output) in enumerate(found.outputs.items()):
+        above, below = axes[:, column]
+        words, unit = quantity(name)
+        above.hist(found.sets.outputs[:, column], bins=24, color=BLUE, alpha=0.45)
+        above.axvspan(output.spread.low, output.spread.high, color=BLUE, alpha=0.12, label="5 to 95 % of the cases")
+        above.axvline(output.nominal.value, color=ORANGE, label="as the scene says")
+        above.set(xlabel=f"{words} [{unit}]" if unit else words, ylabel="input sets" if column == 0 else "")
+        plain(above)
+        plain(below)
+        places = range(len(keys))
+        if output.indices is None or output.floor is None:
+            below.text(0.5, 0.5, "cannot be told", transform=below.transAxes, ha="center", color=GREY)
+        else:
+            total = output.indices.total
+            below.barh(places, [100.0 * each.value for each in total], color=BLUE, alpha=0.6)
+            below.hlines(
+                places, [100.0 * each.low for each in total], [100.0 * each.high for each in total], color=GREY
+            )
+            below.axvline(100.0 * output.floor.high, color=GREY, linestyle=":")
+        below.set(yticks=places, yticklabels=keys if column == 0 else [], xlim=(0.0, 100.0),
+                  xlabel="share left while unknown [%]")  # fmt: skip
+        below.invert_yaxis()
+    axes[0, 0].legend(fontsize=8)
+    save(figure, path)

@@ -1,0 +1,182 @@
+"""Input sets of a scene whose inputs are not known: which inputs vary, the scenes at values of them, their runs."""
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from doe import clearance
+from doe.arrays import Array, Whole
+from doe.clearance import Simulations
+from doe.running.failure import Failure, sentence
+from doe.unknown import laws, plan, screening
+from rbdyn.faults import InputError, RunError, read_toml, set_key
+from rbdyn.scene import Scene, rollers_only
+from rbdyn.scene.uncertain import Correlation, Uncertain
+from rbdyn.scene.unknown import Input, inputs_of, value_of, with_values
+
+# Share of input sets that may be impossible or fail.
+HOLES = 0.05
+SCREENING_SEEDS = 500_000
+
+
+@dataclass(frozen=True)
+class Sets:
+    """Input sets that were run: their ``places`` in what was asked for, their quantiles (n, d), values of the inputs, outputs (n, m), variances of these (n, m) and
+    the degrees of freedom behind them (n, m); what became of the others."""
+
+    places: Whole
+    quantiles: Array
+    inputs: list[dict[str, Any]]
+    outputs: Array
+    variances: Array
+    freedom: Whole
+    failures: tuple[Failure, ...]
+    impossible: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, ``overrides`` of all runs."""
+
+    source: str
+    data: dict[str, Any]
+    scene: Scene
+    uncertain: Uncertain
+    every: list[Input]
+    outputs: tuple[str, ...]
+    overrides: tuple[str, ...] = ()
+
+    def scenes(
+        self, inputs: Sequence[Input], values: Sequence[Mapping[str, Any]], seed: int, more: Sequence[str] = ()
+    ) -> list[Scene | str]:
+        """A scene an input set, or why there is none; ``more`` overrides come last."""
+        by_key = {each.key: each.law for each in self.every}
+        keys = {each.key for each in inputs}
+        # What multiplies an input that varies goes with it, in the ratio that the scene has.
+        tied = {
+            key: value_of(self.scene, key) / value_of(self.scene, law.times)
+            for key, law in by_key.items()
+            if key not in keys and law.times in keys
+        }
+        found: list[Scene | str] = []
+        for number, row in enumerate(values):
+            overrides = [*self.overrides, *self.uncertain.set, f"numerics.seed={seed + number}", *more]
+            try:
+                tables = with_values(self.data, self.source, by_key, {**row, **tied})
+                found.append(Scene.from_dict(tables, self.source, overrides))
+            except InputError as error:
+                found.append(str(error.faults[0]))
+        return found
+
+    @property
+    def replicates(self) -> int:
+        """Replicates of a run."""
+        return Scene.from_dict(self.data, self.source, [*self.overrides, *self.uncertain.set]).numerics.replicates
+
+    def copula(self, inputs: Sequence[Input]) -> Array | None:
+        """How the inputs depend on each other; None where they do not."""
+        present = {each.key for each in inputs}
+        pairs: list[Correlation] = [pair for pair in self.uncertain.correlation if present.issuperset(pair.keys)]
+        return laws.copula([each.key for each in inputs], pairs)
+
+
+def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> Case:
+    """A scene file with what is not known of it. Raises InputError, also where all is known."""
+    data = copy.deepcopy(read_toml(path))
+    for override in overrides:
+        set_key(data, override)
+    return case_of(str(path), data, outputs)
+
+
+def case_of(
+    source: str,
+    data: dict[str, Any],
+    outputs: Sequence[str],
+    declared: Uncertain | None = None,
+    fixed: frozenset[str] = frozenset(),
+    overrides: Sequence[str] = (),
+) -> Case:
+    """Tables of a scene with what is not known of it; ``declared`` counts instead of the scene's own, keys ``fixed`` vary
+    otherwise. Raises InputError, also where all is known."""
+    scene = rollers_only(Scene.from_dict(data, source))
+    uncertain = declared or scene.uncertain or Uncertain()
+    every = inputs_of(scene, data, uncertain, fixed)
+    if not every:
+        raise InputError(
+            [
+                f"{source}: uncertain: nothing is unknown; name keys as \"table.key\" = {{law = ...}} or leave out defaults = 'none'"
+            ]
+        )
+    return Case(source, data, scene, uncertain, every, tuple(outputs), tuple(overrides))
+
+
+def coordinates(inputs: int, points: int, seed: int, factor: Array | None) -> Array:
+    """Quantiles (points, inputs + 1) of input sets, nested; the last input does nothing: it shows what chance does."""
+    quantiles = plan.nested(inputs + 1, points, seed)
+    return np.column_stack([laws.dependent(quantiles[:, :-1], factor), quantiles[:, -1]])
+
+
+def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[str, float]]:
+    """The inputs that vary, of too many those that matter; and the largest share of each of the others.
+
+    Raises RunError, InputError, KeyboardInterrupt.
+    """
+    every = case.every
+    if len(every) <= case.uncertain.inputs:
+        return every, {}
+    quantiles = plan.two_levels(len(every))
+    sets = run(case, every, np.column_stack([quantiles, np.full(len(quantiles), 0.5)]), simulations, SCREENING_SEEDS)
+    positive = (sets.outputs > 0.0).all(axis=0)
+    share = screening.shares(
+        sets.quantiles[:, :-1], np.where(positive, np.log(np.where(positive, sets.outputs, 1.0)), sets.outputs)
+    )
+    declared = [place for place, each in enumerate(every) if each.key in case.uncertain.laws]
+    stay = screening.kept(share, declared, case.uncertain.inputs)
+    left = [place for place in range(len(every)) if place not in stay]
+    return [every[place] for place in stay], {every[place].key: float(share[place].max()) for place in left}
+
+
+def run(
+    case: Case,
+    inputs: Sequence[Input],
+    quantiles: Array,
+    simulations: Simulations,
+    seeds: int = 0,
+    more: Sequence[str] = (),
+    title: str = "input sets",
+) -> Sets:
+    """Run input sets. Raises RunError where too many are impossible or fail, InputError, KeyboardInterrupt."""
+    values = laws.table_of({each.key: each.law for each in inputs}, quantiles)
+    title = "screening" if seeds == SCREENING_SEEDS else title
+    scenes = case.scenes(inputs, values, case.scene.numerics.seed + clearance.INPUT_SEEDS + seeds, more)
+    possible = [place for place, scene in enumerate(scenes) if isinstance(scene, Scene)]
+    labels = [f"{title} {place + 1}" for place in possible]
+    ran = simulations.run([scene for scene in scenes if isinstance(scene, Scene)], labels, simulations.progress(title))
+    good = [(place, result) for place, result in zip(possible, ran, strict=True) if not isinstance(result, Failure)]
+    failures = tuple(result for result in ran if isinstance(result, Failure))
+    impossible = tuple(scene for scene in scenes if isinstance(scene, str))
+    if len(scenes) - len(good) > HOLES * len(scenes):
+        why = sentence(failures) if failures else impossible[0]
+        raise RunError(
+            f"{len(scenes) - len(good)} of {len(scenes)} input sets gave no result, more than {100.0 * HOLES:g} %: {why}; "
+            "narrow the laws of the inputs"
+        )
+    outputs, errors, samples = clearance.figures(case.outputs, [result for _, result in good])
+    freedom = np.maximum(samples - 1, 1)
+    variances = (np.nan_to_num(errors) / student.ppf(0.975, freedom)) ** 2
+    places = np.array([place for place, _ in good], dtype=np.int64)
+    return Sets(
+        places,
+        quantiles[places],
+        [values[place] for place in places],
+        outputs,
+        variances,
+        freedom,
+        failures,
+        impossible,
+    )

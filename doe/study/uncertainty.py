@@ -1,0 +1,133 @@
+"""What is not known of a scene and what it does to its outputs: ``doe uncertainty``."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from doe.clearance import Simulations
+from doe.running.failure import Failure
+from doe.study.input_sets import Sets, coordinates, read_case, run, screened
+from doe.unknown.sensitivity import Index, Indices, sobol
+from doe.unknown.spread import Emulated, Runs, Spread, emulated, spread_of
+from rbdyn.faults import InputError, RunError
+from rbdyn.result import Quantity, SimulationResult
+from rbdyn.scene.unknown import Input
+
+OUTPUTS = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
+# Fresh input sets of the emulator, and input sets that are run at most.
+FRESH, MOST = 8192, 512
+# An end of the range is known whose standard error is below this share of its width, unless another is asked for.
+TARGET = 0.1
+NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
+
+
+@dataclass(frozen=True)
+class OutputRange:
+    """One output: at the scene's own inputs with its errors, its range over what is not known, and which input makes it."""
+
+    nominal: Quantity
+    spread: Spread
+    indices: Indices | None
+    floor: Index | None
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Everything a report needs. ``screened``: inputs left at their value, with the largest share that each had in an
+    output's main effects."""
+
+    path: Path
+    inputs: list[Input]
+    screened: Mapping[str, float]
+    outputs: Mapping[str, OutputRange]
+    sets: Sets
+    seed: int
+    notes: tuple[str, ...]
+
+
+def find_uncertainty(
+    path: Path, overrides: Sequence[str], simulations: Simulations, points: int | None = None, target: float = TARGET
+) -> Uncertainty:
+    """Range of every output of a scene over its unknown inputs, and which of them makes it.
+
+    ``points``: input sets to start from, a power of two, as the scene says where left out; they are doubled, up to 512,
+    until the ends of every range are known to ``target`` of its width. Raises InputError, RunError, KeyboardInterrupt.
+    """
+    case = read_case(path, OUTPUTS, overrides)
+    asked = case.uncertain.points if points is None else points
+    (nominal,) = simulations.run([case.scene], ["as the scene says"], simulations.progress("as the scene says"))
+    if isinstance(nominal, Failure):
+        raise RunError(f"{path}: as the scene says: {nominal.cause}")
+    inputs, rest = screened(case, simulations)
+    seed = case.uncertain.seed
+    factor = case.copula(inputs)
+    fresh = coordinates(len(inputs), FRESH, seed + 1, factor)
+    count = asked
+    while True:
+        sets = run(case, inputs, coordinates(len(inputs), count, seed, factor), simulations)
+        fitted = [_emulated(sets, nominal, place) for place in range(len(OUTPUTS))]
+        spreads = [spread_of(runs, each, fresh, seed) for runs, each in fitted]
+        if count >= MOST or all(each.known <= target for each in spreads):
+            break
+        count *= 2
+    outputs = {
+        name: _output(nominal, name, spread, each, len(inputs), seed, independent=factor is None)
+        for name, spread, (_, each) in zip(OUTPUTS, spreads, fitted, strict=True)
+    }
+    return Uncertainty(path, inputs, rest, outputs, sets, seed, _notes(sets, spreads, count, target))
+
+
+def check_points(points: int | None) -> None:
+    """Raises InputError unless the number of input sets is a power of two."""
+    if points is not None and points & (points - 1):
+        raise InputError([f"--points {points}: no power of two; take {2 ** (points.bit_length() - 1)}"])
+
+
+def _emulated(sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:
+    numerical = _quantity(nominal, OUTPUTS[place]).numerical_error or 0.0
+    runs = Runs(
+        sets.quantiles,
+        sets.outputs[:, place],
+        sets.variances[:, place],
+        sets.freedom[:, place],
+        (numerical / NORMAL) ** 2,
+    )
+    return runs, emulated(runs)
+
+
+def _quantity(nominal: SimulationResult, name: str) -> Quantity:
+    return Quantity.from_dict(nominal.as_dict()[name])
+
+
+def _output(
+    nominal: SimulationResult, name: str, spread: Spread, fitted: Emulated, inputs: int, seed: int, *, independent: bool
+) -> OutputRange:
+    quantity = _quantity(nominal, name)
+    if not (spread.by_emulator and independent):
+        return OutputRange(quantity, spread, None, None)
+    found = sobol(fitted, inputs + 1, seed)
+    return OutputRange(quantity, spread, Indices(found.first[:-1], found.total[:-1]), found.total[-1])
+
+
+def _notes(sets: Sets, spreads: Sequence[Spread], count: int, target: float) -> tuple[str, ...]:
+    notes = []
+    lost = len(sets.failures) + len(sets.impossible)
+    if lost:
+        notes.append(
+            f"{lost} input sets gave no result and are left out: {(*map(str, sets.failures), *sets.impossible)[0]}"
+        )
+    for name, spread in zip(OUTPUTS, spreads, strict=True):
+        if spread.hidden:
+            notes.append(
+                f"{name}: noise hides the inputs; raise numerics.replicates or numerics.turns in uncertain.set"
+            )
+        elif not spread.by_emulator:
+            notes.append(
+                f"{name}: emulators foretell too little of it (Q2 {spread.q2:.2f} of at most {spread.ceiling:.2f}) to say which "
+                "input makes it"
+            )
+        if spread.known > target:
+            notes.append(
+                f"{name}: after {count} input sets an end of its range is known to {100.0 * spread.known:.0f} % of its width only"
+            )
+    return tuple(notes)

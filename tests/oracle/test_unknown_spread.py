@@ -1,0 +1,115 @@
+"""Range and indices of outputs whose truth is known: closed forms, Ishigami's function, the g-function; noise taken off."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from doe.arrays import Array
+from doe.unknown.plan import nested, two_levels
+from doe.unknown.screening import kept, shares
+from doe.unknown.sensitivity import sobol
+from doe.unknown.spread import Runs, emulated, spread_of
+
+ISHIGAMI = 0.5 + 49.0 / 8.0 + 0.1 * np.pi**4 / 5.0 + 0.01 * np.pi**8 / 18.0
+
+
+def _ishigami(quantiles: Array) -> Array:
+    x, y, z = np.pi * (2.0 * quantiles[:, :3].T - 1.0)
+    found: Array = np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+    return found
+
+
+def _noisy(function: Callable[[Array], Array], inputs: int, points: int, sd: float, seed: int) -> Runs:
+    """Runs of a function by replicates whose own variances are known from three degrees of freedom."""
+    random = np.random.default_rng(seed)
+    quantiles = nested(inputs, points, seed)
+    values = function(quantiles) + sd * random.standard_normal(points)
+    return Runs(quantiles, values, sd**2 * random.chisquare(3, points) / 3.0, np.full(points, 3))
+
+
+def test_variance_of_inputs_of_a_linear_function() -> None:
+    """y = 3 a + b of normal a, b: V_in = 10 beside noise of variance 2, range -+ 1.645 sqrt(10)."""
+    runs = _noisy(lambda q: stats.norm.ppf(q[:, :2]) @ [3.0, 1.0], 3, 1024, np.sqrt(2.0), 1)
+    found = spread_of(runs, emulated(runs), nested(3, 8192, 2), 1)
+    assert found.variance["inputs"] * runs.values.var(ddof=1) == pytest.approx(10.0, rel=0.06)
+    assert found.variance["simulation"] == pytest.approx(2.0 / 12.0, rel=0.1)
+    assert sum(found.variance.values()) == pytest.approx(1.0)
+    assert found.by_emulator and not found.hidden
+    assert [found.low, found.high] == pytest.approx(stats.norm.ppf([0.05, 0.95]) * np.sqrt(10.0), rel=0.05)
+    assert found.median == pytest.approx(0.0, abs=0.2)
+
+
+def test_noise_that_hides_the_inputs_is_said() -> None:
+    runs = _noisy(lambda q: 0.01 * q[:, 0], 2, 64, 1.0, 3)
+    found = spread_of(runs, emulated(runs), nested(2, 1024, 4), 1)
+    assert not found.by_emulator
+    assert found.variance["inputs"] < 0.3
+    none = Runs(runs.quantiles, runs.values, 4.0 * np.ones(64), runs.freedom)
+    assert spread_of(none, emulated(none), nested(2, 1024, 4), 1).hidden
+
+
+def test_untrusted_ranges_are_shrunk_by_their_noise() -> None:
+    """A function too rough to emulate: the range is that of the runs, less their noise."""
+    rough = np.random.default_rng(5).permutation(128)
+    runs = _noisy(lambda q: np.sqrt(12.0) * (rough[np.argsort(np.argsort(q[:, 0]))] / 128.0 - 0.5), 2, 128, 0.5, 5)
+    found = spread_of(runs, emulated(runs), nested(2, 1024, 6), 1)
+    assert not found.by_emulator
+    # Uniform of variance 1: 90 % lie within 0.9 sqrt(12); without shrinking noise would add an eighth.
+    assert found.high - found.low == pytest.approx(0.9 * np.sqrt(12.0), rel=0.06)
+    assert 0.02 < found.known < 0.1
+
+
+def test_indices_of_an_additive_function() -> None:
+    """y = 4 u + 2 v + noise: first and total indices 0.8 and 0.2, none of the input that does nothing."""
+    runs = _noisy(lambda q: 10.0 + q[:, :2] @ [4.0, 2.0], 3, 128, 0.2, 7)
+    found = sobol(emulated(runs), 3, 1)
+    for indices in found:
+        assert [each.value for each in indices] == pytest.approx([0.8, 0.2, 0.0], abs=0.03)
+        assert all(
+            each.low - 1e-12 <= truth <= each.high + 1e-12 for each, truth in zip(indices, (0.8, 0.2, 0.0), strict=True)
+        )
+
+
+def test_positive_outputs_are_emulated_by_their_logarithm() -> None:
+    """A product of powers is linear in logarithms: foretold to its last share, indices of the output itself."""
+    runs = _noisy(lambda q: np.exp(2.0 * q[:, 0] + q[:, 1]), 2, 64, 1e-3, 8)
+    fitted = emulated(runs)
+    assert fitted.logarithmic and fitted.q2 > 0.9999
+    # Of y = f g the first index of f is V(f) E(g)^2 / V(y).
+    a, b = np.expm1(2.0) / 2.0, np.expm1(1.0)
+    va, vb = np.expm1(4.0) / 4.0 - a**2, np.expm1(2.0) / 2.0 - b**2
+    whole = va * vb + va * b**2 + vb * a**2
+    found = sobol(fitted, 2, 1)
+    assert [each.value for each in found.first] == pytest.approx([va * b**2 / whole, vb * a**2 / whole], abs=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("noise", "least"), [(0.05, 0.8), (0.3, 0.8)])
+def test_indices_of_ishigami_under_noise(noise: float, least: float) -> None:
+    first, total = [0.3139, 0.4424, 0.0, 0.0], [0.5576, 0.4424, 0.2437, 0.0]
+    covered, errors = [], []
+    for seed in range(12):
+        found = sobol(emulated(_noisy(_ishigami, 4, 256, np.sqrt(noise * ISHIGAMI), seed)), 4, seed)
+        for indices, truth in ((found.first, first), (found.total, total)):
+            covered += [
+                each.low - 1e-9 <= value <= each.high + 1e-9 for each, value in zip(indices, truth, strict=True)
+            ]
+            errors += [each.value - value for each, value in zip(indices, truth, strict=True)]
+    assert np.mean(covered) >= least
+    assert np.sqrt(np.mean(np.square(errors))) <= 0.1
+
+
+def test_screening_finds_the_inputs_that_matter() -> None:
+    quantiles = two_levels(20)
+    weights = np.zeros(20)
+    weights[[3, 11]] = 3.0, 1.0
+    values = np.column_stack([quantiles @ weights, quantiles[:, 7]]) + 0.05 * np.random.default_rng(1).standard_normal(
+        (len(quantiles), 2)
+    )
+    share = shares(quantiles, values)
+    assert share[3, 0] == pytest.approx(0.9, abs=0.02)
+    assert share[7, 1] > 0.98
+    assert kept(share, [0], 4) == [0, 3, 7, 11]
+    assert kept(share, [0, 1], 1) == [0, 1]
