@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from doe.dimension_chain.allocation import Allocation
+from doe.dimension_chain.allocation import Allocation, total_cost
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, middle
-from doe.dimension_chain.cost import total_cost
 from doe.dimension_chain.distributions import moments
 from doe.dimension_chain.faults import faults
 from doe.dimension_chain.intervals import interval, linear_interval

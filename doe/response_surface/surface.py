@@ -23,9 +23,8 @@ from doe.response_surface.box_cox import BoxCox, backward, box_cox, check_positi
 from doe.response_surface.canonical import Canonical, StationaryPoint, canonical
 from doe.response_surface.data import Data, check_errors, check_matrix, checked
 from doe.response_surface.diagnostics import Diagnostics, diagnose
-from doe.response_surface.known_variance import KnownVariance, compare
 from doe.response_surface.least_squares import solve
-from doe.response_surface.model_error import ModelError, model_error
+from doe.response_surface.model_error import KnownVariance, ModelError, compare, model_error
 from rbdyn.records.record import Record, derived, outside_json
 
 Weighting = Literal["equal", "replicates"]

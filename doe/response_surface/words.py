@@ -3,7 +3,7 @@
 from doe.response_surface.anova import find
 from doe.response_surface.canonical import describe_canonical
 from doe.response_surface.diagnostics import describe_diagnostics, p_text
-from doe.response_surface.known_variance import describe_known_variance
+from doe.response_surface.model_error import describe_known_variance
 from doe.response_surface.surface import Surface
 
 ALPHA = 0.05  # p-value up to which something is significant

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rbdyn.accuracy.report import Report, show, write
-    from rbdyn.accuracy.rollers.equal_error import times_faster
+    from rbdyn.accuracy.rollers.comparison import times_faster
     from rbdyn.accuracy.rollers.tolerances import statistics_bias
     from rbdyn.scene import BallScene, Scene
 
@@ -46,7 +46,7 @@ _HOMES = {
     "show": "rbdyn.accuracy.report",
     "write": "rbdyn.accuracy.report",
     "statistics_bias": "rbdyn.accuracy.rollers.tolerances",
-    "times_faster": "rbdyn.accuracy.rollers.equal_error",
+    "times_faster": "rbdyn.accuracy.rollers.comparison",
 }
 
 

@@ -5,7 +5,7 @@ import math
 import re
 from typing import Any, NamedTuple
 
-from rbdyn.life.minimum_load import REFERENCE_SPEED_FACTOR
+from rbdyn.life.roller_capacity import REFERENCE_SPEED_FACTOR
 from rbdyn.properties.catalogue import Designation, Envelope, ball_interior, radial_clearance, roller_interior
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.properties.oils import NamedOil

@@ -15,9 +15,8 @@ from typing import NamedTuple
 from rbdyn.dynamics.ensemble import Ended, Stop, run_all
 from rbdyn.dynamics.recording import Recording, batches_of
 from rbdyn.dynamics.statistics.bias import companion_tolerance
-from rbdyn.dynamics.statistics.drift import drifting
+from rbdyn.dynamics.statistics.drift import drifting, start_of_counting
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.dynamics.statistics.transient import start_of_counting
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 

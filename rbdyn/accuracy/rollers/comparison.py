@@ -1,8 +1,11 @@
-"""Methods beside each other on one compiled right-hand side: error against time, and how many times faster ours is."""
+"""Methods beside each other on one compiled right-hand side: error against time, and how many times faster ours is.
+
+How many times faster one method is than another at equal error, from their work-precision curves.
+"""
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +13,6 @@ import numpy as np
 from rbdyn.accuracy.judgement import SOUGHT
 from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, records, reported, tabled
 from rbdyn.accuracy.rollers import method_bias, trajectory
-from rbdyn.accuracy.rollers.equal_error import Speedup, times_faster
 from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, Stretch, compiled
 from rbdyn.accuracy.rollers.trajectory import DEFAULT_TURNS, STARTS, Error, Reference
 from rbdyn.dynamics.run import prepare
@@ -21,6 +23,10 @@ from rbdyn.scene import Scene
 OK = "ok"
 # A run is timed again and again, at most so often and, past the first time, for so long.
 REPEATS, TIMED_S = 5, 0.1
+# Points over the common range of errors, evenly spaced in the logarithm.
+POINTS = 41
+
+Curve = Sequence[tuple[float, float]]  # (error, time) pairs, all positive
 
 
 class Attempt(Record):
@@ -237,3 +243,40 @@ def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) ->
     failed_at_the_edge(axis, failures)
     label_ends(axis, ends)
     save(figure, path)
+
+
+@dataclass(frozen=True)
+class Speedup:
+    """Ratio of times: geometric mean, least and greatest over the errors from ``low`` to ``high``."""
+
+    low: float
+    high: float
+    mean: float
+    least: float
+    greatest: float
+
+
+def front(curve: Curve) -> list[tuple[float, float]]:
+    """The points that no other beats in both error and time, smallest error first."""
+    unbeaten: list[tuple[float, float]] = []
+    for error, time in sorted(curve):
+        if not unbeaten or time < unbeaten[-1][1]:
+            unbeaten.append((error, time))
+    return unbeaten
+
+
+def times_faster(ours: Curve, theirs: Curve) -> Speedup | None:
+    """Their time over ours, with log time interpolated over log error between the points of each front.
+
+    Nothing is extrapolated: None where the two have no range of errors in common.
+    """
+    fronts = front(ours), front(theirs)
+    if not all(fronts):
+        return None
+    low, high = max(points[0][0] for points in fronts), min(points[-1][0] for points in fronts)
+    if not low < high:
+        return None
+    at = np.linspace(np.log(low), np.log(high), POINTS)
+    our_time, their_time = (np.interp(at, *np.log(np.array(points)).T) for points in fronts)
+    ratio = np.exp(their_time - our_time)
+    return Speedup(low, high, float(np.exp((their_time - our_time).mean())), ratio.min().item(), ratio.max().item())

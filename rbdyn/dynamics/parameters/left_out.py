@@ -8,8 +8,7 @@ import numpy as np
 
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.dynamics.forces.drag import AIR_DENSITY
-from rbdyn.life.minimum_load import minimum_loads
-from rbdyn.life.roller_capacity import dynamic_capacity, static_capacity
+from rbdyn.life.roller_capacity import dynamic_capacity, minimum_loads, static_capacity
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
 

@@ -4,9 +4,8 @@ import math
 from collections.abc import Sequence
 
 from rbdyn.dynamics.statistics import metrics
-from rbdyn.dynamics.statistics.drift import TESTED, slow_change
+from rbdyn.dynamics.statistics.drift import TESTED, Start, slow_change, start_of_counting
 from rbdyn.dynamics.statistics.metrics import Replicate, quantity
-from rbdyn.dynamics.statistics.transient import Start, start_of_counting
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 

@@ -14,8 +14,17 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.row import Row
-from rbdyn.quasistatic.runout.linear import LinearResponse, linear_response
-from rbdyn.quasistatic.runout.lots import RACES, Lot, Parts, Readings, bearing_errors, draw_parts, readings
+from rbdyn.quasistatic.runout.lots import (
+    RACES,
+    LinearResponse,
+    Lot,
+    Parts,
+    Readings,
+    bearing_errors,
+    draw_parts,
+    linear_response,
+    readings,
+)
 from rbdyn.quasistatic.runout.race_errors import Turning, ball_path
 from rbdyn.quasistatic.runout.turn import follow
 
