@@ -1,7 +1,5 @@
-"""Central composite designs in coded units: centre 0, cube corners -1 and +1, one column a factor.
-
-Two-level factorials, full and fractional, and their division into blocks. Corners at -1 and +1.
-"""
+"""Central composite designs in coded units: centre 0, cube corners -1 and +1, one column a factor. Their cubes:
+two-level factorials, full and fractional, and their division into blocks."""
 
 import math
 from itertools import combinations, product

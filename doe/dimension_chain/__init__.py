@@ -2,7 +2,7 @@
 
 ``links`` is what a chain is made of, ``reading`` and ``faults`` its TOML, ``closing`` the closing link as a function of
 its parts (``expressions`` are the links that are no sums), ``intervals``, ``monte_carlo`` and
-``yields`` what comes of given tolerances, ``allocation`` and ``cost`` the way back from limits to tolerances,
+``yields`` what comes of given tolerances, ``allocation`` the way back from limits to tolerances,
 ``iso286`` and ``iso492`` the standards as data, ``selective_assembly`` parts sorted into classes. ``solve`` answers all.
 """
 

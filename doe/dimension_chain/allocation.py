@@ -6,9 +6,8 @@ a yield. Where the chain is not linear, or a yield is wanted, the tolerances of 
 narrowed together until they fill the limits. The nominal of one part is moved: so that the closing link's maximum
 meets its upper limit; for a yield, so that its mean (with functions, the middle of its tails) lies midway.
 
-Cheapest tolerances: the Lagrange optimum of cost curves a + b/T^k that together fill the closing link.
-
-With one multiplier L the optimum is T = (k b/(L |c|))^(1/(k+1)) in worst case, sum |c| T = W, and
+The cheapest are the Lagrange optimum of cost curves a + b/T^k that together fill the closing link: with one multiplier L,
+T = (k b/(L |c|))^(1/(k+1)) in worst case, sum |c| T = W, and
 T = (k b/(2 L c^2))^(1/(k+2)) by root sum square, sum c^2 T^2 = W^2, each kept between the narrowest and the widest that
 its process gives (Chase and Greenwood, Design issues in mechanical tolerance analysis, 1988).
 """

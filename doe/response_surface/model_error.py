@@ -1,4 +1,10 @@
-"""What a surface misses beyond the scatter of its runs, as an error of its predictions.
+"""What the known variance of each run says beside the scatter of the runs, and what a surface misses beyond that scatter, as
+an error of its predictions.
+
+Known variances are those of replicates of the simulation. The residuals over them give a test of lack of fit that needs
+no repeated design points; repeated points tell whether the replicates know all of the scatter. A variance of few
+replicates is itself uncertain: the tests allow for it, and with weights from few replicates they err on the safe side
+(with 8, a true surface is doubted at 5 % in 1 to 2 % of fits; with equal weights in 5 %).
 
 Where lack of fit is significant, the response is the model plus a random field: of mean zero, of one variance, alike
 within a coded unit and strange to itself farther away, so that distinct runs of a design hardly share it. The mean
@@ -9,15 +15,8 @@ Where lack of fit is not significant there is no field, and every interval is th
 
 Sources: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed., 2.7; Sacks, Welch, Mitchell and
 Wynn, Design and analysis of computer experiments, Stat. Sci. 4 (1989), for the field; Searle, Casella and McCulloch,
-Variance Components (1992), for the estimate.
-
-What the known variance of each run, from replicates of the simulation, says beside the scatter of the runs.
-
-The residuals over the known variance give a test of lack of fit that needs no repeated design points; repeated
-points tell whether the replicates know all of the scatter. A variance of few replicates is itself uncertain: the
-tests allow for it, and with weights from few replicates they err on the safe side (with 8, a true surface is
-doubted at 5 % in 1 to 2 % of fits; with equal weights in 5 %).
-Sources: Satterthwaite, An approximate distribution of estimates of variance components (1946); Welch (1951).
+Variance Components (1992), for the estimate; Satterthwaite, An approximate distribution of estimates of variance
+components (1946), and Welch (1951), for known variances.
 """
 
 import math

@@ -29,10 +29,10 @@ def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
     if result.fits is not None:
         _print_fits(result.fits)
     if (runout := result.runout) is not None:
-        print(
-            f"runout over {runout['turns']} turns: radial {runout['indicator_um']:.3g} um by an indicator, {runout['minimum_zone_um']:.3g} um "
-            f"between circles, axial {runout['axial_um']:.3g} um, face {runout['face_um']:.3g} um; asynchronous {runout['asynchronous_radial_um']:.3g} um"
-        )
+        radial = f"{runout['indicator_um']:.3g} um by an indicator, {runout['minimum_zone_um']:.3g} um between circles"
+        axial = f"axial {runout['axial_um']:.3g} um, face {runout['face_um']:.3g} um"
+        asynchronous = f"asynchronous {runout['asynchronous_radial_um']:.3g} um"
+        print(f"runout over {runout['turns']} turns: radial {radial}, {axial}; {asynchronous}")
     print_notes(result.notes or (), quiet)
 
 
@@ -110,7 +110,5 @@ def _print_fits(fits: dict[str, Any]) -> None:
     loosens = fits["inner_ring_loosens_rpm"]
     state = "loose" if fits["inner_ring_loose"] else "tight"
     when = "at no speed" if loosens is None else f"at {loosens:.4g} rpm"
-    print(
-        f"fits: {fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the housing; the inner "
-        f"ring is {state}, rotation loosens it {when}"
-    )
+    pressed = f"{fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the housing"
+    print(f"fits: {pressed}; the inner ring is {state}, rotation loosens it {when}")

@@ -113,11 +113,9 @@ class Run:
         component, step = name(int(self.carry.counts[at.WORST]), self.layout), self.carry.clock[at.STEP]
         message = message.format(component=component, step=step, **self.control._asdict())
         explicit = status is Status.STEP_BUDGET and self.scene.numerics.method in EXPLICIT
-        return (
-            f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s, "
-            f"shaft turn {time_s / self.scene.turn_s:.4g}: {message}; "
-            f"{'take numerics.method = auto, ' if explicit else ''}{remedy}"
-        )
+        where = f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s"
+        why = f"shaft turn {time_s / self.scene.turn_s:.4g}: {message}"
+        return f"{where}, {why}; {'take numerics.method = auto, ' if explicit else ''}{remedy}"
 
 
 def with_numerics(scene: Scene, **changes: Any) -> Scene:

@@ -175,8 +175,6 @@ def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, extends:
         mend = "raise numerics.extend_limit" if extends else "lengthen numerics.turns or set numerics.extend = true"
         if not fits(scene, grown(scene, stage, GROWTH[-1])):
             mend = "take fewer replicates: there is no memory for longer ones"
-        notes.append(
-            f"transient: figures still drift over the {counted:.4g} turns counted; their errors hold what the drift shows, "
-            f"yet it may go farther; {mend}"
-        )
+        what = f"transient: figures still drift over the {counted:.4g} turns counted"
+        notes.append(f"{what}; their errors hold what the drift shows, yet it may go farther; {mend}")
     return tuple(notes)

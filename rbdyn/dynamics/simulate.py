@@ -142,13 +142,9 @@ def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
             "loose for this scene; loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
         )
     if scene.traction.model == "four_constant":
-        notes.append(
-            "traction: one load-independent set of constants; lightly loaded rollers are driven too hard and "
-            "skidding is under-predicted"
-        )
+        what = "traction: one load-independent set of constants"
+        notes.append(f"{what}; lightly loaded rollers are driven too hard and skidding is under-predicted")
     if scene.traction.model == "thermal_newtonian" and scene.lubricant.viscosity_mPas is not None:
-        notes.append(
-            "traction: follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use; choose "
-            "traction.rheology_oil to suit it"
-        )
+        what = "traction: follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use"
+        notes.append(f"{what}; choose traction.rheology_oil to suit it")
     return tuple(notes)

@@ -68,11 +68,8 @@ def target_of(text: str) -> float:
 def checked(target: float, shown: str | None = None) -> float:
     """The target. Raises InputError unless it is a fraction above 0 and at most a half."""
     if not 0.0 < target <= LARGEST_TARGET:
-        raise InputError(
-            [
-                f"--target {shown or f'{target:g}'}: must be above 0 and at most {100.0 * LARGEST_TARGET:g} %; write it as 2% or 0.02"
-            ]
-        )
+        what = f"--target {shown or f'{target:g}'}: must be above 0 and at most {100.0 * LARGEST_TARGET:g} %"
+        raise InputError([f"{what}; write it as 2% or 0.02"])
     return target
 
 
@@ -324,7 +321,5 @@ def _shortfall(target: float, errors: dict[str, float | None], result: Simulatio
         limit = f"its numerical error at numerics.rtol = {choice.rtol:g} limits it"
     else:
         limit = f"its scatter over {choice.replicates} replicates of {choice.turns:g} turns limits it"
-    return (
-        f"target of {100.0 * target:g} % not met: {worst} is known to {100.0 * (errors[worst] or 0.0):.2g} %, and {limit}; "
-        "ask for less, or run longer by numerics.turns and numerics.replicates"
-    )
+    what = f"target of {100.0 * target:g} % not met: {worst} is known to {100.0 * (errors[worst] or 0.0):.2g} %"
+    return f"{what}, and {limit}; ask for less, or run longer by numerics.turns and numerics.replicates"

@@ -1,7 +1,5 @@
-"""Load ratings of a cylindrical roller bearing: ISO 281 and ISO 76, f_c as it is commonly cited.
-
-Radial loads below which makers of cylindrical roller bearings expect the rollers to skid.
-"""
+"""Load ratings of a cylindrical roller bearing (ISO 281 and ISO 76, f_c as it is commonly cited), and the radial loads below
+which makers expect its rollers to skid."""
 
 from rbdyn.fields import RPM
 

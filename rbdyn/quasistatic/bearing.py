@@ -1,6 +1,6 @@
 """Equilibrium of the bearing of a scene: what ``rbdyn.equilibrium`` and ``rbdyn ball`` call.
 
-Other equilibria of the same bearing under the same load: a raceway control other than outer may have several.
+A raceway control other than outer may have several under the same load: others are searched for.
 """
 
 import time
@@ -72,10 +72,8 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | tuple[Solution, ..
     notes += sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
     others = _other_roots(scene, model, solution)
     if others:
-        notes.append(
-            f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load under this raceway control, see "
-            "other_roots; this one is reached from one common cage speed"
-        )
+        what = f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load under this"
+        notes.append(f"{what} raceway control, see other_roots; this one is reached from one common cage speed")
     figures = {"report": report, **grown, "other_roots": others, "notes": notes}
     return replace(nothing, **figures, rows=(solution,), ratings=(rating,))
 

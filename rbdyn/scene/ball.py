@@ -81,29 +81,21 @@ class BallOperation(Consistent):
                 "operation.load_N and operation.radial_load_N or axial_load_N contradict each other: give the one or the others"
             )
         if self.moment_Nm is not None and self.tilt == "fixed" and any(self.moment_Nm):
-            yield (
-                f"operation.moment_Nm = {self.moment_Nm}: has no effect on a ring whose tilt is fixed; leave it out or set "
-                "operation.tilt = 'free'"
-            )
+            what = f"operation.moment_Nm = {self.moment_Nm}: has no effect on a ring whose tilt is fixed"
+            yield f"{what}; leave it out or set operation.tilt = 'free'"
         if self.preload_um is not None:
             if self.preload_N:
-                yield (
-                    f"operation.preload_um = {self.preload_um:g} and operation.preload_N = {self.preload_N:g} contradict each "
-                    "other: preload by displacement or by force"
-                )
+                what = f"operation.preload_um = {self.preload_um:g} and operation.preload_N = {self.preload_N:g}"
+                yield f"{what} contradict each other: preload by displacement or by force"
             if self.prescribed.z_mm is not None:
-                yield (
-                    f"operation.preload_um = {self.preload_um:g} and operation.prescribed.z_mm = {self.prescribed.z_mm:g} "
-                    "both prescribe the axial displacement; leave one out"
-                )
+                both = f"operation.preload_um = {self.preload_um:g} and operation.prescribed.z_mm = {self.prescribed.z_mm:g}"
+                yield f"{both} both prescribe the axial displacement; leave one out"
         for name, value, load in zip(COMPONENTS, self.given, (*self.load, *self.moment), strict=True):
             if value is None or load == 0.0 or (name == "z" and self.preload_um is not None):
                 continue
             if self.tilt == "free" or not name.startswith("tilt"):
-                yield (
-                    f"operation.prescribed: the {name} displacement is prescribed, so the load of {load:g} along it would be "
-                    "lost; leave one out"
-                )
+                what = f"operation.prescribed: the {name} displacement is prescribed"
+                yield f"{what}, so the load of {load:g} along it would be lost; leave one out"
 
     @property
     def speeds(self) -> tuple[float, float]:
@@ -206,10 +198,8 @@ class BallScene(SceneFile):
                 )
             for name, row in (("inner", inner), ("outer", outer)):
                 if row.contact_angle == 0.0:
-                    yield (
-                        f"bearing.{name}.contact_angle_deg = 0: has no load torque after Palmgren; set bearing.middle.speed_split"
-                        " = 'oil' or give bearing.middle.speed_rpm"
-                    )
+                    what = f"bearing.{name}.contact_angle_deg = 0: has no load torque after Palmgren"
+                    yield f"{what}; set bearing.middle.speed_split = 'oil' or give bearing.middle.speed_rpm"
 
     @property
     def outermost_rows(self) -> tuple[BallRow, BallRow]:

@@ -163,7 +163,5 @@ class Numerics(Consistent):
 
     def faults(self) -> Iterator[str]:
         if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > self.most_batches:
-            yield (
-                f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have memory for "
-                f"{self.most_batches} turns each, warm-up included; take fewer turns or replicates"
-            )
+            room = f"memory for {self.most_batches} turns each, warm-up included; take fewer turns or replicates"
+            yield f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have {room}"

@@ -71,10 +71,8 @@ class Operation(Consistent):
 
     def faults(self) -> Iterator[str]:
         if max(abs(self.inner_speed_rpm), abs(self.outer_speed_rpm)) < SLOWEST_RPM:
-            yield (
-                f"operation.inner_speed_rpm = {self.inner_speed_rpm:g}: a run is counted in shaft turns; give at least "
-                f"{SLOWEST_RPM:g}, or turn the outer ring"
-            )
+            what = f"operation.inner_speed_rpm = {self.inner_speed_rpm:g}: a run is counted in shaft turns"
+            yield f"{what}; give at least {SLOWEST_RPM:g}, or turn the outer ring"
 
     @property
     def speeds(self) -> tuple[float, float]:

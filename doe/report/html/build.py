@@ -1,7 +1,4 @@
-"""The page, put together from its parts.
-
-Blocks as HTML; every text is escaped here.
-"""
+"""The page, put together from its parts: blocks as HTML; every text is escaped here."""
 
 import json
 from collections.abc import Mapping

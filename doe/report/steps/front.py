@@ -138,10 +138,9 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
 def _print_convergence(record: dict[str, Any]) -> None:
     history, whole = record["hypervolume_history"], record["hypervolume"]
     reached = next(number for number, each in enumerate(history, 1) if each >= 0.99 * whole)
-    print(
-        f"hypervolume {whole:.4f} of {record['largest_hypervolume']:.3f}; 99 % of it after generation {reached} of "
-        f"{record['generations']}, {record['evaluations']} evaluations"
-    )
+    size = f"hypervolume {whole:.4f} of {record['largest_hypervolume']:.3f}"
+    when = f"generation {reached} of {record['generations']}, {record['evaluations']} evaluations"
+    print(f"{size}; 99 % of it after {when}")
 
 
 def _print_gains(whose: str, gains: dict[str, Any]) -> None:

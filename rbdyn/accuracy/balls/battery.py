@@ -105,10 +105,8 @@ def conclusion(rows: Sequence[Success]) -> str:
     """Who solves most, and how the others compare."""
     best, *rest = sorted(rows, key=lambda row: -row.solved)
     others = ", ".join(f"{row.solver} {row.shown_share}" for row in rest)
-    return (
-        f"{best.solver} solves {best.shown_share} of {best.problems} random scenes, half of them within "
-        f"{best.median_us:.0f} us; {others}; 95 % intervals."
-    )
+    what = f"{best.solver} solves {best.shown_share} of {best.problems} random scenes"
+    return f"{what}, half of them within {best.median_us:.0f} us; {others}; 95 % intervals."
 
 
 def _fared(name: str, runs: Sequence[Run]) -> Success:

@@ -1,7 +1,5 @@
-"""Methods beside each other on one compiled right-hand side: error against time, and how many times faster ours is.
-
-How many times faster one method is than another at equal error, from their work-precision curves.
-"""
+"""Methods beside each other on one compiled right-hand side: error against time, and how many times faster ours is
+at equal error."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -27,6 +25,17 @@ REPEATS, TIMED_S = 5, 0.1
 POINTS = 41
 
 Curve = Sequence[tuple[float, float]]  # (error, time) pairs, all positive
+
+
+@dataclass(frozen=True)
+class Speedup:
+    """Ratio of times: geometric mean, least and greatest over the errors from ``low`` to ``high``."""
+
+    low: float
+    high: float
+    mean: float
+    least: float
+    greatest: float
 
 
 class Attempt(Record):
@@ -187,10 +196,8 @@ def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: f
             f"{ratio.mean:.2g} ({ratio.least:.2g} to {ratio.greatest:.2g}) times that of {name}"
             for name, ratio in ratios.items()
         )
-        sentences.append(
-            f"At equal position error after {turns:g} turns the speed of {OURS.name} is {faster}: geometric mean, least and "
-            "greatest over the errors in common."
-        )
+        what = f"At equal position error after {turns:g} turns the speed of {OURS.name} is {faster}"
+        sentences.append(f"{what}: geometric mean, least and greatest over the errors in common.")
     failed = {a.method: sum(b.method == a.method and b.status != OK for b in attempts) for a in attempts}
     settings = ", ".join(f"{name} at {count}" for name, count in failed.items() if count)
     if settings:
@@ -245,23 +252,12 @@ def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) ->
     save(figure, path)
 
 
-@dataclass(frozen=True)
-class Speedup:
-    """Ratio of times: geometric mean, least and greatest over the errors from ``low`` to ``high``."""
-
-    low: float
-    high: float
-    mean: float
-    least: float
-    greatest: float
-
-
 def front(curve: Curve) -> list[tuple[float, float]]:
     """The points that no other beats in both error and time, smallest error first."""
     unbeaten: list[tuple[float, float]] = []
-    for error, time in sorted(curve):
-        if not unbeaten or time < unbeaten[-1][1]:
-            unbeaten.append((error, time))
+    for error, took in sorted(curve):
+        if not unbeaten or took < unbeaten[-1][1]:
+            unbeaten.append((error, took))
     return unbeaten
 
 

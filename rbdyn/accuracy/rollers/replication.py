@@ -181,14 +181,10 @@ def _choice(name: str, rows: Sequence[Row], unsure: float, sought: float) -> str
     sharpest = min(rows, key=lambda row: row.half_width[name])
     width = sharpest.half_width[name]
     if width * math.exp(-unsure) > sought:
-        return (
-            f"{name} within {percent(sought)}: more than {sharpest.replicates} replicates of {sharpest.turns:g} turns; by "
-            f"the square root about {about(sharpest.replicates * (width / sought) ** 2)} of them."
-        )
-    return (
-        f"{name} within {percent(sought)}: undecided; {sharpest.replicates} replicates of {sharpest.turns:g} turns reach "
-        f"{percent(width)}, known to a factor of {math.exp(unsure):.2g}."
-    )
+        what = f"{name} within {percent(sought)}: more than {sharpest.replicates} replicates of {sharpest.turns:g}"
+        return f"{what} turns; by the square root about {about(sharpest.replicates * (width / sought) ** 2)} of them."
+    what = f"{name} within {percent(sought)}: undecided; {sharpest.replicates} replicates of {sharpest.turns:g}"
+    return f"{what} turns reach {percent(width)}, known to a factor of {math.exp(unsure):.2g}."
 
 
 def _draw(rows: Sequence[Row], path: Any) -> None:

@@ -67,12 +67,8 @@ def study(
 def slice_rows(scene: Scene, counts: Sequence[int] = COUNTS, progress: Reporter | None = None) -> list[Row]:
     """A row a number of slices, fewest first; the last is the reference of the statistics."""
     if not scene.needs_slices:
-        raise InputError(
-            [
-                f"bearing.roller_profile = {scene.bearing.roller_profile!r} with bearing.tilt_mrad = 0: one slice is "
-                "exact; give the roller a profile or the races a tilt to study its slices"
-            ]
-        )
+        what = f"bearing.roller_profile = {scene.bearing.roller_profile!r} with bearing.tilt_mrad = 0: one slice"
+        raise InputError([f"{what} is exact; give the roller a profile or the races a tilt to study its slices"])
     check_replicates(scene)
     counts = sorted(counts)
     counted = Progress(progress, len(counts) * scene.numerics.replicates)
@@ -145,10 +141,8 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
     chosen, hidden = first_within(compared, lambda row: f"{row.slices} slices", sought)
     sentences = [fewest]
     if chosen is not None:
-        sentences.append(
-            f"At {chosen.slices} the biases of the outputs measure at most {percent(sought)} (their errors at most "
-            f"{percent(chosen.known_to)})."
-        )
+        what = f"At {chosen.slices} the biases of the outputs measure at most {percent(sought)}"
+        sentences.append(f"{what} (their errors at most {percent(chosen.known_to)}).")
     if hidden:
         below = (chosen or rows[-1]).slices
         sentences.append(f"What fewer than {below} do to the outputs is {undecided(hidden, scene, sought)}.")

@@ -1,9 +1,5 @@
-"""The page: chapters in Markdown, put into one HTML file with contents and search.
-
-What one floor of the house adds to the manual.
-
-Keys of input files and options of commands as Markdown.
-"""
+"""The page: chapters in Markdown, with keys of input files and options of commands of every floor of the house, put into one
+HTML file with contents and search."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

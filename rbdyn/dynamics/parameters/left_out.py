@@ -153,10 +153,8 @@ def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
         if item.power is not None:
             power = item.power(scene)
             if power > NOTED_SHARE * power_loss > 0.0:
-                notes.append(
-                    f"left out: {item.name}, by an estimate {power:.2g} W ({100.0 * power / power_loss:.2g} % of the power "
-                    f"loss); {item.changes}"
-                )
+                what = f"left out: {item.name}, by an estimate {power:.2g} W"
+                notes.append(f"{what} ({100.0 * power / power_loss:.2g} % of the power loss); {item.changes}")
         elif item.matters is not None and item.matters(scene):
             notes.append(f"left out: {item.name}; {item.changes}")
     return tuple(notes)

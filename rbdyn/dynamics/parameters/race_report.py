@@ -54,10 +54,9 @@ def race_notes(scene: Scene, races: Mapping[str, Mapping[str, float]]) -> tuple[
     law, films = scene.traction, {name: race["lambda_ratio"] for name, race in races.items() if "lambda_ratio" in race}
     thinnest = min(films, key=films.__getitem__, default=None)
     if thinnest and films[thinnest] < FULL_FILM and law.friction == "film" and law.model not in ("coulomb", "off"):
-        notes.append(
-            f"film: lambda is {films[thinnest]:.2g} on the {thinnest} race, below {FULL_FILM:g}, so asperities touch while the friction is "
-            "that of a full film; set traction.friction = 'mixed', or check lubricant.temperature_C and the roughnesses"
-        )
+        what = f"film: lambda is {films[thinnest]:.2g} on the {thinnest} race, below {FULL_FILM:g}"
+        why = "so asperities touch while the friction is that of a full film; set traction.friction = 'mixed'"
+        notes.append(f"{what}, {why}, or check lubricant.temperature_C and the roughnesses")
     return tuple(notes)
 
 

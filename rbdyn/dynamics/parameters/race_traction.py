@@ -127,12 +127,8 @@ def _surface(scene: Scene, contact: RollingContact, oil: Oil, largest_load: floa
     largest_slip = LARGEST_SLIP_RATIO * contact.entrainment_speed
     fit = traction_surface(coefficient, largest_load, smallest_load, largest_slip)
     if fit.error > LARGEST_ERROR:
-        raise InputError(
-            [
-                f"traction.model = '{scene.traction.model}': its table is off by {100.0 * fit.error:.2g} % of the peak up "
-                f"to {largest_load:.4g} N; raise lubricant.temperature_C or choose another model"
-            ]
-        )
+        what = f"traction.model = '{scene.traction.model}': its table is off by {100.0 * fit.error:.2g} % of the peak"
+        raise InputError([f"{what} up to {largest_load:.4g} N; raise lubricant.temperature_C or choose another model"])
     return fit.surface
 
 

@@ -1,4 +1,11 @@
-"""Slow regimes: whether the figures have settled over the counted turns, and what slow change may add to their errors.
+"""Slow change: where the transient ends, whether what is counted has settled, and what slow change may add to its errors.
+
+The transient is found by MSER-5 on the mean of the replicates.
+The marginal standard error rule (White 1997, *Simulation* 69, 323; MSER-5: White, Cobb and Spratt 2000) drops the head
+of the series without which the rest has the smallest standard error of its mean, on means of five batches and over
+at most half of the run. Replicates are averaged first (Welch 1983), which leaves the transient and lowers the noise. On
+stationary noise the rule would still drop a little; so a head counts as a transient only if its mean differs from that
+of the rest beyond their scatter.
 
 Cages have slow regimes: loose ones change the way they whirl over 20 to 400 shaft turns, jumping at random moments, so no
 curve fitted to a start tells where it leads. What can be tested is whether the counted turns drift. Each replicate
@@ -14,14 +21,6 @@ Some regimes last for good: of the replicates of the bearing of Chen et al. 2022
 clearances one in 8. One that none of n replicates is in has a share of about 1/(n + 1) (Laplace's rule of succession);
 how far it may be away is gauged by the stretch of two impact windows, of any replicate, whose figure lies farthest from
 the mean of all. Their product counts too.
-
-Where the transient of a run ends, found from its series: MSER-5 on the mean of the replicates.
-
-The marginal standard error rule (White 1997, *Simulation* 69, 323; MSER-5: White, Cobb and Spratt 2000) drops the head
-of the series without which the rest has the smallest standard error of its mean, on means of five batches and over
-at most half of the run. Replicates are averaged first (Welch 1983), which leaves the transient and lowers the noise. On
-stationary noise the rule would still drop a little; so a head counts as a transient only if its mean differs from that
-of the rest beyond their scatter.
 """
 
 import math

@@ -63,10 +63,8 @@ def error_notes(scene: Scene, figures: dict[str, Quantity], fault: str | None) -
     few = {name: figures[name].effective_samples for name in JUDGED if not _enough(figures[name])}
     if few:
         listed = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
-        notes.append(
-            f"statistical error: uncertain where fewer than {FEW_SAMPLES:.0f} effective samples stand behind it "
-            f"({listed}); raise numerics.turns or numerics.replicates"
-        )
+        what = f"statistical error: uncertain where fewer than {FEW_SAMPLES:.0f} effective samples"
+        notes.append(f"{what} stand behind it ({listed}); raise numerics.turns or numerics.replicates")
     return notes + [note for name in JUDGED if (note := _numerical_note(scene, JUDGED[name], figures[name]))]
 
 

@@ -1,10 +1,8 @@
 """Runout of many bearings at once: races and balls drawn at random, answered in proportion.
 
 Each bearing of a lot has races of a given height (roundness and side-sway, peak to valley) in random orders and phases
-and balls with random diameters and sphericity. Only the orders that pass the balls (``linear_runout``) reach the ring,
+and balls with random diameters and sphericity. Only the orders that pass the balls (``linear_response``) reach the ring,
 each as one wave: a bearing's reading is the real part of a short sum, and a lot is a product of two matrices.
-
-Small form errors answered in proportion: what one ball's error does to an axially loaded ring, and sums of it.
 
 Under a purely axial load all balls are alike, so one ball tells all: an error e of the ball at the azimuth psi moves
 the ring by e g_x along psi, by e g_z axially, and tilts it by e g_tilt about the axis 90 degrees ahead of psi. Around

@@ -1,14 +1,12 @@
-"""Runout of the path that a ring takes.
+"""Runout of the path that a ring takes, and circles about a set of points in a plane.
 
 Three ways to put the radial motion into a number, none of which tells another:
 - ``indicator``: what a fixed indicator reads (its largest range over all directions). Class limits K_ia mean this. An
   eccentric groove shows wholly, as twice its eccentricity.
 - ``minimum_zone``, ``least_squares``: distance between the circles that hold the orbit of the ring's centre between
-  them ("distance between the maximum and minimum envelope circles", Zhou et al. 2024). An eccentric groove moves the
+  them, the first the minimum zone of ISO 1101 ("distance between the maximum and minimum envelope circles", Zhou et al. 2024). An eccentric groove moves the
   centre on a circle and does not show at all.
 - ``error_motion``: range of a fixed indicator's reading less its best-fitting once-per-turn part, as of a spindle.
-
-Circles about a set of points in a plane: least squares, and the minimum zone of ISO 1101; diameter of the set.
 """
 
 import math
@@ -54,9 +52,8 @@ def runout(path: Array, turns: int, face_radius: float) -> Runout:
     """
     steps, left = divmod(len(path), turns)
     if left or steps < 3:
-        raise ValueError(
-            f"{len(path)} steps in {turns} turns: not whole turns of at least three steps; mend the number of turns"
-        )
+        what = f"{len(path)} steps in {turns} turns: not whole turns of at least three steps"
+        raise ValueError(f"{what}; mend the number of turns")
     orbit, axial = path[:, :2], path[:, 2]
     # Far from the origin, digits of the small motion would be lost.
     orbit = orbit - orbit.mean(axis=0)
