@@ -25,8 +25,6 @@ def central_composite(
 ) -> Design:
     """Central composite design in standard order.
 
-    Parameters
-    ----------
     factors : number of factors k, at least 2.
     alpha : axial distance in coded units, or one of the words of `axial_distance`; "inscribed" is the
         rotatable design shrunk until its axial points lie at -1 and +1.
@@ -36,9 +34,7 @@ def central_composite(
         `centre_shares`.
     cube_blocks : blocks of the cube, 1, 2 or 4 (with ``blocks``).
 
-    Raises
-    ------
-    ValueError when a number is out of its range, ``alpha`` or ``cube`` is an unknown word, no fraction is
+    Raises ValueError when a number is out of its range, ``alpha`` or ``cube`` is an unknown word, no fraction is
     tabulated, or the blocks are impossible.
 
     Source: Box and Hunter, Multi-factor experimental designs for exploring response surfaces,

@@ -87,8 +87,6 @@ def direct_front(
 ) -> DirectFront:
     """Find the front of a noisy simulator; the same seed and the same runs give the same bits.
 
-    Parameters
-    ----------
     evaluate : runs points (n, k), a generation at once, and gives responses (n, m) and their standard errors (n, m),
         NaN where a run failed. Every row of every call must be a run of its own (a fresh seed, such as a running
         number), even at a point that was run before.
@@ -98,9 +96,7 @@ def direct_front(
     confidence : at which a difference counts while the search sorts.
     resample : share of the budget for fresh runs at the end. pick : rule that makes the pick.
 
-    Raises
-    ------
-    ValueError when the bounds are not a box, a setting is out of range, the budget is below five populations, or
+    Raises ValueError when the bounds are not a box, a setting is out of range, the budget is below five populations, or
     every run at the points of a stage failed or breaks a limit.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)

@@ -117,8 +117,6 @@ def tolerance_aware_front(
 ) -> ToleranceAware:
     """NSGA-II on robust costs, and what it costs and gains beside the plain front; the same seed, the same bits.
 
-    Parameters
-    ----------
     surfaces : of the m responses, in coded units.
     box : the tolerances.
     lower, upper : bounds (k,) of the region in coded units; the boxes of all points lie within.
@@ -128,9 +126,7 @@ def tolerance_aware_front(
     plain : points (coded) and costs of the plain front, and ``plain_pick`` the row of its pick.
     population, generations, seed, keep, pick, doubt : as for `doe.pareto.front`, of coded points.
 
-    Raises
-    ------
-    ValueError when a tolerance leaves no room in the region; InfeasibleError when no point keeps all limits.
+    Raises ValueError when a tolerance leaves no room in the region; InfeasibleError when no point keeps all limits.
     """
     low, high = lower + box.half, upper - box.half
     check_search(low, high, population, generations, keep)

@@ -85,8 +85,6 @@ def front_uncertainty(
 ) -> FrontUncertainty:
     """How sure a front is, from drawn responses.
 
-    Parameters
-    ----------
     drawn : responses (d, f, m) of the front's points on each drawn set of surfaces.
     half_widths : 95 % half widths (f, m) of the mean responses.
     goals : what is wanted of the responses.

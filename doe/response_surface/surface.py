@@ -173,8 +173,6 @@ def fit(
 ) -> Surface:
     """Fit one response by least squares.
 
-    Parameters
-    ----------
     coded : runs in coded units, shape (n, k).
     values : response of each run, shape (n,).
     name : name of the response, for messages.
@@ -189,9 +187,7 @@ def fit(
     block : label of the block of each run, whole numbers, shape (n,).
     transform : "none", "box_cox" for the recommended exponent, or an exponent: (y^lambda - 1)/lambda, ln y for 0.
 
-    Raises
-    ------
-    ValueError when a value is not finite, all are equal, shapes differ, the model is unknown, runs are too few
+    Raises ValueError when a value is not finite, all are equal, shapes differ, the model is unknown, runs are too few
     for it, the runs cannot tell its terms apart, a transform meets a value that is not positive, or weights are
     asked for and an error is not positive.
     """

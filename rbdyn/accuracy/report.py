@@ -6,12 +6,11 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.result import versions, write_json
 
 # Of each heading the field of a row and the format of its figure, see ``cell``, or a function that words it.
 Columns = Mapping[str, tuple[str, str] | Callable[[Any], str]]
-# Told (done, total) as a study goes on.
-Reporter = Callable[[int, int], None]
 
 
 class Table(NamedTuple):
@@ -39,7 +38,7 @@ class Report:
 class Progress:
     """Counts what is done out of a known total."""
 
-    def __init__(self, report: Reporter | None, total: int) -> None:
+    def __init__(self, report: Reporter, total: int) -> None:
         self.report, self.total, self.done = report, total, 0
 
     def step(self, *part: int) -> None:

@@ -67,9 +67,8 @@ def _print_row(title: str, row: RowReport, verbose: bool) -> None:
     keys = ("azimuth_deg", "inner_angle_deg", "outer_angle_deg", "inner_load_N", "outer_load_N", "centrifugal_force_N")
     rows = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in row.balls]
     print_table(title, header, rows)
-    print(
-        f"ring (x along the radial load, z along the axis): {_place(place)}, {', '.join(f'tilt {axis} {tilt[axis]:.4g} mrad' for axis in 'xy')}"
-    )
+    tilts = ", ".join(f"tilt {axis} {tilt[axis]:.4g} mrad" for axis in "xy")
+    print(f"ring (x along the radial load, z along the axis): {_place(place)}, {tilts}")
     for race, contact in row.contacts.items():
         film = ""
         if "central_film_um" in contact:

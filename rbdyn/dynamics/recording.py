@@ -2,14 +2,14 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE
@@ -145,7 +145,7 @@ def run_series(
     bearing: RollerBearing,
     tolerances: Sequence[float],
     workers: int | None,
-    progress: Callable[[int, int], None] | None,
+    progress: Reporter,
     stop: Stop,
 ) -> list[list[Replicate]]:
     """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""

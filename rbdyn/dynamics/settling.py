@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
-from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.recording import Recording, batches_of
 from rbdyn.dynamics.statistics.bias import companion_tolerance
 from rbdyn.dynamics.statistics.drift import drifting, start_of_counting
@@ -50,9 +50,7 @@ GROWTH = (4.0, 2.0)
 Start = Callable[[int, float, Stop], Recording]
 
 
-def run_until_settled(
-    scene: Scene, start: Start, workers: int | None, progress: Callable[[int, int], None] | None, stop: Stop
-) -> Ensemble:
+def run_until_settled(scene: Scene, start: Start, workers: int | None, progress: Reporter, stop: Stop) -> Ensemble:
     """Run the replicates of a scene, as far as it takes, then their companions just as far.
 
     Raises RunError when a replicate cannot go on, KeyboardInterrupt.
@@ -95,7 +93,7 @@ class Team:
     rtol: float
     workers: int | None
     stop: Stop
-    progress: Callable[[int, int], None] | None
+    progress: Reporter
     to_come: int
     done: int = 0
     recordings: dict[int, Recording] = field(default_factory=dict)

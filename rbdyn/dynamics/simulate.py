@@ -1,12 +1,11 @@
 """Replicates of a scene, gathered with error bars."""
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.ensemble import Reporter, Stop
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
 from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.parameters.left_out import heat_notes, left_out_notes, light_load_notes
@@ -37,7 +36,7 @@ def _types(parameters: Any) -> Any:
 def simulate(
     scene: Scene,
     workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter = None,
     stop: Stop | None = None,
     target: float | None = None,
 ) -> SimulationResult:

@@ -6,7 +6,7 @@ its cause, and the others go on. Finished points may be kept in a file, so that 
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rbdyn.cli.ranges import MOST_VALUES
-from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
@@ -92,7 +92,7 @@ def slip_map(
     speeds_rpm: Sequence[float],
     loads_N: Sequence[float],  # noqa: N803
     workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter = None,
     kept_in: Path | None = None,
 ) -> SlipMap:
     """Run the scene at every pair of inner speed and radial load; what lies in the file ``kept_in`` is not run again.

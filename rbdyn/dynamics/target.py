@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.dynamics.ensemble import Stop
+from rbdyn.arrays import Array
+from rbdyn.dynamics.ensemble import Reporter, Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
@@ -29,8 +29,6 @@ from rbdyn.dynamics.statistics.metrics import Replicate, mean_gap, work_done
 from rbdyn.faults import InputError
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
-
-Array = NDArray[np.float64]
 
 AIMED = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
 SCATTERED = AIMED[:2]  # their bias is seen over the tolerance, that of the loss by the power balance
@@ -114,7 +112,7 @@ def reach(
     target: float,
     simulate: Callable[..., SimulationResult],
     workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter = None,
     stop: Stop | None = None,
 ) -> SimulationResult:
     """``simulate`` until the total relative 95 % error of impact force, whirl ratio and power loss is at most ``target``.
@@ -169,7 +167,7 @@ def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
 
 
 def measure(
-    scene: Scene, workers: int | None, progress: Callable[[int, int], None] | None, stop: Stop | None
+    scene: Scene, workers: int | None, progress: Reporter, stop: Stop | None
 ) -> tuple[Model, Mapping[str, float]]:
     """Pilots over the ladder of tolerances: what they tell, and what they cost (``ADDED``). Raises RunError."""
     turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)

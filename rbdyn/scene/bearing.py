@@ -150,17 +150,15 @@ class Bearing(Consistent):
     def _form_faults(self) -> Iterator[str]:
         errors = self.roller_diameter_errors_um
         if errors is not None and len(errors) != self.rollers:
-            yield (
-                f"bearing.roller_diameter_errors_um: {len(errors)} values for {self.rollers} rollers; give one a roller"
-            )
+            why = f"bearing.roller_diameter_errors_um: {len(errors)} values for {self.rollers} rollers"
+            yield f"{why}; give one a roller"
         if errors is not None and self.roller_diameter_spread_um > 0.0:
             what = "bearing.roller_diameter_errors_um and bearing.roller_diameter_spread_um contradict each other"
             yield f"{what}: give the errors or their spread, not both"
         limit = 0.01 * self.roller_diameter_mm * 1e3
         if errors is not None and any(abs(error) > limit for error in errors):
-            yield (
-                f"bearing.roller_diameter_errors_um: beyond {limit:g} um, a hundredth of the roller; give micrometres"
-            )
+            why = f"bearing.roller_diameter_errors_um: beyond {limit:g} um, a hundredth of the roller"
+            yield f"{why}; give micrometres"
 
 
 class Cage(Consistent):

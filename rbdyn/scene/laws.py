@@ -94,9 +94,8 @@ class Laws(Consistent):
             if all(getattr(self, key) is not None for key in keys):
                 yield f"model.{keys[0]} and model.{keys[1]} contradict each other: give one of them"
         if self.pocket == "off" and self.pocket_film:
-            yield (
-                "model.pocket = 'off' and model.pocket_film = true contradict each other: drop the film or the 'off'"
-            )
+            what = "model.pocket = 'off' and model.pocket_film = true contradict each other"
+            yield f"{what}: drop the film or the 'off'"
 
     def alpha(self, part: str) -> float:
         """Hunt and Crossley's alpha [s/m] of 'pocket' or 'land', given or from its restitution."""

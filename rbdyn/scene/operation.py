@@ -32,9 +32,8 @@ class Schedule(Consistent):
         times = self.time_s
         for i, (a, b) in enumerate(pairwise(times)):
             if b <= a:
-                yield (
-                    f"operation.schedule.time_s: times must rise, but {b:g} s (point {i + 2}) follows {a:g} s; sort them"
-                )
+                what = f"operation.schedule.time_s: times must rise, but {b:g} s (point {i + 2}) follows {a:g} s"
+                yield f"{what}; sort them"
         for key in ("inner_speed_rpm", "radial_load_N"):
             values = getattr(self, key)
             if values is not None and len(values) != len(times):

@@ -41,7 +41,7 @@ class Run(NamedTuple):
     solve_us: float
 
 
-def study(scene: BallScene, progress: Reporter | None = None, scenes: int = SCENES) -> Report:
+def study(scene: BallScene, progress: Reporter = None, scenes: int = SCENES) -> Report:
     """``rbdyn accuracy --battery``, its first ``scenes`` scenes."""
     drawn = cases(scenes, SEED, **{key: getattr(scene.model, key) for key in MODEL})
     ball, rings = scene.material("ball"), scene.material("inner_ring")

@@ -88,10 +88,7 @@ def share(count: int, total: int) -> tuple[float, float]:
 
 
 def study(
-    scene: BallScene,
-    progress: Reporter | None = None,
-    limits: Sequence[int] = LIMITS,
-    perturbations: int = PERTURBATIONS,
+    scene: BallScene, progress: Reporter = None, limits: Sequence[int] = LIMITS, perturbations: int = PERTURBATIONS
 ) -> Report:
     """``rbdyn accuracy`` of a ball bearing. Raises InputError for two rows, RunError where there is no equilibrium."""
     if not isinstance(scene, SingleRowScene):

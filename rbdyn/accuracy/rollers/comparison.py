@@ -55,7 +55,7 @@ class Attempt(Record):
 
 def study(
     scene: Scene,
-    progress: Reporter | None = None,
+    progress: Reporter = None,
     turns: float = DEFAULT_TURNS,
     methods: Sequence[Method] = METHODS,
     sought: float = SOUGHT,
@@ -78,7 +78,7 @@ def study(
     )
 
 
-def trajectories(scene: Scene, progress: Reporter | None, turns: float, methods: Sequence[Method]) -> Report:
+def trajectories(scene: Scene, progress: Reporter, turns: float, methods: Sequence[Method]) -> Report:
     """Error and time of every method at every setting. Raises as ``study``."""
     stretches = trajectory.starts_after_transient(scene, turns)
     compile_s = compiling(stretches[0], methods)

@@ -39,7 +39,7 @@ class Row(Record):
     offset: float = shown("offset", "+.2g %")
 
 
-def study(scene: Scene, progress: Reporter | None = None, repeats: int = REPEATS) -> Report:
+def study(scene: Scene, progress: Reporter = None, repeats: int = REPEATS) -> Report:
     """``rbdyn accuracy --coverage``. Raises RunError, KeyboardInterrupt."""
     scene = one_bearing(scene)
     counted = Progress(progress, repeats + 1)
@@ -59,10 +59,8 @@ def study(scene: Scene, progress: Reporter | None = None, repeats: int = REPEATS
         f"{each * (scene.numerics.replicates + scene.numerics.companions):.0f}, and {100.0 * longer:.0f} % of the runs "
         "were lengthened.",
     ]
-    table, written = (
-        tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, columns_of(Row)),
-        records(rows),
-    )
+    table = tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, columns_of(Row))
+    written = records(rows)
     told: dict[str, Any] = {"pooled": pooled(rows), "repeats": repeats, "mean_turns": turns, "lengthened": longer}
     return reported("coverage", (table,), sentences, written, rows=written, **told, conclusion=" ".join(sentences))
 

@@ -40,7 +40,7 @@ class Row(Record):
 
 
 def bias_rows(
-    scene: Scene, settings: Sequence[tuple[Method, Sequence[float]]] = SETTINGS, progress: Reporter | None = None
+    scene: Scene, settings: Sequence[tuple[Method, Sequence[float]]] = SETTINGS, progress: Reporter = None
 ) -> list[Row]:
     """A row a setting. Raises InputError for a single replicate, RunError where the reference fails, KeyboardInterrupt."""
     check_replicates(scene)

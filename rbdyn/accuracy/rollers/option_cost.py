@@ -72,7 +72,7 @@ COLUMNS: Columns = {
 
 
 def option_costs(
-    scene: Scene, options: Mapping[str, Sequence[str]] = OPTIONS, progress: Reporter | None = None
+    scene: Scene, options: Mapping[str, Sequence[str]] = OPTIONS, progress: Reporter = None
 ) -> list[OptionCost]:
     """A row an option that the scene allows. Raises RunError, KeyboardInterrupt."""
     plain = with_options(scene, (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}"))
@@ -116,7 +116,7 @@ def with_options(scene: Scene, assignments: Sequence[str]) -> Scene:
     return Scene.from_dict(data, " ".join(assignments))
 
 
-def study(scene: Scene, progress: Reporter | None = None, options: Mapping[str, Sequence[str]] = OPTIONS) -> Report:
+def study(scene: Scene, progress: Reporter = None, options: Mapping[str, Sequence[str]] = OPTIONS) -> Report:
     """``rbdyn accuracy --options``. Raises RunError, KeyboardInterrupt."""
     costs = option_costs(scene, options, progress)
     rows = [cost.as_dict() for cost in costs]

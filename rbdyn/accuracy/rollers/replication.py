@@ -63,11 +63,7 @@ class Slope(Record):
 
 
 def study(
-    scene: Scene,
-    progress: Reporter | None = None,
-    turns: Sequence[float] = TURNS,
-    pool: int = POOL,
-    sought: float = SOUGHT,
+    scene: Scene, progress: Reporter = None, turns: Sequence[float] = TURNS, pool: int = POOL, sought: float = SOUGHT
 ) -> Report:
     """``rbdyn accuracy --replicates``. Raises RunError, KeyboardInterrupt."""
     values, cpu_s = pool_of_runs(scene, turns, pool, progress)
@@ -91,7 +87,7 @@ def study(
 
 
 def pool_of_runs(
-    scene: Scene, turns: Sequence[float], pool: int, progress: Reporter | None = None
+    scene: Scene, turns: Sequence[float], pool: int, progress: Reporter = None
 ) -> tuple[dict[float, dict[str, Array]], dict[float, float]]:
     """Per length the outputs of every replicate, and the mean processor time of one [s], discarded turns included.
 
@@ -163,9 +159,8 @@ def conclusion(
             None: f"undecided: errors of {fall.half_width:.2g} hide a difference of {abs(fall.power + 0.5):.2g}; a pool "
             f"of about {about(1.0 + (pool - 1) * (fall.half_width / SLOPE_ERROR) ** 2)} replicates tells",
         }[fall.as_expected]
-        sentences.append(
-            f"{name}: scatter falls with counted turns to the power {fall.power:.2f} ± {fall.half_width:.2f}, {verdict}."
-        )
+        what = f"{name}: scatter falls with counted turns to the power {fall.power:.2f} ± {fall.half_width:.2f}"
+        sentences.append(f"{what}, {verdict}.")
     sentences += [_choice(name, rows, scatter_error(pool), sought) for name in OUTPUTS]
     numerics = scene.numerics
     sentences.append(f"The scene has {numerics.replicates} of {numerics.turns:g}.")

@@ -85,7 +85,7 @@ def scaling(
     rollers: Sequence[int] = ROLLERS,
     slices: Sequence[int] = SLICES,
     memory_turns: Sequence[int] = MEMORY_TURNS,
-    progress: Reporter | None = None,
+    progress: Reporter = None,
 ) -> Scaling:
     """Measure a scene. Raises InputError where it cannot be enlarged or cut, RunError, KeyboardInterrupt."""
     scenes = {
@@ -205,7 +205,7 @@ def _largest_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * per_unit / 1024.0**2
 
 
-def study(scene: Scene, progress: Reporter | None = None) -> Report:
+def study(scene: Scene, progress: Reporter = None) -> Report:
     """``rbdyn accuracy --scaling``. Raises InputError, RunError, KeyboardInterrupt."""
     return report(scaling(scene, progress=progress))
 

@@ -38,9 +38,7 @@ class Row(Bias):
     rhs_ns: float = shown("ns a right-hand side", ".0f")
 
 
-def study(
-    scene: Scene, progress: Reporter | None = None, counts: Sequence[int] = COUNTS, sought: float = SOUGHT
-) -> Report:
+def study(scene: Scene, progress: Reporter = None, counts: Sequence[int] = COUNTS, sought: float = SOUGHT) -> Report:
     """``rbdyn accuracy --slices``.
 
     Raises InputError for a roller without slices or a single replicate, RunError, KeyboardInterrupt.
@@ -64,7 +62,7 @@ def study(
     )
 
 
-def slice_rows(scene: Scene, counts: Sequence[int] = COUNTS, progress: Reporter | None = None) -> list[Row]:
+def slice_rows(scene: Scene, counts: Sequence[int] = COUNTS, progress: Reporter = None) -> list[Row]:
     """A row a number of slices, fewest first; the last is the reference of the statistics."""
     if not scene.needs_slices:
         what = f"bearing.roller_profile = {scene.bearing.roller_profile!r} with bearing.tilt_mrad = 0: one slice"

@@ -70,9 +70,7 @@ def cases(scene: Scene) -> dict[str, tuple[str, ...]]:
     return {name: tuple(Template(each).substitute(figures) for each in told) for name, told in listed.items()}
 
 
-def battery(
-    scene: Scene, chosen: Mapping[str, Sequence[str]] | None = None, progress: Reporter | None = None
-) -> list[Ending]:
+def battery(scene: Scene, chosen: Mapping[str, Sequence[str]] | None = None, progress: Reporter = None) -> list[Ending]:
     """A row a case; all cases unless some are ``chosen``. Raises KeyboardInterrupt."""
     listed = cases(scene) if chosen is None else chosen
     counted, rows = Progress(progress, len(listed)), []
@@ -134,7 +132,7 @@ def _judge(figures: Mapping[str, float], rtol: float, tightened: bool) -> tuple[
     return CLOSED, ""
 
 
-def study(scene: Scene, progress: Reporter | None = None) -> Report:
+def study(scene: Scene, progress: Reporter = None) -> Report:
     """``rbdyn accuracy --stability``. Raises KeyboardInterrupt."""
     return report(battery(scene, progress=progress))
 

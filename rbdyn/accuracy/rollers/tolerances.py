@@ -97,7 +97,7 @@ class StatisticsBias(Record):
 
 
 def statistics_bias(
-    scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Reporter | None = None
+    scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Reporter = None
 ) -> StatisticsBias:
     """A row a tolerance. Runs one replicate at a time.
 

@@ -166,20 +166,15 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
     sizes = drawing.rollers, drawing.roller_diameter, drawing.effective_length, drawing.pitch_diameter
     capacity = drawing.dynamic_capacity_N or dynamic_capacity(*sizes)
     inner, outer = operation.speeds
-    rules, load = (
-        minimum_loads(drawing.pitch_diameter, inner - outer, capacity, static_capacity(*sizes)),
-        operation.largest_load_N,
-    )
+    rules = minimum_loads(drawing.pitch_diameter, inner - outer, capacity, static_capacity(*sizes))
+    load = operation.largest_load_N
     missed = sum(load < least for least in rules.values())
     if not missed:
         return ()
-    listed = ", ".join(
-        f"{1e-3 * least:.2g} kN ({rule})" for rule, least in sorted(rules.items(), key=lambda item: item[1])
-    )
-    return (
-        f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {listed}; no rule is safe, "
-        "cage_slip tells",
-    )
+    rising = sorted(rules.items(), key=lambda item: item[1])
+    listed = ", ".join(f"{1e-3 * least:.2g} kN ({rule})" for rule, least in rising)
+    what = f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {listed}"
+    return (f"{what}; no rule is safe, cage_slip tells",)
 
 
 def heat_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
