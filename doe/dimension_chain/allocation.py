@@ -176,9 +176,8 @@ class Allocation:
         """Each tolerance at the widest grade within it; one finer than IT01 keeps its width without a grade."""
         free = {link.name: link for link in self.chain.free}
         ladders = {name: list(grade_tolerances(link.nominal).items()) for name, link in free.items()}
-        steps = {
-            name: sum(width <= tolerances[name] + SLACK for _, width in ladder) - 1 for name, ladder in ladders.items()
-        }
+        room = {name: tolerances[name] + SLACK for name in ladders}
+        steps = {name: sum(width <= room[name] for _, width in ladder) - 1 for name, ladder in ladders.items()}
 
         def parts(steps: Mapping[str, int]) -> list[Part]:
             chosen = {name: ladders[name][step] for name, step in steps.items() if step >= 0}

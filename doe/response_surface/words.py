@@ -43,9 +43,8 @@ def _terms(surface: Surface) -> str:
 def _lack_of_fit(surface: Surface) -> str:
     p = surface.lack_of_fit["p"]
     if p is not None and p <= ALPHA:
-        what = (
-            f"lack of fit is significant ({p_text(p)}): the surface misses more than the scatter of replicates explains"
-        )
+        why = f"lack of fit is significant ({p_text(p)})"
+        what = f"{why}: the surface misses more than the scatter of replicates explains"
         mend = "enlarge the model, transform the response or narrow the region, and confirm predictions by runs"
         return f"{what}; {mend}."
     if p is not None:

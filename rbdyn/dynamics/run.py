@@ -52,9 +52,8 @@ class Run:
         """Settle "auto" by a trial from where the run stands, which is left as it is."""
         if self.method != "auto":
             return
-        self.method, stiffness = cheaper_method(
-            self.scene, self.bearing, self.explicit, self._control_by, self.carry, self.tally, self.sample_step
-        )
+        memory = self.carry, self.tally, self.sample_step
+        self.method, stiffness = cheaper_method(self.scene, self.bearing, self.explicit, self._control_by, *memory)
         if self.method == "rosenbrock":
             # The implicit method does not see what it overcomes.
             self.carry.stiffness[:] = stiffness

@@ -130,9 +130,8 @@ def slip_map(
         waiting[place] -= 1
         if not waiting[place]:
             cause = causes.get(place)
-            ours, theirs = (
-                [runs.pop((place, rtol, i)) for i in range(count)] if cause is None else [] for rtol, count in series
-            )
+            whole = series if cause is None else [(rtol, 0) for rtol, _ in series]
+            ours, theirs = ([runs.pop((place, rtol, i)) for i in range(count)] for rtol, count in whole)
             points[place] = _point(scenes[place], ours, theirs, cause)
             kept.put(keys[place], points[place].as_dict())
         if progress is not None:

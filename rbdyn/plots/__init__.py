@@ -10,13 +10,5 @@ from rbdyn.plots.contacts import power_by_loss, roller_loads, sliding
 from rbdyn.plots.motion import cage_orbit, forces, pocket_forces, section, spectra, whirl
 
 __all__ = [
-    "cage_orbit",
-    "forces",
-    "pocket_forces",
-    "power_by_loss",
-    "roller_loads",
-    "section",
-    "sliding",
-    "spectra",
-    "whirl",
-]
+    "cage_orbit", "forces", "pocket_forces", "power_by_loss", "roller_loads", "section", "sliding", "spectra", "whirl",
+]  # fmt: skip

@@ -110,9 +110,8 @@ def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> Ba
         layers[name] = row_report(rating, row, film_record(scene, rating, row, rings[name]), None)
         notes += sentences(remarks(row.figures[np.newaxis], [rating], name))
     notes += sentences([tipping(solution.displacement[np.newaxis, 3:], scene)])
-    grown = growth_record(
-        scene, {"inner_less_middle_bore": model.changes[0], "middle_less_outer_race": model.changes[1]}
-    )
+    races = zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True)
+    grown = growth_record(scene, dict(races))
     report = DoubleDeckerReport(
         **told.displacement_record(solution.displacement),
         stiffness=told.stiffness_record(solution.stiffness),

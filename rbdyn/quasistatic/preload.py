@@ -16,7 +16,8 @@ from scipy.optimize import minimize_scalar
 
 from rbdyn.arrays import Array
 from rbdyn.faults import validated
-from rbdyn.quasistatic.fatigue import reference_capacities, solution_life, turning_rings
+from rbdyn.life.turns import turning_rings
+from rbdyn.quasistatic.fatigue import reference_capacities, solution_life
 from rbdyn.quasistatic.remarks import Rating, pressures
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of

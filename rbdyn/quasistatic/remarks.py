@@ -82,9 +82,8 @@ def needed_friction(balls: Array, ratings: Sequence[Rating]) -> Array:
     diameter = np.array([[rating.drawing.ball_diameter] for rating in ratings])
     with np.errstate(divide="ignore", invalid="ignore"):
         if isinstance(controls[0], FrictionShare):
-            ratio = np.array(
-                [[model.outer_contact.stiffness / model.inner_contact.stiffness] for _, model, *_ in ratings]
-            )
+            models = [rating.model for rating in ratings]
+            ratio = np.array([[m.outer_contact.stiffness / m.inner_contact.stiffness] for m in models])
             weight = share * (inner / outer * ratio) ** (4.0 / 3.0)
             share = weight / (1.0 + weight)
         pull = 2.0 * np.abs(balls[:, :, MOMENT]) / diameter

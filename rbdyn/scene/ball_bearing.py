@@ -71,20 +71,16 @@ class BallRow(Consistent):
             return []
         gap = self.groove_centre_distance_mm
         if clearance >= 2.0 * gap:
-            return [
-                f"radial_clearance_mm = {clearance:g}: grooves with centres {gap:.4g} mm apart cannot hold a ball with "
-                f"that much; make it less than {2.0 * gap:.4g}"
-            ]
+            what = f"radial_clearance_mm = {clearance:g}: grooves with centres {gap:.4g} mm apart"
+            return [f"{what} cannot hold a ball with that much; make it less than {2.0 * gap:.4g}"]
         if angle is None:
             return []
         implied = math.degrees(math.acos(min(1.0 - clearance / (2.0 * gap), 1.0)))
         if abs(implied - angle) > AGREED_DEG:
             clearance_of_angle = 2.0 * gap * (1.0 - math.cos(math.radians(angle)))
-            return [
-                f"contact_angle_deg = {angle:g} and radial_clearance_mm = {clearance:g} contradict each other: that clearance "
-                f"gives {implied:.4g} deg, that angle {clearance_of_angle:.4g} mm; leave one out, and give what mounting "
-                "changes as clearance_change_um"
-            ]
+            what = f"contact_angle_deg = {angle:g} and radial_clearance_mm = {clearance:g} contradict each other"
+            why = f"that clearance gives {implied:.4g} deg, that angle {clearance_of_angle:.4g} mm"
+            return [f"{what}: {why}; leave one out, and give what mounting changes as clearance_change_um"]
         return []
 
     def _ring_faults(self) -> Iterator[str]:

@@ -110,9 +110,8 @@ def _tile(tile: Tile) -> str:
 
 def _table(table: Table) -> str:
     words = {0, *table.text_columns}
-    header = "".join(
-        f"<th scope='col'{_kind(place, words)}>{escape(cell)}</th>" for place, cell in enumerate(table.header)
-    )
+    heads = enumerate(table.header)
+    header = "".join(f"<th scope='col'{_kind(place, words)}>{escape(cell)}</th>" for place, cell in heads)
     rows = []
     for name, *cells in table.rows:
         columns = "".join(f"<td{_kind(place, words)}>{_cell(cell)}</td>" for place, cell in enumerate(cells, 1))
@@ -123,9 +122,8 @@ def _table(table: Table) -> str:
         f'<div class="scroll" role="region" aria-label="{caption}"><table{sort}><caption>{caption}</caption>'
         f"<thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>{note}"
     )
-    return (
-        f"<details><summary>{caption}</summary>{body}</details>" if table.folded else f'<div class="table">{body}</div>'
-    )
+    folded = f"<details><summary>{caption}</summary>{body}</details>"
+    return folded if table.folded else f'<div class="table">{body}</div>'
 
 
 def _cell(text: str) -> str:

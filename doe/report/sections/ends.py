@@ -15,14 +15,12 @@ def reference(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     levels, effects, words = [], [], []
     for name, each in (part(summary, "beside_reference") or {}).items():
         for whose in ("ours", "theirs"):
-            levels.append(
-                (f"{label(name)}, {whose}", *(shown(x) for x in each.get(f"{whose}_min_mean_max") or ("",) * 3))
-            )
+            known = each.get(f"{whose}_min_mean_max") or ("",) * 3
+            levels.append((f"{label(name)}, {whose}", *map(shown, known)))
         for factor, effect in (each.get("linear_effects") or {}).items():
             sign = "same" if effect.get("same_sign") else "opposite"
-            effects.append(
-                (label(name), label(factor), shown(effect.get("ours"), 3), shown(effect.get("theirs"), 3), sign)
-            )
+            sizes = (shown(effect.get(whose), 3) for whose in ("ours", "theirs"))
+            effects.append((label(name), label(factor), *sizes, sign))
         words.append(" ".join(filter(None, (each.get("verdict"), each.get("why")))))
     blocks: list[Block] = [Bullets([text for text in words if text])]
     blocks.append(Table("Levels", ("response", "least", "mean", "largest"), levels))

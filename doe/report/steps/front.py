@@ -112,14 +112,12 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
     _print_gains("the pick", record["predicted_gains"])
     sure = record["pick_dominates_baseline"]
     print(record["statement"])
-    flattered = ", ".join(
-        f"{name} {gain['selection_optimism_percent']:+.2f} %" for name, gain in record["predicted_gains"].items()
-    )
+    luck = {name: gain["selection_optimism_percent"] for name, gain in record["predicted_gains"].items()}
+    flattered = ", ".join(f"{name} {percent:+.2f} %" for name, percent in luck.items())
     print(f"the rule picks what errors flatter; luck expected in these gains: {flattered}")
-    print(
-        f"pick: {record['pick']['reason']}; on {sure['draws']} surfaces drawn from their errors it dominates the "
-        f"baseline with probability {sure['probability']:.3f} ± {1.96 * sure['standard_error']:.3f}"
-    )
+    chance = f"{sure['probability']:.3f} ± {1.96 * sure['standard_error']:.3f}"
+    drawn = f"on {sure['draws']} surfaces drawn from their errors it dominates the baseline with probability {chance}"
+    print(f"pick: {record['pick']['reason']}; {drawn}")
     for limit in record["constraints"]:
         print(f"limit: {limit['response']} {limit['sense']} {limit['limit']:g}; the pick has {limit['value']:.5g}")
     if record["feasible_share"] < 1.0:

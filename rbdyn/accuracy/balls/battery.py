@@ -183,9 +183,8 @@ def _draw(runs: dict[str, list[Run]], path: Path) -> None:
     from rbdyn.plots.style import label_ends, plain, plt, save
 
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
-    axis.set(
-        xscale="log", xlabel="time of a call [us]", ylabel="share of scenes solved within it [%]", ylim=(0.0, 103.0)
-    )
+    axis.set(xscale="log", xlabel="time of a call [us]", ylim=(0.0, 103.0))
+    axis.set_ylabel("share of scenes solved within it [%]")
     plain(axis)
     ends: list[Named] = []
     for (name, series), colour in zip(runs.items(), METHOD_COLOURS, strict=False):

@@ -84,11 +84,7 @@ def trajectories(scene: Scene, progress: Reporter, turns: float, methods: Sequen
     compile_s = compiling(stretches[0], methods)
     counted = Progress(progress, STARTS + sum(len(method.settings) for method in methods))
     known = trajectory.reference(stretches, counted.step)
-    attempts = []
-    for method in methods:
-        for attempt in attempts_of(method, stretches, known):
-            attempts.append(attempt)
-            counted.step()
+    attempts = [each for method in methods for each in counted.over(attempts_of(method, stretches, known))]
     ratios = speedups(attempts, known.floor(turns))
     sentences = conclusion(attempts, ratios, known.floor(turns), turns)
     written = records(attempts)

@@ -45,10 +45,8 @@ def study(scene: Scene, progress: Reporter = None, repeats: int = REPEATS) -> Re
     counted = Progress(progress, repeats + 1)
     truth = simulate(truth_of(scene))
     counted.step()
-    results = []
-    for k in range(repeats):
-        results.append(simulate(with_numerics(scene, seed=FIRST_SEED + SEED_STEP * k)))
-        counted.step()
+    seeds = (FIRST_SEED + SEED_STEP * k for k in range(repeats))
+    results = [simulate(with_numerics(scene, seed=seed)) for seed in counted.over(seeds)]
     rows = [row(name, truth, results) for name in FIGURES]
     turns = sum(result.cost["turns"] for result in results) / repeats
     each = scene.numerics.turns + scene.numerics.warm_up_turns

@@ -103,9 +103,8 @@ def table(rows: Sequence[Row], sought: float = SOUGHT) -> Table:
         return lambda row: "" if row.found is None else text(row.found)
 
     biases = {heading: where_found(text) for heading, text in bias_columns(sought).items()}
-    return tabled(
-        f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors", rows, {**columns_of(Row), **biases}
-    )
+    title = f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors"
+    return tabled(title, rows, {**columns_of(Row), **biases})
 
 
 def _replicates(scene: Scene, start: Callable[[int], Run]) -> list[Replicate]:

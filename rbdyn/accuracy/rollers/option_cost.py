@@ -83,7 +83,7 @@ def option_costs(
     bearings = [roller_bearing(option) for option in chosen.values()]
     modules = added_modules(plain, list(chosen.values()))
     rows, counted = [], Progress(progress, len(chosen))
-    for (name, option), bearing, needed in zip(chosen.items(), bearings, modules, strict=True):
+    for (name, option), bearing, needed in counted.over(zip(chosen.items(), bearings, modules, strict=True)):
         compile_s = prepare(option, bearing)
         times: tuple[list[float], list[float]] = ([], [])
         gap = 0.0
@@ -95,7 +95,6 @@ def option_costs(
         with_ns, without_ns = (float(np.median(series)) for series in times)
         holds = footprint(option, bearing)
         rows.append(OptionCost(name, with_ns, without_ns, gap, compile_s, needed, holds, plain_holds))
-        counted.step()
     return rows
 
 

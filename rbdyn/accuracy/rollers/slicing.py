@@ -131,10 +131,8 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
     good = [row for row in rows if row.load_error <= NEGLIGIBLE]
     if not good:
         return f"not even {rows[-1].slices} slices keep the load within {percent(NEGLIGIBLE)}"
-    fewest = (
-        f"{good[0].slices} slices are the fewest whose load is right within {percent(NEGLIGIBLE)}: "
-        f"{good[0].rhs_ns:.0f} ns a right-hand side. The scene has {scene.slices}."
-    )
+    why = f"{good[0].slices} slices are the fewest whose load is right within {percent(NEGLIGIBLE)}"
+    fewest = f"{why}: {good[0].rhs_ns:.0f} ns a right-hand side. The scene has {scene.slices}."
     compared = [row for row in good if row is not rows[-1]]
     chosen, hidden = first_within(compared, lambda row: f"{row.slices} slices", sought)
     sentences = [fewest]

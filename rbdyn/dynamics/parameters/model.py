@@ -225,9 +225,8 @@ def _drag(scene: Scene, oil: Oil) -> Any:
     laws, drawing = scene.model, scene.bearing
     if laws.drag == "off" or laws.drag_coefficient == 0.0:
         return NoDrag()
-    return cylinder_drag(
-        oil.density, scene.lubricant.oil_fraction, laws.drag_coefficient, drawing.roller_diameter, drawing.roller_length
-    )
+    sizes, fraction = (drawing.roller_diameter, drawing.roller_length), scene.lubricant.oil_fraction
+    return cylinder_drag(oil.density, fraction, laws.drag_coefficient, *sizes)
 
 
 def _cage(scene: Scene) -> BalancedCage | UnbalancedCage:

@@ -22,9 +22,8 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
 
     With a profile or a tilt the pressure is that of the most loaded slice, with the roller where the tilt is largest.
     """
-    films = film_report(
-        scene, scene.lubricant.in_service, max(inner_load, SMALLEST_LOAD), max(outer_load, SMALLEST_LOAD)
-    )
+    loads = max(inner_load, SMALLEST_LOAD), max(outer_load, SMALLEST_LOAD)
+    films = film_report(scene, scene.lubricant.in_service, *loads)
     count = scene.slices
     contacts = rolling_contacts(scene)
     report = {}

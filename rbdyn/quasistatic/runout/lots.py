@@ -165,9 +165,8 @@ def readings(
         on_face = response.axial[change] * lifting - face_radius * response.tilt[change] * shifting
         face.append((races[kind] @ (sign * on_face)).real)
     coefficients, (shift, tilt), lift = _ball_waves(parts, response, turning.spin * turn, cage)
-    return Readings(
-        np.array(radial), np.array(face), (coefficients @ shift).real, (coefficients @ (lift - face_radius * tilt)).real
-    )
+    of_balls = (coefficients @ shift).real, (coefficients @ (lift - face_radius * tilt)).real
+    return Readings(np.array(radial), np.array(face), *of_balls)
 
 
 def _passing(order: NDArray[np.int64], relative: Array, cage: Array, z: int) -> tuple[Waves, Waves]:
