@@ -169,10 +169,8 @@ def _print(record: dict[str, Any], table: SweepResult | None, quiet: bool) -> No
 
 
 def _print_limits(record: dict[str, Any]) -> None:
-    rows = [
-        (race, f"{record[f'{race}_roundness_um']:.3g}", f"{record[f'{race}_sway_um']:.3g}")
-        for race in ("inner", "outer")
-    ]
+    of_race = {race: (record[f"{race}_roundness_um"], record[f"{race}_sway_um"]) for race in ("inner", "outer")}
+    rows = [(race, f"{roundness:.3g}", f"{sway:.3g}") for race, (roundness, sway) in of_race.items()]
     title = f"class {record['class']}: {record['radial_limit_um']:g} um radial, {record['axial_limit_um']:g} um axial runout"
     print_table(title, ("race", "roundness up to [um]", "side-sway up to [um]"), rows)
     print(

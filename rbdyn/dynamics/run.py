@@ -5,8 +5,8 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
@@ -99,7 +99,7 @@ class Run:
             kept[:] = 0.0
         self.carry.clock[at.SAMPLE] = self.carry.clock[at.NOW]
 
-    def clock_angles(self) -> NDArray[np.float64]:
+    def clock_angles(self) -> Array:
         """Angles of inner and outer ring [rad] since the start."""
         clock = self.layout.clock
         if clock is None:

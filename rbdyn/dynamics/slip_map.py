@@ -138,10 +138,7 @@ def slip_map(
             progress(done, len(tasks))
 
     started = time.perf_counter()
-    work = [
-        partial(run_replicate, scenes[place], bearings[place], replicate, rtol, stop)
-        for place, rtol, replicate in tasks
-    ]
+    work = [partial(run_replicate, scenes[place], bearings[place], i, rtol, stop) for place, rtol, i in tasks]
     run_all(work, workers, stop, ended)
     wall_s = time.perf_counter() - started
     ordered = tuple(points[place] for place in range(len(scenes)))

@@ -11,7 +11,7 @@ together, pilots and earlier runs included.
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -166,9 +166,7 @@ def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
     return dict(zip(AIMED, figures, strict=True))
 
 
-def measure(
-    scene: Scene, workers: int | None, progress: Reporter, stop: Stop | None
-) -> tuple[Model, Mapping[str, float]]:
+def measure(scene: Scene, workers: int | None, progress: Reporter, stop: Stop | None) -> tuple[Model, dict[str, float]]:
     """Pilots over the ladder of tolerances: what they tell, and what they cost (``ADDED``). Raises RunError."""
     turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)
     pilot = with_numerics(scene, turns=turns, replicates=PILOT_REPLICATES)

@@ -5,9 +5,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Mask
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
 from rbdyn.contact.static_limit import BALLS, dent_sentence
 from rbdyn.quasistatic.row.control import FixedShare, FrictionShare
@@ -37,7 +36,7 @@ class Remark(NamedTuple):
     """Something unusual: in a word, at which of n points, and what to say of one of them."""
 
     word: str
-    where: NDArray[np.bool_]
+    where: Mask
     say: Callable[[int], str]
     row: str = ""
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from doe.report.words import probability
 from doe.response_surface import Surface, describe
 from rbdyn.cli.terminal import print_table
 
@@ -110,8 +111,7 @@ def _verdict(p: float | None) -> tuple[str, str]:
     """A p value and its stars."""
     if p is None:
         return "", ""
-    stars = next((stars for limit, stars in STARS if p <= limit), "")
-    return "< 0.0001" if p < 1e-4 else f"{p:.4f}", stars
+    return probability(p), next((stars for limit, stars in STARS if p <= limit), "")
 
 
 def _shown(value: float | None) -> str:

@@ -142,10 +142,8 @@ def _print_convergence(record: dict[str, Any]) -> None:
 
 
 def _print_gains(whose: str, gains: dict[str, Any]) -> None:
-    rows = [
-        (name, change(gain), gain["verdict"], f"± {_number(gain['single_run_scatter_percent'])} %")
-        for name, gain in gains.items()
-    ]
+    scatter = {name: _number(gain["single_run_scatter_percent"]) for name, gain in gains.items()}
+    rows = [(name, change(gain), gain["verdict"], f"± {scatter[name]} %") for name, gain in gains.items()]
     header = ("", "against the baseline", "verdict", "scatter of two single runs")
     print_table(f"predicted gains of {whose}", header, rows)
 

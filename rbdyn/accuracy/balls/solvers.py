@@ -193,11 +193,8 @@ def success_table(title: str, rows: Sequence[Success], first: str = "solver") ->
 
 def causes(rows: Sequence[Success]) -> list[str]:
     """A sentence for each solver that failed somewhere."""
-    return [
-        f"{row.solver} failed: " + "; ".join(f"{count} x {why}" for why, count in row.causes.items())
-        for row in rows
-        if row.causes
-    ]
+    told = {row.solver: "; ".join(f"{count} x {why}" for why, count in row.causes.items()) for row in rows}
+    return [f"{solver} failed: {whys}" for solver, whys in told.items() if whys]
 
 
 def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:

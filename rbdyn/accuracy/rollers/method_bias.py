@@ -59,11 +59,8 @@ def bias_rows(
                 step = fixed_step(scene, setting)
                 return FixedStepRun(scene, bearing, index, step, method.name == VELOCITY_VERLET.name)
 
-            label = (
-                f"rtol {setting:g}"
-                if method.adaptive
-                else f"{scene.turn_s / fixed_step(scene, setting):.0f} steps a turn"
-            )
+            steps = f"{scene.turn_s / fixed_step(scene, setting):.0f} steps a turn"
+            label = f"rtol {setting:g}" if method.adaptive else steps
             try:
                 rows.append(_row(scene, method.name, label, _replicates(scene, start), reference))
             except RunError as error:

@@ -212,10 +212,9 @@ def report(measured: Scaling) -> Report:
     for kind, line in measured.lines.items():
         straight = f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f})"
         sentences.append(f"{straight}; as a power: n^{line.exponent:.2f}")
-    sentences += [
-        f"{memory.turns} counted turns: at most {memory.peak_MiB:.1f} MiB in a process of its own"
-        for memory in measured.memory
-    ]
+    for memory in measured.memory:
+        most = f"at most {memory.peak_MiB:.1f} MiB in a process of its own"
+        sentences.append(f"{memory.turns} counted turns: {most}")
     points: dict[str, Any] = {kind: records(sizes) for kind, sizes in measured.points.items()}
     fits = {kind: asdict(line) for kind, line in measured.lines.items()}
     sheet = [{"of": kind, **point} for kind, sizes in points.items() for point in sizes]

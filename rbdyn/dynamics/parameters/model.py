@@ -7,8 +7,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.film import short_journal_film
 from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, sliced
@@ -124,7 +124,7 @@ def race_contact_law(scene: Scene, which: str) -> Any:
     )
 
 
-def roller_relief(scene: Scene, slices: int) -> NDArray[np.float64]:
+def roller_relief(scene: Scene, slices: int) -> Array:
     """Profile drop of the roller at its slice centres [m]."""
     from rbdyn.contact import profile
 

@@ -24,7 +24,6 @@ the mean of all. Their product counts too.
 """
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +32,7 @@ from rbdyn.arrays import Array
 from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics import metrics
 from rbdyn.dynamics.statistics.batch_means import autocorrelation_time, estimate, student_factor
-from rbdyn.dynamics.statistics.metrics import Figure, Replicate, mean
+from rbdyn.dynamics.statistics.metrics import Figure, Replicate, Runs, mean
 from rbdyn.scene import Scene
 
 GROUP = 5
@@ -73,7 +72,7 @@ def find_transient(series: Array) -> int | None:
     return dropped * GROUP if abs(float(head.mean() - rest.mean())) > SIGNIFICANT * error else 0
 
 
-def series_of(runs: Sequence[Replicate]) -> dict[str, Array]:
+def series_of(runs: Runs) -> dict[str, Array]:
     """Impact force, whirl and power loss of each batch, averaged over the replicates."""
 
     def whirl(run: Replicate) -> Array:
@@ -97,7 +96,7 @@ class Start(NamedTuple):
     notes: tuple[str, ...]
 
 
-def start_of_counting(scene: Scene, runs: Sequence[Replicate]) -> Start:
+def start_of_counting(scene: Scene, runs: Runs) -> Start:
     """Where to start counting, as ``numerics.discard_turns`` asks: after so many turns, or after the transient."""
     numerics, run = scene.numerics, runs[0]
     if scene.operation.schedule is not None:
@@ -156,7 +155,7 @@ class Drift(NamedTuple):
         return BIAS_OF_DRIFT * max(abs(self.size) - self.error, 0.0)
 
 
-def drift_of(figure: Figure, runs: Sequence[Replicate]) -> Drift | None:
+def drift_of(figure: Figure, runs: Runs) -> Drift | None:
     """Drift of a figure over what is counted; None where that is too short to tell."""
     moments = [figure.moments(run) for run in runs]
     rows = min(len(part) for part in moments)
@@ -179,13 +178,13 @@ def drift_of(figure: Figure, runs: Sequence[Replicate]) -> Drift | None:
     return Drift(after.value - before.value, error, freedom, size)
 
 
-def drifting(runs: Sequence[Replicate]) -> bool:
+def drifting(runs: Runs) -> bool:
     """Whether any figure that can be told drifts beyond its scatter."""
     drifts = (drift_of(figure, runs) for figure in TESTED.values())
     return any(drift is not None and drift.significant for drift in drifts)
 
 
-def unseen_regime(figure: Figure, runs: Sequence[Replicate], since: int) -> float:
+def unseen_regime(figure: Figure, runs: Runs, since: int) -> float:
     """What a regime in which no replicate is counted may add to the mean, gauged by all stretches from batch ``since`` on."""
     counted = np.sum([figure.moments(run).sum(axis=0) for run in runs], axis=0)
     middle, farthest = float(figure.of_sums(counted)), 0.0
@@ -198,7 +197,7 @@ def unseen_regime(figure: Figure, runs: Sequence[Replicate], since: int) -> floa
     return farthest / (len(runs) + 1)
 
 
-def slow_change(figure: Figure, tested: Figure, runs: Sequence[Replicate], since: int, *, steady: bool) -> float:
+def slow_change(figure: Figure, tested: Figure, runs: Runs, since: int, *, steady: bool) -> float:
     """Half-width that slow change adds to a figure: drift left over and regimes unseen, as root sum of squares; none in a
     run that is not ``steady``, whose figures change with its schedule."""
     if not steady:

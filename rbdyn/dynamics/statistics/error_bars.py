@@ -1,11 +1,10 @@
 """Figures of a scene with their error bars, and what is to be said about these."""
 
 import math
-from collections.abc import Sequence
 
 from rbdyn.dynamics.statistics import metrics
 from rbdyn.dynamics.statistics.drift import TESTED, Start, slow_change, start_of_counting
-from rbdyn.dynamics.statistics.metrics import Replicate, quantity
+from rbdyn.dynamics.statistics.metrics import Replicate, Runs, quantity
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
@@ -32,18 +31,14 @@ LARGE, NOTICEABLE = 0.05, 0.01
 RULES = 3.0
 
 
-def after_transient(
-    scene: Scene, runs: Sequence[Replicate], companions: Sequence[Replicate]
-) -> tuple[list[Replicate], list[Replicate], Start]:
+def after_transient(scene: Scene, runs: Runs, companions: Runs) -> tuple[list[Replicate], list[Replicate], Start]:
     """Replicates and companions counted from where the scene asks, and where that is."""
     start = start_of_counting(scene, runs)
     ours, theirs = ([run.counted_from(start.first) for run in series] for series in (runs, companions))
     return ours, theirs, start
 
 
-def quantities(
-    scene: Scene, runs: Sequence[Replicate], companions: Sequence[Replicate], since: int | None = None
-) -> dict[str, Quantity]:
+def quantities(scene: Scene, runs: Runs, companions: Runs, since: int | None = None) -> dict[str, Quantity]:
     """Every figure with its errors, by the name it has in a record.
 
     ``since``: batch from which the replicates show what regimes there are, that from which they count unless given.

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Whole
 from rbdyn.faults import RunError
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
@@ -95,10 +95,10 @@ class Parts(NamedTuple):
     """Parts of the bearings of a lot. ``races``: complex amplitudes (4, bearings, orders) of forms of limit one;
     ``diameter``: (bearings, Z) and ``sphericity``: complex amplitudes (bearings, orders, Z), in m."""
 
-    order: NDArray[np.int64]
+    order: Whole
     races: Waves
     diameter: Array
-    sphericity_order: NDArray[np.int64]
+    sphericity_order: Whole
     sphericity: Waves
 
 
@@ -126,7 +126,7 @@ def draw_parts(lot: Lot, balls: int, bearings: int, seed: int) -> Parts:
 def bearing_errors(parts: Parts, bearing: int, limits: Array) -> RaceErrors:
     """Form errors of one bearing of the lot at the limits [m] of ``RACES``."""
 
-    def form(order: NDArray[np.int64], amplitude: Waves) -> Waviness:
+    def form(order: Whole, amplitude: Waves) -> Waviness:
         return Waviness(order, np.abs(amplitude), -np.angle(amplitude) / order)
 
     forms = {name: form(parts.order, limits[k] * parts.races[k, bearing]) for k, name in enumerate(RACES)}
@@ -169,7 +169,7 @@ def readings(
     return Readings(np.array(radial), np.array(face), *of_balls)
 
 
-def _passing(order: NDArray[np.int64], relative: Array, cage: Array, z: int) -> tuple[Waves, Waves]:
+def _passing(order: Whole, relative: Array, cage: Array, z: int) -> tuple[Waves, Waves]:
     """Waves (orders, steps) by which unit amplitudes c of Re(c exp(i n angle)) shift and lift the ring.
 
     Sum over the balls of Re(c exp(i n phi_j)) exp(i psi_j) with phi_j = psi_j - ring angle: nothing but for n = kZ -+ 1.
