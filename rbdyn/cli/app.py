@@ -256,31 +256,22 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         "cage slip": result.cage_slip,
     }
     header = ("figure", "value", "statistical error (95 %)", "numerical error (95 %)", "effective samples")
-    rows = [
-        (
-            label,
-            f"{of.value:.5g}",
-            shown(of.statistical_error),
-            shown(of.numerical_error),
-            f"{of.effective_samples:.0f}",
-        )
-        for label, of in figures.items()
-    ]
+    rows = []
+    for label, of in figures.items():
+        errors = shown(of.statistical_error), shown(of.numerical_error)
+        rows.append((label, f"{of.value:.5g}", *errors, f"{of.effective_samples:.0f}"))
     columns = len(header) if verbose else -1
     terminal.print_table("", header[:columns], [row[:columns] for row in rows])
     if result.target is not None:
         _print_target(result.target)
-    print(
-        f"race loads up to {result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer); power balance "
-        f"closes to {100.0 * result.power_gap:.2g} %; {result.replicates} replicates, seed {result.seed}; "
-        f"{result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to load or compile"
-    )
+    loads = f"{result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer)"
+    runs = f"{result.replicates} replicates, seed {result.seed}"
+    took = f"{result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to load or compile"
+    print(f"race loads up to {loads}; power balance closes to {100.0 * result.power_gap:.2g} %; {runs}; {took}")
     for race, at in result.races.items():
         film = f", film {at['central_film_um']:.2g} um, lambda {at['lambda_ratio']:.2g}" if "lambda_ratio" in at else ""
-        print(
-            f"{race} race at its largest load: {at['max_pressure_MPa']:.0f} MPa over {at['half_width_um']:.0f} um each way"
-            + film
-        )
+        pressed = f"{at['max_pressure_MPa']:.0f} MPa over {at['half_width_um']:.0f} um each way"
+        print(f"{race} race at its largest load: {pressed}{film}")
     if len(result.clearance) > 2:
         parts = ", ".join(f"{name.replace('_', ' ')} {value:+.1f} um" for name, value in result.clearance.items())
         print(f"clearance: {parts}")
@@ -296,16 +287,13 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
 
 def _print_target(target: dict[str, Any]) -> None:
     chosen, cost = target["chosen"], target["cost"]
-    reached = ", ".join(
-        f"{name} {'unknown' if error is None else f'{100.0 * error:.2g} %'}"
-        for name, error in target["relative_error"].items()
-    )
-    print(
-        f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached}) by "
-        f"{chosen['replicates']} replicates of {chosen['turns']:g} turns at rtol {chosen['rtol']:g}; "
-        f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides, "
-        f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots; the seconds are those of pilots and all runs"
-    )
+    errors = target["relative_error"].items()
+    reached = ", ".join(f"{name} {'unknown' if e is None else f'{100.0 * e:.2g} %'}" for name, e in errors)
+    aim = f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached})"
+    runs = f"{chosen['replicates']} replicates of {chosen['turns']:g} turns at rtol {chosen['rtol']:g}"
+    spent = f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides"
+    pilots = f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots"
+    print(f"{aim} by {runs}; {spent}, {pilots}; the seconds are those of pilots and all runs")
 
 
 @app.command()

@@ -164,11 +164,9 @@ def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, extends:
     counted = runs[0].duration / turn_s
     if stage.looks:
         dropped = float(runs[0].durations[: stage.first].sum()) / turn_s
-        notes.append(
-            f"length: figures drifted, so each replicate ran {dropped + counted:.4g} shaft turns in place of "
-            f"{numerics.warm_up_turns + numerics.turns:.4g}, of which the last {counted:.4g} count "
-            "(numerics.extend = false forbids it)"
-        )
+        ran = f"{dropped + counted:.4g} shaft turns in place of {numerics.warm_up_turns + numerics.turns:.4g}"
+        last = f"of which the last {counted:.4g} count (numerics.extend = false forbids it)"
+        notes.append(f"length: figures drifted, so each replicate ran {ran}, {last}")
     if scene.operation.schedule is None and drifting(runs):
         mend = "raise numerics.extend_limit" if extends else "lengthen numerics.turns or set numerics.extend = true"
         if not fits(scene, grown(scene, stage, GROWTH[-1])):

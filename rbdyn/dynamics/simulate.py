@@ -136,10 +136,9 @@ def clearance_report(scene: Scene) -> dict[str, float]:
 def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
     notes = []
     if power_gap > LARGEST_POWER_GAP:
-        notes.append(
-            f"power balance closes only to {100.0 * power_gap:.2g} %: numerics.rtol = {scene.numerics.rtol:g} is too "
-            "loose for this scene; loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
-        )
+        loose = f"numerics.rtol = {scene.numerics.rtol:g} is too loose for this scene"
+        why = "loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
+        notes.append(f"power balance closes only to {100.0 * power_gap:.2g} %: {loose}; {why}")
     if scene.traction.model == "four_constant":
         what = "traction: one load-independent set of constants"
         notes.append(f"{what}; lightly loaded rollers are driven too hard and skidding is under-predicted")

@@ -142,14 +142,12 @@ def _print_convergence(record: dict[str, Any]) -> None:
 
 
 def _print_gains(whose: str, gains: dict[str, Any]) -> None:
-    scatter = {name: _number(gain["single_run_scatter_percent"]) for name, gain in gains.items()}
-    rows = [(name, change(gain), gain["verdict"], f"± {scatter[name]} %") for name, gain in gains.items()]
+    rows = []
+    for name, gain in gains.items():
+        scatter = gain["single_run_scatter_percent"]
+        rows.append((name, change(gain), gain["verdict"], f"± {'?' if scatter is None else f'{scatter:.2f}'} %"))
     header = ("", "against the baseline", "verdict", "scatter of two single runs")
     print_table(f"predicted gains of {whose}", header, rows)
-
-
-def _number(value: float | None) -> str:
-    return "?" if value is None else f"{value:.2f}"
 
 
 def _cells(point: dict[str, Any]) -> list[str]:
@@ -239,18 +237,12 @@ def print_tolerance_aware(record: dict[str, Any]) -> None:
     print_table(f"after manufacture within {widths}: {kind}", ("", *names), rows)
     at = ", ".join(f"{name} = {x:.5g}" for name, x in pick["factors"].items())
     print(f"tolerance-aware pick: {at}; {pick['reason']}")
-    print(
-        f"the tolerance-aware front has {record['nominal_loss_percent']:.2f} % less hypervolume than the plain one in "
-        "nominal values" + _robust_gain(record["robust_gain_percent"])
-    )
-    survival = record["survival"]
-    print(
-        f"parts that still dominate the baseline: {100 * survival['plain_pick']:.1f} % at the plain pick, "
-        f"{100 * survival['pick']:.1f} % at the tolerance-aware one (± {196 * survival['standard_error']:.2f} %)"
-    )
+    less = f"{record['nominal_loss_percent']:.2f} % less hypervolume than the plain one in nominal values"
+    percent, survival = record["robust_gain_percent"], record["survival"]
+    more = "" if percent is None else f", and {percent:.2f} % more in what manufacture leaves"
+    print(f"the tolerance-aware front has {less}{more}")
+    plain = f"{100 * survival['plain_pick']:.1f} % at the plain pick"
+    aware = f"{100 * survival['pick']:.1f} % at the tolerance-aware one (± {196 * survival['standard_error']:.2f} %)"
+    print(f"parts that still dominate the baseline: {plain}, {aware}")
     if not record["plain_pick_inside"]:
         print("the tolerance box of the plain pick reaches out of the region: its figures are extrapolated")
-
-
-def _robust_gain(percent: float | None) -> str:
-    return "" if percent is None else f", and {percent:.2f} % more in what manufacture leaves"

@@ -75,9 +75,6 @@ def _numerical_note(scene: Scene, name: str, figure: Quantity) -> str | None:
     if error <= (NOTICEABLE if biased else LARGE) * size:
         return None
     rtol = scene.numerics.rtol
-    mend = (
-        f"tighten numerics.rtol = {rtol:g} to {0.1 * rtol:.1g}"
-        if biased
-        else "it is mostly scatter, so raise numerics.turns or numerics.replicates"
-    )
+    longer = "it is mostly scatter, so raise numerics.turns or numerics.replicates"
+    mend = f"tighten numerics.rtol = {rtol:g} to {0.1 * rtol:.1g}" if biased else longer
     return f"numerical error: {name} may be off by {100.0 * error / size:.2g} %; {mend}"
