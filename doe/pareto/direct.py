@@ -148,13 +148,7 @@ def _check(low: Array, high: Array, evaluations: int, population: int, resample:
 
 
 def _search(
-    evaluate: Evaluate,
-    box: tuple[Array, Array],
-    goals: Goals,
-    size: int,
-    generations: int,
-    seed: int,
-    confidence: float,
+    evaluate: Evaluate, box: tuple[Array, Array], goals: Goals, size: int, rounds: int, seed: int, confidence: float
 ) -> Samples:
     """Every evaluation of NSGA-II whose survivors are told apart beyond their errors only."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
@@ -179,9 +173,9 @@ def _search(
     problem = Problem(n_var=box[0].size, n_obj=len(goals.objectives), xl=box[0], xu=box[1])
     algorithm = NSGA2(pop_size=size, sampling=LHS(), survival=Surviving(filter_infeasible=False))
     algorithm.tournament_type = "comp_by_rank_and_crowding"
-    algorithm.setup(problem, termination=("n_gen", generations), seed=seed)
+    algorithm.setup(problem, termination=("n_gen", rounds), seed=seed)
     batches: list[Samples] = []
-    for _ in range(generations):
+    for _ in range(rounds):
         infill = algorithm.ask()
         batch = _run(evaluate, infill.get("X"))
         bad = batch.failed

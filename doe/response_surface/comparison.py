@@ -28,10 +28,14 @@ class Predictor(Protocol):
         ...
 
 
+# Made of the runs of some rows; ValueError where they do not suffice.
+Refit = Callable[[Rows], Predictor]
+
+
 def compare(
     coded: ArrayLike,
     values: ArrayLike,
-    refit: Callable[[Rows], Predictor],
+    refit: Refit,
     *,
     name: str,
     matrix: ArrayLike | None = None,
@@ -95,12 +99,7 @@ def compare(
 
 
 def _left_out(
-    name: str,
-    points: Array,
-    response: Array,
-    group: Whole,
-    folds: Sequence[Sequence[int]],
-    rivals: tuple[Callable[[Rows], Predictor], ...],
+    name: str, points: Array, response: Array, group: Whole, folds: Sequence[Sequence[int]], rivals: tuple[Refit, ...]
 ) -> tuple[Array, Array]:
     """Mean responses (c,) of points left out a fold at a time, and what rivals fitted without them foretell (c, rivals).
 

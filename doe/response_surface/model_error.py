@@ -59,13 +59,7 @@ class KnownVariance(Record):
 
 
 def compare(
-    solution: LeastSquares,
-    matrix: Array,
-    response: Array,
-    variances: Array,
-    replicates: Whole,
-    groups: Whole,
-    count: int,
+    fit: LeastSquares, matrix: Array, response: Array, variances: Array, replicates: Whole, groups: Whole, count: int
 ) -> KnownVariance:
     """Set the residual and the pure error of a fit against ``variances`` (n,) of the runs.
 
@@ -73,18 +67,18 @@ def compare(
     repeated points; ``replicates`` (n,) are behind each variance (0: unknown, taken as known exactly). With weights
     1 / variance the residual sum is the chi-square; with equal weights it is divided by the mean variance.
     """
-    unit = solution.weights * variances
-    weighted = bool(np.ptp(solution.weights) > 0)
+    unit = fit.weights * variances
+    weighted = bool(np.ptp(fit.weights) > 0)
     few = replicates[replicates > 1]
     dof = 1.0 / float(np.mean(1.0 / (few - 1))) if few.size else None
-    df = solution.dof
-    chi_square = solution.residual_sum / float(unit.mean())
-    project = solution.inverse[:count] @ (matrix * solution.weights[:, None]).T
+    df = fit.dof
+    chi_square = fit.residual_sum / float(unit.mean())
+    project = fit.inverse[:count] @ (matrix * fit.weights[:, None]).T
     return KnownVariance(
         chi_square=chi_square,
         df=df,
         p=_upper_tail(unit, dof, weighted, chi_square, df),
-        pure_error=_beside_pure_error(solution, response, unit, groups, dof, weighted),
+        pure_error=_beside_pure_error(fit, response, unit, groups, dof, weighted),
         covariance=(project * variances) @ project.T,
         dof=dof,
     )

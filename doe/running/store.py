@@ -63,9 +63,10 @@ class EndedRun:
     owner: str | None
 
 
-RunResult = dict[str, Any] | Failure
+Record = dict[str, Any]
+RunResult = Record | Failure
 # Whether a result is what the reader of the store takes it for; None: any is.
-Sound = Callable[[dict[str, Any]], bool] | None
+Sound = Callable[[Record], bool] | None
 
 
 class Store(Database):
@@ -82,7 +83,7 @@ class Store(Database):
         self._beating: threading.Thread | None = None
         self._me.enter()
 
-    def get(self, key: str) -> dict[str, Any] | None:
+    def get(self, key: str) -> Record | None:
         """The stored result, or None."""
         outcome = self.outcomes([Point(key, key)]).get(key)
         return outcome if isinstance(outcome, dict) else None
@@ -149,13 +150,7 @@ class Store(Database):
                     self._sign(connection)
 
     def put(
-        self,
-        key: str,
-        result: dict[str, Any],
-        *,
-        seconds: float | None = None,
-        host: str | None = None,
-        pid: int | None = None,
+        self, key: str, result: Record, *, seconds: float | None = None, host: str | None = None, pid: int | None = None
     ) -> None:
         """Keep a result; it is on the disk when this returns.
 

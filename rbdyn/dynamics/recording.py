@@ -141,16 +141,11 @@ def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: fl
 
 
 def run_series(
-    scene: Scene,
-    bearing: RollerBearing,
-    tolerances: Sequence[float],
-    workers: int | None,
-    progress: Reporter,
-    stop: Stop,
+    scene: Scene, bearing: RollerBearing, rtols: Sequence[float], workers: int | None, progress: Reporter, stop: Stop
 ) -> list[list[Replicate]]:
     """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""
     replicates = range(scene.numerics.replicates)
-    tasks = [partial(run_replicate, scene, bearing, index, rtol, stop) for rtol in tolerances for index in replicates]
+    tasks = [partial(run_replicate, scene, bearing, index, rtol, stop) for rtol in rtols for index in replicates]
     runs: dict[int, Replicate] = {}
 
     def ended(one: Ended[Replicate]) -> None:
@@ -159,7 +154,7 @@ def run_series(
             progress(len(runs), len(tasks))
 
     run_all(tasks, workers, stop, ended)
-    return [[runs[place * len(replicates) + index] for index in replicates] for place in range(len(tolerances))]
+    return [[runs[place * len(replicates) + index] for index in replicates] for place in range(len(rtols))]
 
 
 def kinematic_cage_angle(scene: Scene, before: Array, after: Array) -> float:

@@ -44,6 +44,7 @@ LOAD_KEYS = (
 # Points between two reports of progress, and two looks for Ctrl-C.
 CHUNK = 2000
 Progress = Callable[[int, int], None]
+Reporter = Progress | None
 Group = tuple[Whole, Array]
 
 
@@ -60,7 +61,7 @@ class Walked(NamedTuple):
 def sweep(
     scene: BallScene | Scene,
     keys: Mapping[str, Sequence[float]],
-    progress: Progress | None = None,
+    progress: Reporter = None,
     kept_in: Path | None = None,
 ) -> SweepResult:
     """Equilibrium at every point of the grid of ``keys``: dotted names of numbers in the scene, and their values.
