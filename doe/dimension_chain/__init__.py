@@ -1,7 +1,7 @@
 """Dimension chains: a closing link, its parts and their tolerances.
 
 ``links`` is what a chain is made of, ``reading`` and ``faults`` its TOML, ``closing`` the closing link as a function of
-its parts (``expressions`` are the links that are no sums), ``intervals``, ``monte_carlo`` and
+its parts (``expressions`` are the links that are no sums), ``monte_carlo`` and
 ``yields`` what comes of given tolerances, ``allocation`` the way back from limits to tolerances,
 ``iso286`` and ``iso492`` the standards as data, ``selective_assembly`` parts sorted into classes. ``solve`` answers all.
 """

@@ -19,8 +19,7 @@ from math import exp, inf, sqrt
 
 import numpy as np
 
-from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, middle
-from doe.dimension_chain.intervals import interval, total
+from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, interval, middle, total
 from doe.dimension_chain.iso286 import grade_tolerances, tolerance_unit
 from doe.dimension_chain.links import DIGITS, SLACK, Chain, Cost, Interval, Link, Mode, Part
 from doe.dimension_chain.monte_carlo import Assemblies, draw

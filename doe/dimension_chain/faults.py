@@ -5,9 +5,8 @@ from collections.abc import Callable
 from functools import partial
 
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import NoValueError, is_part, press_fit_factor, used_links
+from doe.dimension_chain.closing import NoValueError, interval, is_part, press_fit_factor, used_links
 from doe.dimension_chain.expressions import shown
-from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.iso286 import LARGEST, positioned
 from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link
 from doe.dimension_chain.parts import coded_limits

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from doe.arrays import Array
+from doe.pareto.archive import hypervolume
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume
 from doe.pareto.nsga2 import Doubt, Judged, Objectives, check_search, search
 from doe.pareto.picks import NAMES, Rule, knee_depth, thinned
 from doe.pareto.tolerance_aware import ToleranceAware

@@ -16,9 +16,8 @@ from typing import Literal
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto.archive import Archive, dominates
+from doe.pareto.archive import Archive, dominates, hypervolume
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume
 from doe.pareto.manufacture import Distribution, error_of_share, even_offsets
 from doe.pareto.nsga2 import Doubt, Judged, check_search, search
 from doe.pareto.picks import NAMES, Rule, thinned

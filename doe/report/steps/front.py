@@ -6,8 +6,7 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.pareto import ParetoFront
-from doe.pareto.archive import dominates
-from doe.pareto.indicators import REFERENCE
+from doe.pareto.archive import REFERENCE, dominates
 from doe.pareto.tolerance_aware import ToleranceAware
 from doe.report.steps.confirmation import gains_record, point_record
 from doe.report.words import change
