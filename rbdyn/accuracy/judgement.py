@@ -87,8 +87,6 @@ def undecided(hidden: Iterable[Difference], scene: Scene, sought: float = SOUGHT
     numerics = scene.numerics
     turns = turns_needed(worst.error, numerics.turns, sought)
     replicates = replicates_needed(worst.error, numerics.replicates, sought)
-    return (
-        f"undecided: errors of {percent(worst.error)} hide differences of {percent(abs(worst.value))} ({worst.where}); "
-        f"to tell {percent(sought)} raise numerics.turns to about {about(turns)} or numerics.replicates to about "
-        f"{about(replicates)}"
-    )
+    hides = f"errors of {percent(worst.error)} hide differences of {percent(abs(worst.value))} ({worst.where})"
+    mend = f"raise numerics.turns to about {about(turns)} or numerics.replicates to about {about(replicates)}"
+    return f"undecided: {hides}; to tell {percent(sought)} {mend}"

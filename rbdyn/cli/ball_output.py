@@ -73,10 +73,9 @@ def _print_row(title: str, row: RowReport, verbose: bool) -> None:
         film = ""
         if "central_film_um" in contact:
             film = f", film {contact['central_film_um']:.3g} um, lambda {contact['lambda_ratio']:.2g}"
-        print(
-            f"{race} race: up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa over "
-            f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} um{film}"
-        )
+        ellipse = f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} um"
+        pressed = f"up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa"
+        print(f"{race} race: {pressed} over {ellipse}{film}")
     life = row.life
     if life["L10_Mrev"] is not None:
         hours = f", {life['L10_h']:.4g} h" if life["L10_h"] is not None else ""

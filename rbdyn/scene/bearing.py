@@ -102,10 +102,9 @@ class Bearing(Consistent):
     def faults(self) -> Iterator[str]:
         chord = self.pitch_diameter_mm * math.sin(math.pi / self.rollers)
         if chord <= self.roller_diameter_mm:
-            yield (
-                f"bearing.rollers = {self.rollers}: rollers of {self.roller_diameter_mm:g} mm do not fit on a pitch "
-                f"circle of {self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm; take fewer or smaller ones"
-            )
+            circle = f"a pitch circle of {self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm"
+            what = f"rollers of {self.roller_diameter_mm:g} mm do not fit on {circle}"
+            yield f"bearing.rollers = {self.rollers}: {what}; take fewer or smaller ones"
         if self.roller_diameter_mm >= self.pitch_diameter_mm:
             what = f"bearing.roller_diameter_mm = {self.roller_diameter_mm:g}: leaves no inner raceway"
             yield f"{what} on a pitch circle of {self.pitch_diameter_mm:g} mm; make the roller smaller"

@@ -55,10 +55,9 @@ def _section(section: Section) -> str:
     for together, blocks in groupby(section.blocks, lambda block: isinstance(block, Table) and not block.folded):
         parts = [text(f"{block.name}.html") if isinstance(block, Widget) else render(block) for block in blocks]
         body += [f'<div class="tables">{"".join(parts)}</div>'] if together else parts
-    return (
-        f'<section id="{section.key}" aria-labelledby="{section.key}_title">\n'
-        f'<h2 id="{section.key}_title">{escape(section.title)}</h2>\n{"".join(body)}\n</section>'
-    )
+    heading = f'<h2 id="{section.key}_title">{escape(section.title)}</h2>'
+    opening = f'<section id="{section.key}" aria-labelledby="{section.key}_title">'
+    return f"{opening}\n{heading}\n{''.join(body)}\n</section>"
 
 
 def _scripts(widgets: set[str]) -> list[str]:
@@ -118,10 +117,8 @@ def _table(table: Table) -> str:
         rows.append(f"<tr><th scope='row'>{escape(name)}</th>{columns}</tr>")
     note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
     caption, sort = escape(table.caption), ' class="sortable"' if table.sortable else ""
-    body = (
-        f'<div class="scroll" role="region" aria-label="{caption}"><table{sort}><caption>{caption}</caption>'
-        f"<thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>{note}"
-    )
+    inside = f"<caption>{caption}</caption><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody>"
+    body = f'<div class="scroll" role="region" aria-label="{caption}"><table{sort}>{inside}</table></div>{note}'
     folded = f"<details><summary>{caption}</summary>{body}</details>"
     return folded if table.folded else f'<div class="table">{body}</div>'
 

@@ -208,11 +208,9 @@ def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
     best = min(alike, key=lambda row: row.median_us)
     rivals = ", ".join(f"{row.solver} {row.shown_share}" for row in alike if row is not best)
     times = ", ".join(f"{name} {took:.0f} us" for name, took in sorted(reached.items(), key=lambda it: it[1]))
-    return (
-        f"To an equilibrium of this scene: {times or 'none'}. Take {best.solver}: it solves "
-        f"{best.shown_share} of {best.problems} scenes nearby, half of them within {best.median_us:.0f} us"
-        + (f"; so many scenes do not tell it from {rivals} in sureness." if rivals else ".")
-    )
+    solves = f"{best.shown_share} of {best.problems} scenes nearby, half of them within {best.median_us:.0f} us"
+    beside = f"; so many scenes do not tell it from {rivals} in sureness" if rivals else ""
+    return f"To an equilibrium of this scene: {times or 'none'}. Take {best.solver}: it solves {solves}{beside}."
 
 
 def _fared(name: str, solver: Solver, problems: Sequence[Problem], counted: Progress) -> Success:

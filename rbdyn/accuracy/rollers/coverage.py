@@ -51,12 +51,9 @@ def study(scene: Scene, progress: Reporter = None, repeats: int = REPEATS) -> Re
     turns = sum(result.cost["turns"] for result in results) / repeats
     each = scene.numerics.turns + scene.numerics.warm_up_turns
     longer = sum(result.counted_turns > 1.01 * scene.numerics.turns for result in results) / repeats
-    sentences = [
-        conclusion(rows, repeats),
-        f"A run took {turns:.0f} shaft turns over all replicates and companions; asked for were "
-        f"{each * (scene.numerics.replicates + scene.numerics.companions):.0f}, and {100.0 * longer:.0f} % of the runs "
-        "were lengthened.",
-    ]
+    asked = each * (scene.numerics.replicates + scene.numerics.companions)
+    took = f"A run took {turns:.0f} shaft turns over all replicates and companions; asked for were {asked:.0f}"
+    sentences = [conclusion(rows, repeats), f"{took}, and {100.0 * longer:.0f} % of the runs were lengthened."]
     table = tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, columns_of(Row))
     written = records(rows)
     told: dict[str, Any] = {"pooled": pooled(rows), "repeats": repeats, "mean_turns": turns, "lengthened": longer}

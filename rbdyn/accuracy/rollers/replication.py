@@ -153,12 +153,11 @@ def conclusion(
     ``pool`` replicates is known."""
     sentences = []
     for name, fall in slopes.items():
-        verdict = {
-            True: "as independent turns do",
-            False: "not as independent turns do (-0.5)",
-            None: f"undecided: errors of {fall.half_width:.2g} hide a difference of {abs(fall.power + 0.5):.2g}; a pool "
-            f"of about {about(1.0 + (pool - 1) * (fall.half_width / SLOPE_ERROR) ** 2)} replicates tells",
-        }[fall.as_expected]
+        verdict = "as independent turns do" if fall.as_expected else "not as independent turns do (-0.5)"
+        if fall.as_expected is None:
+            verdict = f"undecided: errors of {fall.half_width:.2g} hide a difference of {abs(fall.power + 0.5):.2g}"
+            larger = about(1.0 + (pool - 1) * (fall.half_width / SLOPE_ERROR) ** 2)
+            verdict += f"; a pool of about {larger} replicates tells"
         what = f"{name}: scatter falls with counted turns to the power {fall.power:.2f} ± {fall.half_width:.2f}"
         sentences.append(f"{what}, {verdict}.")
     sentences += [_choice(name, rows, scatter_error(pool), sought) for name in OUTPUTS]
