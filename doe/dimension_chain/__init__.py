@@ -10,5 +10,5 @@ from doe.dimension_chain.faults import faults
 from doe.dimension_chain.iso286 import fit_limits, grade_tolerances, tolerance_unit
 from doe.dimension_chain.iso492 import ring_limits
 from doe.dimension_chain.links import Chain, Link, Part
-from doe.dimension_chain.reading import chain_from, is_several, read_chain, read_chains
+from doe.dimension_chain.reading import chain_from, is_several, read_chains
 from doe.dimension_chain.solution import ChainResult, solve
