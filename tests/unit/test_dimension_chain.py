@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm
 
+from doe.dimension_chain import chain_from, grade_tolerances, solve, tolerance_unit
 from rbdyn.faults import InputError
 
 POCKET = """
