@@ -72,8 +72,9 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | tuple[Solution, ..
     notes += sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
     others = _other_roots(scene, model, solution)
     if others:
-        what = f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load under this"
-        notes.append(f"{what} raceway control, see other_roots; this one is reached from one common cage speed")
+        more = f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load"
+        known = "see other_roots; this one is reached from one common cage speed"
+        notes.append(f"{more} under this raceway control, {known}")
     figures = {"report": report, **grown, "other_roots": others, "notes": notes}
     return replace(nothing, **figures, rows=(solution,), ratings=(rating,))
 

@@ -135,5 +135,6 @@ def misfits(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diame
     # A ball spins dm/(2 D) times a turn, or a little less.
     fastest = max((wave.order for wave in errors.ball_sphericity), default=0) * pitch_diameter_mm / ball_diameter_mm
     if fastest >= errors.steps:
-        what = f"errors.steps = {errors.steps}: too few to show errors.ball_sphericity on balls that spin"
-        yield f"{what} {0.5 * pitch_diameter_mm / ball_diameter_mm:.3g} times a turn; take at least {int(fastest) + 1}"
+        spinning = f"balls that spin {0.5 * pitch_diameter_mm / ball_diameter_mm:.3g} times a turn"
+        what = f"errors.steps = {errors.steps}: too few to show errors.ball_sphericity on {spinning}"
+        yield f"{what}; take at least {int(fastest) + 1}"

@@ -173,12 +173,12 @@ def _choice(name: str, rows: Sequence[Row], unsure: float, sought: float) -> str
         best = min(good, key=lambda row: row.cpu_s)
         return f"{name} within {percent(sought)}: {best.replicates} replicates of {best.turns:g} turns, {best.cpu_s:.2g} s."
     sharpest = min(rows, key=lambda row: row.half_width[name])
-    width = sharpest.half_width[name]
+    width, most = sharpest.half_width[name], f"{sharpest.replicates} replicates of {sharpest.turns:g} turns"
     if width * math.exp(-unsure) > sought:
-        what = f"{name} within {percent(sought)}: more than {sharpest.replicates} replicates of {sharpest.turns:g}"
-        return f"{what} turns; by the square root about {about(sharpest.replicates * (width / sought) ** 2)} of them."
-    what = f"{name} within {percent(sought)}: undecided; {sharpest.replicates} replicates of {sharpest.turns:g}"
-    return f"{what} turns reach {percent(width)}, known to a factor of {math.exp(unsure):.2g}."
+        by_root = about(sharpest.replicates * (width / sought) ** 2)
+        return f"{name} within {percent(sought)}: more than {most}; by the square root about {by_root} of them."
+    reach = f"{most} reach {percent(width)}, known to a factor of {math.exp(unsure):.2g}"
+    return f"{name} within {percent(sought)}: undecided; {reach}."
 
 
 def _draw(rows: Sequence[Row], path: Any) -> None:

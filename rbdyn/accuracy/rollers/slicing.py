@@ -65,8 +65,9 @@ def study(scene: Scene, progress: Reporter = None, counts: Sequence[int] = COUNT
 def slice_rows(scene: Scene, counts: Sequence[int] = COUNTS, progress: Reporter = None) -> list[Row]:
     """A row a number of slices, fewest first; the last is the reference of the statistics."""
     if not scene.needs_slices:
-        what = f"bearing.roller_profile = {scene.bearing.roller_profile!r} with bearing.tilt_mrad = 0: one slice"
-        raise InputError([f"{what} is exact; give the roller a profile or the races a tilt to study its slices"])
+        plain = f"bearing.roller_profile = {scene.bearing.roller_profile!r} with bearing.tilt_mrad = 0"
+        mend = "give the roller a profile or the races a tilt to study its slices"
+        raise InputError([f"{plain}: one slice is exact; {mend}"])
     check_replicates(scene)
     counts = sorted(counts)
     counted = Progress(progress, len(counts) * scene.numerics.replicates)
