@@ -27,12 +27,10 @@ def surfaces(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         return None
     terms = list(dict.fromkeys(term for each in fitted.values() for term in each["coefficients"]))
     errors = {name: each.get("standard_errors") or {} for name, each in fitted.items()}
-    rows = []
-    for term in terms:
-        known = [(each["coefficients"].get(term), errors[name].get(term)) for name, each in fitted.items()]
-        rows.append(
-            [_term(term, summary), *("–" if value is None else with_error(value, error) for value, error in known)]
-        )
+    rows = [
+        [_term(term, summary), *(_coefficient(each["coefficients"].get(term), errors[name].get(term)) for name, each in fitted.items())]
+        for term in terms
+    ]  # fmt: skip
     note = "± are standard errors." if any(errors.values()) else ""
     header = ["term", *(f"{label(name)}, {each.get('model', '')}" for name, each in fitted.items())]
     blocks: list[Block] = [Widget("surface")] if part(summary, "asked", "factors") else []
@@ -43,6 +41,10 @@ def surfaces(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 def _term(term: str, summary: Record) -> str:
     names = {each.letter: each.words for each in factors(summary)}
     return f"{term}, {names[term]}" if term in names else term.replace("^2", "²")
+
+
+def _coefficient(value: float | None, error: float | None) -> str:
+    return "–" if value is None else with_error(value, error)
 
 
 def _stationary(summary: Record, fitted: Record) -> Table:
