@@ -23,8 +23,7 @@ from published.common import Table, canvas, save
 from published.homogenisation import homogenisation
 
 from rbdyn.quasistatic.runout.classes import running_accuracy
-from rbdyn.quasistatic.runout.linear import linear_response
-from rbdyn.quasistatic.runout.lots import Lot, draw_parts, readings
+from rbdyn.quasistatic.runout.lots import Lot, draw_parts, linear_response, readings
 from rbdyn.quasistatic.runout.model import bench_of
 from rbdyn.quasistatic.runout.race_errors import RaceErrors, ball_path, perfect, waviness
 from rbdyn.quasistatic.runout.tolerance_design import Bench, RaceLimits, design, runouts

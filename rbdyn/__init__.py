@@ -15,18 +15,9 @@ if TYPE_CHECKING:
     from rbdyn.scene import BallScene, Scene
 
 __all__ = [
-    "BallResult",
-    "BallScene",
-    "History",
-    "InputError",
-    "RunError",
-    "Scene",
-    "SimulationResult",
-    "equilibrium",
-    "history",
-    "load",
+    "BallResult", "BallScene", "History", "InputError", "RunError", "Scene", "SimulationResult", "equilibrium", "history", "load",
     "simulate",
-]
+]  # fmt: skip
 
 _HOMES = {
     "Scene": "rbdyn.scene",

@@ -28,7 +28,7 @@ def save(out: Path | None, source: Path, name: str, record: dict[str, Any]) -> N
 def keeping_runs(out: Path | None, source: Path) -> Iterator[None]:
     """Let Ctrl-C tell that finished runs are kept, once there is a store of them in ``out``, and ``doe status`` that the
     study of the file ``source`` runs there."""
-    from doe.running.at_work import at_work
+    from doe.running.owner import at_work
     from doe.study.runs import STORE
 
     with keeping(None if out is None else out / STORE), nullcontext() if out is None else at_work(source, out):

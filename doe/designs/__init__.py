@@ -1,6 +1,6 @@
 """Designs of experiments in coded units, one column a factor.
 
-- ``central_composite`` (on ``cube``), ``box_behnken``, ``grids``: the designs, each a ``design.Design``, which knows units
+- ``central_composite``, ``box_behnken``, ``grids``: the designs, each a ``design.Design``, which knows units
 - ``evaluation`` (on ``model``): what a design can tell before any run is made
 """
 

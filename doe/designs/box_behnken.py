@@ -24,9 +24,7 @@ def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = Fals
     ``blocks``: the published division into orthogonal blocks (3 for 4 factors, 2 for 5 to 7), each with an
     equal share of the centre points.
 
-    Raises
-    ------
-    ValueError when the number of factors is out of range, blocks do not exist for it, or the centre points
+    Raises ValueError when the number of factors is out of range, blocks do not exist for it, or the centre points
     cannot be shared equally.
 
     Source: Box and Behnken, Some new three level designs for the study of quantitative variables,

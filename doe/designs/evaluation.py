@@ -31,8 +31,6 @@ def evaluate(
 ) -> dict[str, Any]:
     """Evaluate a design for a model.
 
-    Parameters
-    ----------
     coded : points in coded units, shape (n, k).
     terms : terms of the model, with "1".
     block : block of each run (n,); effects of blocks are estimated along, predictions are means over them.
@@ -40,9 +38,7 @@ def evaluate(
         given: the box as wide as the design if a run stands in a corner of it, else the ball through the
         outermost runs.
 
-    Returns
-    -------
-    JSON-ready. ``efficiency_percent`` with X the model matrix, p terms, n runs, factors scaled to -1..+1 over
+    Returns a record ready for JSON. ``efficiency_percent`` with X the model matrix, p terms, n runs, factors scaled to -1..+1 over
     the design: d = |X'X|^(1/p)/n, a = p/(n trace (X'X)^-1), g = p/(largest), i = p/(mean) scaled prediction
     variance over the region (i has no bound of 100). ``scaled_prediction_variance`` is n var(prediction)/sigma^2:
     ``centre``, ``mean`` (exact), ``max`` (over a lattice and 4096 points) of the region, and ``box_max`` of the box
@@ -53,9 +49,7 @@ def evaluate(
     ``condition_number`` of the model matrix with columns of unit length; ``degrees_of_freedom``; ``blocks``:
     None for one block, else ``sizes``, whether ``orthogonal`` and the ``largest_cosine`` between block and terms.
 
-    Raises
-    ------
-    ValueError naming the terms that the runs cannot tell apart.
+    Raises ValueError naming the terms that the runs cannot tell apart.
 
     Source: Atkinson, Donev and Tobias, Optimum Experimental Designs (2007) (efficiencies);
     Giovannitti-Jensen and Myers, Technometrics 31 (1989) (by radius); Zahran, Anderson-Cook and Myers,

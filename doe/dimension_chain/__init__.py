@@ -1,8 +1,8 @@
 """Dimension chains: a closing link, its parts and their tolerances.
 
 ``links`` is what a chain is made of, ``reading`` and ``faults`` its TOML, ``closing`` the closing link as a function of
-its parts (``expressions`` are the links that are no sums), ``intervals``, ``monte_carlo`` and
-``yields`` what comes of given tolerances, ``allocation`` and ``cost`` the way back from limits to tolerances,
+its parts (``expressions`` are the links that are no sums), ``monte_carlo`` and
+``yields`` what comes of given tolerances, ``allocation`` the way back from limits to tolerances,
 ``iso286`` and ``iso492`` the standards as data, ``selective_assembly`` parts sorted into classes. ``solve`` answers all.
 """
 
@@ -10,5 +10,5 @@ from doe.dimension_chain.faults import faults
 from doe.dimension_chain.iso286 import fit_limits, grade_tolerances, tolerance_unit
 from doe.dimension_chain.iso492 import ring_limits
 from doe.dimension_chain.links import Chain, Link, Part
-from doe.dimension_chain.reading import chain_from, is_several, read_chain, read_chains
+from doe.dimension_chain.reading import chain_from, is_several, read_chains
 from doe.dimension_chain.solution import ChainResult, solve

@@ -5,20 +5,23 @@
 a yield. Where the chain is not linear, or a yield is wanted, the tolerances of the linear rule are widened or
 narrowed together until they fill the limits. The nominal of one part is moved: so that the closing link's maximum
 meets its upper limit; for a yield, so that its mean (with functions, the middle of its tails) lies midway.
+
+The cheapest are the Lagrange optimum of cost curves a + b/T^k that together fill the closing link: with one multiplier L,
+T = (k b/(L |c|))^(1/(k+1)) in worst case, sum |c| T = W, and
+T = (k b/(2 L c^2))^(1/(k+2)) by root sum square, sum c^2 T^2 = W^2, each kept between the narrowest and the widest that
+its process gives (Chase and Greenwood, Design issues in mechanical tolerance analysis, 1988).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, sqrt
+from math import exp, inf, sqrt
 
 import numpy as np
 
-from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, middle
-from doe.dimension_chain.cost import cheapest
-from doe.dimension_chain.intervals import interval, total
+from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, interval, middle, total
 from doe.dimension_chain.iso286 import grade_tolerances, tolerance_unit
-from doe.dimension_chain.links import DIGITS, SLACK, Chain, Interval, Link, Mode, Part
+from doe.dimension_chain.links import DIGITS, SLACK, Chain, Cost, Interval, Link, Mode, Part
 from doe.dimension_chain.monte_carlo import Assemblies, draw
 from doe.dimension_chain.parts import allocated_part, given_part
 from doe.dimension_chain.yields import closing_moments, exact_shares, standard_error
@@ -30,6 +33,7 @@ WANDER = 0.5  # of the nominal: farther off, the steps of Newton have lost the s
 WIDEST = 64.0  # times the tolerances of the linear rule
 
 Tolerances = Mapping[str, float]
+SPAN = 700.0  # of the logarithm of the multiplier: all that a float holds
 
 
 def moved_by(part: Part, step: float) -> Part:
@@ -171,9 +175,8 @@ class Allocation:
         """Each tolerance at the widest grade within it; one finer than IT01 keeps its width without a grade."""
         free = {link.name: link for link in self.chain.free}
         ladders = {name: list(grade_tolerances(link.nominal).items()) for name, link in free.items()}
-        steps = {
-            name: sum(width <= tolerances[name] + SLACK for _, width in ladder) - 1 for name, ladder in ladders.items()
-        }
+        room = {name: tolerances[name] + SLACK for name in ladders}
+        steps = {name: sum(width <= room[name] for _, width in ladder) - 1 for name, ladder in ladders.items()}
 
         def parts(steps: Mapping[str, int]) -> list[Part]:
             chosen = {name: ladders[name][step] for name, step in steps.items() if step >= 0}
@@ -209,3 +212,38 @@ class Allocation:
     def _drawn(self, parts: list[Part]) -> Assemblies:
         seed, limits = self.chain.monte_carlo.seed, self.chain.closing_link
         return draw(self.function, parts, limits, samples=SAMPLES, seed=seed, laws=())
+
+
+def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode: Mode) -> list[float]:
+    """Tolerances, mm, of least cost whose worst case or root sum square is ``width``; slopes must not be zero.
+
+    Where even the widest fill less than the width, these. Raises ValueError, with the width that is needed, where
+    even the narrowest fill more.
+    """
+
+    from scipy.optimize import brentq
+
+    def tolerance(curve: Cost, slope: float, log_multiplier: float) -> float:
+        power, weight = (curve.k + 2, 2 * slope**2) if mode == "rss" else (curve.k + 1, abs(slope))
+        wish = (curve.k * curve.b / weight) ** (1 / power) * exp(-log_multiplier / power)
+        return min(max(wish, curve.narrowest_mm), curve.widest_mm or inf)
+
+    def tolerances(log_multiplier: float) -> list[float]:
+        return [tolerance(curve, slope, log_multiplier) for curve, slope in zip(curves, slopes, strict=True)]
+
+    def excess(log_multiplier: float) -> float:
+        shares = [abs(s) * t for s, t in zip(slopes, tolerances(log_multiplier), strict=True)]
+        return total(shares, mode) / width - 1
+
+    if excess(SPAN) > 0:
+        needed = width * (1 + excess(SPAN))
+        what = f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm"
+        raise ValueError(f"{what}; widen the limits or let a process go narrower")
+    if excess(-SPAN / 4) < 0:
+        return tolerances(-SPAN / 4)
+    return tolerances(brentq(excess, -SPAN / 4, SPAN, xtol=1e-13, rtol=1e-14))
+
+
+def total_cost(curves: Sequence[Cost], tolerances: Sequence[float]) -> float:
+    """Cost of all tolerances, mm."""
+    return sum(curve.a + curve.b / t**curve.k for curve, t in zip(curves, tolerances, strict=True))

@@ -5,9 +5,8 @@ from collections.abc import Callable
 from functools import partial
 
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import NoValueError, is_part, press_fit_factor, used_links
+from doe.dimension_chain.closing import NoValueError, interval, is_part, press_fit_factor, used_links
 from doe.dimension_chain.expressions import shown
-from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.iso286 import LARGEST, positioned
 from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link
 from doe.dimension_chain.parts import coded_limits
@@ -101,17 +100,13 @@ def _reference_faults(chain: Chain) -> list[str]:
     for link in chain.link:
         if _sentence(partial(used_links, link)) is None:
             names = used_links(link)
-            sentences += [
-                f'link "{link.name}": uses "{name}", which no link before it is called; name one of '
-                f"{', '.join(before) or 'those placed before it'}"
-                for name in names
-                if name not in before
-            ]
+            mend = f"name one of {', '.join(before) or 'those placed before it'}"
+            alien = [f'uses "{name}", which no link before it is called' for name in names if name not in before]
+            sentences += [f'link "{link.name}": {fault}; {mend}' for fault in alien]
             grown = link.thermal_growth and before.get(link.thermal_growth.of)
             if grown and not (grown.is_dimension and grown.nominal > 0):
-                sentences.append(
-                    f'link "{link.name}": thermal_growth.of = "{grown.name}": must be a positive dimension'
-                )
+                why = f'thermal_growth.of = "{grown.name}": must be a positive dimension'
+                sentences.append(f'link "{link.name}": {why}')
         bore = link.press_fit and before.get(link.press_fit.bore)
         if link.press_fit and bore and (wrong := _sentence(partial(press_fit_factor, link.press_fit, bore.nominal))):
             sentences.append(f'link "{link.name}": press_fit: {wrong}')
@@ -125,9 +120,8 @@ def _selective_faults(chain: Chain) -> list[str]:
     parts = [link.name for link in chain.link if is_part(link)]
     pair = {"first": chain.selective.first, "second": chain.selective.second}
     alien = {key: name for key, name in pair.items() if name not in parts}
-    sentences = [
-        f'selective.{key} = "{name}": is no part; name one of {", ".join(parts)}' for key, name in alien.items()
-    ]
+    mend = f"name one of {', '.join(parts)}"
+    sentences = [f'selective.{key} = "{name}": is no part; {mend}' for key, name in alien.items()]
     if pair["first"] == pair["second"]:
         sentences.append(f'selective.second = "{pair["second"]}": is the first part too; name another')
     return sentences
@@ -155,18 +149,14 @@ def _room_faults(chain: Chain) -> list[str]:
         share, target = search.sure_yield(bare), chain.allocate.target_yield
         if share < target:
             low, high = search.tails(bare)
-            return [
-                f"allocate.target_yield = {target:g}: the fixed links alone give {share:.4g}; narrow or unfix one, or "
-                f"widen the limits: {_nearest(limits, high - low)}"
-            ]
+            what = f"allocate.target_yield = {target:g}: the fixed links alone give {share:.4g}"
+            return [f"{what}; narrow or unfix one, or widen the limits: {_nearest(limits, high - low)}"]
     else:
         low, high = interval(search.function, bare, chain.allocate.mode)
         consumed = high - low
         if consumed > SLACK and width <= consumed + SLACK:
-            return [
-                f"link.fixed = true: the fixed links consume {consumed:.4f} mm of the closing link's {width:.4f} "
-                f"mm; narrow or unfix one, or widen the limits: {_nearest(limits, consumed)}"
-            ]
+            what = f"link.fixed = true: the fixed links consume {consumed:.4f} mm of the closing link's {width:.4f} mm"
+            return [f"{what}; narrow or unfix one, or widen the limits: {_nearest(limits, consumed)}"]
     tight = _sentence(search.linear_rule)
     return [f'allocate.method = "{chain.allocate.method}": {tight}'] if tight else []
 

@@ -26,11 +26,6 @@ class Chains(Strict):
     """The chains."""
 
 
-def read_chain(path: Path | str) -> Chain:
-    """Read a chain from a TOML file; InputError names the file, every fault and its mend."""
-    return chain_from(read_toml(path), str(path))
-
-
 def chain_from(data: Mapping[str, Any], source: str) -> Chain:
     """Build a chain from a table; ``source`` names the file in the messages of InputError."""
     chain = validated(Chain, data, source)

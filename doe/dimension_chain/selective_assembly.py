@@ -13,9 +13,8 @@ from itertools import pairwise
 import numpy as np
 
 from doe.arrays import Array, Rows
-from doe.dimension_chain.closing import ClosingFunction, middle
+from doe.dimension_chain.closing import ClosingFunction, interval, middle
 from doe.dimension_chain.distributions import quantile
-from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.links import DIGITS, SLACK, ClosingLink, Interval, Part, Selective
 from doe.dimension_chain.yields import standard_error
 from rbdyn.records.record import Record, derived, keyed

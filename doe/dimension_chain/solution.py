@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import ClosingFunction, NoValueError, middle
-from doe.dimension_chain.cost import total_cost
+from doe.dimension_chain.allocation import Allocation, total_cost
+from doe.dimension_chain.closing import ClosingFunction, NoValueError, interval, linear_interval, middle
 from doe.dimension_chain.distributions import moments
 from doe.dimension_chain.faults import faults
-from doe.dimension_chain.intervals import interval, linear_interval
 from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part
 from doe.dimension_chain.monte_carlo import ALIKE, Assemblies, draw
 from doe.dimension_chain.parts import given_parts

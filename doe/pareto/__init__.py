@@ -1,6 +1,6 @@
 """Pareto fronts: search, picks, errors.
 
-- ``goals``, ``archive``, ``indicators``, ``picks``: costs of responses, what dominates what, how good a front is, which one
+- ``goals``, ``archive``, ``picks``: costs of responses, what dominates what, how good a front is, which one
 - ``nsga2``, ``front``: search among cheap responses, and the front found
 - ``uncertainty``: what the surfaces' errors make of a front and of a gain
 - ``quadratic``, ``tolerance_aware``: the front of what manufacture leaves of a point
@@ -8,9 +8,8 @@
 - ``direct``, ``surrogate_loss``: the front of a noisy simulator, and what surfaces lose against it
 """
 
-from doe.pareto.archive import non_dominated
+from doe.pareto.archive import hypervolume, non_dominated
 from doe.pareto.front import ParetoFront, front
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume
 from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import knee_depth

@@ -1,4 +1,6 @@
-"""Dominance, also between means that carry errors; archives of evaluated points and evenly spread picks of them.
+"""Dominance, also between means that carry errors; archives of evaluated points, evenly spread picks and hypervolume of them.
+
+Costs are normalised to 0 at the ideal point and 1 at the nadir point, up to `REFERENCE` in a hypervolume.
 
 Source: Hughes, Evolutionary multi-objective ranking with uncertainty and noise (2001); Teich, Pareto-front exploration
 with uncertain objectives (2001): one dominates another only where the noise cannot have made the difference.
@@ -11,7 +13,27 @@ import numpy as np
 from scipy.stats import norm
 
 from doe.arrays import Array, Mask, Rows
-from doe.pareto.indicators import normalised
+
+REFERENCE = 1.1  # reference point of the hypervolume: the nadir and a tenth of each range beyond it
+
+
+def normalised(values: Array, ideal: Array, nadir: Array) -> Array:
+    """Costs (..., q) on the scale from ideal 0 to nadir 1; a cost without range stays at 0."""
+    span = nadir - ideal
+    return (values - ideal) / np.where(span > 0, span, 1.0)
+
+
+def hypervolume(values: Array, ideal: Array, nadir: Array) -> float:
+    """Volume that ``values`` (n, m) dominate, in objectives normalised to ``ideal`` 0 and ``nadir`` 1.
+
+    The reference point is `REFERENCE` in each objective, so the largest volume possible is REFERENCE^m.
+    Fronts compare only under the same ``ideal`` and ``nadir``.
+    """
+    from pymoo.indicators.hv import HV
+
+    inside = normalised(values, ideal, nadir)
+    inside = inside[(inside < REFERENCE).all(axis=1)]
+    return float(HV(ref_point=np.full(values.shape[1], REFERENCE))(inside)) if len(inside) else 0.0
 
 
 class Archive(NamedTuple):

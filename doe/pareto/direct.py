@@ -87,8 +87,6 @@ def direct_front(
 ) -> DirectFront:
     """Find the front of a noisy simulator; the same seed and the same runs give the same bits.
 
-    Parameters
-    ----------
     evaluate : runs points (n, k), a generation at once, and gives responses (n, m) and their standard errors (n, m),
         NaN where a run failed. Every row of every call must be a run of its own (a fresh seed, such as a running
         number), even at a point that was run before.
@@ -98,9 +96,7 @@ def direct_front(
     confidence : at which a difference counts while the search sorts.
     resample : share of the budget for fresh runs at the end. pick : rule that makes the pick.
 
-    Raises
-    ------
-    ValueError when the bounds are not a box, a setting is out of range, the budget is below five populations, or
+    Raises ValueError when the bounds are not a box, a setting is out of range, the budget is below five populations, or
     every run at the points of a stage failed or breaks a limit.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
@@ -152,13 +148,7 @@ def _check(low: Array, high: Array, evaluations: int, population: int, resample:
 
 
 def _search(
-    evaluate: Evaluate,
-    box: tuple[Array, Array],
-    goals: Goals,
-    size: int,
-    generations: int,
-    seed: int,
-    confidence: float,
+    evaluate: Evaluate, box: tuple[Array, Array], goals: Goals, size: int, rounds: int, seed: int, confidence: float
 ) -> Samples:
     """Every evaluation of NSGA-II whose survivors are told apart beyond their errors only."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
@@ -183,9 +173,9 @@ def _search(
     problem = Problem(n_var=box[0].size, n_obj=len(goals.objectives), xl=box[0], xu=box[1])
     algorithm = NSGA2(pop_size=size, sampling=LHS(), survival=Surviving(filter_infeasible=False))
     algorithm.tournament_type = "comp_by_rank_and_crowding"
-    algorithm.setup(problem, termination=("n_gen", generations), seed=seed)
+    algorithm.setup(problem, termination=("n_gen", rounds), seed=seed)
     batches: list[Samples] = []
-    for _ in range(generations):
+    for _ in range(rounds):
         infill = algorithm.ask()
         batch = _run(evaluate, infill.get("X"))
         bad = batch.failed

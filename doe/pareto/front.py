@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from doe.arrays import Array
+from doe.pareto.archive import hypervolume
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume
 from doe.pareto.nsga2 import Doubt, Judged, Objectives, check_search, search
 from doe.pareto.picks import NAMES, Rule, knee_depth, thinned
 from doe.pareto.tolerance_aware import ToleranceAware
@@ -72,8 +72,6 @@ def front(
 ) -> ParetoFront:
     """Find the Pareto front of responses over a box; the same seed gives the same bits.
 
-    Parameters
-    ----------
     objectives : maps points (n, k) to responses (n, m), at least two of them with a goal.
     lower, upper : bounds of the factors, shape (k,).
     goals : what is wanted of the responses; all to be minimised without it.
@@ -85,9 +83,7 @@ def front(
     standard_errors : maps points (n, k) to the standard errors (n, m) of their responses.
     doubt : maps points (n, k) to how far below and above (n, m) their responses may be; limits hold all over it.
 
-    Raises
-    ------
-    ValueError when the bounds are not a box, a setting is out of range, or an objective is not finite;
+    Raises ValueError when the bounds are not a box, a setting is out of range, or an objective is not finite;
     InfeasibleError when no point evaluated keeps all limits.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)

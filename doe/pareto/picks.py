@@ -10,9 +10,8 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from doe.arrays import Array, Rows
-from doe.pareto.archive import dominates, spread
+from doe.pareto.archive import dominates, normalised, spread
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import normalised
 
 Rule = Literal["knee", "desirability", "weights"]
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto.archive import non_dominated
+from doe.pareto.archive import hypervolume, non_dominated
 from doe.pareto.direct import DirectFront
-from doe.pareto.indicators import hypervolume
 
 DRAWS = 200  # of the noise of a front
 

@@ -62,8 +62,6 @@ def widest_tolerances(
 ) -> WidestTolerances:
     """Find the widest tolerances with which a part keeps all limits with a given probability.
 
-    Parameters
-    ----------
     objectives : maps points (samples, k) to costs (samples, c). Row i always belongs to part i, so a surface of its
         own may be drawn for each part; then ``limits`` has a row a part too.
     pick : the nominal point (k,).
@@ -80,9 +78,7 @@ def widest_tolerances(
     The widest is looked for from the pick outwards up to the first loss, so all narrower tolerances keep the limits
     too. Where even the exact pick breaks a limit, all widths are zero.
 
-    Raises
-    ------
-    ValueError when a ratio is not positive, a probability is not in (0, 1), or the pick is outside the region.
+    Raises ValueError when a ratio is not positive, a probability is not in (0, 1), or the pick is outside the region.
     """
     centre, share = np.asarray(pick, float), np.asarray(ratios, float)
     low, high = np.asarray(lower, float), np.asarray(upper, float)

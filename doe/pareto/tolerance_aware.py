@@ -16,9 +16,8 @@ from typing import Literal
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto.archive import Archive, dominates
+from doe.pareto.archive import Archive, dominates, hypervolume
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume
 from doe.pareto.manufacture import Distribution, error_of_share, even_offsets
 from doe.pareto.nsga2 import Doubt, Judged, check_search, search
 from doe.pareto.picks import NAMES, Rule, thinned
@@ -117,8 +116,6 @@ def tolerance_aware_front(
 ) -> ToleranceAware:
     """NSGA-II on robust costs, and what it costs and gains beside the plain front; the same seed, the same bits.
 
-    Parameters
-    ----------
     surfaces : of the m responses, in coded units.
     box : the tolerances.
     lower, upper : bounds (k,) of the region in coded units; the boxes of all points lie within.
@@ -128,9 +125,7 @@ def tolerance_aware_front(
     plain : points (coded) and costs of the plain front, and ``plain_pick`` the row of its pick.
     population, generations, seed, keep, pick, doubt : as for `doe.pareto.front`, of coded points.
 
-    Raises
-    ------
-    ValueError when a tolerance leaves no room in the region; InfeasibleError when no point keeps all limits.
+    Raises ValueError when a tolerance leaves no room in the region; InfeasibleError when no point keeps all limits.
     """
     low, high = lower + box.half, upper - box.half
     check_search(low, high, population, generations, keep)

@@ -74,32 +74,23 @@ def non_dominated_share(costs: Array) -> Array:
 
 
 def front_uncertainty(
-    drawn: Array,
-    half_widths: Array,
-    goals: Goals,
-    values: Array,
-    pick: int,
-    rule: Rule,
-    baseline: Array,
-    baseline_values: Array,
+    drawn: Array, widths: Array, goals: Goals, values: Array, pick: int, rule: Rule, baseline: Array, original: Array
 ) -> FrontUncertainty:
     """How sure a front is, from drawn responses.
 
-    Parameters
-    ----------
     drawn : responses (d, f, m) of the front's points on each drawn set of surfaces.
-    half_widths : 95 % half widths (f, m) of the mean responses.
+    widths : 95 % half widths (f, m) of the mean responses.
     goals : what is wanted of the responses.
     values : responses (f, m) on the fitted surfaces.
     pick, rule : row of the pick and the rule that made it.
-    baseline, baseline_values : responses (d, m) of the baseline on the drawn surfaces and (m,) on the fitted ones.
+    baseline, original : responses (d, m) of the baseline on the drawn surfaces and (m,) on the fitted ones.
     """
     costs, base = goals.costs(drawn), goals.costs(baseline)
     wins, error = share(dominates(costs[:, pick], base))
-    real = goals.costs(baseline_values) - goals.costs(values)
+    real = goals.costs(original) - goals.costs(values)
     optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
     sure = float(wins), float(error)
-    return FrontUncertainty(half_widths, non_dominated_share(costs), *sure, optimism, len(drawn))
+    return FrontUncertainty(widths, non_dominated_share(costs), *sure, optimism, len(drawn))
 
 
 def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals, rule: Rule) -> Array:

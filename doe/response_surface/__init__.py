@@ -1,7 +1,7 @@
 """Response surfaces: least-squares polynomials with the statistics to judge them.
 
 ``surface`` fits and predicts; ``least_squares`` solves, ``anova``, ``canonical``, ``diagnostics`` and
-``known_variance`` judge, ``words`` says it in sentences.
+``model_error`` judge, ``words`` says it in sentences.
 """
 
 from doe.designs.model import model_matrix

@@ -30,22 +30,16 @@ BoxCox = TypedDict(
 def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response") -> BoxCox:
     """Profile likelihood of the transform's exponent for a response fitted by the columns of ``matrix``.
 
-    Parameters
-    ----------
     matrix : model matrix (n, p) of the runs, with a column of ones.
     values : response of each run, shape (n,), all positive.
     name : name of the response, for the sentences.
 
-    Returns
-    -------
-    ``lambda`` of the largest likelihood; ``interval`` of those whose likelihood-ratio statistic is within the
+    Returns ``lambda`` of the largest likelihood; ``interval`` of those whose likelihood-ratio statistic is within the
     chi-squared quantile of `LEVEL`, cut at the range ``searched``; ``recommended``: 1 (no transform) if that
     lies in the interval, else the usual exponent in it nearest to ``lambda``, else ``lambda`` itself; 1 again
     where the whole interval lies beyond the usual ones, which speaks of outliers or missing terms.
 
-    Raises
-    ------
-    ValueError when a value is not positive, the values are all equal, or no more runs than columns are given.
+    Raises ValueError when a value is not positive, the values are all equal, or no more runs than columns are given.
 
     Source: Box and Cox (1964), maximized likelihood.
     """

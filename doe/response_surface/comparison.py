@@ -28,10 +28,14 @@ class Predictor(Protocol):
         ...
 
 
+# Made of the runs of some rows; ValueError where they do not suffice.
+Refit = Callable[[Rows], Predictor]
+
+
 def compare(
     coded: ArrayLike,
     values: ArrayLike,
-    refit: Callable[[Rows], Predictor],
+    refit: Refit,
     *,
     name: str,
     matrix: ArrayLike | None = None,
@@ -46,8 +50,6 @@ def compare(
     the hyperparameters of all runs: a fit costs the cube of their number. A point without which the polynomial cannot be fitted, or is a guess, such as the
     centre of a spherical design, is not compared: no one would leave it out.
 
-    Parameters
-    ----------
     coded, values : runs in coded units (n, k) and their response (n,).
     refit : the polynomial fitted to the runs of the given rows; it raises ValueError where they do not suffice.
     name : of the response, for the sentence. seed : of the search for hyperparameters.
@@ -55,16 +57,12 @@ def compare(
         replicates together above 0.95); without it only those whose absence makes ``refit`` fail.
     standard_errors : known standard error of each value (n,), for the process; else it estimates one.
 
-    Returns
-    -------
-    ``polynomial`` and ``gaussian_process``, each with ``loo_rmse`` and ``loo_r2`` (None where the points all
+    Returns ``polynomial`` and ``gaussian_process``, each with ``loo_rmse`` and ``loo_r2`` (None where the points all
     have one mean); ``difference`` of the squared misses, polynomial less process: ``mean``, ``standard_error``
     and 95 % ``interval`` by Student's t over the points, which takes them as independent; ``points`` compared;
     ``folds``: how often some were left out; ``recommended``: "gaussian_process" only where the interval lies above zero, else "polynomial"; ``sentence``.
 
-    Raises
-    ------
-    ValueError when fewer than three points can be left out.
+    Raises ValueError when fewer than three points can be left out.
 
     Source: Stone, Cross-validatory choice, J. R. Stat. Soc. B 36 (1974); the interval is rough, for there is no
     unbiased variance of a cross-validation (Bengio and Grandvalet, J. Mach. Learn. Res. 5 (2004)).
@@ -101,12 +99,7 @@ def compare(
 
 
 def _left_out(
-    name: str,
-    points: Array,
-    response: Array,
-    group: Whole,
-    folds: Sequence[Sequence[int]],
-    rivals: tuple[Callable[[Rows], Predictor], ...],
+    name: str, points: Array, response: Array, group: Whole, folds: Sequence[Sequence[int]], rivals: tuple[Refit, ...]
 ) -> tuple[Array, Array]:
     """Mean responses (c,) of points left out a fold at a time, and what rivals fitted without them foretell (c, rivals).
 

@@ -23,9 +23,8 @@ from doe.response_surface.box_cox import BoxCox, backward, box_cox, check_positi
 from doe.response_surface.canonical import Canonical, StationaryPoint, canonical
 from doe.response_surface.data import Data, check_errors, check_matrix, checked
 from doe.response_surface.diagnostics import Diagnostics, diagnose
-from doe.response_surface.known_variance import KnownVariance, compare
 from doe.response_surface.least_squares import solve
-from doe.response_surface.model_error import ModelError, model_error
+from doe.response_surface.model_error import KnownVariance, ModelError, compare, model_error
 from rbdyn.records.record import Record, derived, outside_json
 
 Weighting = Literal["equal", "replicates"]
@@ -174,8 +173,6 @@ def fit(
 ) -> Surface:
     """Fit one response by least squares.
 
-    Parameters
-    ----------
     coded : runs in coded units, shape (n, k).
     values : response of each run, shape (n,).
     name : name of the response, for messages.
@@ -190,9 +187,7 @@ def fit(
     block : label of the block of each run, whole numbers, shape (n,).
     transform : "none", "box_cox" for the recommended exponent, or an exponent: (y^lambda - 1)/lambda, ln y for 0.
 
-    Raises
-    ------
-    ValueError when a value is not finite, all are equal, shapes differ, the model is unknown, runs are too few
+    Raises ValueError when a value is not finite, all are equal, shapes differ, the model is unknown, runs are too few
     for it, the runs cannot tell its terms apart, a transform meets a value that is not positive, or weights are
     asked for and an error is not positive.
     """

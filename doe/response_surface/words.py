@@ -3,7 +3,7 @@
 from doe.response_surface.anova import find
 from doe.response_surface.canonical import describe_canonical
 from doe.response_surface.diagnostics import describe_diagnostics, p_text
-from doe.response_surface.known_variance import describe_known_variance
+from doe.response_surface.model_error import describe_known_variance
 from doe.response_surface.surface import Surface
 
 ALPHA = 0.05  # p-value up to which something is significant
@@ -43,9 +43,8 @@ def _terms(surface: Surface) -> str:
 def _lack_of_fit(surface: Surface) -> str:
     p = surface.lack_of_fit["p"]
     if p is not None and p <= ALPHA:
-        what = (
-            f"lack of fit is significant ({p_text(p)}): the surface misses more than the scatter of replicates explains"
-        )
+        why = f"lack of fit is significant ({p_text(p)})"
+        what = f"{why}: the surface misses more than the scatter of replicates explains"
         mend = "enlarge the model, transform the response or narrow the region, and confirm predictions by runs"
         return f"{what}; {mend}."
     if p is not None:

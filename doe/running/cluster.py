@@ -46,7 +46,8 @@ def run_on_cluster(
                 if place in futures:
                     answers.put(place)
                 broken = place in futures and futures[place].status == "error"
-                alone_s = 0.0 if _workers(client) else alone_s + LOOK_S
+                running = client.status == "running"
+                alone_s = 0.0 if running and client.scheduler_info(n_workers=-1)["workers"] else alone_s + LOOK_S
                 if broken or client.status != "running" or alone_s > DESERTED_S:
                     raise _gone(address, client) from None
                 continue
@@ -64,10 +65,6 @@ def run_on_cluster(
 def _gone(address: str, client: Any) -> StoppedError:
     what = "its workers are gone" if client.status == "running" else "the scheduler is gone"
     return StoppedError(f"--scheduler {address}: {what}", "start again when the cluster is back")
-
-
-def _workers(client: Any) -> int:
-    return len(client.scheduler_info(n_workers=-1)["workers"]) if client.status == "running" else 0
 
 
 async def _knock(address: str) -> None:

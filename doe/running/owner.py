@@ -1,13 +1,17 @@
-"""Which process works on a run, and whether it still lives."""
+"""Which process works on a run, and whether it still lives; which studies run just now and in which folder: a note of each,
+so that it can be found from its file alone."""
 
 import functools
+import json
 import os
 import socket
 import time
 import uuid
-from contextlib import suppress
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 # A process of another machine that has not given a sign of life for so long [s] counts as gone. One whose clock is behind
 # by more than this seems gone too soon, and its runs are run twice; of one dated ahead see ``Owner.lives``.
@@ -90,3 +94,53 @@ def _answers(pid: int) -> str:
     except OSError as error:
         return "" if isinstance(error, ProcessLookupError) else "alive"
     return "alive"
+
+
+@contextmanager
+def at_work(study: Path, folder: Path) -> Iterator[None]:
+    """Note, while it lasts, that this process runs the study of a file in a folder.
+
+    Where no note can be written the study runs all the same, and is found by its folder only.
+    """
+    owner = this_process()
+    owner.enter()
+    note = _place() / f"{owner.token}.json"
+    with suppress(OSError):
+        note.parent.mkdir(parents=True, exist_ok=True)
+        # A process that was killed has left its note.
+        for other, _, gone in _notes():
+            if gone.host == socket.gethostname() and not gone.lives(other.stat().st_mtime):
+                other.unlink(missing_ok=True)
+        told = {"study": str(study.resolve()), "folder": str(folder.resolve()), "owner": asdict(owner)}
+        note.write_text(json.dumps(told), encoding="utf-8")
+    try:
+        yield
+    finally:
+        owner.leave()
+        with suppress(OSError):
+            note.unlink(missing_ok=True)
+
+
+def folders_of(study: Path) -> list[Path]:
+    """Folders in which live processes of this machine and user run the study of a file."""
+    with suppress(OSError):
+        return sorted(
+            {
+                Path(told["folder"])
+                for note, told, owner in _notes()
+                if told["study"] == str(study.resolve()) and owner.lives(note.stat().st_mtime)
+            }
+        )
+    return []
+
+
+def _place() -> Path:
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rbdyn" / "at_work"
+
+
+def _notes() -> Iterator[tuple[Path, dict[str, Any], Owner]]:
+    for note in _place().glob("*.json"):
+        # One that is being written or has just been taken away tells nothing.
+        with suppress(OSError, ValueError, TypeError, KeyError):
+            told = json.loads(note.read_text(encoding="utf-8"))
+            yield note, told, Owner(**told["owner"])

@@ -63,9 +63,10 @@ class EndedRun:
     owner: str | None
 
 
-RunResult = dict[str, Any] | Failure
+Record = dict[str, Any]
+RunResult = Record | Failure
 # Whether a result is what the reader of the store takes it for; None: any is.
-Sound = Callable[[dict[str, Any]], bool] | None
+Sound = Callable[[Record], bool] | None
 
 
 class Store(Database):
@@ -82,7 +83,7 @@ class Store(Database):
         self._beating: threading.Thread | None = None
         self._me.enter()
 
-    def get(self, key: str) -> dict[str, Any] | None:
+    def get(self, key: str) -> Record | None:
         """The stored result, or None."""
         outcome = self.outcomes([Point(key, key)]).get(key)
         return outcome if isinstance(outcome, dict) else None
@@ -149,13 +150,7 @@ class Store(Database):
                     self._sign(connection)
 
     def put(
-        self,
-        key: str,
-        result: dict[str, Any],
-        *,
-        seconds: float | None = None,
-        host: str | None = None,
-        pid: int | None = None,
+        self, key: str, result: Record, *, seconds: float | None = None, host: str | None = None, pid: int | None = None
     ) -> None:
         """Keep a result; it is on the disk when this returns.
 
@@ -174,11 +169,9 @@ class Store(Database):
         columns = ", ".join(facts)
         replaced = ", ".join(f"{name} = excluded.{name}" for name in facts)
         with self._transaction(durable=True) as connection:
-            connection.execute(
-                f"INSERT INTO runs (key, study, {columns}) VALUES (?, ?{', ?' * len(facts)}) ON CONFLICT (key) "
-                f"DO UPDATE SET {replaced} WHERE runs.status = 'claimed'",
-                (key, self._study, *facts.values()),
-            )
+            insert = f"INSERT INTO runs (key, study, {columns}) VALUES (?, ?{', ?' * len(facts)})"
+            update = f"ON CONFLICT (key) DO UPDATE SET {replaced} WHERE runs.status = 'claimed'"
+            connection.execute(f"{insert} {update}", (key, self._study, *facts.values()))
 
     def forget_failures(self, points: Sequence[Point]) -> None:
         """Let points be run again that failed before this store was opened."""
@@ -238,11 +231,9 @@ class Store(Database):
             return False
         lives, ahead = Owner(*row[:5]).lives(row[5]), row[5] - time.time()
         if lives and ahead > BEAT_S and row[1] != self._me.machine:
-            self._tell(
-                [owner],
-                f"process {row[2]} on {row[0]} gave its last sign of life {ahead:.0f} s ahead of this clock; set both clocks "
-                f"right. Unless it gives another within {LEASE_S:g} s, its runs are taken over",
-            )
+            what = f"process {row[2]} on {row[0]} gave its last sign of life {ahead:.0f} s ahead of this clock"
+            mend = f"set both clocks right. Unless it gives another within {LEASE_S:g} s, its runs are taken over"
+            self._tell([owner], f"{what}; {mend}")
         return lives
 
 

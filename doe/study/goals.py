@@ -69,18 +69,13 @@ def tolerance_box(study: Study) -> ToleranceBox | None:
 def tolerances_of(study: Study) -> Array:
     """Half widths (k,) of all factors in coded units. Raises InputError for each that has none or too wide a one."""
     known = known_tolerances(study)
-    faults = [
-        f"{study.path}: factor.tolerance of {name}: missing; the tolerance-aware front needs the half width that "
-        "manufacture keeps, here or as half_width_mm of a chain that closes on this factor"
-        for name in study.factors
-        if name not in known
-    ]
-    room = region_of(study) * study.step
-    faults += [
-        f"{study.path}: factor.tolerance of {name} = {known[name]:g}: leaves no room in the region, which reaches "
-        f"{limit:g} to either side of the centre; narrow it or widen the design"
-        for name, limit in zip(study.factors, room, strict=True)
-        if known.get(name, 0.0) >= limit
-    ]
+    where = f"{study.path}: factor.tolerance of"
+    needs = "the tolerance-aware front needs the half width that manufacture keeps"
+    mend = "here or as half_width_mm of a chain that closes on this factor"
+    faults = [f"{where} {name}: missing; {needs}, {mend}" for name in study.factors if name not in known]
+    for name, limit in zip(study.factors, region_of(study) * study.step, strict=True):
+        if known.get(name, 0.0) >= limit:
+            why = f"leaves no room in the region, which reaches {limit:g} to either side of the centre"
+            faults.append(f"{where} {name} = {known[name]:g}: {why}; narrow it or widen the design")
     refuse(faults)
     return np.array([known[name] for name in study.factors]) / study.step

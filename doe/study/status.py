@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from doe import clearance
-from doe.running.at_work import folders_of
 from doe.running.failure import Failure, grouped
+from doe.running.owner import folders_of
 from doe.running.store import Claim, EndedRun, Point, Store
 from doe.study.runs import STORE, ordered_runs
 from doe.study_file import Study

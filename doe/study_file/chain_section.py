@@ -1,15 +1,15 @@
 """Dimension chains of STUDY.toml."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from rbdyn.faults import InputError, Strict, read_toml
+from rbdyn.faults import Consistent, InputError, read_toml
 
 
-class StudyChain(Strict):
+class StudyChain(Consistent):
     """Dimension chain whose closing link is the picked value of a factor. Its links stand here or in a file."""
 
     name: Annotated[str, Field(min_length=1)]
@@ -30,13 +30,11 @@ class StudyChain(Strict):
     selective: dict[str, Any] | None = None
     """Selective assembly, as in a CHAIN.toml."""
 
-    @model_validator(mode="after")
-    def _links_are_somewhere(self) -> Self:
+    def faults(self) -> Iterator[str]:
         if self.file is None and not self.link:
-            raise ValueError("link: missing; give the links, or the file that has them")
+            yield "link: missing; give the links, or the file that has them"
         if self.file is not None and (self.link or self.allocate or self.monte_carlo or self.selective):
-            raise ValueError(f"file = {self.file!r}: has the links and all about them; leave out one or the other")
-        return self
+            yield f"file = {self.file!r}: has the links and all about them; leave out one or the other"
 
 
 def chain_table(chain: StudyChain, folder: Path, value: float, half_width: float | None = None) -> Mapping[str, Any]:

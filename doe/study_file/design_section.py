@@ -1,11 +1,12 @@
 """Factors and the design of STUDY.toml."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from rbdyn.faults import Strict
-from rbdyn.fields import LARGEST, Positive, or_refuse
+from rbdyn.faults import Consistent
+from rbdyn.fields import LARGEST, Positive
 
 # A name that heads a column of a table: one field whoever writes or reads it.
 Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
@@ -13,7 +14,7 @@ Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p
 FINEST = 1e-9
 
 
-class Factor(Strict):
+class Factor(Consistent):
     """A factor: its name, its key in the scene, its values."""
 
     name: Name
@@ -31,15 +32,12 @@ class Factor(Strict):
     allowed: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     """Ends as far as an adaptive search may go beyond the region of the design; not at all where left out."""
 
-    @model_validator(mode="after")
-    def _levels_differ(self) -> Self:
-        faults = []
+    def faults(self) -> Iterator[str]:
         if self.step < FINEST * abs(self.centre):
-            faults.append(f"step = {self.step:g}: is lost in rounding beside centre = {self.centre:g}; widen it")
+            yield f"step = {self.step:g}: is lost in rounding beside centre = {self.centre:g}; widen it"
         if self.resolution is not None and self.resolution < FINEST * self.step:
             steps = f"makes more than {1.0 / FINEST:g} steps of step = {self.step:g}"
-            faults.append(f"resolution = {self.resolution:g}: {steps}; coarsen it")
-        return or_refuse(self, faults)
+            yield f"resolution = {self.resolution:g}: {steps}; coarsen it"
 
 
 Kind = Literal["central_composite", "box_behnken", "full_factorial", "latin_hypercube", "sobol"]
@@ -55,7 +53,7 @@ KEYS_OF = {
 }
 
 
-class Design(Strict):
+class Design(Consistent):
     """Which runs are made, and in which order."""
 
     kind: Kind = "central_composite"
@@ -86,11 +84,9 @@ class Design(Strict):
             return self.centre_replicates
         return 6 if self.kind in ("central_composite", "box_behnken") else 0
 
-    @model_validator(mode="after")
-    def _keys_belong_to_the_kind(self) -> Self:
+    def faults(self) -> Iterator[str]:
         alien = self.model_fields_set & set().union(*KEYS_OF.values()) - KEYS_OF[self.kind]
         mend = f"kind = {self.kind!r} has no such key; remove it or choose another kind"
-        faults = [f"{key}: {mend}" for key in type(self).model_fields if key in alien]
+        yield from (f"{key}: {mend}" for key in type(self).model_fields if key in alien)
         if self.cube_blocks > 1 and not self.blocks:
-            faults.append(f"cube_blocks = {self.cube_blocks}: needs blocks; write blocks = true beside it")
-        return or_refuse(self, faults)
+            yield f"cube_blocks = {self.cube_blocks}: needs blocks; write blocks = true beside it"

@@ -33,10 +33,8 @@ def study_of_table(path: Path, factors: Sequence[str], responses: Sequence[str],
         raise InputError([f"{path}: has no further column of numbers; {has}"])
     actual = read_table(path, factors, responses, path).actual
     low, high = actual.min(axis=0), actual.max(axis=0)
-    refuse(
-        f"--factor {factors[place]}: is {low[place]:g} in every row of {path}; leave it out"
-        for place in np.flatnonzero(low == high)
-    )
+    always = [(factors[place], low[place]) for place in np.flatnonzero(low == high)]
+    refuse(f"--factor {name}: is {value:g} in every row of {path}; leave it out" for name, value in always)
     scales = zip(factors, (0.5 * (low + high)).tolist(), (0.5 * (high - low)).tolist(), strict=True)
     data = {
         "factor": [{"name": name, "centre": centre, "step": step} for name, centre, step in scales],

@@ -47,12 +47,8 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     """
     header, rows = _fields(path)
     wanted, errors = [*factors, *responses], [f"{name}_error" for name in responses]
-    faults = [
-        f"{path}: column {_cut(name)} is missing; add it, or rename the factor or response in {named_in} to one of "
-        f"{listed(header)}"
-        for name in wanted
-        if name not in header
-    ]
+    mend = f"add it, or rename the factor or response in {named_in} to one of {listed(header)}"
+    faults = [f"{path}: column {_cut(name)} is missing; {mend}" for name in wanted if name not in header]
     columns = {}
     for name in (*wanted, *errors, COUNT, *LABELS):
         if name in header:

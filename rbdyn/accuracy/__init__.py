@@ -17,14 +17,14 @@ call never counts; what fails stays in the table. From Python::
 Names are fetched when first used: importing the package loads neither numba nor scipy.
 """
 
-from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rbdyn.accuracy.report import Report, show, write
-    from rbdyn.accuracy.rollers.equal_error import times_faster
+    from rbdyn.accuracy.rollers.comparison import times_faster
     from rbdyn.accuracy.rollers.tolerances import statistics_bias
+    from rbdyn.dynamics.ensemble import Reporter
     from rbdyn.scene import BallScene, Scene
 
 __all__ = ["BALL_STUDIES", "STUDIES", "Report", "show", "statistics_bias", "study", "times_faster", "write"]
@@ -46,13 +46,11 @@ _HOMES = {
     "show": "rbdyn.accuracy.report",
     "write": "rbdyn.accuracy.report",
     "statistics_bias": "rbdyn.accuracy.rollers.tolerances",
-    "times_faster": "rbdyn.accuracy.rollers.equal_error",
+    "times_faster": "rbdyn.accuracy.rollers.comparison",
 }
 
 
-def study(
-    name: str, scene: "Scene | BallScene", progress: Callable[[int, int], None] | None = None, **options: Any
-) -> "Report":
+def study(name: str, scene: "Scene | BallScene", progress: "Reporter" = None, **options: Any) -> "Report":
     """Run the study ``name`` of ``STUDIES``; ``progress(done, total)`` is called as it goes on.
 
     Raises KeyError for an unknown name, InputError where the scene has nothing to study, RunError, KeyboardInterrupt.

@@ -52,9 +52,8 @@ def overall(verdicts: Iterable[Verdict]) -> Verdict:
 def check_replicates(scene: Scene) -> None:
     """Raises InputError for a single replicate, whose mean has no error here."""
     if scene.numerics.replicates < 2:
-        raise InputError(
-            ["numerics.replicates = 1: the study compares means over replicates; give at least 2, better 8"]
-        )
+        what = "numerics.replicates = 1: the study compares means over replicates"
+        raise InputError([f"{what}; give at least 2, better 8"])
 
 
 def turns_needed(error: float, turns: float, sought: float = SOUGHT) -> float:
@@ -88,8 +87,6 @@ def undecided(hidden: Iterable[Difference], scene: Scene, sought: float = SOUGHT
     numerics = scene.numerics
     turns = turns_needed(worst.error, numerics.turns, sought)
     replicates = replicates_needed(worst.error, numerics.replicates, sought)
-    return (
-        f"undecided: errors of {percent(worst.error)} hide differences of {percent(abs(worst.value))} ({worst.where}); "
-        f"to tell {percent(sought)} raise numerics.turns to about {about(turns)} or numerics.replicates to about "
-        f"{about(replicates)}"
-    )
+    hides = f"errors of {percent(worst.error)} hide differences of {percent(abs(worst.value))} ({worst.where})"
+    mend = f"raise numerics.turns to about {about(turns)} or numerics.replicates to about {about(replicates)}"
+    return f"undecided: {hides}; to tell {percent(sought)} {mend}"

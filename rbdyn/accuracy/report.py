@@ -1,17 +1,17 @@
 """What a study hands over: one record, tables to print, sheets and pictures to write."""
 
 import platform
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
+from rbdyn.dynamics.ensemble import Reporter
 from rbdyn.result import versions, write_json
 
+T = TypeVar("T")
 # Of each heading the field of a row and the format of its figure, see ``cell``, or a function that words it.
 Columns = Mapping[str, tuple[str, str] | Callable[[Any], str]]
-# Told (done, total) as a study goes on.
-Reporter = Callable[[int, int], None]
 
 
 class Table(NamedTuple):
@@ -39,7 +39,7 @@ class Report:
 class Progress:
     """Counts what is done out of a known total."""
 
-    def __init__(self, report: Reporter | None, total: int) -> None:
+    def __init__(self, report: Reporter, total: int) -> None:
         self.report, self.total, self.done = report, total, 0
 
     def step(self, *part: int) -> None:
@@ -47,6 +47,12 @@ class Progress:
         self.done += 1
         if self.report is not None:
             self.report(self.done, self.total)
+
+    def over(self, items: Iterable[T]) -> Iterator[T]:
+        """The items; when the next one is asked for, one more is done."""
+        for each in items:
+            yield each
+            self.step()
 
 
 def cell(value: Any, form: str) -> str:

@@ -6,39 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rbdyn.cli import options as given
+from rbdyn.cli import terminal
 from rbdyn.cli.ball import ball
 from rbdyn.cli.keys import command as keys
 from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
-from rbdyn.cli.options import (
-    Json,
-    Out,
-    Quiet,
-    Replicates,
-    SceneFile,
-    Seed,
-    Set,
-    Turns,
-    Verbose,
-    Version,
-    Workers,
-    count_option,
-    flag,
-    folder_option,
-    study_flag,
-    valued,
-    verbose_flag,
-)
-from rbdyn.cli.terminal import (
-    FAILED,
-    guarded,
-    hand_over,
-    keeping,
-    output_folder,
-    print_notes,
-    print_table,
-    progress_bar,
-)
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -57,76 +30,80 @@ app.command()(manual)
 
 
 @app.callback()
-def main(version: Version = False) -> None:
+def main(version: given.Version = False) -> None:
     """Dynamics of rolling bearings: forces, whirl and power loss with their errors."""
 
 
 @app.command()
 def simulate(
-    scene: SceneFile,
-    assignments: Set = None,
-    turns: Turns = None,
-    replicates: Replicates = None,
-    seed: Seed = None,
-    workers: Workers = None,
+    scene: given.SceneFile,
+    assignments: given.Set = None,
+    turns: given.Turns = None,
+    replicates: given.Replicates = None,
+    seed: given.Seed = None,
+    workers: given.Workers = None,
     target: Annotated[
         str | None,
-        valued(
+        given.valued(
             "2%",
             "Choose tolerance, turns and replicates so that impact, whirl and loss are known to this.",
             "those given",
         ),
     ] = None,
-    out: Out = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    out: given.Out = None,
+    as_json: given.Json = False,
+    quiet: given.Quiet = False,
+    verbose: given.Verbose = False,
 ) -> None:
     """Simulate a cylindrical roller bearing: impact force, whirl deviation ratio, power loss."""
-    with guarded(as_json):
+    with terminal.guarded(as_json):
         loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
         aim = None if target is None else _aim(target, turns, replicates)
-        folder = output_folder(out, "rbdyn simulate", scene) if out else None
+        folder = terminal.output_folder(out, "rbdyn simulate", scene) if out else None
         from rbdyn.dynamics.simulate import simulate as run_scene
 
-        with progress_bar("simulating", quiet or as_json) as progress:
+        with terminal.progress_bar("simulating", quiet or as_json) as progress:
             result = run_scene(loaded, workers, progress, target=aim)
         loaded = type(loaded).from_dict(result.scene)
         files = _write(loaded, result, folder) if folder else []
-        hand_over(result.as_dict, as_json, lambda: _print(result, quiet, verbose), folder, files)
+        terminal.hand_over(result.as_dict, as_json, lambda: _print(result, quiet, verbose), folder, files)
 
 
 @app.command()
 def accuracy(
     scene: Annotated[Path | None, typer.Argument(metavar="SCENE.toml", help="Scene to study.")] = None,
-    assignments: Set = None,
-    out: Annotated[Path | None, folder_option("Write the study as JSON, CSV and pictures here.")] = None,
-    methods: Annotated[bool, study_flag("--methods", "Other integrators beside ours")] = False,
-    slices: Annotated[bool, study_flag("--slices", "Slices of a profiled roller")] = False,
-    replicates: Annotated[bool, study_flag("--replicates", "Statistical error against run time")] = False,
-    coverage: Annotated[bool, study_flag("--coverage", "How often the stated intervals hold the truth")] = False,
-    repeats: Annotated[int | None, count_option(2, "Repeats of the coverage.", 200)] = None,
-    options: Annotated[bool, study_flag("--options", "What each option costs")] = False,
-    stability: Annotated[bool, study_flag("--stability", "How stiff and extreme variants of the scene end")] = False,
-    scaling: Annotated[bool, study_flag("--scaling", "Time by rollers and slices, memory by turns")] = False,
-    battery: Annotated[bool, study_flag("--battery", "Solvers over thousands of random ball bearings")] = False,
-    scenes: Annotated[int | None, count_option(1, "Scenes of the battery.", 5000)] = None,
-    trajectory: Annotated[float | None, valued("TURNS", "Length of the trajectories, up to 1 turn.", "0.25")] = None,
+    assignments: given.Set = None,
+    out: Annotated[Path | None, given.folder_option("Write the study as JSON, CSV and pictures here.")] = None,
+    methods: Annotated[bool, given.study_flag("--methods", "Other integrators beside ours")] = False,
+    slices: Annotated[bool, given.study_flag("--slices", "Slices of a profiled roller")] = False,
+    replicates: Annotated[bool, given.study_flag("--replicates", "Statistical error against run time")] = False,
+    coverage: Annotated[bool, given.study_flag("--coverage", "How often the stated intervals hold the truth")] = False,
+    repeats: Annotated[int | None, given.count_option(2, "Repeats of the coverage.", 200)] = None,
+    options: Annotated[bool, given.study_flag("--options", "What each option costs")] = False,
+    stability: Annotated[
+        bool, given.study_flag("--stability", "How stiff and extreme variants of the scene end")
+    ] = False,
+    scaling: Annotated[bool, given.study_flag("--scaling", "Time by rollers and slices, memory by turns")] = False,
+    battery: Annotated[bool, given.study_flag("--battery", "Solvers over thousands of random ball bearings")] = False,
+    scenes: Annotated[int | None, given.count_option(1, "Scenes of the battery.", 5000)] = None,
+    trajectory: Annotated[
+        float | None, given.valued("TURNS", "Length of the trajectories, up to 1 turn.", "0.25")
+    ] = None,
     sought: Annotated[
-        float | None, valued("%", "Bias of an output that counts.", "1", "--sought-percent", min=0.01, max=50.0)
+        float | None, given.valued("%", "Bias of an output that counts.", "1", "--sought-percent", min=0.01, max=50.0)
     ] = None,
     page: Annotated[
-        Path | None, valued("FILE", "Measure the shipped examples and write one page of Markdown.", "no page")
+        Path | None, given.valued("FILE", "Measure the shipped examples and write one page of Markdown.", "no page")
     ] = None,
     part: Annotated[
-        list[str] | None, valued("NAME", "With --page, run this part only; repeatable.", "all parts")
+        list[str] | None, given.valued("NAME", "With --page, run this part only; repeatable.", "all parts")
     ] = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Annotated[bool, verbose_flag("Also versions.")] = False,
+    as_json: given.Json = False,
+    quiet: given.Quiet = False,
+    verbose: Annotated[bool, given.verbose_flag("Also versions.")] = False,
 ) -> None:
     """Show error against run time: of every output at each tolerance and of the motion; of a ball bearing, the solvers."""
-    with guarded(as_json):
+    with terminal.guarded(as_json):
         from rbdyn import accuracy as studies
         from rbdyn.accuracy.choice import chosen_study
         from rbdyn.scene import Scene
@@ -145,13 +122,13 @@ def accuracy(
         name = chosen_study(flags, limits, loaded)
         if "sought" in limits:
             limits["sought"] *= 0.01
-        folder = output_folder(out, "rbdyn accuracy", scene) if out else None
-        with progress_bar(name, quiet or as_json) as progress:
+        folder = terminal.output_folder(out, "rbdyn accuracy", scene) if out else None
+        with terminal.progress_bar(name, quiet or as_json) as progress:
             report = studies.study(name, loaded, progress, **limits)
         files = studies.write(report, folder) if folder else []
-        hand_over(lambda: report.record, as_json, lambda: studies.show(report, verbose), folder, files)
+        terminal.hand_over(lambda: report.record, as_json, lambda: studies.show(report, verbose), folder, files)
     if report.failed:
-        raise typer.Exit(FAILED)
+        raise typer.Exit(terminal.FAILED)
 
 
 def _print_map(mapped: "SlipMap") -> None:
@@ -160,7 +137,7 @@ def _print_map(mapped: "SlipMap") -> None:
         (f"{value:g}", *(f"{100.0 * slip:.3g} %" if slip == slip else "failed" for slip in row))
         for value, row in zip(mapped.loads_N, mapped.grid("cage_slip"), strict=True)
     ]
-    print_table("cage slip", header, rows)
+    terminal.print_table("cage slip", header, rows)
     print(f"{len(mapped.points)} points in {mapped.wall_s:.1f} s, seed {mapped.seed}")
 
 
@@ -177,37 +154,37 @@ def _write_map(mapped: "SlipMap", folder: Path) -> list[str]:
 
 @app.command("map")
 def slip_map(
-    scene: SceneFile,
+    scene: given.SceneFile,
     speed: Annotated[str, typer.Option(metavar="RPM", help="Inner speeds: start:stop:count or a,b,c.")],
     load: Annotated[str, typer.Option(metavar="N", help="Radial loads: start:stop:count or a,b,c.")],
-    assignments: Set = None,
-    turns: Turns = None,
-    replicates: Replicates = None,
-    seed: Seed = None,
-    workers: Workers = None,
+    assignments: given.Set = None,
+    turns: given.Turns = None,
+    replicates: given.Replicates = None,
+    seed: given.Seed = None,
+    workers: given.Workers = None,
     out: Annotated[
-        Path | None, folder_option("Write map.json, map.csv and map.png here, and keep finished points.")
+        Path | None, given.folder_option("Write map.json, map.csv and map.png here, and keep finished points.")
     ] = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    as_json: given.Json = False,
+    quiet: given.Quiet = False,
 ) -> None:
     """Map cage slip, power loss, impact and whirl over speed and load."""
-    with guarded(as_json):
+    with terminal.guarded(as_json):
         loaded = _rollers(scene, assignments, turns=turns, replicates=replicates, seed=seed)
-        folder = output_folder(out, "rbdyn map", scene) if out else None
+        folder = terminal.output_folder(out, "rbdyn map", scene) if out else None
         from rbdyn.cli.ranges import axis_values
         from rbdyn.dynamics import slip_map as study
 
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
         points = folder / study.POINTS if folder else None
-        with keeping(points), progress_bar("mapping", quiet or as_json) as progress:
+        with terminal.keeping(points), terminal.progress_bar("mapping", quiet or as_json) as progress:
             mapped = study.slip_map(loaded, *axes, workers, progress, points)
         files = _write_map(mapped, folder) if folder else []
-        hand_over(mapped.as_dict, as_json, lambda: _print_map(mapped), folder, files)
+        terminal.hand_over(mapped.as_dict, as_json, lambda: _print_map(mapped), folder, files)
         for point in mapped.failed:
             print(f"{point.inner_speed_rpm:g} rpm, {point.radial_load_N:g} N {point.status}", file=sys.stderr)
     if mapped.failed:
-        raise typer.Exit(FAILED)
+        raise typer.Exit(terminal.FAILED)
 
 
 def _rollers(path: Path, assignments: list[str] | None, **shorthand: float | None) -> "Scene":
@@ -238,15 +215,17 @@ def _measure(page: Path | None, parts: list[str], others: bool, as_json: bool, q
         raise InputError([f"{'--part' if parts else 'SCENE.toml'}: {known}"])
     if others:
         raise InputError([f"--page {page}: lists its own commands; leave out the scene and all options but --part"])
-    found = measure(page, parts, lambda name: progress_bar(name, quiet or as_json))
+    found = measure(page, parts, lambda name: terminal.progress_bar(name, quiet or as_json))
     failed = {name: each["status"] for name, each in found.items() if each["status"] not in ("ok", "kept")}
     record = {"status": "failed" if failed else "ok", "page": str(page), "parts": found}
     measured = [name for name, each in found.items() if each["status"] == "ok"]
-    hand_over(lambda: record, as_json, lambda: print(f"written to {page}: measured {', '.join(measured) or 'nothing'}"))
+    terminal.hand_over(
+        lambda: record, as_json, lambda: print(f"written to {page}: measured {', '.join(measured) or 'nothing'}")
+    )
     for name, status in failed.items():
         print(f"{name} {status}", file=sys.stderr)
     if failed:
-        raise typer.Exit(FAILED)
+        raise typer.Exit(terminal.FAILED)
 
 
 def _write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str]:
@@ -277,31 +256,22 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         "cage slip": result.cage_slip,
     }
     header = ("figure", "value", "statistical error (95 %)", "numerical error (95 %)", "effective samples")
-    rows = [
-        (
-            label,
-            f"{of.value:.5g}",
-            shown(of.statistical_error),
-            shown(of.numerical_error),
-            f"{of.effective_samples:.0f}",
-        )
-        for label, of in figures.items()
-    ]
+    rows = []
+    for label, of in figures.items():
+        errors = shown(of.statistical_error), shown(of.numerical_error)
+        rows.append((label, f"{of.value:.5g}", *errors, f"{of.effective_samples:.0f}"))
     columns = len(header) if verbose else -1
-    print_table("", header[:columns], [row[:columns] for row in rows])
+    terminal.print_table("", header[:columns], [row[:columns] for row in rows])
     if result.target is not None:
         _print_target(result.target)
-    print(
-        f"race loads up to {result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer); power balance "
-        f"closes to {100.0 * result.power_gap:.2g} %; {result.replicates} replicates, seed {result.seed}; "
-        f"{result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to load or compile"
-    )
+    loads = f"{result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer)"
+    runs = f"{result.replicates} replicates, seed {result.seed}"
+    took = f"{result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to load or compile"
+    print(f"race loads up to {loads}; power balance closes to {100.0 * result.power_gap:.2g} %; {runs}; {took}")
     for race, at in result.races.items():
         film = f", film {at['central_film_um']:.2g} um, lambda {at['lambda_ratio']:.2g}" if "lambda_ratio" in at else ""
-        print(
-            f"{race} race at its largest load: {at['max_pressure_MPa']:.0f} MPa over {at['half_width_um']:.0f} um each way"
-            + film
-        )
+        pressed = f"{at['max_pressure_MPa']:.0f} MPa over {at['half_width_um']:.0f} um each way"
+        print(f"{race} race at its largest load: {pressed}{film}")
     if len(result.clearance) > 2:
         parts = ", ".join(f"{name.replace('_', ' ')} {value:+.1f} um" for name, value in result.clearance.items())
         print(f"clearance: {parts}")
@@ -310,43 +280,42 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
             print(f"transient: {result.transient_turns:g} shaft turns")
         terms = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
         gap = result.power_gap * result.power_loss.value
-        print_table(f"power lost, each to ± {gap:.2g} W (gap of the power balance)", ("term", "W"), terms)
-        print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
-    print_notes(result.notes, quiet)
+        terminal.print_table(f"power lost, each to ± {gap:.2g} W (gap of the power balance)", ("term", "W"), terms)
+        terminal.print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
+    terminal.print_notes(result.notes, quiet)
 
 
 def _print_target(target: dict[str, Any]) -> None:
     chosen, cost = target["chosen"], target["cost"]
-    reached = ", ".join(
-        f"{name} {'unknown' if error is None else f'{100.0 * error:.2g} %'}"
-        for name, error in target["relative_error"].items()
-    )
-    print(
-        f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached}) by "
-        f"{chosen['replicates']} replicates of {chosen['turns']:g} turns at rtol {chosen['rtol']:g}; "
-        f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides, "
-        f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots; the seconds are those of pilots and all runs"
-    )
+    errors = target["relative_error"].items()
+    reached = ", ".join(f"{name} {'unknown' if e is None else f'{100.0 * e:.2g} %'}" for name, e in errors)
+    aim = f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached})"
+    runs = f"{chosen['replicates']} replicates of {chosen['turns']:g} turns at rtol {chosen['rtol']:g}"
+    spent = f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides"
+    pilots = f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots"
+    print(f"{aim} by {runs}; {spent}, {pilots}; the seconds are those of pilots and all runs")
 
 
 @app.command()
 def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
-    out: Annotated[Path | None, folder_option("Write here.", "'show' beside the result")] = None,
-    turns: Annotated[float | None, valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
+    out: Annotated[Path | None, given.folder_option("Write here.", "'show' beside the result")] = None,
+    turns: Annotated[float | None, given.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
     replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
-    animate: Annotated[bool, flag("--animate", says="Also a moving picture and a player.")] = False,
-    lyapunov: Annotated[bool, flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Annotated[bool, verbose_flag("Also peaks of the spectra.")] = False,
+    animate: Annotated[bool, given.flag("--animate", says="Also a moving picture and a player.")] = False,
+    lyapunov: Annotated[bool, given.flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,
+    as_json: given.Json = False,
+    quiet: given.Quiet = False,
+    verbose: Annotated[bool, given.verbose_flag("Also peaks of the spectra.")] = False,
 ) -> None:
     """Show how the bearing of a saved result moves: pictures, history.csv and orbit.json."""
-    with guarded(as_json):
+    with terminal.guarded(as_json):
         from rbdyn.cli import show as motion
 
         request = motion.request_of(result, turns, replicate)
-        folder = output_folder(out or request.path.parent / "show", "rbdyn show", request.path)
-        with progress_bar("showing", quiet or as_json) as progress:
+        folder = terminal.output_folder(out or request.path.parent / "show", "rbdyn show", request.path)
+        with terminal.progress_bar("showing", quiet or as_json) as progress:
             record = motion.write(request, folder, animate, lyapunov, progress)
-        hand_over(lambda: record, as_json, lambda: motion.print_record(record, quiet, verbose), folder, record["files"])
+        terminal.hand_over(
+            lambda: record, as_json, lambda: motion.print_record(record, quiet, verbose), folder, record["files"]
+        )

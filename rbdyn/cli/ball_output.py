@@ -29,10 +29,10 @@ def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
     if result.fits is not None:
         _print_fits(result.fits)
     if (runout := result.runout) is not None:
-        print(
-            f"runout over {runout['turns']} turns: radial {runout['indicator_um']:.3g} um by an indicator, {runout['minimum_zone_um']:.3g} um "
-            f"between circles, axial {runout['axial_um']:.3g} um, face {runout['face_um']:.3g} um; asynchronous {runout['asynchronous_radial_um']:.3g} um"
-        )
+        radial = f"{runout['indicator_um']:.3g} um by an indicator, {runout['minimum_zone_um']:.3g} um between circles"
+        axial = f"axial {runout['axial_um']:.3g} um, face {runout['face_um']:.3g} um"
+        asynchronous = f"asynchronous {runout['asynchronous_radial_um']:.3g} um"
+        print(f"runout over {runout['turns']} turns: radial {radial}, {axial}; {asynchronous}")
     print_notes(result.notes or (), quiet)
 
 
@@ -67,17 +67,15 @@ def _print_row(title: str, row: RowReport, verbose: bool) -> None:
     keys = ("azimuth_deg", "inner_angle_deg", "outer_angle_deg", "inner_load_N", "outer_load_N", "centrifugal_force_N")
     rows = [(f"{ball['azimuth_deg']:.1f}", *(f"{ball[key]:.4g}" for key in keys[1:])) for ball in row.balls]
     print_table(title, header, rows)
-    print(
-        f"ring (x along the radial load, z along the axis): {_place(place)}, {', '.join(f'tilt {axis} {tilt[axis]:.4g} mrad' for axis in 'xy')}"
-    )
+    tilts = ", ".join(f"tilt {axis} {tilt[axis]:.4g} mrad" for axis in "xy")
+    print(f"ring (x along the radial load, z along the axis): {_place(place)}, {tilts}")
     for race, contact in row.contacts.items():
         film = ""
         if "central_film_um" in contact:
             film = f", film {contact['central_film_um']:.3g} um, lambda {contact['lambda_ratio']:.2g}"
-        print(
-            f"{race} race: up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa over "
-            f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} um{film}"
-        )
+        ellipse = f"{2e3 * contact['semi_major_mm']:.3g} x {2e3 * contact['semi_minor_mm']:.3g} um"
+        pressed = f"up to {contact['load_N']:.4g} N, {row.max_stress_MPa[race]:.0f} MPa"
+        print(f"{race} race: {pressed} over {ellipse}{film}")
     life = row.life
     if life["L10_Mrev"] is not None:
         hours = f", {life['L10_h']:.4g} h" if life["L10_h"] is not None else ""
@@ -110,7 +108,5 @@ def _print_fits(fits: dict[str, Any]) -> None:
     loosens = fits["inner_ring_loosens_rpm"]
     state = "loose" if fits["inner_ring_loose"] else "tight"
     when = "at no speed" if loosens is None else f"at {loosens:.4g} rpm"
-    print(
-        f"fits: {fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the housing; the inner "
-        f"ring is {state}, rotation loosens it {when}"
-    )
+    pressed = f"{fits['inner_pressure_MPa']:.4g} MPa on the shaft, {fits['outer_pressure_MPa']:.4g} MPa in the housing"
+    print(f"fits: {pressed}; the inner ring is {state}, rotation loosens it {when}")

@@ -169,13 +169,10 @@ def _print(record: dict[str, Any], table: SweepResult | None, quiet: bool) -> No
 
 
 def _print_limits(record: dict[str, Any]) -> None:
-    rows = [
-        (race, f"{record[f'{race}_roundness_um']:.3g}", f"{record[f'{race}_sway_um']:.3g}")
-        for race in ("inner", "outer")
-    ]
+    of_race = {race: (record[f"{race}_roundness_um"], record[f"{race}_sway_um"]) for race in ("inner", "outer")}
+    rows = [(race, f"{roundness:.3g}", f"{sway:.3g}") for race, (roundness, sway) in of_race.items()]
     title = f"class {record['class']}: {record['radial_limit_um']:g} um radial, {record['axial_limit_um']:g} um axial runout"
     print_table(title, ("race", "roundness up to [um]", "side-sway up to [um]"), rows)
-    print(
-        f"yield {100.0 * record['yield']:.1f} +- {100.0 * record['standard_error']:.1f} % (standard error) of {record['bearings']} bearings, "
-        f"{record['solved_in_full']} of them solved in full, seed {record['seed']}"
-    )
+    good = f"{100.0 * record['yield']:.1f} +- {100.0 * record['standard_error']:.1f} % (standard error)"
+    solved = f"{record['solved_in_full']} of them solved in full, seed {record['seed']}"
+    print(f"yield {good} of {record['bearings']} bearings, {solved}")

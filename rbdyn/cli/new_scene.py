@@ -5,7 +5,7 @@ import math
 import re
 from typing import Any, NamedTuple
 
-from rbdyn.life.minimum_load import REFERENCE_SPEED_FACTOR
+from rbdyn.life.roller_capacity import REFERENCE_SPEED_FACTOR
 from rbdyn.properties.catalogue import Designation, Envelope, ball_interior, radial_clearance, roller_interior
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.properties.oils import NamedOil
@@ -39,6 +39,10 @@ BALL_SPEEDS = {"deep_groove_ball": 1.0e6, "angular_contact_ball": 6.3e5}
 USUAL_SPEED, USUAL_LOAD, USUAL_PRELOAD = 0.5, 0.1, 0.01
 
 
+# Of a template, by the names in it.
+Values = dict[str, Any]
+
+
 class OperatingPoint(NamedTuple):
     """What the user asks for; None where it is left to this module."""
 
@@ -50,7 +54,7 @@ class OperatingPoint(NamedTuple):
     clearance: str
 
 
-def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> dict[str, Any]:
+def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> Values:
     """Values of ``roller_scene.toml``. Raises ValueError for impossible dimensions or an unlisted clearance."""
     from rbdyn.life.roller_capacity import dynamic_capacity
 
@@ -76,7 +80,7 @@ def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) ->
     }
 
 
-def ball_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> dict[str, Any]:
+def ball_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> Values:
     """Values of ``ball_scene.toml``. Raises ValueError as ``roller_values``."""
     from rbdyn.life.ball_capacity import dynamic_capacity
 
@@ -92,9 +96,7 @@ def ball_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> d
     return {**inside._asdict(), **common, **known, "preload": preload, "preload_by": why}
 
 
-def _common(
-    named: Designation, sizes: Envelope, point: OperatingPoint, reference: float, capacity: float
-) -> dict[str, Any]:
+def _common(named: Designation, sizes: Envelope, point: OperatingPoint, reference: float, capacity: float) -> Values:
     """What both kinds of bearing have: name, boundary dimensions, oil, speed [rpm] and load [N]."""
     oil, base, grease = point.oil
     speed, load = point.speed, point.load
@@ -123,14 +125,12 @@ def _common(
 CLEARANCE_VALUES = ("clearance", "clearance_class", "lower", "upper")
 
 
-def _clearance(bore: float, name: str, kind: str) -> dict[str, Any]:
+def _clearance(bore: float, name: str, kind: str) -> Values:
     lower, upper = (1e-3 * limit for limit in radial_clearance(bore, name, kind))
     return dict(zip(CLEARANCE_VALUES, (round(0.5 * (lower + upper), 4), name, lower, upper), strict=True))
 
 
-def _cage(
-    named: Designation, width: float, length: float, rollers: int, diameter: float, pitch: float
-) -> dict[str, Any]:
+def _cage(named: Designation, width: float, length: float, rollers: int, diameter: float, pitch: float) -> Values:
     """A cage of the kind that the suffix names, about the pitch circle."""
     suffix = re.sub(r"^(EC|E)", "", named.suffix.split(" ")[0])
     guidance, material = CAGES.get(suffix, CAGES[USUAL_CAGE])

@@ -34,9 +34,8 @@ def guarded(as_json: bool) -> Iterator[None]:
     except KeyboardInterrupt as error:
         _leave(as_json, INTERRUPTED, [f"interrupted; {str(error) or 'nothing was kept'}"])
     except MemoryError as error:
-        _leave(
-            as_json, FAILED, [f"out of memory: {error or 'no more is left'}; ask for fewer points, samples or turns"]
-        )
+        why = f"out of memory: {error or 'no more is left'}"
+        _leave(as_json, FAILED, [f"{why}; ask for fewer points, samples or turns"])
     except OSError as error:
         sentence = f"{error.filename or 'output'}: {error.strerror}; check the path, its permissions and the disk"
         _leave(as_json, FAILED if error.errno == errno.ENOSPC else BAD_INPUT, [sentence])

@@ -93,10 +93,8 @@ def point_contact(curvature_sum: float, curvature_difference: float, equivalent_
     no point (sum <= 0, or F outside [0, 1)) and for E' <= 0.
     """
     if not curvature_sum > 0.0 or not 0.0 <= curvature_difference < 1.0:
-        raise ValueError(
-            f"curvature sum {curvature_sum:g}/m and difference {curvature_difference:g}: a point contact needs a sum"
-            " above 0 and a difference from 0 to below 1"
-        )
+        what = f"curvature sum {curvature_sum:g}/m and difference {curvature_difference:g}"
+        raise ValueError(f"{what}: a point contact needs a sum above 0 and a difference from 0 to below 1")
     if not equivalent_modulus > 0.0:
         raise ValueError(f"equivalent modulus {equivalent_modulus:g} Pa must be positive")
     log_ellipticity, shape = _shape(curvature_difference)

@@ -75,7 +75,6 @@ def table_relief(position: Array, points: Sequence[tuple[float, float]]) -> Arra
     else:
         covered = (position >= table[0, 0]) & (position <= table[-1, 0])
     if not np.all(covered):
-        raise ValueError(
-            f"the profile is given from {table[0, 0]:g} to {table[-1, 0]:g} m, short of the contact; add points"
-        )
+        what = f"the profile is given from {table[0, 0]:g} to {table[-1, 0]:g} m, short of the contact"
+        raise ValueError(f"{what}; add points")
     return np.asarray(np.interp(position, table[:, 0], table[:, 1]))

@@ -14,6 +14,8 @@ from typing import Generic, TypeVar
 from rbdyn.faults import RunError
 
 T = TypeVar("T")
+# Told (done, total) as something goes on, where anybody asks.
+Reporter = Callable[[int, int], None] | None
 
 # Ctrl-C is looked for as often as this [s].
 NAP_S = 0.2

@@ -2,14 +2,14 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+from rbdyn.arrays import Array
+from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE
@@ -31,7 +31,7 @@ class Batches:
     A whole number of batches fits an impact window.
     """
 
-    warm_up: NDArray[np.float64]
+    warm_up: Array
     length: float
     per_window: int
 
@@ -49,7 +49,7 @@ class Batches:
         """Batches of a run of so many turns after the warm-up [shaft turns]."""
         return self.first + math.ceil(counted / self.length - 1e-9)
 
-    def ends(self, counted: float) -> NDArray[np.float64]:
+    def ends(self, counted: float) -> Array:
         """Ends of all batches [shaft turns] of a run of so many turns after the warm-up; the last may be shorter."""
         begin = float(self.warm_up[-1]) if self.first else 0.0
         after = np.minimum(np.arange(1, self.count(counted) - self.first + 1) * self.length, counted)
@@ -73,7 +73,7 @@ class Recording:
     def __init__(self, run: Run) -> None:
         self.run, self.batches = run, batches_of(run.scene)
         self._begin = run.clock_angles()
-        self._ends, self._booked = [0.0], list[tuple[NDArray[np.float64], ...]]()
+        self._ends, self._booked = [0.0], list[tuple[Array, ...]]()
         self._looks = [self._look()]
         self._cpu_s = 0.0
 
@@ -141,16 +141,11 @@ def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: fl
 
 
 def run_series(
-    scene: Scene,
-    bearing: RollerBearing,
-    tolerances: Sequence[float],
-    workers: int | None,
-    progress: Callable[[int, int], None] | None,
-    stop: Stop,
+    scene: Scene, bearing: RollerBearing, rtols: Sequence[float], workers: int | None, progress: Reporter, stop: Stop
 ) -> list[list[Replicate]]:
     """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""
     replicates = range(scene.numerics.replicates)
-    tasks = [partial(run_replicate, scene, bearing, index, rtol, stop) for rtol in tolerances for index in replicates]
+    tasks = [partial(run_replicate, scene, bearing, index, rtol, stop) for rtol in rtols for index in replicates]
     runs: dict[int, Replicate] = {}
 
     def ended(one: Ended[Replicate]) -> None:
@@ -159,10 +154,10 @@ def run_series(
             progress(len(runs), len(tasks))
 
     run_all(tasks, workers, stop, ended)
-    return [[runs[place * len(replicates) + index] for index in replicates] for place in range(len(tolerances))]
+    return [[runs[place * len(replicates) + index] for index in replicates] for place in range(len(rtols))]
 
 
-def kinematic_cage_angle(scene: Scene, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
+def kinematic_cage_angle(scene: Scene, before: Array, after: Array) -> float:
     """Angle [rad] that an epicyclic cage turns while inner and outer ring turn from ``before`` to ``after``."""
     outer, inner = scene.geometry.raceways
     turned = after - before

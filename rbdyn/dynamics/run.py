@@ -5,8 +5,8 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
@@ -52,9 +52,8 @@ class Run:
         """Settle "auto" by a trial from where the run stands, which is left as it is."""
         if self.method != "auto":
             return
-        self.method, stiffness = cheaper_method(
-            self.scene, self.bearing, self.explicit, self._control_by, self.carry, self.tally, self.sample_step
-        )
+        memory = self.carry, self.tally, self.sample_step
+        self.method, stiffness = cheaper_method(self.scene, self.bearing, self.explicit, self._control_by, *memory)
         if self.method == "rosenbrock":
             # The implicit method does not see what it overcomes.
             self.carry.stiffness[:] = stiffness
@@ -100,7 +99,7 @@ class Run:
             kept[:] = 0.0
         self.carry.clock[at.SAMPLE] = self.carry.clock[at.NOW]
 
-    def clock_angles(self) -> NDArray[np.float64]:
+    def clock_angles(self) -> Array:
         """Angles of inner and outer ring [rad] since the start."""
         clock = self.layout.clock
         if clock is None:
@@ -113,11 +112,9 @@ class Run:
         component, step = name(int(self.carry.counts[at.WORST]), self.layout), self.carry.clock[at.STEP]
         message = message.format(component=component, step=step, **self.control._asdict())
         explicit = status is Status.STEP_BUDGET and self.scene.numerics.method in EXPLICIT
-        return (
-            f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s, "
-            f"shaft turn {time_s / self.scene.turn_s:.4g}: {message}; "
-            f"{'take numerics.method = auto, ' if explicit else ''}{remedy}"
-        )
+        where = f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s"
+        why = f"shaft turn {time_s / self.scene.turn_s:.4g}: {message}"
+        return f"{where}, {why}; {'take numerics.method = auto, ' if explicit else ''}{remedy}"
 
 
 def with_numerics(scene: Scene, **changes: Any) -> Scene:

@@ -12,12 +12,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
-from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.recording import Recording, batches_of
 from rbdyn.dynamics.statistics.bias import companion_tolerance
-from rbdyn.dynamics.statistics.drift import drifting
+from rbdyn.dynamics.statistics.drift import drifting, start_of_counting
 from rbdyn.dynamics.statistics.metrics import Replicate
-from rbdyn.dynamics.statistics.transient import start_of_counting
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 
@@ -51,9 +50,7 @@ GROWTH = (4.0, 2.0)
 Start = Callable[[int, float, Stop], Recording]
 
 
-def run_until_settled(
-    scene: Scene, start: Start, workers: int | None, progress: Callable[[int, int], None] | None, stop: Stop
-) -> Ensemble:
+def run_until_settled(scene: Scene, start: Start, workers: int | None, progress: Reporter, stop: Stop) -> Ensemble:
     """Run the replicates of a scene, as far as it takes, then their companions just as far.
 
     Raises RunError when a replicate cannot go on, KeyboardInterrupt.
@@ -96,7 +93,7 @@ class Team:
     rtol: float
     workers: int | None
     stop: Stop
-    progress: Callable[[int, int], None] | None
+    progress: Reporter
     to_come: int
     done: int = 0
     recordings: dict[int, Recording] = field(default_factory=dict)
@@ -167,17 +164,13 @@ def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, extends:
     counted = runs[0].duration / turn_s
     if stage.looks:
         dropped = float(runs[0].durations[: stage.first].sum()) / turn_s
-        notes.append(
-            f"length: figures drifted, so each replicate ran {dropped + counted:.4g} shaft turns in place of "
-            f"{numerics.warm_up_turns + numerics.turns:.4g}, of which the last {counted:.4g} count "
-            "(numerics.extend = false forbids it)"
-        )
+        ran = f"{dropped + counted:.4g} shaft turns in place of {numerics.warm_up_turns + numerics.turns:.4g}"
+        last = f"of which the last {counted:.4g} count (numerics.extend = false forbids it)"
+        notes.append(f"length: figures drifted, so each replicate ran {ran}, {last}")
     if scene.operation.schedule is None and drifting(runs):
         mend = "raise numerics.extend_limit" if extends else "lengthen numerics.turns or set numerics.extend = true"
         if not fits(scene, grown(scene, stage, GROWTH[-1])):
             mend = "take fewer replicates: there is no memory for longer ones"
-        notes.append(
-            f"transient: figures still drift over the {counted:.4g} turns counted; their errors hold what the drift shows, "
-            f"yet it may go farther; {mend}"
-        )
+        what = f"transient: figures still drift over the {counted:.4g} turns counted"
+        notes.append(f"{what}; their errors hold what the drift shows, yet it may go farther; {mend}")
     return tuple(notes)

@@ -1,12 +1,11 @@
 """Replicates of a scene, gathered with error bars."""
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from rbdyn.dynamics.ensemble import Stop
+from rbdyn.dynamics.ensemble import Reporter, Stop
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
 from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.parameters.left_out import heat_notes, left_out_notes, light_load_notes
@@ -37,7 +36,7 @@ def _types(parameters: Any) -> Any:
 def simulate(
     scene: Scene,
     workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter = None,
     stop: Stop | None = None,
     target: float | None = None,
 ) -> SimulationResult:
@@ -137,18 +136,13 @@ def clearance_report(scene: Scene) -> dict[str, float]:
 def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
     notes = []
     if power_gap > LARGEST_POWER_GAP:
-        notes.append(
-            f"power balance closes only to {100.0 * power_gap:.2g} %: numerics.rtol = {scene.numerics.rtol:g} is too "
-            "loose for this scene; loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
-        )
+        loose = f"numerics.rtol = {scene.numerics.rtol:g} is too loose for this scene"
+        why = "loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
+        notes.append(f"power balance closes only to {100.0 * power_gap:.2g} %: {loose}; {why}")
     if scene.traction.model == "four_constant":
-        notes.append(
-            "traction: one load-independent set of constants; lightly loaded rollers are driven too hard and "
-            "skidding is under-predicted"
-        )
+        what = "traction: one load-independent set of constants"
+        notes.append(f"{what}; lightly loaded rollers are driven too hard and skidding is under-predicted")
     if scene.traction.model == "thermal_newtonian" and scene.lubricant.viscosity_mPas is not None:
-        notes.append(
-            "traction: follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use; choose "
-            "traction.rheology_oil to suit it"
-        )
+        what = "traction: follows the oil and its temperature, not lubricant.viscosity_mPas, which the films use"
+        notes.append(f"{what}; choose traction.rheology_oil to suit it")
     return tuple(notes)

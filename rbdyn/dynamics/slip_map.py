@@ -6,7 +6,7 @@ its cause, and the others go on. Finished points may be kept in a file, so that 
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rbdyn.cli.ranges import MOST_VALUES
-from rbdyn.dynamics.ensemble import Ended, Stop, run_all
+from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
@@ -92,7 +92,7 @@ def slip_map(
     speeds_rpm: Sequence[float],
     loads_N: Sequence[float],  # noqa: N803
     workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter = None,
     kept_in: Path | None = None,
 ) -> SlipMap:
     """Run the scene at every pair of inner speed and radial load; what lies in the file ``kept_in`` is not run again.
@@ -130,19 +130,15 @@ def slip_map(
         waiting[place] -= 1
         if not waiting[place]:
             cause = causes.get(place)
-            ours, theirs = (
-                [runs.pop((place, rtol, i)) for i in range(count)] if cause is None else [] for rtol, count in series
-            )
+            whole = series if cause is None else [(rtol, 0) for rtol, _ in series]
+            ours, theirs = ([runs.pop((place, rtol, i)) for i in range(count)] for rtol, count in whole)
             points[place] = _point(scenes[place], ours, theirs, cause)
             kept.put(keys[place], points[place].as_dict())
         if progress is not None:
             progress(done, len(tasks))
 
     started = time.perf_counter()
-    work = [
-        partial(run_replicate, scenes[place], bearings[place], replicate, rtol, stop)
-        for place, rtol, replicate in tasks
-    ]
+    work = [partial(run_replicate, scenes[place], bearings[place], i, rtol, stop) for place, rtol, i in tasks]
     run_all(work, workers, stop, ended)
     wall_s = time.perf_counter() - started
     ordered = tuple(points[place] for place in range(len(scenes)))

@@ -11,14 +11,14 @@ together, pilots and earlier runs included.
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.dynamics.ensemble import Stop
+from rbdyn.arrays import Array
+from rbdyn.dynamics.ensemble import Reporter, Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
@@ -29,8 +29,6 @@ from rbdyn.dynamics.statistics.metrics import Replicate, mean_gap, work_done
 from rbdyn.faults import InputError
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
-
-Array = NDArray[np.float64]
 
 AIMED = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
 SCATTERED = AIMED[:2]  # their bias is seen over the tolerance, that of the loss by the power balance
@@ -68,11 +66,8 @@ def target_of(text: str) -> float:
 def checked(target: float, shown: str | None = None) -> float:
     """The target. Raises InputError unless it is a fraction above 0 and at most a half."""
     if not 0.0 < target <= LARGEST_TARGET:
-        raise InputError(
-            [
-                f"--target {shown or f'{target:g}'}: must be above 0 and at most {100.0 * LARGEST_TARGET:g} %; write it as 2% or 0.02"
-            ]
-        )
+        what = f"--target {shown or f'{target:g}'}: must be above 0 and at most {100.0 * LARGEST_TARGET:g} %"
+        raise InputError([f"{what}; write it as 2% or 0.02"])
     return target
 
 
@@ -117,7 +112,7 @@ def reach(
     target: float,
     simulate: Callable[..., SimulationResult],
     workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reporter = None,
     stop: Stop | None = None,
 ) -> SimulationResult:
     """``simulate`` until the total relative 95 % error of impact force, whirl ratio and power loss is at most ``target``.
@@ -171,9 +166,7 @@ def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
     return dict(zip(AIMED, figures, strict=True))
 
 
-def measure(
-    scene: Scene, workers: int | None, progress: Callable[[int, int], None] | None, stop: Stop | None
-) -> tuple[Model, Mapping[str, float]]:
+def measure(scene: Scene, workers: int | None, progress: Reporter, stop: Stop | None) -> tuple[Model, dict[str, float]]:
     """Pilots over the ladder of tolerances: what they tell, and what they cost (``ADDED``). Raises RunError."""
     turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)
     pilot = with_numerics(scene, turns=turns, replicates=PILOT_REPLICATES)
@@ -324,7 +317,5 @@ def _shortfall(target: float, errors: dict[str, float | None], result: Simulatio
         limit = f"its numerical error at numerics.rtol = {choice.rtol:g} limits it"
     else:
         limit = f"its scatter over {choice.replicates} replicates of {choice.turns:g} turns limits it"
-    return (
-        f"target of {100.0 * target:g} % not met: {worst} is known to {100.0 * (errors[worst] or 0.0):.2g} %, and {limit}; "
-        "ask for less, or run longer by numerics.turns and numerics.replicates"
-    )
+    what = f"target of {100.0 * target:g} % not met: {worst} is known to {100.0 * (errors[worst] or 0.0):.2g} %"
+    return f"{what}, and {limit}; ask for less, or run longer by numerics.turns and numerics.replicates"

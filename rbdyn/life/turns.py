@@ -10,6 +10,13 @@ from rbdyn.records.record import finite
 Turning = Literal["inner", "outer", "both"]
 
 
+def turning_rings(inner_speed: float, outer_speed: float) -> Turning:
+    """Which rings turn against a load that keeps its direction; the inner one where nothing turns."""
+    if outer_speed == 0.0:
+        return "inner"
+    return "outer" if inner_speed == 0.0 else "both"
+
+
 @dataclass(frozen=True)
 class Life:
     """Life that nine bearings, or rows, in ten reach.

@@ -135,9 +135,7 @@ def azimuth(result: "SweepResult", path: Path) -> None:
 def maps(result: "SweepResult", path: Path) -> None:
     """A panel a figure over both keys; points without an equilibrium stay white."""
     rows = _rows(result)
-    panels = [
-        (prefix + name, f"{title} {text}".strip(), log) for title, prefix in rows.items() for name, text, log in MAPS
-    ]
+    panels = [(row + name, f"{title} {text}".strip(), log) for title, row in rows.items() for name, text, log in MAPS]
     panels += ROUND_MAPS
     across = 3 if len(rows) == 1 else len(MAPS)
     lines = -(-len(panels) // across)

@@ -109,10 +109,9 @@ def read_designation(text: str) -> Designation:
     ):
         if not letters and series in known:
             return Designation(kind, letters, series, code, suffix)
-    raise ValueError(
-        "is no designation known here; write NU, NJ, NUP, N or NF with series 10, 2, 22, 3 or 23 (NU210), a deep groove ball "
-        "bearing of series 60, 62, 63, 618, 619 (6208) or an angular contact one of 70, 72, 73, 718, 719 (7208B)"
-    )
+    rollers = "NU, NJ, NUP, N or NF with series 10, 2, 22, 3 or 23 (NU210)"
+    balls = "a deep groove ball bearing of series 60, 62, 63, 618, 619 (6208) or an angular contact one"
+    raise ValueError(f"is no designation known here; write {rollers}, {balls} of 70, 72, 73, 718, 719 (7208B)")
 
 
 def envelope(named: Designation) -> Envelope:

@@ -2,7 +2,7 @@
 
 - ``row``: one row of balls, its forces and its solver; ``double_decker``: two rows with a floating ring between
 - ``bearing``: what ``rbdyn.equilibrium`` calls, solvers by name; ``result``, ``remarks``: what is reported, and to beware of
-- ``rivals``: solvers beside ours; ``roots``: other equilibria of the same bearing
+- ``rivals``: solvers beside ours
 - ``fatigue``, ``preload``: life, and the preload for the longest
 - ``runout``: form errors, the turning ring, classes; ``sweep``: equilibria over keys of a scene
 

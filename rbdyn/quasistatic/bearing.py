@@ -1,12 +1,16 @@
-"""Equilibrium of the bearing of a scene: what ``rbdyn.equilibrium`` and ``rbdyn ball`` call."""
+"""Equilibrium of the bearing of a scene: what ``rbdyn.equilibrium`` and ``rbdyn ball`` call.
+
+A raceway control other than outer may have several under the same load: others are searched for.
+"""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from rbdyn.arrays import Array
 from rbdyn.mounting.ball_rings import growth_record, row_change
 from rbdyn.quasistatic import result as told
 from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
@@ -15,9 +19,10 @@ from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.remarks import Rating, overloads, remarks, sentences, tipping
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport, film_record, row_report
 from rbdyn.quasistatic.rivals import finite_search, plain_newton
-from rbdyn.quasistatic.roots import other_roots
+from rbdyn.quasistatic.row.control import Control, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
+from rbdyn.quasistatic.row.row import Row
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
@@ -30,6 +35,11 @@ SOLVERS: dict[str, Callable[..., Solution]] = {
 }
 # Raceway controls under which there may be more than one equilibrium.
 SEVERAL_ROOTS = ("inner", "half")
+# Shares of the inner race and of the speeds whose equilibria are the starts of the search.
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+SPEEDS = (0.7, 1.4)
+# Contact angles that differ by less belong to one equilibrium [rad].
+SAME = 1e-4
 
 
 def equilibrium(scene: BallScene | Scene, start: BallResult | tuple[Solution, ...] | None = None) -> BallResult:
@@ -62,10 +72,9 @@ def equilibrium(scene: BallScene | Scene, start: BallResult | tuple[Solution, ..
     notes += sentences([*remarks(table, [rating]), tipping(solution.displacement[np.newaxis, 3:], scene)])
     others = _other_roots(scene, model, solution)
     if others:
-        notes.append(
-            f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load under this raceway control, see "
-            "other_roots; this one is reached from one common cage speed"
-        )
+        more = f"{len(others)} more equilibri{'um' if len(others) == 1 else 'a'} of the same load"
+        known = "see other_roots; this one is reached from one common cage speed"
+        notes.append(f"{more} under this raceway control, {known}")
     figures = {"report": report, **grown, "other_roots": others, "notes": notes}
     return replace(nothing, **figures, rows=(solution,), ratings=(rating,))
 
@@ -102,9 +111,8 @@ def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> Ba
         layers[name] = row_report(rating, row, film_record(scene, rating, row, rings[name]), None)
         notes += sentences(remarks(row.figures[np.newaxis], [rating], name))
     notes += sentences([tipping(solution.displacement[np.newaxis, 3:], scene)])
-    grown = growth_record(
-        scene, {"inner_less_middle_bore": model.changes[0], "middle_less_outer_race": model.changes[1]}
-    )
+    races = zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True)
+    grown = growth_record(scene, dict(races))
     report = DoubleDeckerReport(
         **told.displacement_record(solution.displacement),
         stiffness=told.stiffness_record(solution.stiffness),
@@ -128,3 +136,35 @@ def _nothing(scene: BallScene, status: str, took: float) -> BallResult:
         versions=versions(),
         scene=scene.model_dump(mode="json"),
     )
+
+
+def other_roots(row: Row, control: Control, load: Array, given: Array, known: Solution) -> tuple[Solution, ...]:
+    """Equilibria besides ``known``, found from those of other raceway controls and of slower and faster rings.
+
+    A search, not a proof: an empty answer says that none of these starts leads elsewhere. None under one common cage speed,
+    where the equilibrium is unique.
+    """
+    if not isinstance(control, FixedShare | FrictionShare):
+        return ()
+    roots = [known]
+    for start in _starts(row, control, load, given):
+        root = solve(row, control, load, given, start)
+        if root.found and all(_differ(root, other) for other in roots):
+            roots.append(root)
+    return tuple(roots[1:])
+
+
+def _starts(row: Row, control: FixedShare | FrictionShare, load: Array, given: Array) -> Sequence[Solution]:
+    usual = control.spinning
+    neighbours: list[Control] = [FixedShare(share, usual) for share in SHARES]
+    turning = [usual._replace(inner_speed=k * usual.inner_speed, outer_speed=k * usual.outer_speed) for k in SPEEDS]
+    # The sign of the moment that many texts have leads to the other side.
+    turning.append(usual._replace(turning=-usual.turning))
+    neighbours += [control._replace(spinning=each) for each in turning]
+    return [start for start in (solve(row, each, load, given) for each in neighbours) if start.found]
+
+
+def _differ(one: Solution, other: Solution) -> bool:
+    touching = (one.inner_load > 0.0) & (other.inner_load > 0.0)
+    apart = np.abs(one.inner_angle - other.inner_angle)[touching]
+    return bool(np.any((one.inner_load > 0.0) != (other.inner_load > 0.0)) or np.any(apart > SAME))

@@ -25,13 +25,6 @@ def reference_capacities(drawing: BallRow) -> tuple[float, float]:
     return rated_capacities(capacity_of(drawing), drawing.balls, drawing.gamma, angle, *drawing.groove_factors)
 
 
-def turning_rings(inner_speed: float, outer_speed: float) -> Turning:
-    """Which rings turn against a load that keeps its direction; the inner one where nothing turns."""
-    if outer_speed == 0.0:
-        return "inner"
-    return "outer" if inner_speed == 0.0 else "both"
-
-
 def solution_life(solution: Solution, capacities: tuple[float, float], turning: Turning = "inner") -> Life:
     """Life of a row in equilibrium."""
     return row_life(solution.inner_load, solution.outer_load, capacities, turning)

@@ -16,7 +16,8 @@ from scipy.optimize import minimize_scalar
 
 from rbdyn.arrays import Array
 from rbdyn.faults import validated
-from rbdyn.quasistatic.fatigue import reference_capacities, solution_life, turning_rings
+from rbdyn.life.turns import turning_rings
+from rbdyn.quasistatic.fatigue import reference_capacities, solution_life
 from rbdyn.quasistatic.remarks import Rating, pressures
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
@@ -89,9 +90,8 @@ def sweep(case_at: Callable[[float], Case], values: Sequence[float], name: str, 
         start = points[-1].solution if points[-1].solution.found else None
     balanced = [point for point in points if point.solution.found]
     if len(balanced) < 3:
-        raise ValueError(
-            f"{name}: only {len(balanced)} of {len(points)} scanned values have an equilibrium; scan a range that has one"
-        )
+        what = f"{name}: only {len(balanced)} of {len(points)} scanned values have an equilibrium"
+        raise ValueError(f"{what}; scan a range that has one")
 
     def refined(worth: Callable[[Point], float]) -> Point:
         best = min(range(len(balanced)), key=lambda i: worth(balanced[i]))
@@ -123,18 +123,15 @@ def _notes(
     for goal, point in (("least peak stress", least), ("longest life", longest)):
         for end, word in ((points[0].value, "lower"), (points[-1].value, "upper")):
             if abs(point.value - end) <= 1e-3 * span:
-                notes.append(
-                    f"the {goal} lies at the {word} end of the range, {name} {scale * end:.4g} {unit}: it has no "
-                    "optimum inside; widen the range or take what the end gives"
-                )
+                what = f"the {goal} lies at the {word} end of the range, {name} {scale * end:.4g} {unit}"
+                notes.append(f"{what}: it has no optimum inside; widen the range or take what the end gives")
     loss = 1.0 - least.million_turns / longest.million_turns
     rise = longest.peak_pressure / least.peak_pressure - 1.0
     apart = abs(least.value - longest.value) > SAME_PLACE * span
     if apart and (loss > SAME_VALUE or rise > SAME_VALUE):
-        notes.append(
-            f"least peak stress and longest life differ: {name} {scale * least.value:.4g} {unit} for stress costs "
-            f"{100.0 * loss:.3g} % of the life, {scale * longest.value:.4g} {unit} for life {100.0 * rise:.3g} % more stress"
-        )
+        what = "least peak stress and longest life differ"
+        why = f"{name} {scale * least.value:.4g} {unit} for stress costs {100.0 * loss:.3g} % of the life"
+        notes.append(f"{what}: {why}, {scale * longest.value:.4g} {unit} for life {100.0 * rise:.3g} % more stress")
     return tuple(notes)
 
 
@@ -148,10 +145,8 @@ def over_preload(
     """
     at = _case(scene, capacities)
     if not math.isnan(at.given[2]):
-        raise ValueError(
-            "operation.prescribed.z_mm or preload_um: the axial displacement is prescribed, so a preload by force has no "
-            "effect; leave it out"
-        )
+        what = "operation.prescribed.z_mm or preload_um: the axial displacement is prescribed"
+        raise ValueError(f"{what}, so a preload by force has no effect; leave it out")
 
     def case_at(preload: float) -> Case:
         return at._replace(load=at.load + np.array([0.0, 0.0, preload, 0.0, 0.0]))
@@ -168,10 +163,9 @@ def over_clearance(
     """
     angle = scene.bearing.contact_angle_deg
     if angle is not None:
-        raise ValueError(
-            f"bearing.contact_angle_deg = {angle:g} rules the clearance, {1e6 * clearance_of(scene.bearing):.4g} um: give "
-            "bearing.radial_clearance_mm in its place, or --sweep bearing.clearance_change_um"
-        )
+        what = f"bearing.contact_angle_deg = {angle:g} rules the clearance, {1e6 * clearance_of(scene.bearing):.4g} um"
+        why = "give bearing.radial_clearance_mm in its place"
+        raise ValueError(f"{what}: {why}, or --sweep bearing.clearance_change_um")
 
     def case_at(clearance: float) -> Case:
         return _case(_redrawn(scene, radial_clearance_mm=1e3 * clearance), capacities)

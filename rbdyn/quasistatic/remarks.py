@@ -5,9 +5,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Mask
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
 from rbdyn.contact.static_limit import BALLS, dent_sentence
 from rbdyn.quasistatic.row.control import FixedShare, FrictionShare
@@ -37,7 +36,7 @@ class Remark(NamedTuple):
     """Something unusual: in a word, at which of n points, and what to say of one of them."""
 
     word: str
-    where: NDArray[np.bool_]
+    where: Mask
     say: Callable[[int], str]
     row: str = ""
 
@@ -82,9 +81,8 @@ def needed_friction(balls: Array, ratings: Sequence[Rating]) -> Array:
     diameter = np.array([[rating.drawing.ball_diameter] for rating in ratings])
     with np.errstate(divide="ignore", invalid="ignore"):
         if isinstance(controls[0], FrictionShare):
-            ratio = np.array(
-                [[model.outer_contact.stiffness / model.inner_contact.stiffness] for _, model, *_ in ratings]
-            )
+            models = [rating.model for rating in ratings]
+            ratio = np.array([[m.outer_contact.stiffness / m.inner_contact.stiffness] for m in models])
             weight = share * (inner / outer * ratio) ** (4.0 / 3.0)
             share = weight / (1.0 + weight)
         pull = 2.0 * np.abs(balls[:, :, MOMENT]) / diameter

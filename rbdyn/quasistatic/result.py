@@ -10,8 +10,9 @@ from rbdyn.arrays import Array
 from rbdyn.contact import point_film
 from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
+from rbdyn.life.turns import turning_rings
 from rbdyn.properties.materials import equivalent_modulus
-from rbdyn.quasistatic.fatigue import solution_life, turning_rings
+from rbdyn.quasistatic.fatigue import solution_life
 from rbdyn.quasistatic.remarks import Rating, needed_friction
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.records.record import Record, outside_json, spread
@@ -123,9 +124,8 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         figures = []
         for name, row in self.row_reports.items() if self.report else ():
             of_row = f"{name} row " if name else ""
-            figures += [
-                Figure(f"{of_row}pressure, {race} race", p, None, "MPa") for race, p in row.max_stress_MPa.items()
-            ]
+            stress = row.max_stress_MPa.items()
+            figures += [Figure(f"{of_row}pressure, {race} race", p, None, "MPa") for race, p in stress]
             figures.append(Figure(f"{of_row}life L10", row.life["L10_Mrev"], None, "million turns"))
         for axis in "xyz" if self.report else "":
             figures.append(Figure(f"displacement {axis}", 1e3 * self.reached.displacement_mm[axis], None, "µm"))
@@ -230,9 +230,8 @@ def film_record(scene: BallScene, rating: Rating, solution: Solution, rings: tup
         load = float(loads.max())
         if entrainment == 0.0 or load == 0.0:
             continue
-        rolling = point_film.RollingBall(
-            contact, point_film.rolling_radius(drawing.ball_diameter, side), equivalent_modulus(ball, ring), entrainment
-        )
+        radius = point_film.rolling_radius(drawing.ball_diameter, side)
+        rolling = point_film.RollingBall(contact, radius, equivalent_modulus(ball, ring), entrainment)
         heat = float(point_film.thermal_factor(rolling, oil, load))
         central = float(point_film.central_film(rolling, oil, load)) * heat
         roughness = lubricant.roller_roughness, lubricant.race_roughness

@@ -77,33 +77,24 @@ class BallOperation(Consistent):
 
     def faults(self) -> Iterator[str]:
         if self.load_N is not None and (self.radial_load_N is not None or self.axial_load_N is not None):
-            yield (
-                "operation.load_N and operation.radial_load_N or axial_load_N contradict each other: give the one or the others"
-            )
+            why = "operation.load_N and operation.radial_load_N or axial_load_N contradict each other"
+            yield f"{why}: give the one or the others"
         if self.moment_Nm is not None and self.tilt == "fixed" and any(self.moment_Nm):
-            yield (
-                f"operation.moment_Nm = {self.moment_Nm}: has no effect on a ring whose tilt is fixed; leave it out or set "
-                "operation.tilt = 'free'"
-            )
+            what = f"operation.moment_Nm = {self.moment_Nm}: has no effect on a ring whose tilt is fixed"
+            yield f"{what}; leave it out or set operation.tilt = 'free'"
         if self.preload_um is not None:
             if self.preload_N:
-                yield (
-                    f"operation.preload_um = {self.preload_um:g} and operation.preload_N = {self.preload_N:g} contradict each "
-                    "other: preload by displacement or by force"
-                )
+                what = f"operation.preload_um = {self.preload_um:g} and operation.preload_N = {self.preload_N:g}"
+                yield f"{what} contradict each other: preload by displacement or by force"
             if self.prescribed.z_mm is not None:
-                yield (
-                    f"operation.preload_um = {self.preload_um:g} and operation.prescribed.z_mm = {self.prescribed.z_mm:g} "
-                    "both prescribe the axial displacement; leave one out"
-                )
+                both = f"operation.preload_um = {self.preload_um:g} and operation.prescribed.z_mm = {self.prescribed.z_mm:g}"
+                yield f"{both} both prescribe the axial displacement; leave one out"
         for name, value, load in zip(COMPONENTS, self.given, (*self.load, *self.moment), strict=True):
             if value is None or load == 0.0 or (name == "z" and self.preload_um is not None):
                 continue
             if self.tilt == "free" or not name.startswith("tilt"):
-                yield (
-                    f"operation.prescribed: the {name} displacement is prescribed, so the load of {load:g} along it would be "
-                    "lost; leave one out"
-                )
+                what = f"operation.prescribed: the {name} displacement is prescribed"
+                yield f"{what}, so the load of {load:g} along it would be lost; leave one out"
 
     @property
     def speeds(self) -> tuple[float, float]:
@@ -201,15 +192,12 @@ class BallScene(SceneFile):
         middle = None if inner is outer else self.bearing.middle  # type: ignore[union-attr]
         if middle is not None and middle.speed_split == "torque_balance" and middle.speed_rpm is None:
             if self.lubricant is None:
-                yield (
-                    "lubricant: missing; bearing.middle.speed_split = 'torque_balance' needs its viscosity, or set 'oil'"
-                )
+                needs = "bearing.middle.speed_split = 'torque_balance' needs its viscosity"
+                yield f"lubricant: missing; {needs}, or set 'oil'"
             for name, row in (("inner", inner), ("outer", outer)):
                 if row.contact_angle == 0.0:
-                    yield (
-                        f"bearing.{name}.contact_angle_deg = 0: has no load torque after Palmgren; set bearing.middle.speed_split"
-                        " = 'oil' or give bearing.middle.speed_rpm"
-                    )
+                    what = f"bearing.{name}.contact_angle_deg = 0: has no load torque after Palmgren"
+                    yield f"{what}; set bearing.middle.speed_split = 'oil' or give bearing.middle.speed_rpm"
 
     @property
     def outermost_rows(self) -> tuple[BallRow, BallRow]:
@@ -220,13 +208,10 @@ class BallScene(SceneFile):
     @property
     def summary(self) -> str:
         """The scene in a line."""
-        point, rows = (
-            self.operation,
-            dict.fromkeys(f"{row.balls} x {row.ball_diameter_mm:g} mm" for row in self.outermost_rows),
-        )
-        loads = ", ".join(
-            f"{key} = {value}" for key, value in point.model_dump(exclude_unset=True).items() if "load" in key
-        )
+        rows = dict.fromkeys(f"{row.balls} x {row.ball_diameter_mm:g} mm" for row in self.outermost_rows)
+        point = self.operation
+        given = point.model_dump(exclude_unset=True)
+        loads = ", ".join(f"{key} = {value}" for key, value in given.items() if "load" in key)
         return f"{self.bearing.kind}, balls {' and '.join(rows)}, {point.inner_speed_rpm:g} rpm, {loads or 'no load'}"
 
     @classmethod
@@ -282,9 +267,8 @@ def _unmounted_faults(scene: BallScene) -> Iterator[str]:
     if turning.outer_speed_rpm != 0.0 and outer.outside_diameter_mm is None and not paper:
         yield f"{prefix[1]}outside_diameter_mm: missing; the outer ring {speed}"
     if paper and inner is not outer and outer.bore_mm is None:
-        yield (
-            "bearing.outer.bore_mm: missing; model.ring_expansion_form = 'paper' takes it for the middle ring's; add it"
-        )
+        why = "model.ring_expansion_form = 'paper' takes it for the middle ring's"
+        yield f"bearing.outer.bore_mm: missing; {why}; add it"
 
 
 def _mounted_faults(mounting: Mounting, scene: BallScene) -> Iterator[str]:
@@ -296,13 +280,11 @@ def _mounted_faults(mounting: Mounting, scene: BallScene) -> Iterator[str]:
     ):
         drawn = getattr(row, key)
         if drawn is not None and drawn != mounted:
-            yield (
-                f"mounting.{key} = {mounted:g} and the bearing's {key} = {drawn:g} contradict each other: leave the bearing's out"
-            )
+            what = f"mounting.{key} = {mounted:g} and the bearing's {key} = {drawn:g} contradict each other"
+            yield f"{what}: leave the bearing's out"
     for row in {id(row): row for row in (inner, outer)}.values():
         if row.clearance_change_um != 0.0:
-            yield (
-                f"clearance_change_um = {row.clearance_change_um:g} and [mounting] both tell what mounting changes; leave one out"
-            )
+            what = f"clearance_change_um = {row.clearance_change_um:g} and [mounting] both tell what mounting changes"
+            yield f"{what}; leave one out"
     if scene.model.ring_expansion and scene.model.ring_expansion_form == "paper":
         yield "model.ring_expansion_form = 'paper' knows no fits; take [mounting] away or set it to 'thick_ring'"

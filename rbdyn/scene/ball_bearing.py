@@ -54,15 +54,12 @@ class BallRow(Consistent):
     def faults(self) -> Iterator[str]:
         chord = self.pitch_diameter_mm * math.sin(math.pi / self.balls)
         if chord <= self.ball_diameter_mm:
-            yield (
-                f"balls = {self.balls}: balls of {self.ball_diameter_mm:g} mm do not fit on a pitch circle of "
-                f"{self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm; take fewer or smaller ones"
-            )
+            circle = f"a pitch circle of {self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm"
+            what = f"balls = {self.balls}: balls of {self.ball_diameter_mm:g} mm do not fit on {circle}"
+            yield f"{what}; take fewer or smaller ones"
         if self.ball_diameter_mm >= self.pitch_diameter_mm:
-            yield (
-                f"ball_diameter_mm = {self.ball_diameter_mm:g}: leaves no inner raceway on a pitch circle of "
-                f"{self.pitch_diameter_mm:g} mm; make the ball smaller"
-            )
+            circle = f"a pitch circle of {self.pitch_diameter_mm:g} mm"
+            yield f"ball_diameter_mm = {self.ball_diameter_mm:g}: leaves no inner raceway on {circle}; make the ball smaller"
         # Only a contact angle that is known tells where the races are.
         yield from self._clearance_faults() or self._ring_faults()
 
@@ -74,34 +71,26 @@ class BallRow(Consistent):
             return []
         gap = self.groove_centre_distance_mm
         if clearance >= 2.0 * gap:
-            return [
-                f"radial_clearance_mm = {clearance:g}: grooves with centres {gap:.4g} mm apart cannot hold a ball with "
-                f"that much; make it less than {2.0 * gap:.4g}"
-            ]
+            what = f"radial_clearance_mm = {clearance:g}: grooves with centres {gap:.4g} mm apart"
+            return [f"{what} cannot hold a ball with that much; make it less than {2.0 * gap:.4g}"]
         if angle is None:
             return []
         implied = math.degrees(math.acos(min(1.0 - clearance / (2.0 * gap), 1.0)))
         if abs(implied - angle) > AGREED_DEG:
             clearance_of_angle = 2.0 * gap * (1.0 - math.cos(math.radians(angle)))
-            return [
-                f"contact_angle_deg = {angle:g} and radial_clearance_mm = {clearance:g} contradict each other: that clearance "
-                f"gives {implied:.4g} deg, that angle {clearance_of_angle:.4g} mm; leave one out, and give what mounting "
-                "changes as clearance_change_um"
-            ]
+            what = f"contact_angle_deg = {angle:g} and radial_clearance_mm = {clearance:g} contradict each other"
+            why = f"that clearance gives {implied:.4g} deg, that angle {clearance_of_angle:.4g} mm"
+            return [f"{what}: {why}; leave one out, and give what mounting changes as clearance_change_um"]
         return []
 
     def _ring_faults(self) -> Iterator[str]:
         reach = self.ball_diameter_mm * math.cos(self.contact_angle)
         if self.bore_mm is not None and self.bore_mm >= self.pitch_diameter_mm - reach:
-            yield (
-                f"bore_mm = {self.bore_mm:g}: leaves no inner ring under a raceway of "
-                f"{self.pitch_diameter_mm - reach:.4g} mm; make it smaller"
-            )
+            race = f"a raceway of {self.pitch_diameter_mm - reach:.4g} mm"
+            yield f"bore_mm = {self.bore_mm:g}: leaves no inner ring under {race}; make it smaller"
         if self.outside_diameter_mm is not None and self.outside_diameter_mm <= self.pitch_diameter_mm + reach:
-            yield (
-                f"outside_diameter_mm = {self.outside_diameter_mm:g}: leaves no outer ring over a raceway of "
-                f"{self.pitch_diameter_mm + reach:.4g} mm; make it larger"
-            )
+            race = f"a raceway of {self.pitch_diameter_mm + reach:.4g} mm"
+            yield f"outside_diameter_mm = {self.outside_diameter_mm:g}: leaves no outer ring over {race}; make it larger"
 
     @property
     def groove_centre_distance_mm(self) -> float:
@@ -180,10 +169,9 @@ class DoubleDecker(Consistent):
     def faults(self) -> Iterator[str]:
         below, above = self.inner.raceway_diameters_mm[1], self.outer.raceway_diameters_mm[0]
         if not below < above:
-            yield (
-                f"bearing.outer.pitch_diameter_mm = {self.outer.pitch_diameter_mm:g}: leaves no middle ring between raceways "
-                f"of {below:.4g} and {above:.4g} mm; make it larger, or the inner row smaller"
-            )
+            why = f"leaves no middle ring between raceways of {below:.4g} and {above:.4g} mm"
+            mend = "make it larger, or the inner row smaller"
+            yield f"bearing.outer.pitch_diameter_mm = {self.outer.pitch_diameter_mm:g}: {why}; {mend}"
 
     @property
     def pitch_ratio(self) -> float:

@@ -102,25 +102,20 @@ class Bearing(Consistent):
     def faults(self) -> Iterator[str]:
         chord = self.pitch_diameter_mm * math.sin(math.pi / self.rollers)
         if chord <= self.roller_diameter_mm:
-            yield (
-                f"bearing.rollers = {self.rollers}: rollers of {self.roller_diameter_mm:g} mm do not fit on a pitch "
-                f"circle of {self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm; take fewer or smaller ones"
-            )
+            circle = f"a pitch circle of {self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm"
+            what = f"rollers of {self.roller_diameter_mm:g} mm do not fit on {circle}"
+            yield f"bearing.rollers = {self.rollers}: {what}; take fewer or smaller ones"
         if self.roller_diameter_mm >= self.pitch_diameter_mm:
-            yield (
-                f"bearing.roller_diameter_mm = {self.roller_diameter_mm:g}: leaves no inner raceway on a pitch circle "
-                f"of {self.pitch_diameter_mm:g} mm; make the roller smaller"
-            )
+            what = f"bearing.roller_diameter_mm = {self.roller_diameter_mm:g}: leaves no inner raceway"
+            yield f"{what} on a pitch circle of {self.pitch_diameter_mm:g} mm; make the roller smaller"
         if self.effective_length_mm > self.roller_length_mm:
-            yield (
-                f"bearing.effective_length_mm = {self.effective_length_mm:g}: contact longer than the roller of "
-                f"{self.roller_length_mm:g} mm; shorten it or lengthen bearing.roller_length_mm"
-            )
+            why = f"contact longer than the roller of {self.roller_length_mm:g} mm"
+            mend = "shorten it or lengthen bearing.roller_length_mm"
+            yield f"bearing.effective_length_mm = {self.effective_length_mm:g}: {why}; {mend}"
         if abs(self.radial_clearance_mm) >= 0.1 * self.roller_diameter_mm:
-            yield (
-                f"bearing.radial_clearance_mm = {self.radial_clearance_mm:g}: out of proportion to a roller of "
-                f"{self.roller_diameter_mm:g} mm; give millimetres, below a tenth of the roller"
-            )
+            why = f"out of proportion to a roller of {self.roller_diameter_mm:g} mm"
+            mend = "give millimetres, below a tenth of the roller"
+            yield f"bearing.radial_clearance_mm = {self.radial_clearance_mm:g}: {why}; {mend}"
         yield from self._profile_faults()
         yield from self._form_faults()
 
@@ -130,16 +125,12 @@ class Bearing(Consistent):
             if value is None and self.roller_profile == profile:
                 yield f"bearing.{key}: missing; bearing.roller_profile = {profile!r} needs it"
             if value is not None and self.roller_profile != profile:
-                yield (
-                    f"bearing.{key} and bearing.roller_profile = {self.roller_profile!r} contradict each other: take "
-                    f"away the one or set the other to {profile!r}"
-                )
+                what = f"bearing.{key} and bearing.roller_profile = {self.roller_profile!r} contradict each other"
+                yield f"{what}: take away the one or set the other to {profile!r}"
         half = 0.5 * self.roller_length_mm
         if self.crown_radius_mm is not None and self.crown_radius_mm <= half:
-            yield (
-                f"bearing.crown_radius_mm = {self.crown_radius_mm:g}: a crown of a roller of {self.roller_length_mm:g} mm "
-                f"needs a radius above {half:g} mm, commonly metres; enlarge it"
-            )
+            what = f"bearing.crown_radius_mm = {self.crown_radius_mm:g}: a crown of a roller of {self.roller_length_mm:g} mm"
+            yield f"{what} needs a radius above {half:g} mm, commonly metres; enlarge it"
         points = self.profile_table_mm_um or []
         if any(len(point) != 2 for point in points):
             yield "bearing.profile_table_mm_um: each point is [position in mm, drop in um]; mend the list"
@@ -148,33 +139,25 @@ class Bearing(Consistent):
             yield "bearing.profile_table_mm_um: positions must rise from point to point; sort them"
         for x, drop in points:
             if abs(x) > half:
-                yield (
-                    f"bearing.profile_table_mm_um: point ({x:g} mm, {drop:g} um) lies beyond the roller's end at "
-                    f"{half:g} mm; shorten the profile or lengthen bearing.roller_length_mm"
-                )
+                what = f"bearing.profile_table_mm_um: point ({x:g} mm, {drop:g} um) lies beyond the roller's end at {half:g} mm"
+                yield f"{what}; shorten the profile or lengthen bearing.roller_length_mm"
         reach = max((abs(x) for x, _ in points), default=math.inf)
         if reach < 0.5 * self.effective_length_mm:
-            yield (
-                f"bearing.profile_table_mm_um: ends at {reach:g} mm, within the contact of "
-                f"{0.5 * self.effective_length_mm:g} mm from the middle; carry the table on"
-            )
+            contact = f"the contact of {0.5 * self.effective_length_mm:g} mm from the middle"
+            yield f"bearing.profile_table_mm_um: ends at {reach:g} mm, within {contact}; carry the table on"
 
     def _form_faults(self) -> Iterator[str]:
         errors = self.roller_diameter_errors_um
         if errors is not None and len(errors) != self.rollers:
-            yield (
-                f"bearing.roller_diameter_errors_um: {len(errors)} values for {self.rollers} rollers; give one a roller"
-            )
+            why = f"bearing.roller_diameter_errors_um: {len(errors)} values for {self.rollers} rollers"
+            yield f"{why}; give one a roller"
         if errors is not None and self.roller_diameter_spread_um > 0.0:
-            yield (
-                "bearing.roller_diameter_errors_um and bearing.roller_diameter_spread_um contradict each other: give the "
-                "errors or their spread, not both"
-            )
+            what = "bearing.roller_diameter_errors_um and bearing.roller_diameter_spread_um contradict each other"
+            yield f"{what}: give the errors or their spread, not both"
         limit = 0.01 * self.roller_diameter_mm * 1e3
         if errors is not None and any(abs(error) > limit for error in errors):
-            yield (
-                f"bearing.roller_diameter_errors_um: beyond {limit:g} um, a hundredth of the roller; give micrometres"
-            )
+            why = f"bearing.roller_diameter_errors_um: beyond {limit:g} um, a hundredth of the roller"
+            yield f"{why}; give micrometres"
 
 
 class Cage(Consistent):
@@ -225,10 +208,9 @@ class Cage(Consistent):
         if self.pocket_clearance_mm > 5.0 or (self.guide_clearance_mm or 0.0) > 5.0:
             yield "cage: clearances above 5 mm are not clearances; give millimetres"
         elif self.pocket_radial_clearance_mm is not None and self.guidance != "roller":
-            yield (
-                f"cage.pocket_radial_clearance_mm and cage.guidance = {self.guidance!r} contradict each other: lips hold "
-                "the cage only under guidance by the rollers; take away the one or set the other to 'roller'"
-            )
+            what = f"cage.pocket_radial_clearance_mm and cage.guidance = {self.guidance!r} contradict each other"
+            why = "lips hold the cage only under guidance by the rollers"
+            yield f"{what}: {why}; take away the one or set the other to 'roller'"
 
     @property
     def lip_clearance_mm(self) -> float | None:

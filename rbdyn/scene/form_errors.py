@@ -92,21 +92,15 @@ class FormErrors(Consistent):
         for key in GROOVES:
             drawn = getattr(self, f"{key}_random")
             if drawn is not None and drawn.lowest_order > drawn.highest_order:
-                yield (
-                    f"errors.{key}_random.lowest_order = {drawn.lowest_order}: above highest_order = "
-                    f"{drawn.highest_order}; swap them"
-                )
+                what = f"errors.{key}_random.lowest_order = {drawn.lowest_order}"
+                yield f"{what}: above highest_order = {drawn.highest_order}; swap them"
         if self.ball_diameter_errors_um is not None and self.ball_diameter_spread_um > 0.0:
-            yield (
-                "errors.ball_diameter_errors_um and errors.ball_diameter_spread_um contradict each other: give the "
-                "errors or their spread, not both"
-            )
+            what = "errors.ball_diameter_errors_um and errors.ball_diameter_spread_um contradict each other"
+            yield f"{what}: give the errors or their spread, not both"
         highest = self.highest_order
         if 2 * highest >= self.steps:
-            yield (
-                f"errors.steps = {self.steps}: too few to show order {highest}, which needs more than two steps a "
-                f"wave; take at least {2 * highest + 1}"
-            )
+            what = f"errors.steps = {self.steps}: too few to show order {highest}"
+            yield f"{what}, which needs more than two steps a wave; take at least {2 * highest + 1}"
 
     def ball_diameter_errors(self, normal: "Array") -> "Array":
         """Each ball's diameter less the nominal one [m], as given or with the spread of standard ``normal`` numbers."""
@@ -141,7 +135,6 @@ def misfits(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diame
     # A ball spins dm/(2 D) times a turn, or a little less.
     fastest = max((wave.order for wave in errors.ball_sphericity), default=0) * pitch_diameter_mm / ball_diameter_mm
     if fastest >= errors.steps:
-        yield (
-            f"errors.steps = {errors.steps}: too few to show errors.ball_sphericity on balls that spin "
-            f"{0.5 * pitch_diameter_mm / ball_diameter_mm:.3g} times a turn; take at least {int(fastest) + 1}"
-        )
+        spinning = f"balls that spin {0.5 * pitch_diameter_mm / ball_diameter_mm:.3g} times a turn"
+        what = f"errors.steps = {errors.steps}: too few to show errors.ball_sphericity on {spinning}"
+        yield f"{what}; take at least {int(fastest) + 1}"

@@ -94,9 +94,8 @@ class Laws(Consistent):
             if all(getattr(self, key) is not None for key in keys):
                 yield f"model.{keys[0]} and model.{keys[1]} contradict each other: give one of them"
         if self.pocket == "off" and self.pocket_film:
-            yield (
-                "model.pocket = 'off' and model.pocket_film = true contradict each other: drop the film or the 'off'"
-            )
+            what = "model.pocket = 'off' and model.pocket_film = true contradict each other"
+            yield f"{what}: drop the film or the 'off'"
 
     def alpha(self, part: str) -> float:
         """Hunt and Crossley's alpha [s/m] of 'pocket' or 'land', given or from its restitution."""
@@ -163,7 +162,5 @@ class Numerics(Consistent):
 
     def faults(self) -> Iterator[str]:
         if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > self.most_batches:
-            yield (
-                f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have memory for "
-                f"{self.most_batches} turns each, warm-up included; take fewer turns or replicates"
-            )
+            room = f"memory for {self.most_batches} turns each, warm-up included; take fewer turns or replicates"
+            yield f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have {room}"

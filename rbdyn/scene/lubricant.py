@@ -91,10 +91,8 @@ class Lubricant(Consistent):
         elif points:
             (cold, thick), (hot, thin) = sorted(points)
             if not (-60.0 <= cold < hot <= HOTTEST_C and thick > thin > 0.5):
-                yield (
-                    f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature, from -60 to {HOTTEST_C:g} C, to "
-                    "no less than 0.5 mm2/s; mend them"
-                )
+                what = f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature"
+                yield f"{what}, from -60 to {HOTTEST_C:g} C, to no less than 0.5 mm2/s; mend them"
 
     @model_serializer(mode="wrap")
     def _without_empty_data(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -219,15 +217,11 @@ class Traction(Consistent):
         if self.constants is not None:
             yield from self._constant_faults(*self.constants)
         elif self.model == "four_constant" and not self.mu_m > max(self.mu_0, self.mu_inf):
-            yield (
-                f"traction.mu_m = {self.mu_m:g}: the peak must lie above traction.mu_0 = {self.mu_0:g} and "
-                f"traction.mu_inf = {self.mu_inf:g}; raise it"
-            )
+            what = f"traction.mu_m = {self.mu_m:g}: the peak must lie above traction.mu_0 = {self.mu_0:g}"
+            yield f"{what} and traction.mu_inf = {self.mu_inf:g}; raise it"
         if self.friction == "mixed" and self.model in ("coulomb", "off"):
-            yield (
-                f"traction.friction = 'mixed': traction.model = '{self.model}' has no film; choose a model of a film "
-                "or set traction.friction = 'film'"
-            )
+            what = f"traction.friction = 'mixed': traction.model = '{self.model}' has no film"
+            yield f"{what}; choose a model of a film or set traction.friction = 'film'"
 
     def _constant_faults(self, a: float, b: float, c: float, d: float) -> Iterator[str]:
         shown = f"traction.constants = [{a:g}, {b:g}, {c:g}, {d:g}]"

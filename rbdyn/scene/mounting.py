@@ -71,45 +71,33 @@ class Mounting(Consistent):
 
     def faults(self) -> Iterator[str]:
         if self.shaft_bore_mm >= self.bore_mm:
-            yield (
-                f"mounting.shaft_bore_mm = {self.shaft_bore_mm:g}: leaves no shaft in a bearing bore of "
-                f"{self.bore_mm:g} mm; make it smaller, 0 for a solid shaft"
-            )
+            bore = f"a bearing bore of {self.bore_mm:g} mm; make it smaller, 0 for a solid shaft"
+            yield f"mounting.shaft_bore_mm = {self.shaft_bore_mm:g}: leaves no shaft in {bore}"
         if self.outside_diameter_mm <= self.bore_mm:
-            yield (
-                f"mounting.outside_diameter_mm = {self.outside_diameter_mm:g}: not above the bore of "
-                f"{self.bore_mm:g} mm; make it larger"
-            )
+            what = f"mounting.outside_diameter_mm = {self.outside_diameter_mm:g}"
+            yield f"{what}: not above the bore of {self.bore_mm:g} mm; make it larger"
         if self.housing_diameter_mm <= self.outside_diameter_mm:
-            yield (
-                f"mounting.housing_diameter_mm = {self.housing_diameter_mm:g}: leaves no housing around a bearing of "
-                f"{self.outside_diameter_mm:g} mm; make it larger"
-            )
+            what = f"mounting.housing_diameter_mm = {self.housing_diameter_mm:g}"
+            yield f"{what}: leaves no housing around a bearing of {self.outside_diameter_mm:g} mm; make it larger"
         for key, diameter in (
             ("inner_interference_um", self.bore_mm),
             ("outer_interference_um", self.outside_diameter_mm),
         ):
             interference = getattr(self, key)
             if abs(interference) > LARGEST_FIT * diameter * 1e3:
-                yield (
-                    f"mounting.{key} = {interference:g}: out of proportion to a fit of {diameter:g} mm; give "
-                    f"micrometres, at most {LARGEST_FIT * diameter * 1e3:g}"
-                )
+                what = f"mounting.{key} = {interference:g}: out of proportion to a fit of {diameter:g} mm"
+                yield f"{what}; give micrometres, at most {LARGEST_FIT * diameter * 1e3:g}"
 
 
 def misfits(mounting: Mounting, bearing: Raceways) -> Iterator[str]:
     """One sentence for each way in which the mounting does not suit the bearing."""
     inner, outer = bearing.raceway_diameters_mm
     if mounting.bore_mm >= inner:
-        yield (
-            f"mounting.bore_mm = {mounting.bore_mm:g}: leaves no inner ring under a raceway of {inner:g} mm; "
-            "make it smaller"
-        )
+        what = f"mounting.bore_mm = {mounting.bore_mm:g}: leaves no inner ring under a raceway of {inner:g} mm"
+        yield f"{what}; make it smaller"
     if mounting.outside_diameter_mm <= outer:
-        yield (
-            f"mounting.outside_diameter_mm = {mounting.outside_diameter_mm:g}: leaves no outer ring over a raceway of "
-            f"{outer:g} mm; make it larger"
-        )
+        what = f"mounting.outside_diameter_mm = {mounting.outside_diameter_mm:g}"
+        yield f"{what}: leaves no outer ring over a raceway of {outer:g} mm; make it larger"
 
 
 def material_of(chosen: MaterialName | CustomMaterial) -> Material:

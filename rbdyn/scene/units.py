@@ -46,7 +46,6 @@ def unit_notes(
             for other, number in meant.items()
             if low <= number <= high
         ]
-        notes.append(
-            f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}; {(likely or ['check its unit'])[0]}"
-        )
+        what = f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}"
+        notes.append(f"{what}; {(likely or ['check its unit'])[0]}")
     return tuple(notes)

@@ -15,7 +15,7 @@ from instant_runs import instantly
 from short_studies import short_study, silent
 
 from doe.report.steps.status import print_status
-from doe.running.at_work import at_work
+from doe.running.owner import at_work
 from doe.running.store import Point, Store
 from doe.study.runs import STORE, run_design
 from doe.study.status import study_status
@@ -121,7 +121,7 @@ def test_a_running_study_is_found_by_its_file(tmp_path, monkeypatch):
             assert str(far / STORE) in asked()
         with at_work(path, other):
             assert f"runs in {far} and in {other}; name one of them by --out" in asked()
-    killed = f"from doe.running.at_work import *; import os\nwith at_work(Path({str(path)!r}), Path('x')): os._exit(0)"
+    killed = f"from doe.running.owner import *; import os\nwith at_work(Path({str(path)!r}), Path('x')): os._exit(0)"
     subprocess.run([sys.executable, "-c", killed], check=True)
     notes = tmp_path / "cache" / "rbdyn" / "at_work"
     assert len(list(notes.iterdir())) == 1 and "study_results" in asked()

@@ -1,6 +1,7 @@
 """Dimension chains in short, for the tests."""
 
-from doe.dimension_chain import Chain
+from doe.dimension_chain import Chain, chain_from
+from rbdyn.faults import read_toml
 
 
 def chain(links, limits=(0.0, 1.0), **allocate):
@@ -12,6 +13,11 @@ def chain(links, limits=(0.0, 1.0), **allocate):
         tables.append({"name": name, "coefficient": coefficient, "nominal_mm": nominal} | deviations | extra)
     closing = {"lower_mm": limits[0], "upper_mm": limits[1]}
     return Chain.model_validate({"closing_link": closing, "link": tables, "allocate": allocate})
+
+
+def read_chain(path):
+    """The chain of a TOML file that is one chain."""
+    return chain_from(read_toml(path), str(path))
 
 
 def with_functions(plain, *functions, **tables):

@@ -11,7 +11,7 @@ from typer.main import get_command
 from rbdyn.cli.app import app
 from rbdyn.cli.keys import kinds
 from rbdyn.cli.manual import command
-from rbdyn.cli.manual.part import Part
+from rbdyn.cli.manual.page import Part
 
 ROOT = Path(__file__).parents[2]
 

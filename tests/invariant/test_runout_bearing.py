@@ -11,8 +11,7 @@ import pytest
 
 from rbdyn.faults import InputError, RunError
 from rbdyn.quasistatic.row.equilibrium import solve
-from rbdyn.quasistatic.runout.linear import CHANGES, linear_response
-from rbdyn.quasistatic.runout.lots import RACES, Lot, bearing_errors, draw_parts, readings
+from rbdyn.quasistatic.runout.lots import CHANGES, RACES, Lot, bearing_errors, draw_parts, linear_response, readings
 from rbdyn.quasistatic.runout.model import bench_of, follow_ring
 from rbdyn.quasistatic.runout.race_errors import ball_path, perfect, waviness
 from rbdyn.quasistatic.runout.tolerance_design import design, full_runouts, runouts

@@ -12,8 +12,7 @@ import pytest
 
 from rbdyn import accuracy
 from rbdyn.accuracy.rollers import comparison, method_bias, methods
-from rbdyn.accuracy.rollers.comparison import attempt, attempts_of, curve
-from rbdyn.accuracy.rollers.equal_error import front, times_faster
+from rbdyn.accuracy.rollers.comparison import attempt, attempts_of, curve, front, times_faster
 from rbdyn.accuracy.rollers.fixed_step import runge_kutta_4, steps_of, velocity_of
 from rbdyn.accuracy.rollers.methods import METHODS, OURS, RUNGE_KUTTA_4, SCIPY_RK45, VELOCITY_VERLET, Method, fixed_step
 from rbdyn.accuracy.rollers.right_hand_side import BudgetSpent, RightHandSide

@@ -13,8 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn.quasistatic.runout.classes import running_accuracy
-from rbdyn.quasistatic.runout.measures import error_motion, face_runout, runout
-from rbdyn.quasistatic.runout.roundness import convex_hull, diameter, least_squares_circle, minimum_zone, zone_about
+from rbdyn.quasistatic.runout.measures import (
+    convex_hull,
+    diameter,
+    error_motion,
+    face_runout,
+    least_squares_circle,
+    minimum_zone,
+    runout,
+    zone_about,
+)
 
 ANGLE = 2.0 * math.pi * np.arange(360) / 360
 

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from rbdyn import equilibrium
 from rbdyn.faults import InputError
+from rbdyn.life.turns import turning_rings
 from rbdyn.plots import ball as ball_pictures
 from rbdyn.plots import ball_sweep as pictures
-from rbdyn.quasistatic.fatigue import reference_capacities, solution_life, turning_rings
+from rbdyn.quasistatic.fatigue import reference_capacities, solution_life
 from rbdyn.quasistatic.row.control import CommonCage, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.newton import RACE_CONTROL_LOST
 from rbdyn.quasistatic.sweep import run as sweeps

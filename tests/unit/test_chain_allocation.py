@@ -11,8 +11,8 @@ from scipy.optimize import minimize
 from scipy.special import ndtri
 
 from doe.dimension_chain import grade_tolerances, solve
-from doe.dimension_chain.cost import cheapest, total_cost
-from doe.dimension_chain.intervals import total
+from doe.dimension_chain.allocation import cheapest, total_cost
+from doe.dimension_chain.closing import total
 from doe.dimension_chain.links import Cost
 from doe.report.markdown import markdown_report
 from doe.report.steps.chain import print_chain

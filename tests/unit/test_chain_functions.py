@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from doe.dimension_chain import solve
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import closing_function, press_fit_factor
+from doe.dimension_chain.closing import closing_function, interval, press_fit_factor
 from doe.dimension_chain.expressions import evaluate, names_in
-from doe.dimension_chain.intervals import interval
 from doe.dimension_chain.links import PressFit
 from doe.dimension_chain.monte_carlo import draw
 from doe.dimension_chain.parts import given_parts

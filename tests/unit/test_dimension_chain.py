@@ -5,12 +5,12 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from chains import by_name, chain
+from chains import by_name, chain, read_chain
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from doe.dimension_chain import chain_from, grade_tolerances, read_chain, solve, tolerance_unit
+from doe.dimension_chain import chain_from, grade_tolerances, solve, tolerance_unit
 from rbdyn.faults import InputError
 
 POCKET = """

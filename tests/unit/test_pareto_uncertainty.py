@@ -127,7 +127,7 @@ def test_probability_of_dominance_of_two_independent_gains():
     sure = front_uncertainty(
         *(drawn, np.ones((1, 2)), Goals.of(["min", "min"]), np.zeros((1, 2)), 0, "knee"),
         baseline=np.ones((20000, 2)),
-        baseline_values=np.ones(2),
+        original=np.ones(2),
     )
     assert sure.pick_dominates == pytest.approx(0.8413**2, abs=4 * sure.pick_dominates_error)
     assert sure.non_dominated.tolist() == [1.0]

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from rbdyn import BallScene
 from rbdyn.life import balls as life
+from rbdyn.life.turns import turning_rings
 from rbdyn.quasistatic import fatigue, preload
 
 
@@ -120,7 +121,7 @@ def test_ratings_of_a_drawing(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
     plain_capacities = importlib.import_module("published.lundberg_palmgren").plain_capacities
     assert plain_capacities(close)[0] > plain_capacities(drawing)[0]
-    assert [fatigue.turning_rings(*speeds) for speeds in ((0, 0), (1, 0), (0, 1), (1, -1))] == [
+    assert [turning_rings(*speeds) for speeds in ((0, 0), (1, 0), (0, 1), (1, -1))] == [
         "inner", "inner", "outer", "both",
     ]  # fmt: skip
 

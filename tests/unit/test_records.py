@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from chains import read_chain
 
-from doe.dimension_chain import read_chain, solve
+from doe.dimension_chain import solve
 from rbdyn import BallResult, BallScene, InputError, SimulationResult, equilibrium
 from rbdyn.dynamics.slip_map import Point
 from rbdyn.records.record import Record, derived, keyed, outside_json, spread

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numba import njit
-from test_scene import TABLE
+from plain_scene import TABLE
 
 from rbdyn.contact import film_thickness as films
 from rbdyn.contact import rheology

@@ -1,6 +1,6 @@
 """A study as one HTML file that can be mailed: nothing fetched, readable without scripts and on paper.
 
-- ``build``: the page; ``render``: blocks of ``doe.report.sections`` as HTML; ``data``: the numbers for the scripts
+- ``build``: the page, from blocks of ``doe.report.sections``; ``data``: the numbers for the scripts
 - ``page.html``, ``report.css``: skeleton and looks; ``surface.html``, ``front.html``, ``bearing.html``: controls
 - ``*.js``: the interactive pictures, each for itself; ``page.js`` holds what they share
 """

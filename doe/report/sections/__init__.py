@@ -2,7 +2,7 @@
 
 - ``blocks``: words, tables, figures, places for interactive pictures
 - ``record``: reading summary.json, any part of which may be missing
-- ``answer``, ``experiments``, ``fits``, ``fronts``, ``parts``, ``bearing``, ``ends``: the sections, in this order
+- ``answer``, ``experiments``, ``fits``, ``fronts``, ``parts``, ``bearing``, ``contents``: the sections, in this order
 - ``plot``: static pictures as SVG; ``plots_of_fits``, ``plots_of_fronts`` draw most of them
 """
 

@@ -43,10 +43,8 @@ def motion(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     blocks: list[Block] = []
     orbits = {name: each for name, each in motion.items() if part(each, "cage_orbit_um", "x")}
     if orbits:
-        caption = (
-            "Path of the cage centre about that of its guide, and enlarged; triangle start, square end. The radius of the dashed "
-            "circle is half of the diametral guide clearance."
-        )
+        path = "Path of the cage centre about that of its guide, and enlarged; triangle start, square end."
+        caption = f"{path} The radius of the dashed circle is half of the diametral guide clearance."
         drawn = [orbit(name, each, whole) for whole in (True, False) for name, each in orbits.items()]
         blocks.append(Figures(drawn, caption))
     if any(part(each, "moving") for each in motion.values()):

@@ -55,15 +55,13 @@ def _response(value: Record | None) -> str:
 
 def _evaluation(evaluation: Record) -> list[Block]:
     """Single figures in one table; figures by term in another."""
-    by_term = {
-        key: value for key, value in evaluation.items() if isinstance(value, Mapping) and {"A", "B"} <= set(value)
-    }
+    tables = {key: value for key, value in evaluation.items() if isinstance(value, Mapping)}
+    by_term = {key: value for key, value in tables.items() if {"A", "B"} <= set(value)}
     rest = {key: value for key, value in evaluation.items() if key not in by_term and not isinstance(value, list)}
     blocks: list[Block] = [record_table("How good the design is for the models asked", rest), _by_term(by_term)]
     if pictures := evaluation_plots(evaluation):
-        caption = (
-            "Scaled prediction variance: least, mean and largest by radius; and what a share of the region stays below."
-        )
+        what = "Scaled prediction variance: least, mean and largest by radius"
+        caption = f"{what}; and what a share of the region stays below."
         blocks.append(Figures(pictures, caption))
     return blocks
 

@@ -44,9 +44,7 @@ def _term(term: str, summary: Record) -> str:
 
 
 def _coefficient(value: float | None, error: float | None) -> str:
-    if value is None:
-        return "–"
-    return with_error(value, error)
+    return "–" if value is None else with_error(value, error)
 
 
 def _stationary(summary: Record, fitted: Record) -> Table:

@@ -39,9 +39,8 @@ def _chain(name: str, chain: Record) -> list[Block]:
     header = ("part", "dimension [mm]", "grade", "nominal moved [mm]", "share of variance", "share of worst case")
     blocks.append(Table(f"Parts of the chain {label(name)}", header, rows, text_columns=(2,)))
     if shares:
-        blocks.append(
-            Figures([contributions(name, shares)], "What each part contributes to the scatter of the closing link.")
-        )
+        caption = "What each part contributes to the scatter of the closing link."
+        blocks.append(Figures([contributions(name, shares)], caption))
     if closing := chain.get("closing_link"):
         rows = [
             (words, _length(closing.get(key)))

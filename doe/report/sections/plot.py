@@ -115,10 +115,8 @@ class Plot:
 
     def svg(self, words: str, extra: str = "") -> str:
         """The picture; ``words`` describe it to those who cannot see it, ``extra`` are further attributes."""
-        return (
-            f'<svg class="plot" viewBox="0 0 {self.width:g} {self.height:g}" role="img" aria-label="{escape(words)}"{extra}>'
-            f"{self._axes()}{''.join(self.marks)}</svg>"
-        )
+        told = f'viewBox="0 0 {self.width:g} {self.height:g}" role="img" aria-label="{escape(words)}"{extra}'
+        return f'<svg class="plot" {told}>{self._axes()}{"".join(self.marks)}</svg>'
 
     def _axes(self) -> str:
         left, right = self.LEFT, self.width - self.RIGHT
@@ -150,10 +148,8 @@ def symbol(u: float, v: float, shape: str, role: str, radius: float = 5.5, title
 
 def wide_svg(width: float, height: float, words: str, drawn: Iterable[str], extra: str = "") -> str:
     """A picture across the page of marks that are ``drawn`` already; ``words`` describe it."""
-    return (
-        f'<div class="scroll"><svg class="plot wide" viewBox="0 0 {width:g} {height:g}" role="img" '
-        f'aria-label="{escape(words)}"{extra}>{"".join(drawn)}</svg></div>'
-    )
+    told = f'viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(words)}"{extra}'
+    return f'<div class="scroll"><svg class="plot wide" {told}>{"".join(drawn)}</svg></div>'
 
 
 def legend(entries: Sequence[tuple[str, str, str]]) -> str:

@@ -1,6 +1,6 @@
 """Pictures of the residuals of a fit, and of how well a design predicts."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from statistics import NormalDist
 
 from doe.report.sections.plot import Plot, Point, span
@@ -13,20 +13,20 @@ SUSPECT, INFLUENTIAL = 3.0, 1.0
 
 def diagnostic_plots(name: str, runs: Sequence[Record]) -> list[str]:
     """Four pictures as SVG; a picture whose numbers are undefined is left out."""
-    drawn = [_predicted(name, runs), _residuals(name, runs), _normal(name, runs), _influence(name, runs)]
+    drawn = [_plotted(_predicted, name, runs, "observed", "predicted")]
+    drawn += [_plotted(_residuals, name, runs, "predicted", "studentized"), _normal(name, runs)]
+    drawn.append(_plotted(_influence, name, runs, "leverage", "cook"))
     return [svg for svg in drawn if svg]
 
 
-def _known(runs: Sequence[Record], across: str, up: str) -> tuple[list[Point], list[str]]:
+def _plotted(plot: Callable[..., str], name: str, runs: Sequence[Record], across: str, up: str) -> str:
     kept = [run for run in runs if run.get(across) is not None and run.get(up) is not None]
     points = [(float(run[across]), float(run[up])) for run in kept]
-    return points, [f"run {run.get('run')}: {shown(p[0])}, {shown(p[1])}" for run, p in zip(kept, points, strict=True)]
+    titles = [f"run {run.get('run')}: {shown(p[0])}, {shown(p[1])}" for run, p in zip(kept, points, strict=True)]
+    return plot(name, points, titles) if points else ""
 
 
-def _predicted(name: str, runs: Sequence[Record]) -> str:
-    points, titles = _known(runs, "observed", "predicted")
-    if not points:
-        return ""
+def _predicted(name: str, points: list[Point], titles: list[str]) -> str:
     both = span([x for point in points for x in point])
     plot = Plot(both, both, (f"observed {label(name)}", "predicted"))
     plot.line([(both[0], both[0]), (both[1], both[1])], "guide")
@@ -34,10 +34,7 @@ def _predicted(name: str, runs: Sequence[Record]) -> str:
     return plot.svg(f"Predicted on observed {label(name)}, {len(points)} runs")
 
 
-def _residuals(name: str, runs: Sequence[Record]) -> str:
-    points, titles = _known(runs, "predicted", "studentized")
-    if not points:
-        return ""
+def _residuals(name: str, points: list[Point], titles: list[str]) -> str:
     reach = max(SUSPECT * 1.1, *(abs(y) * 1.06 for _, y in points))
     plot = Plot(span(x for x, _ in points), (-reach, reach), (f"predicted {label(name)}", "studentized residual"))
     for level in (-SUSPECT, 0.0, SUSPECT):
@@ -60,10 +57,7 @@ def _normal(name: str, runs: Sequence[Record]) -> str:
     return plot.svg(f"Normal plot of the residuals of {label(name)}, {len(points)} runs")
 
 
-def _influence(name: str, runs: Sequence[Record]) -> str:
-    points, titles = _known(runs, "leverage", "cook")
-    if not points:
-        return ""
+def _influence(name: str, points: list[Point], titles: list[str]) -> str:
     top = max(INFLUENTIAL * 1.05, *(1.08 * y for _, y in points))
     plot = Plot((0.0, 1.05), (0.0, top), ("leverage", "Cook's distance"))
     plot.line([(0.0, INFLUENTIAL), (1.05, INFLUENTIAL)], "guide")
@@ -83,11 +77,8 @@ def evaluation_plots(evaluation: Record) -> list[str]:
         drawn.append(plot.svg("Scaled prediction variance by radius: least, mean, largest"))
     if shares := evaluation.get("fraction_of_design_space"):
         points = [(float(each["percent"]), float(each["variance"])) for each in shares]
-        plot = Plot(
-            (0.0, 100.0),
-            (0.0, span([0.0, *(y for _, y in points)])[1]),
-            ("share of the region [%]", "scaled prediction variance"),
-        )
+        top = span([0.0, *(y for _, y in points)])
+        plot = Plot((0.0, 100.0), (0.0, top[1]), ("share of the region [%]", "scaled prediction variance"))
         plot.line(points, "front")
         drawn.append(plot.svg("Scaled prediction variance that a share of the region stays below"))
     return drawn

@@ -47,9 +47,8 @@ def pairs(
         whole = [_pair(point, one, two) for point in [*marks.values(), *(p for each in sets for p in each.points)]]
         whole += [place for place, _ in simulated.values()]
         across, up = bounds.get(one, ()), bounds.get(two, ())
-        plot = Plot(
-            span([*(x for x, _ in whole), *across]), span([*(y for _, y in whole), *up]), (label(one), label(two))
-        )
+        ranges = span([*(x for x, _ in whole), *across]), span([*(y for _, y in whole), *up])
+        plot = Plot(*ranges, (label(one), label(two)))
         for bound in across:
             plot.line([(bound, plot.y[0]), (bound, plot.y[1])], "limit")
         for bound in up:

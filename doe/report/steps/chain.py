@@ -67,19 +67,16 @@ def _ppm(rejected: Mapping[str, float], side: str) -> str:
 
 def _print_answer(chain: ChainResult) -> None:
     (low, high), (least, most), out = chain.worst_case_mm, chain.rss_mm, chain.rejected["as_given"]
-    print(
-        f"{'as given: ' if chain.refused else ''}closing link {low:.4f} to {high:.4f} mm in worst case, "
-        f"{least:.4f} to {most:.4f} mm by root sum square, yield "
-        f"{chain.yields['as_given']:.6f} ± {chain.standard_errors['as_given']:.1g} "
-        f"({out['low_ppm']:.0f} ppm below, {out['high_ppm']:.0f} ppm above)"
-        + (f", Cp {chain.cp:.2f}, Cpk {chain.cpk:.2f}" if chain.cp is not None else "")
-    )
+    closing = f"closing link {low:.4f} to {high:.4f} mm in worst case, {least:.4f} to {most:.4f} mm by root sum square"
+    good = f"{chain.yields['as_given']:.6f} ± {chain.standard_errors['as_given']:.1g}"
+    able = f", Cp {chain.cp:.2f}, Cpk {chain.cpk:.2f}" if chain.cp is not None else ""
+    ppm = f"({out['low_ppm']:.0f} ppm below, {out['high_ppm']:.0f} ppm above){able}"
+    print(f"{'as given: ' if chain.refused else ''}{closing}, yield {good} {ppm}")
     if chain.linearisation is not None:
         bent = chain.linearisation
-        print(
-            f"a linear chain would miss the worst case by {bent.worst_case_error_mm:.4f} mm, the mean by "
-            f"{bent.mean_shift_mm:+z.4f} mm and the standard deviation by {bent.deviation_error_percent or 0.0:+z.1f} %"
-        )
+        worst = f"the worst case by {bent.worst_case_error_mm:.4f} mm, the mean by {bent.mean_shift_mm:+z.4f} mm"
+        spread = f"the standard deviation by {bent.deviation_error_percent or 0.0:+z.1f} %"
+        print(f"a linear chain would miss {worst} and {spread}")
     if chain.cost is not None:
         print(f"cost of the allocated tolerances {chain.cost:.4g}")
 
@@ -89,11 +86,10 @@ def _print_selective(chain: ChainResult, verbose: bool) -> None:
     assert found is not None
     low, high = found.worst_case_mm
     needed = "no number of classes keeps" if found.classes_needed is None else f"{found.classes_needed} would keep"
-    print(
-        f"matched in {found.classes} classes: closing link {low:.4f} to {high:.4f} mm in worst case ({needed} the "
-        f"limits), {100 * found.matched:.2f} % of the parts find a mate, {found.good:.6f} ± "
-        f"{found.standard_error:.1g} of the matched within the limits ({found.random:.6f} at random)"
-    )
+    closing = f"closing link {low:.4f} to {high:.4f} mm in worst case ({needed} the limits)"
+    mates = f"{100 * found.matched:.2f} % of the parts find a mate, {found.good:.6f} ± {found.standard_error:.1g}"
+    good = f"of the matched within the limits ({found.random:.6f} at random)"
+    print(f"matched in {found.classes} classes: {closing}, {mates} {good}")
     if verbose:
         rows = [(name, "  ".join(f"{edge:.4f}" for edge in edges)) for name, edges in found.edges_mm.items()]
         print_table("classes", ("part", "limits of the classes [mm]"), rows)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from doe.report.words import probability
 from doe.response_surface import Surface, describe
 from rbdyn.cli.terminal import print_table
 
@@ -86,12 +87,13 @@ def _print_equations(surface: Surface, factors: Sequence[str]) -> None:
         named = zip("ABCDEFGHIJKLMNOPQRSTUVWXYZ", factors, strict=False)
         print(", ".join(f"{letter} = {name}" for letter, name in named))
     unit = "times the known error " if surface.weighting == "replicates" else ""
-    print(
-        f"R² {_shown(surface.r2)}, adjusted {_shown(surface.adjusted_r2)}, predicted "
-        f"{_shown(surface.predicted_r2)}, PRESS {_shown(surface.press)}, CV {_shown(surface.cv_percent)} %, "
-        f"adequate precision {_shown(surface.adequate_precision)}, residual standard deviation "
-        f"{_shown(surface.residual_mean_square**0.5)} {unit}on {surface.residual_dof} degrees of freedom"
+    explained = (
+        f"R² {_shown(surface.r2)}, adjusted {_shown(surface.adjusted_r2)}, predicted {_shown(surface.predicted_r2)}"
     )
+    missed = f"PRESS {_shown(surface.press)}, CV {_shown(surface.cv_percent)} %"
+    precision = f"adequate precision {_shown(surface.adequate_precision)}"
+    rest = f"{_shown(surface.residual_mean_square**0.5)} {unit}on {surface.residual_dof} degrees of freedom"
+    print(f"{explained}, {missed}, {precision}, residual standard deviation {rest}")
 
 
 def _print_runs(surface: Surface) -> None:
@@ -110,8 +112,7 @@ def _verdict(p: float | None) -> tuple[str, str]:
     """A p value and its stars."""
     if p is None:
         return "", ""
-    stars = next((stars for limit, stars in STARS if p <= limit), "")
-    return "< 0.0001" if p < 1e-4 else f"{p:.4f}", stars
+    return probability(p), next((stars for limit, stars in STARS if p <= limit), "")
 
 
 def _shown(value: float | None) -> str:

@@ -6,8 +6,7 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.pareto import ParetoFront
-from doe.pareto.archive import dominates
-from doe.pareto.indicators import REFERENCE
+from doe.pareto.archive import REFERENCE, dominates
 from doe.pareto.tolerance_aware import ToleranceAware
 from doe.report.steps.confirmation import gains_record, point_record
 from doe.report.words import change
@@ -112,14 +111,12 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
     _print_gains("the pick", record["predicted_gains"])
     sure = record["pick_dominates_baseline"]
     print(record["statement"])
-    flattered = ", ".join(
-        f"{name} {gain['selection_optimism_percent']:+.2f} %" for name, gain in record["predicted_gains"].items()
-    )
+    luck = {name: gain["selection_optimism_percent"] for name, gain in record["predicted_gains"].items()}
+    flattered = ", ".join(f"{name} {percent:+.2f} %" for name, percent in luck.items())
     print(f"the rule picks what errors flatter; luck expected in these gains: {flattered}")
-    print(
-        f"pick: {record['pick']['reason']}; on {sure['draws']} surfaces drawn from their errors it dominates the "
-        f"baseline with probability {sure['probability']:.3f} ± {1.96 * sure['standard_error']:.3f}"
-    )
+    chance = f"{sure['probability']:.3f} ± {1.96 * sure['standard_error']:.3f}"
+    drawn = f"on {sure['draws']} surfaces drawn from their errors it dominates the baseline with probability {chance}"
+    print(f"pick: {record['pick']['reason']}; {drawn}")
     for limit in record["constraints"]:
         print(f"limit: {limit['response']} {limit['sense']} {limit['limit']:g}; the pick has {limit['value']:.5g}")
     if record["feasible_share"] < 1.0:
@@ -138,23 +135,18 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
 def _print_convergence(record: dict[str, Any]) -> None:
     history, whole = record["hypervolume_history"], record["hypervolume"]
     reached = next(number for number, each in enumerate(history, 1) if each >= 0.99 * whole)
-    print(
-        f"hypervolume {whole:.4f} of {record['largest_hypervolume']:.3f}; 99 % of it after generation {reached} of "
-        f"{record['generations']}, {record['evaluations']} evaluations"
-    )
+    size = f"hypervolume {whole:.4f} of {record['largest_hypervolume']:.3f}"
+    when = f"generation {reached} of {record['generations']}, {record['evaluations']} evaluations"
+    print(f"{size}; 99 % of it after {when}")
 
 
 def _print_gains(whose: str, gains: dict[str, Any]) -> None:
-    rows = [
-        (name, change(gain), gain["verdict"], f"± {_number(gain['single_run_scatter_percent'])} %")
-        for name, gain in gains.items()
-    ]
+    rows = []
+    for name, gain in gains.items():
+        scatter = gain["single_run_scatter_percent"]
+        rows.append((name, change(gain), gain["verdict"], f"± {'?' if scatter is None else f'{scatter:.2f}'} %"))
     header = ("", "against the baseline", "verdict", "scatter of two single runs")
     print_table(f"predicted gains of {whose}", header, rows)
-
-
-def _number(value: float | None) -> str:
-    return "?" if value is None else f"{value:.2f}"
 
 
 def _cells(point: dict[str, Any]) -> list[str]:
@@ -244,18 +236,12 @@ def print_tolerance_aware(record: dict[str, Any]) -> None:
     print_table(f"after manufacture within {widths}: {kind}", ("", *names), rows)
     at = ", ".join(f"{name} = {x:.5g}" for name, x in pick["factors"].items())
     print(f"tolerance-aware pick: {at}; {pick['reason']}")
-    print(
-        f"the tolerance-aware front has {record['nominal_loss_percent']:.2f} % less hypervolume than the plain one in "
-        "nominal values" + _robust_gain(record["robust_gain_percent"])
-    )
-    survival = record["survival"]
-    print(
-        f"parts that still dominate the baseline: {100 * survival['plain_pick']:.1f} % at the plain pick, "
-        f"{100 * survival['pick']:.1f} % at the tolerance-aware one (± {196 * survival['standard_error']:.2f} %)"
-    )
+    less = f"{record['nominal_loss_percent']:.2f} % less hypervolume than the plain one in nominal values"
+    percent, survival = record["robust_gain_percent"], record["survival"]
+    more = "" if percent is None else f", and {percent:.2f} % more in what manufacture leaves"
+    print(f"the tolerance-aware front has {less}{more}")
+    plain = f"{100 * survival['plain_pick']:.1f} % at the plain pick"
+    aware = f"{100 * survival['pick']:.1f} % at the tolerance-aware one (± {196 * survival['standard_error']:.2f} %)"
+    print(f"parts that still dominate the baseline: {plain}, {aware}")
     if not record["plain_pick_inside"]:
         print("the tolerance box of the plain pick reaches out of the region: its figures are extrapolated")
-
-
-def _robust_gain(percent: float | None) -> str:
-    return "" if percent is None else f", and {percent:.2f} % more in what manufacture leaves"

@@ -41,7 +41,7 @@ class Run(NamedTuple):
     solve_us: float
 
 
-def study(scene: BallScene, progress: Reporter | None = None, scenes: int = SCENES) -> Report:
+def study(scene: BallScene, progress: Reporter = None, scenes: int = SCENES) -> Report:
     """``rbdyn accuracy --battery``, its first ``scenes`` scenes."""
     drawn = cases(scenes, SEED, **{key: getattr(scene.model, key) for key in MODEL})
     ball, rings = scene.material("ball"), scene.material("inner_ring")
@@ -105,10 +105,8 @@ def conclusion(rows: Sequence[Success]) -> str:
     """Who solves most, and how the others compare."""
     best, *rest = sorted(rows, key=lambda row: -row.solved)
     others = ", ".join(f"{row.solver} {row.shown_share}" for row in rest)
-    return (
-        f"{best.solver} solves {best.shown_share} of {best.problems} random scenes, half of them within "
-        f"{best.median_us:.0f} us; {others}; 95 % intervals."
-    )
+    what = f"{best.solver} solves {best.shown_share} of {best.problems} random scenes"
+    return f"{what}, half of them within {best.median_us:.0f} us; {others}; 95 % intervals."
 
 
 def _fared(name: str, runs: Sequence[Run]) -> Success:
@@ -185,9 +183,8 @@ def _draw(runs: dict[str, list[Run]], path: Path) -> None:
     from rbdyn.plots.style import label_ends, plain, plt, save
 
     figure, axis = plt.subplots(figsize=(7.6, 5.0))
-    axis.set(
-        xscale="log", xlabel="time of a call [us]", ylabel="share of scenes solved within it [%]", ylim=(0.0, 103.0)
-    )
+    axis.set(xscale="log", xlabel="time of a call [us]", ylim=(0.0, 103.0))
+    axis.set_ylabel("share of scenes solved within it [%]")
     plain(axis)
     ends: list[Named] = []
     for (name, series), colour in zip(runs.items(), METHOD_COLOURS, strict=False):

@@ -88,10 +88,7 @@ def share(count: int, total: int) -> tuple[float, float]:
 
 
 def study(
-    scene: BallScene,
-    progress: Reporter | None = None,
-    limits: Sequence[int] = LIMITS,
-    perturbations: int = PERTURBATIONS,
+    scene: BallScene, progress: Reporter = None, limits: Sequence[int] = LIMITS, perturbations: int = PERTURBATIONS
 ) -> Report:
     """``rbdyn accuracy`` of a ball bearing. Raises InputError for two rows, RunError where there is no equilibrium."""
     if not isinstance(scene, SingleRowScene):
@@ -196,11 +193,8 @@ def success_table(title: str, rows: Sequence[Success], first: str = "solver") ->
 
 def causes(rows: Sequence[Success]) -> list[str]:
     """A sentence for each solver that failed somewhere."""
-    return [
-        f"{row.solver} failed: " + "; ".join(f"{count} x {why}" for why, count in row.causes.items())
-        for row in rows
-        if row.causes
-    ]
+    told = {row.solver: "; ".join(f"{count} x {why}" for why, count in row.causes.items()) for row in rows}
+    return [f"{solver} failed: {whys}" for solver, whys in told.items() if whys]
 
 
 def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
@@ -214,11 +208,9 @@ def conclusion(attempts: Sequence[Attempt], rows: Sequence[Success]) -> str:
     best = min(alike, key=lambda row: row.median_us)
     rivals = ", ".join(f"{row.solver} {row.shown_share}" for row in alike if row is not best)
     times = ", ".join(f"{name} {took:.0f} us" for name, took in sorted(reached.items(), key=lambda it: it[1]))
-    return (
-        f"To an equilibrium of this scene: {times or 'none'}. Take {best.solver}: it solves "
-        f"{best.shown_share} of {best.problems} scenes nearby, half of them within {best.median_us:.0f} us"
-        + (f"; so many scenes do not tell it from {rivals} in sureness." if rivals else ".")
-    )
+    solves = f"{best.shown_share} of {best.problems} scenes nearby, half of them within {best.median_us:.0f} us"
+    beside = f"; so many scenes do not tell it from {rivals} in sureness" if rivals else ""
+    return f"To an equilibrium of this scene: {times or 'none'}. Take {best.solver}: it solves {solves}{beside}."
 
 
 def _fared(name: str, solver: Solver, problems: Sequence[Problem], counted: Progress) -> Success:

@@ -5,5 +5,5 @@
 - ``comparison``: our method beside others on one right-hand side; ``method_bias``: their statistics
 - ``slicing``, ``replication``, ``coverage``: slices, replicates, and how often stated intervals hold the truth
 - ``option_cost``, ``stability``, ``scaling``: what options cost, how extremes end, time and memory by size
-- beneath: ``right_hand_side``, ``fixed_step``, ``methods``, ``equal_error``, ``footprint``, ``pictures``
+- beneath: ``right_hand_side``, ``fixed_step``, ``methods``, ``footprint``, ``pictures``
 """

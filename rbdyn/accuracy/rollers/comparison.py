@@ -1,8 +1,9 @@
-"""Methods beside each other on one compiled right-hand side: error against time, and how many times faster ours is."""
+"""Methods beside each other on one compiled right-hand side: error against time, and how many times faster ours is
+at equal error."""
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from rbdyn.accuracy.judgement import SOUGHT
 from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, records, reported, tabled
 from rbdyn.accuracy.rollers import method_bias, trajectory
-from rbdyn.accuracy.rollers.equal_error import Speedup, times_faster
 from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, Stretch, compiled
 from rbdyn.accuracy.rollers.trajectory import DEFAULT_TURNS, STARTS, Error, Reference
 from rbdyn.dynamics.run import prepare
@@ -21,6 +21,21 @@ from rbdyn.scene import Scene
 OK = "ok"
 # A run is timed again and again, at most so often and, past the first time, for so long.
 REPEATS, TIMED_S = 5, 0.1
+# Points over the common range of errors, evenly spaced in the logarithm.
+POINTS = 41
+
+Curve = Sequence[tuple[float, float]]  # (error, time) pairs, all positive
+
+
+@dataclass(frozen=True)
+class Speedup:
+    """Ratio of times: geometric mean, least and greatest over the errors from ``low`` to ``high``."""
+
+    low: float
+    high: float
+    mean: float
+    least: float
+    greatest: float
 
 
 class Attempt(Record):
@@ -40,7 +55,7 @@ class Attempt(Record):
 
 def study(
     scene: Scene,
-    progress: Reporter | None = None,
+    progress: Reporter = None,
     turns: float = DEFAULT_TURNS,
     methods: Sequence[Method] = METHODS,
     sought: float = SOUGHT,
@@ -63,17 +78,13 @@ def study(
     )
 
 
-def trajectories(scene: Scene, progress: Reporter | None, turns: float, methods: Sequence[Method]) -> Report:
+def trajectories(scene: Scene, progress: Reporter, turns: float, methods: Sequence[Method]) -> Report:
     """Error and time of every method at every setting. Raises as ``study``."""
     stretches = trajectory.starts_after_transient(scene, turns)
     compile_s = compiling(stretches[0], methods)
     counted = Progress(progress, STARTS + sum(len(method.settings) for method in methods))
     known = trajectory.reference(stretches, counted.step)
-    attempts = []
-    for method in methods:
-        for attempt in attempts_of(method, stretches, known):
-            attempts.append(attempt)
-            counted.step()
+    attempts = [each for method in methods for each in counted.over(attempts_of(method, stretches, known))]
     ratios = speedups(attempts, known.floor(turns))
     sentences = conclusion(attempts, ratios, known.floor(turns), turns)
     written = records(attempts)
@@ -181,10 +192,8 @@ def conclusion(attempts: Sequence[Attempt], ratios: dict[str, Speedup], floor: f
             f"{ratio.mean:.2g} ({ratio.least:.2g} to {ratio.greatest:.2g}) times that of {name}"
             for name, ratio in ratios.items()
         )
-        sentences.append(
-            f"At equal position error after {turns:g} turns the speed of {OURS.name} is {faster}: geometric mean, least and "
-            "greatest over the errors in common."
-        )
+        what = f"At equal position error after {turns:g} turns the speed of {OURS.name} is {faster}"
+        sentences.append(f"{what}: geometric mean, least and greatest over the errors in common.")
     failed = {a.method: sum(b.method == a.method and b.status != OK for b in attempts) for a in attempts}
     settings = ", ".join(f"{name} at {count}" for name, count in failed.items() if count)
     if settings:
@@ -237,3 +246,29 @@ def _draw(attempts: Sequence[Attempt], floor: float, turns: float, path: Any) ->
     failed_at_the_edge(axis, failures)
     label_ends(axis, ends)
     save(figure, path)
+
+
+def front(curve: Curve) -> list[tuple[float, float]]:
+    """The points that no other beats in both error and time, smallest error first."""
+    unbeaten: list[tuple[float, float]] = []
+    for error, took in sorted(curve):
+        if not unbeaten or took < unbeaten[-1][1]:
+            unbeaten.append((error, took))
+    return unbeaten
+
+
+def times_faster(ours: Curve, theirs: Curve) -> Speedup | None:
+    """Their time over ours, with log time interpolated over log error between the points of each front.
+
+    Nothing is extrapolated: None where the two have no range of errors in common.
+    """
+    fronts = front(ours), front(theirs)
+    if not all(fronts):
+        return None
+    low, high = max(points[0][0] for points in fronts), min(points[-1][0] for points in fronts)
+    if not low < high:
+        return None
+    at = np.linspace(np.log(low), np.log(high), POINTS)
+    our_time, their_time = (np.interp(at, *np.log(np.array(points)).T) for points in fronts)
+    ratio = np.exp(their_time - our_time)
+    return Speedup(low, high, float(np.exp((their_time - our_time).mean())), ratio.min().item(), ratio.max().item())

@@ -39,30 +39,23 @@ class Row(Record):
     offset: float = shown("offset", "+.2g %")
 
 
-def study(scene: Scene, progress: Reporter | None = None, repeats: int = REPEATS) -> Report:
+def study(scene: Scene, progress: Reporter = None, repeats: int = REPEATS) -> Report:
     """``rbdyn accuracy --coverage``. Raises RunError, KeyboardInterrupt."""
     scene = one_bearing(scene)
     counted = Progress(progress, repeats + 1)
     truth = simulate(truth_of(scene))
     counted.step()
-    results = []
-    for k in range(repeats):
-        results.append(simulate(with_numerics(scene, seed=FIRST_SEED + SEED_STEP * k)))
-        counted.step()
+    seeds = (FIRST_SEED + SEED_STEP * k for k in range(repeats))
+    results = [simulate(with_numerics(scene, seed=seed)) for seed in counted.over(seeds)]
     rows = [row(name, truth, results) for name in FIGURES]
     turns = sum(result.cost["turns"] for result in results) / repeats
     each = scene.numerics.turns + scene.numerics.warm_up_turns
     longer = sum(result.counted_turns > 1.01 * scene.numerics.turns for result in results) / repeats
-    sentences = [
-        conclusion(rows, repeats),
-        f"A run took {turns:.0f} shaft turns over all replicates and companions; asked for were "
-        f"{each * (scene.numerics.replicates + scene.numerics.companions):.0f}, and {100.0 * longer:.0f} % of the runs "
-        "were lengthened.",
-    ]
-    table, written = (
-        tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, columns_of(Row)),
-        records(rows),
-    )
+    asked = each * (scene.numerics.replicates + scene.numerics.companions)
+    took = f"A run took {turns:.0f} shaft turns over all replicates and companions; asked for were {asked:.0f}"
+    sentences = [conclusion(rows, repeats), f"{took}, and {100.0 * longer:.0f} % of the runs were lengthened."]
+    table = tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, columns_of(Row))
+    written = records(rows)
     told: dict[str, Any] = {"pooled": pooled(rows), "repeats": repeats, "mean_turns": turns, "lengthened": longer}
     return reported("coverage", (table,), sentences, written, rows=written, **told, conclusion=" ".join(sentences))
 

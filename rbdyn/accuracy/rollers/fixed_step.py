@@ -14,8 +14,8 @@ Both keep a tally as our method does, at step ends: works by their own weights, 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Whole
 from rbdyn.compiled.kernel import entry, kernel
 from rbdyn.dynamics.forces import state
 from rbdyn.dynamics.forces.equations import LOADS, POWERS, derivative, derivative_once
@@ -23,7 +23,7 @@ from rbdyn.dynamics.forces.state import Layout
 from rbdyn.dynamics.integrators.booking import book_whirl
 
 
-def velocity_of(layout: Layout) -> NDArray[np.int64]:
+def velocity_of(layout: Layout) -> Whole:
     """For each state component the index of its velocity; -1 for what is not a position."""
     z, components = layout.rollers, layout.components
     owners = [(part.body, place % z if place < layout.first_body else 0) for place, part in enumerate(components)]

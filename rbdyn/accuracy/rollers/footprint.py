@@ -37,9 +37,8 @@ def footprint(scene: "Scene", bearing: "RollerBearing") -> Footprint:
 
 def parameter_bytes(parameters: Any) -> int:
     """Size of all numbers and arrays within the parameters of a bearing."""
-    return sum(
-        part.nbytes if isinstance(part, np.ndarray) else 8 for part in _parts(parameters) if not isinstance(part, tuple)
-    )
+    single = (part for part in _parts(parameters) if not isinstance(part, tuple))
+    return sum(part.nbytes if isinstance(part, np.ndarray) else 8 for part in single)
 
 
 def _parts(parameters: Any) -> Iterator[Any]:

@@ -40,7 +40,7 @@ class Row(Record):
 
 
 def bias_rows(
-    scene: Scene, settings: Sequence[tuple[Method, Sequence[float]]] = SETTINGS, progress: Reporter | None = None
+    scene: Scene, settings: Sequence[tuple[Method, Sequence[float]]] = SETTINGS, progress: Reporter = None
 ) -> list[Row]:
     """A row a setting. Raises InputError for a single replicate, RunError where the reference fails, KeyboardInterrupt."""
     check_replicates(scene)
@@ -59,11 +59,8 @@ def bias_rows(
                 step = fixed_step(scene, setting)
                 return FixedStepRun(scene, bearing, index, step, method.name == VELOCITY_VERLET.name)
 
-            label = (
-                f"rtol {setting:g}"
-                if method.adaptive
-                else f"{scene.turn_s / fixed_step(scene, setting):.0f} steps a turn"
-            )
+            steps = f"{scene.turn_s / fixed_step(scene, setting):.0f} steps a turn"
+            label = f"rtol {setting:g}" if method.adaptive else steps
             try:
                 rows.append(_row(scene, method.name, label, _replicates(scene, start), reference))
             except RunError as error:
@@ -103,9 +100,8 @@ def table(rows: Sequence[Row], sought: float = SOUGHT) -> Table:
         return lambda row: "" if row.found is None else text(row.found)
 
     biases = {heading: where_found(text) for heading, text in bias_columns(sought).items()}
-    return tabled(
-        f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors", rows, {**columns_of(Row), **biases}
-    )
+    title = f"bias of the statistics against rtol {REFERENCE_RTOL:g}, 95 % errors"
+    return tabled(title, rows, {**columns_of(Row), **biases})
 
 
 def _replicates(scene: Scene, start: Callable[[int], Run]) -> list[Replicate]:

@@ -72,7 +72,7 @@ COLUMNS: Columns = {
 
 
 def option_costs(
-    scene: Scene, options: Mapping[str, Sequence[str]] = OPTIONS, progress: Reporter | None = None
+    scene: Scene, options: Mapping[str, Sequence[str]] = OPTIONS, progress: Reporter = None
 ) -> list[OptionCost]:
     """A row an option that the scene allows. Raises RunError, KeyboardInterrupt."""
     plain = with_options(scene, (f"numerics.turns={TURNS}", f"numerics.discard_turns={DISCARDED}"))
@@ -83,7 +83,7 @@ def option_costs(
     bearings = [roller_bearing(option) for option in chosen.values()]
     modules = added_modules(plain, list(chosen.values()))
     rows, counted = [], Progress(progress, len(chosen))
-    for (name, option), bearing, needed in zip(chosen.items(), bearings, modules, strict=True):
+    for (name, option), bearing, needed in counted.over(zip(chosen.items(), bearings, modules, strict=True)):
         compile_s = prepare(option, bearing)
         times: tuple[list[float], list[float]] = ([], [])
         gap = 0.0
@@ -95,7 +95,6 @@ def option_costs(
         with_ns, without_ns = (float(np.median(series)) for series in times)
         holds = footprint(option, bearing)
         rows.append(OptionCost(name, with_ns, without_ns, gap, compile_s, needed, holds, plain_holds))
-        counted.step()
     return rows
 
 
@@ -116,7 +115,7 @@ def with_options(scene: Scene, assignments: Sequence[str]) -> Scene:
     return Scene.from_dict(data, " ".join(assignments))
 
 
-def study(scene: Scene, progress: Reporter | None = None, options: Mapping[str, Sequence[str]] = OPTIONS) -> Report:
+def study(scene: Scene, progress: Reporter = None, options: Mapping[str, Sequence[str]] = OPTIONS) -> Report:
     """``rbdyn accuracy --options``. Raises RunError, KeyboardInterrupt."""
     costs = option_costs(scene, options, progress)
     rows = [cost.as_dict() for cost in costs]

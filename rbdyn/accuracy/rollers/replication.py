@@ -63,11 +63,7 @@ class Slope(Record):
 
 
 def study(
-    scene: Scene,
-    progress: Reporter | None = None,
-    turns: Sequence[float] = TURNS,
-    pool: int = POOL,
-    sought: float = SOUGHT,
+    scene: Scene, progress: Reporter = None, turns: Sequence[float] = TURNS, pool: int = POOL, sought: float = SOUGHT
 ) -> Report:
     """``rbdyn accuracy --replicates``. Raises RunError, KeyboardInterrupt."""
     values, cpu_s = pool_of_runs(scene, turns, pool, progress)
@@ -91,7 +87,7 @@ def study(
 
 
 def pool_of_runs(
-    scene: Scene, turns: Sequence[float], pool: int, progress: Reporter | None = None
+    scene: Scene, turns: Sequence[float], pool: int, progress: Reporter = None
 ) -> tuple[dict[float, dict[str, Array]], dict[float, float]]:
     """Per length the outputs of every replicate, and the mean processor time of one [s], discarded turns included.
 
@@ -157,15 +153,13 @@ def conclusion(
     ``pool`` replicates is known."""
     sentences = []
     for name, fall in slopes.items():
-        verdict = {
-            True: "as independent turns do",
-            False: "not as independent turns do (-0.5)",
-            None: f"undecided: errors of {fall.half_width:.2g} hide a difference of {abs(fall.power + 0.5):.2g}; a pool "
-            f"of about {about(1.0 + (pool - 1) * (fall.half_width / SLOPE_ERROR) ** 2)} replicates tells",
-        }[fall.as_expected]
-        sentences.append(
-            f"{name}: scatter falls with counted turns to the power {fall.power:.2f} ± {fall.half_width:.2f}, {verdict}."
-        )
+        verdict = "as independent turns do" if fall.as_expected else "not as independent turns do (-0.5)"
+        if fall.as_expected is None:
+            verdict = f"undecided: errors of {fall.half_width:.2g} hide a difference of {abs(fall.power + 0.5):.2g}"
+            larger = about(1.0 + (pool - 1) * (fall.half_width / SLOPE_ERROR) ** 2)
+            verdict += f"; a pool of about {larger} replicates tells"
+        what = f"{name}: scatter falls with counted turns to the power {fall.power:.2f} ± {fall.half_width:.2f}"
+        sentences.append(f"{what}, {verdict}.")
     sentences += [_choice(name, rows, scatter_error(pool), sought) for name in OUTPUTS]
     numerics = scene.numerics
     sentences.append(f"The scene has {numerics.replicates} of {numerics.turns:g}.")
@@ -179,16 +173,12 @@ def _choice(name: str, rows: Sequence[Row], unsure: float, sought: float) -> str
         best = min(good, key=lambda row: row.cpu_s)
         return f"{name} within {percent(sought)}: {best.replicates} replicates of {best.turns:g} turns, {best.cpu_s:.2g} s."
     sharpest = min(rows, key=lambda row: row.half_width[name])
-    width = sharpest.half_width[name]
+    width, most = sharpest.half_width[name], f"{sharpest.replicates} replicates of {sharpest.turns:g} turns"
     if width * math.exp(-unsure) > sought:
-        return (
-            f"{name} within {percent(sought)}: more than {sharpest.replicates} replicates of {sharpest.turns:g} turns; by "
-            f"the square root about {about(sharpest.replicates * (width / sought) ** 2)} of them."
-        )
-    return (
-        f"{name} within {percent(sought)}: undecided; {sharpest.replicates} replicates of {sharpest.turns:g} turns reach "
-        f"{percent(width)}, known to a factor of {math.exp(unsure):.2g}."
-    )
+        by_root = about(sharpest.replicates * (width / sought) ** 2)
+        return f"{name} within {percent(sought)}: more than {most}; by the square root about {by_root} of them."
+    reach = f"{most} reach {percent(width)}, known to a factor of {math.exp(unsure):.2g}"
+    return f"{name} within {percent(sought)}: undecided; {reach}."
 
 
 def _draw(rows: Sequence[Row], path: Any) -> None:

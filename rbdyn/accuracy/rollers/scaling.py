@@ -85,7 +85,7 @@ def scaling(
     rollers: Sequence[int] = ROLLERS,
     slices: Sequence[int] = SLICES,
     memory_turns: Sequence[int] = MEMORY_TURNS,
-    progress: Reporter | None = None,
+    progress: Reporter = None,
 ) -> Scaling:
     """Measure a scene. Raises InputError where it cannot be enlarged or cut, RunError, KeyboardInterrupt."""
     scenes = {
@@ -95,11 +95,7 @@ def scaling(
     counted = Progress(progress, len(rollers) + len(slices) + len(memory_turns))
     points = {kind: _times(sizes, counted.step) for kind, sizes in scenes.items()}
     prepare(scene, roller_bearing(scene))  # so that no process compiles, which takes memory too
-    memory = []
-    for turns in memory_turns:
-        memory.append(Memory(turns, peak_memory(scene, turns)))
-        counted.step()
-    return Scaling(points, memory)
+    return Scaling(points, [Memory(turns, peak_memory(scene, turns)) for turns in counted.over(memory_turns)])
 
 
 def with_rollers(scene: Scene, count: int) -> Scene:
@@ -109,9 +105,8 @@ def with_rollers(scene: Scene, count: int) -> Scene:
     """
     bearing, cage, operation = scene.bearing, scene.cage, scene.operation
     if bearing.roller_diameter_errors_um is not None:
-        raise InputError(
-            ["bearing.roller_diameter_errors_um: holds for its own number of rollers only; leave it out to scale"]
-        )
+        what = "bearing.roller_diameter_errors_um: holds for its own number of rollers only"
+        raise InputError([f"{what}; leave it out to scale"])
     if operation.schedule is not None:
         raise InputError(["operation.schedule: would have to be scaled with the rollers; leave it out to scale"])
     ratio = count / bearing.rollers
@@ -205,7 +200,7 @@ def _largest_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * per_unit / 1024.0**2
 
 
-def study(scene: Scene, progress: Reporter | None = None) -> Report:
+def study(scene: Scene, progress: Reporter = None) -> Report:
     """``rbdyn accuracy --scaling``. Raises InputError, RunError, KeyboardInterrupt."""
     return report(scaling(scene, progress=progress))
 
@@ -213,22 +208,18 @@ def study(scene: Scene, progress: Reporter | None = None) -> Report:
 def report(measured: Scaling) -> Report:
     """Tables, fits and picture of what was measured."""
     tables = [tabled("", points, {kind: ("size", ""), **COLUMNS}) for kind, points in measured.points.items()]
-    sentences = [
-        f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f}); "
-        f"as a power: n^{line.exponent:.2f}"
-        for kind, line in measured.lines.items()
-    ]
-    sentences += [
-        f"{memory.turns} counted turns: at most {memory.peak_MiB:.1f} MiB in a process of its own"
-        for memory in measured.memory
-    ]
+    sentences = []
+    for kind, line in measured.lines.items():
+        straight = f"{line.fixed_ns:.0f} ns + {line.each_ns:.4g} ns for each of the {kind} (r2 {line.r2:.4f})"
+        sentences.append(f"{straight}; as a power: n^{line.exponent:.2f}")
+    for memory in measured.memory:
+        most = f"at most {memory.peak_MiB:.1f} MiB in a process of its own"
+        sentences.append(f"{memory.turns} counted turns: {most}")
     points: dict[str, Any] = {kind: records(sizes) for kind, sizes in measured.points.items()}
     fits = {kind: asdict(line) for kind, line in measured.lines.items()}
     sheet = [{"of": kind, **point} for kind, sizes in points.items() for point in sizes]
-    memory = records(measured.memory)
-    return reported(
-        "scaling", tables, sentences, sheet, lambda path: _draw(measured, path), **points, fits=fits, memory=memory
-    )
+    told = points | {"fits": fits, "memory": records(measured.memory)}
+    return reported("scaling", tables, sentences, sheet, lambda path: _draw(measured, path), **told)
 
 
 def _draw(measured: Scaling, path: Path) -> None:

@@ -38,9 +38,7 @@ class Row(Bias):
     rhs_ns: float = shown("ns a right-hand side", ".0f")
 
 
-def study(
-    scene: Scene, progress: Reporter | None = None, counts: Sequence[int] = COUNTS, sought: float = SOUGHT
-) -> Report:
+def study(scene: Scene, progress: Reporter = None, counts: Sequence[int] = COUNTS, sought: float = SOUGHT) -> Report:
     """``rbdyn accuracy --slices``.
 
     Raises InputError for a roller without slices or a single replicate, RunError, KeyboardInterrupt.
@@ -64,15 +62,12 @@ def study(
     )
 
 
-def slice_rows(scene: Scene, counts: Sequence[int] = COUNTS, progress: Reporter | None = None) -> list[Row]:
+def slice_rows(scene: Scene, counts: Sequence[int] = COUNTS, progress: Reporter = None) -> list[Row]:
     """A row a number of slices, fewest first; the last is the reference of the statistics."""
     if not scene.needs_slices:
-        raise InputError(
-            [
-                f"bearing.roller_profile = {scene.bearing.roller_profile!r} with bearing.tilt_mrad = 0: one slice is "
-                "exact; give the roller a profile or the races a tilt to study its slices"
-            ]
-        )
+        plain = f"bearing.roller_profile = {scene.bearing.roller_profile!r} with bearing.tilt_mrad = 0"
+        mend = "give the roller a profile or the races a tilt to study its slices"
+        raise InputError([f"{plain}: one slice is exact; {mend}"])
     check_replicates(scene)
     counts = sorted(counts)
     counted = Progress(progress, len(counts) * scene.numerics.replicates)
@@ -137,18 +132,14 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
     good = [row for row in rows if row.load_error <= NEGLIGIBLE]
     if not good:
         return f"not even {rows[-1].slices} slices keep the load within {percent(NEGLIGIBLE)}"
-    fewest = (
-        f"{good[0].slices} slices are the fewest whose load is right within {percent(NEGLIGIBLE)}: "
-        f"{good[0].rhs_ns:.0f} ns a right-hand side. The scene has {scene.slices}."
-    )
+    why = f"{good[0].slices} slices are the fewest whose load is right within {percent(NEGLIGIBLE)}"
+    fewest = f"{why}: {good[0].rhs_ns:.0f} ns a right-hand side. The scene has {scene.slices}."
     compared = [row for row in good if row is not rows[-1]]
     chosen, hidden = first_within(compared, lambda row: f"{row.slices} slices", sought)
     sentences = [fewest]
     if chosen is not None:
-        sentences.append(
-            f"At {chosen.slices} the biases of the outputs measure at most {percent(sought)} (their errors at most "
-            f"{percent(chosen.known_to)})."
-        )
+        what = f"At {chosen.slices} the biases of the outputs measure at most {percent(sought)}"
+        sentences.append(f"{what} (their errors at most {percent(chosen.known_to)}).")
     if hidden:
         below = (chosen or rows[-1]).slices
         sentences.append(f"What fewer than {below} do to the outputs is {undecided(hidden, scene, sought)}.")

@@ -70,16 +70,11 @@ def cases(scene: Scene) -> dict[str, tuple[str, ...]]:
     return {name: tuple(Template(each).substitute(figures) for each in told) for name, told in listed.items()}
 
 
-def battery(
-    scene: Scene, chosen: Mapping[str, Sequence[str]] | None = None, progress: Reporter | None = None
-) -> list[Ending]:
+def battery(scene: Scene, chosen: Mapping[str, Sequence[str]] | None = None, progress: Reporter = None) -> list[Ending]:
     """A row a case; all cases unless some are ``chosen``. Raises KeyboardInterrupt."""
     listed = cases(scene) if chosen is None else chosen
-    counted, rows = Progress(progress, len(listed)), []
-    for name, assignments in listed.items():
-        rows.append(ending(scene, name, assignments))
-        counted.step()
-    return rows
+    counted = Progress(progress, len(listed))
+    return [ending(scene, name, told) for name, told in counted.over(listed.items())]
 
 
 def ending(scene: Scene, case: str, assignments: Sequence[str]) -> Ending:
@@ -134,7 +129,7 @@ def _judge(figures: Mapping[str, float], rtol: float, tightened: bool) -> tuple[
     return CLOSED, ""
 
 
-def study(scene: Scene, progress: Reporter | None = None) -> Report:
+def study(scene: Scene, progress: Reporter = None) -> Report:
     """``rbdyn accuracy --stability``. Raises KeyboardInterrupt."""
     return report(battery(scene, progress=progress))
 
@@ -143,9 +138,8 @@ def report(rows: Sequence[Ending]) -> Report:
     """Table of the endings, and every reason."""
     unexplained = sum(row.unexplained for row in rows)
     written = records(rows)
-    status: dict[str, Any] = (
-        {"status": f"{unexplained} of {len(rows)} cases neither close nor tell why"} if unexplained else {}
-    )
+    why = f"{unexplained} of {len(rows)} cases neither close nor tell why"
+    status: dict[str, Any] = {"status": why} if unexplained else {}
     table = tabled(f"extreme scenes; closed: power balance within {100.0 * LARGEST_GAP:g} %", rows, columns_of(Ending))
     sentences = [f"{row.case}: {row.reason}" for row in rows if row.reason]
     sheet = [row | {"assignments": " ".join(row["assignments"])} for row in written]

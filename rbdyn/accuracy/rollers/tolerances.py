@@ -97,7 +97,7 @@ class StatisticsBias(Record):
 
 
 def statistics_bias(
-    scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Reporter | None = None
+    scene: Scene, tolerances: Sequence[float] = TOLERANCES, progress: Reporter = None
 ) -> StatisticsBias:
     """A row a tolerance. Runs one replicate at a time.
 
@@ -131,16 +131,13 @@ def conclusion(rows: Sequence[Row], scene: Scene, sought: float = SOUGHT) -> str
     chosen, hidden = first_within(closing, lambda row: f"rtol {row.rtol:g}", sought)
     rest = undecided(hidden, scene, sought) if hidden else ""
     if chosen is None:
-        return rest or (
-            f"no tolerance looser than the reference, rtol {reference.rtol:g}, has biases of at most {percent(sought)} and a "
-            f"power balance that closes within {percent(NEGLIGIBLE)}"
-        )
-    return (
-        f"rtol {chosen.rtol:g} is {'one' if hidden else 'the loosest'} whose biases measure at most {percent(sought)} (their "
-        f"errors at most {percent(chosen.known_to)}) and whose power balance closes within {percent(NEGLIGIBLE)}: "
-        f"{chosen.turn_ms:.2f} ms a shaft turn. The scene has {scene.numerics.rtol:g}."
-        + (f" Looser ones are {rest}." if hidden else "")
-    )
+        looser = f"no tolerance looser than the reference, rtol {reference.rtol:g}"
+        kept = f"biases of at most {percent(sought)} and a power balance that closes within {percent(NEGLIGIBLE)}"
+        return rest or f"{looser}, has {kept}"
+    biases = f"biases measure at most {percent(sought)} (their errors at most {percent(chosen.known_to)})"
+    closes = f"whose power balance closes within {percent(NEGLIGIBLE)}: {chosen.turn_ms:.2f} ms a shaft turn"
+    which = f"rtol {chosen.rtol:g} is {'one' if hidden else 'the loosest'} whose {biases} and {closes}"
+    return f"{which}. The scene has {scene.numerics.rtol:g}." + (f" Looser ones are {rest}." if hidden else "")
 
 
 def bias_of(runs: Sequence[Replicate], reference: Sequence[Replicate]) -> Bias:

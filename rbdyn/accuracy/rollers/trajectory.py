@@ -9,11 +9,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbdyn.accuracy.report import Table
 from rbdyn.accuracy.rollers.methods import DOP853, OURS, Method, Stretch
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Whole
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of
@@ -74,7 +73,7 @@ def starts_after_transient(scene: Scene, turns: float = DEFAULT_TURNS, starts: i
     return stretches
 
 
-def positions(scene: Scene) -> NDArray[np.int64]:
+def positions(scene: Scene) -> Whole:
     """Indices of the positions of rollers, cage and rings [m] in the state."""
     return np.flatnonzero([part.unit == "m" for part in layout_of(scene).components])
 

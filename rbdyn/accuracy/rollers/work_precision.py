@@ -16,7 +16,7 @@ MOTION = ("rows", "conclusion", "turns", "starts", "reference", "resolved_m", "t
 
 def study(
     scene: Scene,
-    progress: Reporter | None = None,
+    progress: Reporter = None,
     turns: float = DEFAULT_TURNS,
     rtols: Sequence[float] = tolerances.TOLERANCES,
     sought: float = SOUGHT,

@@ -22,8 +22,7 @@ def manual(
         from importlib.metadata import entry_points
 
         from rbdyn.cli.keys import kinds
-        from rbdyn.cli.manual.page import page
-        from rbdyn.cli.manual.part import Part
+        from rbdyn.cli.manual.page import Part, page
         from rbdyn.result import whole_file
 
         own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds())

@@ -1,24 +1,35 @@
-"""The page: chapters in Markdown, put into one HTML file with contents and search."""
+"""The page: chapters in Markdown, with keys of input files and options of commands of every floor of the house, put into one
+HTML file with contents and search."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import typer
 from markdown_it import MarkdownIt
 from markdown_it.renderer import RendererProtocol
 from markdown_it.token import Token
+from pydantic import BaseModel
 
+from rbdyn.cli.keys import Key, keys, lines
 from rbdyn.cli.manual.docstrings import equations, library, trees_of
-from rbdyn.cli.manual.part import Part
-from rbdyn.cli.manual.reference import commands_of, keys_of
 from rbdyn.records.words import filled_page
 
 OPTION = re.compile(r"(?<!\S)(--?[a-z][\w-]*)")
 # Headings deeper than this stand on the page and in the search, not in the contents.
 DEEPEST = 3
+
+
+class Part(NamedTuple):
+    """A package with its chapters, its command and the kinds of its input files."""
+
+    package: str
+    prose: Path  # folder of chapters, NN_name.md
+    commands: Any  # group of commands, as typer makes it
+    kinds: Mapping[str, type[BaseModel]]
 
 
 class Heading(NamedTuple):
@@ -95,3 +106,37 @@ def _entry(headings: Sequence[Heading]) -> str:
     shown = (each for each in headings if each.level <= DEEPEST)
     title, *inner = (f'<a class="l{each.level}" href="#{each.key}">{each.html}</a>' for each in shown)
     return f"<li><details><summary>{title}</summary>{''.join(inner)}</details></li>" if inner else f"<li>{title}</li>"
+
+
+def keys_of(part: Part) -> Iterator[str]:
+    """A heading a kind of file, a table and a key, and what the key means."""
+    tables: dict[tuple[str, str], list[Key]] = {}
+    for key in keys(part.kinds):
+        tables.setdefault((key.file, key.key.rpartition(".")[0]), []).append(key)
+    kind = ""
+    for (file, table), found in tables.items():
+        if file != kind:
+            kind = file
+            yield f"## {file.capitalize()}"
+        yield f"### {file}, " + (f"table `{table}`" if table else "outside all tables")
+        for key in found:
+            head = lines(key)[0].removeprefix(f"{key.key}: ")
+            # Its description, and what else a key says behind it.
+            told = (plain(str(each)) for each in (head, *key[Key._fields.index("description") :]))
+            yield "\n\n".join((f"#### `{key.key}`", *told))
+
+
+def commands_of(part: Part) -> Iterator[str]:
+    """A heading a command: its usage, what it does, its options."""
+    for name, command in part.commands.commands.items():
+        whole = f"{part.package} {name}"
+        context = typer.Context(command, info_name=whole)
+        usage = " ".join(command.get_usage(context).removeprefix("Usage: ").split())
+        records = filter(None, (each.get_help_record(context) for each in command.params))
+        options = "\n".join(f"- `{option}`: {plain(says)}" for option, says in records)
+        yield f"## `{whole}`\n\n```sh\n{usage}\n```\n\n{plain(command.help)}\n\n{options}"
+
+
+def plain(text: str) -> str:
+    """Text in which Markdown sees no emphasis."""
+    return text.replace("*", r"\*")

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Whole
 from rbdyn.contact.film_thickness import hertz_pressure
 from rbdyn.dynamics.parameters.race_traction import rolling_contacts
 
@@ -150,7 +149,7 @@ class Profile:
     mean: Array
     low: Array
     high: Array
-    samples: NDArray[np.int64]
+    samples: Whole
 
 
 def against_azimuth(history: "History", values: Array, bins: int = 72) -> Profile:

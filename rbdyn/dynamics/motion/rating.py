@@ -9,7 +9,7 @@ from rbdyn.dynamics.forces.slice_loads import slice_loads
 from rbdyn.dynamics.parameters.model import race_contact_law
 from rbdyn.life.roller_capacity import dynamic_capacity
 from rbdyn.life.rollers import ReferenceLife, reference_life
-from rbdyn.life.turns import Turning
+from rbdyn.life.turns import turning_rings
 from rbdyn.scene import Scene
 
 
@@ -22,22 +22,19 @@ def rating_life(scene: Scene, azimuth: Array, inner_load: Array, outer_load: Arr
     """
     drawing = scene.bearing
     diameter = drawing.roller_diameter
-    capacity = drawing.dynamic_capacity_N or dynamic_capacity(
-        drawing.rollers, diameter, drawing.effective_length, drawing.pitch_diameter
-    )
+    sizes = drawing.rollers, diameter, drawing.effective_length, drawing.pitch_diameter
+    capacity = drawing.dynamic_capacity_N or dynamic_capacity(*sizes)
     nx, ny = np.cos(azimuth), np.sin(azimuth)
     inner, outer = (
         slice_loads(race_contact_law(scene, race), scene.slices, 0.5 * diameter, loads, nx, ny)
         for race, loads in (("inner", inner_load), ("outer", outer_load))
     )
-    inner_turns, outer_turns = (speed != 0.0 for speed in scene.operation.speeds)
-    turning: Turning = "inner" if not outer_turns else "both" if inner_turns else "outer"
     return reference_life(
         inner,
         outer,
         capacity=capacity,
         gamma=drawing.diameter_ratio,
-        turning=turning,
+        turning=turning_rings(*scene.operation.speeds),
         angle=np.mod(azimuth, 2.0 * math.pi),
         edges=drawing.roller_profile != "cylinder",
     )

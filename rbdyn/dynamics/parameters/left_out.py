@@ -8,8 +8,7 @@ import numpy as np
 
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.dynamics.forces.drag import AIR_DENSITY
-from rbdyn.life.minimum_load import minimum_loads
-from rbdyn.life.roller_capacity import dynamic_capacity, static_capacity
+from rbdyn.life.roller_capacity import dynamic_capacity, minimum_loads, static_capacity
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
 
@@ -154,10 +153,8 @@ def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
         if item.power is not None:
             power = item.power(scene)
             if power > NOTED_SHARE * power_loss > 0.0:
-                notes.append(
-                    f"left out: {item.name}, by an estimate {power:.2g} W ({100.0 * power / power_loss:.2g} % of the power "
-                    f"loss); {item.changes}"
-                )
+                what = f"left out: {item.name}, by an estimate {power:.2g} W"
+                notes.append(f"{what} ({100.0 * power / power_loss:.2g} % of the power loss); {item.changes}")
         elif item.matters is not None and item.matters(scene):
             notes.append(f"left out: {item.name}; {item.changes}")
     return tuple(notes)
@@ -169,20 +166,15 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
     sizes = drawing.rollers, drawing.roller_diameter, drawing.effective_length, drawing.pitch_diameter
     capacity = drawing.dynamic_capacity_N or dynamic_capacity(*sizes)
     inner, outer = operation.speeds
-    rules, load = (
-        minimum_loads(drawing.pitch_diameter, inner - outer, capacity, static_capacity(*sizes)),
-        operation.largest_load_N,
-    )
+    rules = minimum_loads(drawing.pitch_diameter, inner - outer, capacity, static_capacity(*sizes))
+    load = operation.largest_load_N
     missed = sum(load < least for least in rules.values())
     if not missed:
         return ()
-    listed = ", ".join(
-        f"{1e-3 * least:.2g} kN ({rule})" for rule, least in sorted(rules.items(), key=lambda item: item[1])
-    )
-    return (
-        f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {listed}; no rule is safe, "
-        "cage_slip tells",
-    )
+    rising = sorted(rules.items(), key=lambda item: item[1])
+    listed = ", ".join(f"{1e-3 * least:.2g} kN ({rule})" for rule, least in rising)
+    what = f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {listed}"
+    return (f"{what}; no rule is safe, cage_slip tells",)
 
 
 def heat_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:

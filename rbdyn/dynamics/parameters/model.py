@@ -7,8 +7,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.film import short_journal_film
 from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, sliced
@@ -124,7 +124,7 @@ def race_contact_law(scene: Scene, which: str) -> Any:
     )
 
 
-def roller_relief(scene: Scene, slices: int) -> NDArray[np.float64]:
+def roller_relief(scene: Scene, slices: int) -> Array:
     """Profile drop of the roller at its slice centres [m]."""
     from rbdyn.contact import profile
 
@@ -225,9 +225,8 @@ def _drag(scene: Scene, oil: Oil) -> Any:
     laws, drawing = scene.model, scene.bearing
     if laws.drag == "off" or laws.drag_coefficient == 0.0:
         return NoDrag()
-    return cylinder_drag(
-        oil.density, scene.lubricant.oil_fraction, laws.drag_coefficient, drawing.roller_diameter, drawing.roller_length
-    )
+    sizes, fraction = (drawing.roller_diameter, drawing.roller_length), scene.lubricant.oil_fraction
+    return cylinder_drag(oil.density, fraction, laws.drag_coefficient, *sizes)
 
 
 def _cage(scene: Scene) -> BalancedCage | UnbalancedCage:

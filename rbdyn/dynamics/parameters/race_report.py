@@ -22,9 +22,8 @@ def race_report(scene: Scene, inner_load: float, outer_load: float) -> dict[str,
 
     With a profile or a tilt the pressure is that of the most loaded slice, with the roller where the tilt is largest.
     """
-    films = film_report(
-        scene, scene.lubricant.in_service, max(inner_load, SMALLEST_LOAD), max(outer_load, SMALLEST_LOAD)
-    )
+    loads = max(inner_load, SMALLEST_LOAD), max(outer_load, SMALLEST_LOAD)
+    films = film_report(scene, scene.lubricant.in_service, *loads)
     count = scene.slices
     contacts = rolling_contacts(scene)
     report = {}
@@ -54,10 +53,9 @@ def race_notes(scene: Scene, races: Mapping[str, Mapping[str, float]]) -> tuple[
     law, films = scene.traction, {name: race["lambda_ratio"] for name, race in races.items() if "lambda_ratio" in race}
     thinnest = min(films, key=films.__getitem__, default=None)
     if thinnest and films[thinnest] < FULL_FILM and law.friction == "film" and law.model not in ("coulomb", "off"):
-        notes.append(
-            f"film: lambda is {films[thinnest]:.2g} on the {thinnest} race, below {FULL_FILM:g}, so asperities touch while the friction is "
-            "that of a full film; set traction.friction = 'mixed', or check lubricant.temperature_C and the roughnesses"
-        )
+        what = f"film: lambda is {films[thinnest]:.2g} on the {thinnest} race, below {FULL_FILM:g}"
+        why = "so asperities touch while the friction is that of a full film; set traction.friction = 'mixed'"
+        notes.append(f"{what}, {why}, or check lubricant.temperature_C and the roughnesses")
     return tuple(notes)
 
 

@@ -3,25 +3,7 @@
 import math
 from typing import TYPE_CHECKING, Any
 
-from rbdyn.contact.film_thickness import (
-    RollingContact,
-    asperity_share,
-    film_in_service,
-    hertz_pressure,
-    lambda_ratio,
-    lightest_load,
-    minimum_film,
-    thermal_factor,
-)
-from rbdyn.contact.traction import (
-    BlendedFourConstantTraction,
-    FourConstantTraction,
-    MixedTraction,
-    NoTraction,
-    dry_friction,
-    four_constants,
-    traction_surface,
-)
+from rbdyn.contact import film_thickness, traction
 from rbdyn.faults import InputError
 from rbdyn.properties.lubricants import Oil
 from rbdyn.properties.materials import equivalent_modulus
@@ -41,7 +23,7 @@ LARGEST_PRESSURE = 4e9
 LARGEST_ERROR = 0.01
 
 
-def race_traction(scene: Scene, contact: RollingContact, oil: Oil, largest_load: float) -> Any:
+def race_traction(scene: Scene, contact: film_thickness.RollingContact, oil: Oil, largest_load: float) -> Any:
     """Traction law of a race by one of its contacts.
 
     ``oil`` is the scene's, at its temperature; a table covers loads up to ``largest_load`` [N]. The film is that of
@@ -57,12 +39,12 @@ def race_traction(scene: Scene, contact: RollingContact, oil: Oil, largest_load:
     return _mixed(scene, law, contact, oil) if table.friction == "mixed" else law
 
 
-def rolling_contacts(scene: Scene) -> dict[str, RollingContact]:
+def rolling_contacts(scene: Scene) -> dict[str, film_thickness.RollingContact]:
     """The "outer" and "inner" contact of a whole roller, rolling at the nominal speed."""
     modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
     length, speed = scene.bearing.effective_length, abs(scene.geometry.motion.entrainment)
     return {
-        race: RollingContact(radius, length, modulus, speed)
+        race: film_thickness.RollingContact(radius, length, modulus, speed)
         for race, radius in zip(("outer", "inner"), scene.geometry.reduced_radii, strict=True)
     }
 
@@ -78,17 +60,19 @@ def film_report(scene: Scene, oil: Oil, inner_load: float, outer_load: float) ->
     for (race, contact), load in zip(rolling_contacts(scene).items(), (outer_load, inner_load), strict=True):
         if contact.entrainment_speed == 0.0:
             continue
-        factor = thermal_factor(contact, oil, load)
-        film = film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
+        factor = film_thickness.thermal_factor(contact, oil, load)
+        film = film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
         ratio = _lambda(scene, film)
         values = {
             "load_N": load,
-            "hertz_pressure_Pa": hertz_pressure(contact, load),
+            "hertz_pressure_Pa": film_thickness.hertz_pressure(contact, load),
             "central_film_m": film,
-            "minimum_film_m": factor * minimum_film(contact, oil, load),
+            "minimum_film_m": factor * film_thickness.minimum_film(contact, oil, load),
             "thermal_factor": factor,
             "lambda_ratio": ratio,
-            "asperity_share": asperity_share(ratio, scene.traction.asperity_b, scene.traction.asperity_c),
+            "asperity_share": film_thickness.asperity_share(
+                ratio, scene.traction.asperity_b, scene.traction.asperity_c
+            ),
         }
         report[race] = {key: float(value) for key, value in values.items()}
     return report
@@ -97,42 +81,38 @@ def film_report(scene: Scene, oil: Oil, inner_load: float, outer_load: float) ->
 def _load_independent(scene: Scene) -> Any:
     table = scene.traction
     if table.model == "coulomb":
-        return dry_friction(table.coulomb, table.blend_speed_m_s)
+        return traction.dry_friction(table.coulomb, table.blend_speed_m_s)
     if table.model == "off":
-        return NoTraction()
+        return traction.NoTraction()
     if table.constants is not None:
         a, b, c, d = table.constants
         at_rest = a + d
     else:
-        a, b, c, d = four_constants(table.mu_0, table.mu_m, table.mu_inf, table.u_m_m_s)
+        a, b, c, d = traction.four_constants(table.mu_0, table.mu_m, table.mu_inf, table.u_m_m_s)
         at_rest = table.mu_0
     if at_rest > 0.0:
-        return BlendedFourConstantTraction(a, b, c, d, table.blend_speed_m_s)
-    return FourConstantTraction(a, b, c, d)
+        return traction.BlendedFourConstantTraction(a, b, c, d, table.blend_speed_m_s)
+    return traction.FourConstantTraction(a, b, c, d)
 
 
-def _surface(scene: Scene, contact: RollingContact, oil: Oil, largest_load: float) -> Any:
+def _surface(scene: Scene, contact: film_thickness.RollingContact, oil: Oil, largest_load: float) -> Any:
     from rbdyn.contact.rheology import traction_coefficient, with_body_creep
 
     rheology = _rheology(scene, oil)
 
     def coefficient(slip: Any, load: Any) -> Any:
-        film = film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
+        film = film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
         alone = traction_coefficient(rheology, contact, slip, load, film)
         return with_body_creep(alone, contact, slip, load)
 
     capacity = 2.0 * math.pi * contact.radius * contact.length * LARGEST_PRESSURE**2
     largest_load = min(largest_load, capacity / contact.equivalent_modulus)
-    smallest_load = min(lightest_load(contact, oil), largest_load / SMALLEST_RANGE)
+    smallest_load = min(film_thickness.lightest_load(contact, oil), largest_load / SMALLEST_RANGE)
     largest_slip = LARGEST_SLIP_RATIO * contact.entrainment_speed
-    fit = traction_surface(coefficient, largest_load, smallest_load, largest_slip)
+    fit = traction.traction_surface(coefficient, largest_load, smallest_load, largest_slip)
     if fit.error > LARGEST_ERROR:
-        raise InputError(
-            [
-                f"traction.model = '{scene.traction.model}': its table is off by {100.0 * fit.error:.2g} % of the peak up "
-                f"to {largest_load:.4g} N; raise lubricant.temperature_C or choose another model"
-            ]
-        )
+        what = f"traction.model = '{scene.traction.model}': its table is off by {100.0 * fit.error:.2g} % of the peak"
+        raise InputError([f"{what} up to {largest_load:.4g} N; raise lubricant.temperature_C or choose another model"])
     return fit.surface
 
 
@@ -149,15 +129,15 @@ def _rheology(scene: Scene, oil: Oil) -> "Rheology":
     return LimitingShear(oil.viscosity, oil.pressure_coefficient, table.limiting_shear_ratio)
 
 
-def _mixed(scene: Scene, fluid: Any, contact: RollingContact, oil: Oil) -> MixedTraction:
+def _mixed(scene: Scene, fluid: Any, contact: film_thickness.RollingContact, oil: Oil) -> traction.MixedTraction:
     table = scene.traction
     # The film goes as Q^-0.1. Heating and starvation vary little with the load: they are taken at that of the most
     # loaded roller, 5 F/Z (Stribeck).
     stribeck = 5.0 * scene.operation.largest_load_N / scene.bearing.rollers
-    load = max(stribeck, lightest_load(contact, oil))
-    film = film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
+    load = max(stribeck, film_thickness.lightest_load(contact, oil))
+    film = film_thickness.film_in_service(contact, oil, load, scene.lubricant.inlet_distance)
     ratio_at_one = float(_lambda(scene, film)) * load**0.1
-    return MixedTraction(
+    return traction.MixedTraction(
         fluid,
         table.boundary_friction,
         table.blend_speed_m_s,
@@ -168,4 +148,4 @@ def _mixed(scene: Scene, fluid: Any, contact: RollingContact, oil: Oil) -> Mixed
 
 def _lambda(scene: Scene, film: Any) -> Any:
     lubricant = scene.lubricant
-    return lambda_ratio(film, lubricant.roller_roughness, lubricant.race_roughness)
+    return film_thickness.lambda_ratio(film, lubricant.roller_roughness, lubricant.race_roughness)

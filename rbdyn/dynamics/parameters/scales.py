@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.contact.traction import traction
 from rbdyn.dynamics.forces.equations import RollerBearing
@@ -76,7 +76,7 @@ def slip_scale(bearing: RollerBearing, load: float) -> float:
     return scale
 
 
-def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method: str = "rk45") -> NDArray[np.float64]:
+def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method: str = "rk45") -> Array:
     """Tolerance of each state component: ``rtol`` of the approach or contact speed that the component can make.
 
     In a slow bearing the contact speed is at most the method's share of the speed of the faster race, and the approach

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rbdyn.arrays import Array
 from rbdyn.dynamics.forces.drive import action
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_SPEED, CAGE_X, CAGE_Y, RING_X
@@ -13,7 +13,7 @@ from rbdyn.dynamics.parameters.static_load import static_share
 from rbdyn.scene import Scene
 
 
-def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Generator) -> NDArray[np.float64]:
+def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Generator) -> Array:
     """State at time zero.
 
     The cage stands at any angle, rollers within +-20 % of the pocket clearance of their pockets' middles and the cage a

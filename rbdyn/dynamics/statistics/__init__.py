@@ -1,6 +1,6 @@
 """From batches to figures with errors.
 
 - ``metrics``: impact force, whirl deviation ratio, power loss, cage speed of replicates
-- ``batch_means``: scatter; ``transient``, ``drift``: slow change; ``bias``: time integration
+- ``batch_means``: scatter; ``drift``: transient and slow change; ``bias``: time integration
 - ``error_bars``: all of them joined, and what is to be said of them
 """

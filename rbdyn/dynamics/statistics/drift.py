@@ -1,4 +1,11 @@
-"""Slow regimes: whether the figures have settled over the counted turns, and what slow change may add to their errors.
+"""Slow change: where the transient ends, whether what is counted has settled, and what slow change may add to its errors.
+
+The transient is found by MSER-5 on the mean of the replicates.
+The marginal standard error rule (White 1997, *Simulation* 69, 323; MSER-5: White, Cobb and Spratt 2000) drops the head
+of the series without which the rest has the smallest standard error of its mean, on means of five batches and over
+at most half of the run. Replicates are averaged first (Welch 1983), which leaves the transient and lowers the noise. On
+stationary noise the rule would still drop a little; so a head counts as a transient only if its mean differs from that
+of the rest beyond their scatter.
 
 Cages have slow regimes: loose ones change the way they whirl over 20 to 400 shaft turns, jumping at random moments, so no
 curve fitted to a start tells where it leads. What can be tested is whether the counted turns drift. Each replicate
@@ -17,16 +24,22 @@ the mean of all. Their product counts too.
 """
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD
+from rbdyn.arrays import Array
+from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics import metrics
-from rbdyn.dynamics.statistics.batch_means import estimate, student_factor
-from rbdyn.dynamics.statistics.metrics import Figure, Replicate, mean
+from rbdyn.dynamics.statistics.batch_means import autocorrelation_time, estimate, student_factor
+from rbdyn.dynamics.statistics.metrics import Figure, Replicate, Runs, mean
+from rbdyn.scene import Scene
 
+GROUP = 5
+# Means of five batches without which nothing can be said.
+FEWEST_GROUPS = 8
+# Standard errors by which the mean of a head must differ: the head is the worst of many, so more than the usual two or three.
+SIGNIFICANT = 4.0
 # Replicates from which their differences are tested as such; fewer are tested by batch means.
 FEWEST_REPLICATES = 3
 # Share of settled runs that a test of one figure lengthens in vain is one less this.
@@ -37,6 +50,69 @@ NEGLIGIBLE = 1e-3
 STRETCH = 2
 # Mean of a transient that halves from half to half, over the difference of the halves: (1 + q)/(2 (1 - q)), q = 1/2.
 BIAS_OF_DRIFT = 1.5
+
+
+def find_transient(series: Array) -> int | None:
+    """Batches of the transient of one series, a multiple of five; None where it is too short to tell."""
+    groups = len(series) // GROUP
+    if groups < FEWEST_GROUPS:
+        return None
+    means = series[: groups * GROUP].reshape(groups, GROUP).mean(axis=1)
+    # Means and variances of all tails at once, about the mean lest digits cancel.
+    tails = (means - means.mean())[::-1]
+    count = np.arange(1, groups + 1)
+    mean = np.cumsum(tails) / count
+    spread = np.maximum(np.cumsum(tails**2) - count * mean**2, 0.0) / count**2
+    half = (groups + 1) // 2
+    dropped = half - int(np.argmin(spread[::-1][: half + 1][::-1]))
+    head, rest = means[:dropped], means[dropped:]
+    if dropped == 0:
+        return 0
+    error = math.sqrt(rest.var(ddof=1) * autocorrelation_time([rest]) * (1.0 / len(head) + 1.0 / len(rest)))
+    return dropped * GROUP if abs(float(head.mean() - rest.mean())) > SIGNIFICANT * error else 0
+
+
+def series_of(runs: Runs) -> dict[str, Array]:
+    """Impact force, whirl and power loss of each batch, averaged over the replicates."""
+
+    def whirl(run: Replicate) -> Array:
+        samples, total, squares = run.whirl.T
+        mean = total / samples
+        return np.sqrt(np.maximum(squares / samples - mean**2, 0.0)) / np.where(mean > 0.0, mean, 1.0)
+
+    return {
+        "impact_force_N": np.mean([run.largest[:, POCKET_LOAD] for run in runs], axis=0),
+        "whirl_deviation_ratio": np.mean([whirl(run) for run in runs], axis=0),
+        "power_loss_W": np.mean([run.work[:, :SHAFT].sum(axis=1) / run.durations for run in runs], axis=0),
+    }
+
+
+class Start(NamedTuple):
+    """Where counting starts: batch, transient found in the whole run [shaft turns] (None where the run is too short or
+    follows a schedule), and what a result has to say about both."""
+
+    first: int
+    turns: float | None
+    notes: tuple[str, ...]
+
+
+def start_of_counting(scene: Scene, runs: Runs) -> Start:
+    """Where to start counting, as ``numerics.discard_turns`` asks: after so many turns, or after the transient."""
+    numerics, run = scene.numerics, runs[0]
+    if scene.operation.schedule is not None:
+        return Start(run.first, None, ())
+    known = [batches for series in series_of(runs).values() if (batches := find_transient(series)) is not None]
+    transient = max(known, default=None)  # the longest; None where the run is too short to tell
+    if transient is None:
+        fewest = GROUP * FEWEST_GROUPS * run.durations[0] / scene.turn_s
+        note = f"the run is too short to show its transient: {fewest:g} shaft turns are needed; lengthen numerics.turns"
+        return Start(run.first, None, (note,))
+    turns = round(float(run.durations[:transient].sum()) / scene.turn_s, 6)
+    if numerics.discard_turns == "auto":
+        # An impact window at least must be left to count.
+        first = min(transient, len(run.durations) - run.per_window)
+        return Start(first, turns, ())
+    return Start(run.first, turns, ())
 
 
 def _largest(force: int) -> Figure:
@@ -79,7 +155,7 @@ class Drift(NamedTuple):
         return BIAS_OF_DRIFT * max(abs(self.size) - self.error, 0.0)
 
 
-def drift_of(figure: Figure, runs: Sequence[Replicate]) -> Drift | None:
+def drift_of(figure: Figure, runs: Runs) -> Drift | None:
     """Drift of a figure over what is counted; None where that is too short to tell."""
     moments = [figure.moments(run) for run in runs]
     rows = min(len(part) for part in moments)
@@ -102,13 +178,13 @@ def drift_of(figure: Figure, runs: Sequence[Replicate]) -> Drift | None:
     return Drift(after.value - before.value, error, freedom, size)
 
 
-def drifting(runs: Sequence[Replicate]) -> bool:
+def drifting(runs: Runs) -> bool:
     """Whether any figure that can be told drifts beyond its scatter."""
     drifts = (drift_of(figure, runs) for figure in TESTED.values())
     return any(drift is not None and drift.significant for drift in drifts)
 
 
-def unseen_regime(figure: Figure, runs: Sequence[Replicate], since: int) -> float:
+def unseen_regime(figure: Figure, runs: Runs, since: int) -> float:
     """What a regime in which no replicate is counted may add to the mean, gauged by all stretches from batch ``since`` on."""
     counted = np.sum([figure.moments(run).sum(axis=0) for run in runs], axis=0)
     middle, farthest = float(figure.of_sums(counted)), 0.0
@@ -121,7 +197,7 @@ def unseen_regime(figure: Figure, runs: Sequence[Replicate], since: int) -> floa
     return farthest / (len(runs) + 1)
 
 
-def slow_change(figure: Figure, tested: Figure, runs: Sequence[Replicate], since: int, *, steady: bool) -> float:
+def slow_change(figure: Figure, tested: Figure, runs: Runs, since: int, *, steady: bool) -> float:
     """Half-width that slow change adds to a figure: drift left over and regimes unseen, as root sum of squares; none in a
     run that is not ``steady``, whose figures change with its schedule."""
     if not steady:

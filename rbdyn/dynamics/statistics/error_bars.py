@@ -1,12 +1,10 @@
 """Figures of a scene with their error bars, and what is to be said about these."""
 
 import math
-from collections.abc import Sequence
 
 from rbdyn.dynamics.statistics import metrics
-from rbdyn.dynamics.statistics.drift import TESTED, slow_change
-from rbdyn.dynamics.statistics.metrics import Replicate, quantity
-from rbdyn.dynamics.statistics.transient import Start, start_of_counting
+from rbdyn.dynamics.statistics.drift import TESTED, Start, slow_change, start_of_counting
+from rbdyn.dynamics.statistics.metrics import Replicate, Runs, quantity
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
 
@@ -33,18 +31,14 @@ LARGE, NOTICEABLE = 0.05, 0.01
 RULES = 3.0
 
 
-def after_transient(
-    scene: Scene, runs: Sequence[Replicate], companions: Sequence[Replicate]
-) -> tuple[list[Replicate], list[Replicate], Start]:
+def after_transient(scene: Scene, runs: Runs, companions: Runs) -> tuple[list[Replicate], list[Replicate], Start]:
     """Replicates and companions counted from where the scene asks, and where that is."""
     start = start_of_counting(scene, runs)
     ours, theirs = ([run.counted_from(start.first) for run in series] for series in (runs, companions))
     return ours, theirs, start
 
 
-def quantities(
-    scene: Scene, runs: Sequence[Replicate], companions: Sequence[Replicate], since: int | None = None
-) -> dict[str, Quantity]:
+def quantities(scene: Scene, runs: Runs, companions: Runs, since: int | None = None) -> dict[str, Quantity]:
     """Every figure with its errors, by the name it has in a record.
 
     ``since``: batch from which the replicates show what regimes there are, that from which they count unless given.
@@ -64,10 +58,8 @@ def error_notes(scene: Scene, figures: dict[str, Quantity], fault: str | None) -
     few = {name: figures[name].effective_samples for name in JUDGED if not _enough(figures[name])}
     if few:
         listed = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
-        notes.append(
-            f"statistical error: uncertain where fewer than {FEW_SAMPLES:.0f} effective samples stand behind it "
-            f"({listed}); raise numerics.turns or numerics.replicates"
-        )
+        what = f"statistical error: uncertain where fewer than {FEW_SAMPLES:.0f} effective samples"
+        notes.append(f"{what} stand behind it ({listed}); raise numerics.turns or numerics.replicates")
     return notes + [note for name in JUDGED if (note := _numerical_note(scene, JUDGED[name], figures[name]))]
 
 
@@ -83,9 +75,6 @@ def _numerical_note(scene: Scene, name: str, figure: Quantity) -> str | None:
     if error <= (NOTICEABLE if biased else LARGE) * size:
         return None
     rtol = scene.numerics.rtol
-    mend = (
-        f"tighten numerics.rtol = {rtol:g} to {0.1 * rtol:.1g}"
-        if biased
-        else "it is mostly scatter, so raise numerics.turns or numerics.replicates"
-    )
+    longer = "it is mostly scatter, so raise numerics.turns or numerics.replicates"
+    mend = f"tighten numerics.rtol = {rtol:g} to {0.1 * rtol:.1g}" if biased else longer
     return f"numerical error: {name} may be off by {100.0 * error / size:.2g} %; {mend}"

@@ -13,9 +13,8 @@ row's inner ones. A displacement of the middle ring is that of P2. All small: mo
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Mask
 from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare
 from rbdyn.quasistatic.row.equilibrium import OK, Solution, solve, without_noise
 from rbdyn.quasistatic.row.row import Row, component_lengths
@@ -76,7 +75,7 @@ class DoubleDeckerSolution(NamedTuple):
     steps: int
     status: str
     stack: Stack
-    free: NDArray[np.bool_]
+    free: Mask
 
     @property
     def found(self) -> bool:
@@ -183,9 +182,7 @@ def _shared_out(stack: Stack, load: Array, given: Array, middle_given: Array, sh
     return solve(*stack.outer, load_on_middle_ring(stack, inner), there).displacement
 
 
-def _follow(
-    stack: Stack, load: Array, given: Array, free: NDArray[np.bool_], middle: Array, start: Start
-) -> DoubleDeckerSolution:
+def _follow(stack: Stack, load: Array, given: Array, free: Mask, middle: Array, start: Start) -> DoubleDeckerSolution:
     """Newton on the free components of the middle ring's displacement, guarded by the length of what is left over."""
     to_inner = carried(stack.arm_0)
     held = ~np.isnan(given)
@@ -224,7 +221,7 @@ def _largest(inner: Solution, outer: Solution) -> float:
     return float(max(inner.outer_load.max(initial=0.0), outer.outer_load.max(initial=0.0), 1e-12))
 
 
-def _relative_by_middle(stiffness: Array, held: NDArray[np.bool_], to_inner: Array) -> Array:
+def _relative_by_middle(stiffness: Array, held: Mask, to_inner: Array) -> Array:
     """How the inner row's displacement follows the middle ring: held components against it, the others in balance."""
     follows = np.zeros((5, 5))
     follows[held] = -to_inner[held]
@@ -252,7 +249,7 @@ def _onto_by_relative(stack: Stack, inner: Solution) -> Array:
 
 
 def _result(
-    stack: Stack, free: NDArray[np.bool_], inner: Solution, outer: Solution, onto: Array, steps: int
+    stack: Stack, free: Mask, inner: Solution, outer: Solution, onto: Array, steps: int
 ) -> DoubleDeckerSolution:
     to_inner = carried(stack.arm_0)
     left = (onto - outer.reaction)[free & (np.arange(5) < 3)]

@@ -84,10 +84,8 @@ def load_torque(
     Raises ValueError unless angle and capacity are positive.
     """
     if static_capacity <= 0.0 or contact_angle <= 0.0:
-        raise ValueError(
-            f"a static capacity of {static_capacity:g} N and a contact angle of {contact_angle:g} rad give no load torque; "
-            "both must be greater than 0"
-        )
+        given = f"a static capacity of {static_capacity:g} N and a contact angle of {contact_angle:g} rad"
+        raise ValueError(f"{given} give no load torque; both must be greater than 0")
     radial, axial = abs(radial_load), abs(axial_load)
     scale, exponent = ANGULAR_CONTACT
     rating = static_equivalent_load(radial, axial, contact_angle) / static_capacity

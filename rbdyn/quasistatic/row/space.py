@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Whole
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.ring import BALL, BALL_WORK, RING, SUMS
 from rbdyn.quasistatic.row.row import Row, component_lengths
@@ -34,7 +33,7 @@ class Space(NamedTuple):
     ``sums``, ``work`` (Z, BALL_WORK): columns of ``ring``; ``counts``: above. ``table``, ``base``: of an elimination and of the first guess.
     """
 
-    counts: NDArray[np.int64]
+    counts: Whole
     q: Array
     balls: Array
     matrix: Array

@@ -35,10 +35,8 @@ def running_accuracy(
     row = _row(tolerance_class, "bore", 1e3 * bore)
     if row is None:
         held = _rows(tolerance_class, "bore")
-        raise ValueError(
-            f"a bore of {1e3 * bore:g} mm: class {tolerance_class} is held here above {held[0]['above']} mm and up to "
-            f"{held[-1]['up_to']} mm"
-        )
+        reach = f"above {held[0]['above']} mm and up to {held[-1]['up_to']} mm"
+        raise ValueError(f"a bore of {1e3 * bore:g} mm: class {tolerance_class} is held here {reach}")
     outer = None if outside_diameter is None else _row(tolerance_class, "outside", 1e3 * outside_diameter)
     limits = (*(row[name] for name in ("K_ia", "S_d", "S_ia")), outer["K_ea"] if outer else "")
     return RunningAccuracy(*(1e-6 * float(limit) if limit else None for limit in limits))  # type: ignore[arg-type]

@@ -1,8 +1,12 @@
 """Runout of many bearings at once: races and balls drawn at random, answered in proportion.
 
 Each bearing of a lot has races of a given height (roundness and side-sway, peak to valley) in random orders and phases
-and balls with random diameters and sphericity. Only the orders that pass the balls (``linear_runout``) reach the ring,
+and balls with random diameters and sphericity. Only the orders that pass the balls (``linear_response``) reach the ring,
 each as one wave: a bearing's reading is the real part of a short sum, and a lot is a product of two matrices.
+
+Under a purely axial load all balls are alike, so one ball tells all: an error e of the ball at the azimuth psi moves
+the ring by e g_x along psi, by e g_z axially, and tilts it by e g_tilt about the axis 90 degrees ahead of psi. Around
+Z equal balls all orders of a groove cancel but n = kZ +- 1, which shift and tilt, and n = kZ, which moves axially.
 """
 
 import math
@@ -12,13 +16,60 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
-from rbdyn.quasistatic.runout.linear import LinearResponse
+from rbdyn.arrays import Array, Whole
+from rbdyn.faults import RunError
+from rbdyn.quasistatic.row.control import Control
+from rbdyn.quasistatic.row.equilibrium import Solution, solve
+from rbdyn.quasistatic.row.row import Row
 from rbdyn.quasistatic.runout.race_errors import RaceErrors, Turning, Waviness
 
+# Error of one ball in the differences [m]: far below any deflection, far above the solver's round-off.
+SMALL_ERROR = 1e-8
+CHANGES = ("axial", "radial", "inner_reach", "outer_reach")
 Waves = NDArray[np.complex128]
 # Kinds of race errors in the order of all arrays here.
 RACES = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway")
+
+
+class LinearResponse(NamedTuple):
+    """Displacement by unit change [m] of one ball, (4,) for axial, radial, inner_reach and outer_reach.
+
+    ``radial`` towards the ball [-], ``axial`` [-], ``tilt`` about the axis 90 degrees ahead of the ball [rad/m].
+    """
+
+    radial: Array
+    axial: Array
+    tilt: Array
+
+
+def linear_response(row: Row, control: Control, load: Array, given: Array | None = None) -> LinearResponse:
+    """Response of a row of equal, evenly spaced balls under an axial load, by central differences.
+
+    Arguments as of ``equilibrium.solve``. Raises ValueError where load or row single out a direction, and RunError
+    with the reason where there is no equilibrium.
+    """
+    if np.any(np.delete(load, 2)):
+        raise ValueError("load: runout answers in proportion only under a purely axial load; set the rest to 0")
+    if any(np.ptp(getattr(row, name)) > 0.0 for name in CHANGES):
+        raise ValueError("row: balls differ already; give the nominal row")
+    middle = _settled(solve(row, control, load, given))
+    slopes = []
+    for name in CHANGES:
+        ends = []
+        for change in (-SMALL_ERROR, SMALL_ERROR):
+            changed = getattr(row, name).copy()
+            changed[0] += change
+            ends.append(_settled(solve(row._replace(**{name: changed}), control, load, given, middle)))
+        slopes.append((ends[1].displacement - ends[0].displacement) / (2.0 * SMALL_ERROR))
+    x, y, z, theta_x, theta_y = np.array(slopes).T
+    cosine, sine = row.cosine[0], row.sine[0]
+    return LinearResponse(x * cosine + y * sine, z, theta_y * cosine - theta_x * sine)
+
+
+def _settled(solution: Solution) -> Solution:
+    if not solution.found:
+        raise RunError(f"runout of the nominal bearing: {solution.status}")
+    return solution
 
 
 @dataclass(frozen=True)
@@ -44,10 +95,10 @@ class Parts(NamedTuple):
     """Parts of the bearings of a lot. ``races``: complex amplitudes (4, bearings, orders) of forms of limit one;
     ``diameter``: (bearings, Z) and ``sphericity``: complex amplitudes (bearings, orders, Z), in m."""
 
-    order: NDArray[np.int64]
+    order: Whole
     races: Waves
     diameter: Array
-    sphericity_order: NDArray[np.int64]
+    sphericity_order: Whole
     sphericity: Waves
 
 
@@ -75,7 +126,7 @@ def draw_parts(lot: Lot, balls: int, bearings: int, seed: int) -> Parts:
 def bearing_errors(parts: Parts, bearing: int, limits: Array) -> RaceErrors:
     """Form errors of one bearing of the lot at the limits [m] of ``RACES``."""
 
-    def form(order: NDArray[np.int64], amplitude: Waves) -> Waviness:
+    def form(order: Whole, amplitude: Waves) -> Waviness:
         return Waviness(order, np.abs(amplitude), -np.angle(amplitude) / order)
 
     forms = {name: form(parts.order, limits[k] * parts.races[k, bearing]) for k, name in enumerate(RACES)}
@@ -114,12 +165,11 @@ def readings(
         on_face = response.axial[change] * lifting - face_radius * response.tilt[change] * shifting
         face.append((races[kind] @ (sign * on_face)).real)
     coefficients, (shift, tilt), lift = _ball_waves(parts, response, turning.spin * turn, cage)
-    return Readings(
-        np.array(radial), np.array(face), (coefficients @ shift).real, (coefficients @ (lift - face_radius * tilt)).real
-    )
+    of_balls = (coefficients @ shift).real, (coefficients @ (lift - face_radius * tilt)).real
+    return Readings(np.array(radial), np.array(face), *of_balls)
 
 
-def _passing(order: NDArray[np.int64], relative: Array, cage: Array, z: int) -> tuple[Waves, Waves]:
+def _passing(order: Whole, relative: Array, cage: Array, z: int) -> tuple[Waves, Waves]:
     """Waves (orders, steps) by which unit amplitudes c of Re(c exp(i n angle)) shift and lift the ring.
 
     Sum over the balls of Re(c exp(i n phi_j)) exp(i psi_j) with phi_j = psi_j - ring angle: nothing but for n = kZ -+ 1.

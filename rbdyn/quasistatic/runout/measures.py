@@ -1,25 +1,26 @@
-"""Runout of the path that a ring takes.
+"""Runout of the path that a ring takes, and circles about a set of points in a plane.
 
 Three ways to put the radial motion into a number, none of which tells another:
 - ``indicator``: what a fixed indicator reads (its largest range over all directions). Class limits K_ia mean this. An
   eccentric groove shows wholly, as twice its eccentricity.
 - ``minimum_zone``, ``least_squares``: distance between the circles that hold the orbit of the ring's centre between
-  them ("distance between the maximum and minimum envelope circles", Zhou et al. 2024). An eccentric groove moves the
+  them, the first the minimum zone of ISO 1101 ("distance between the maximum and minimum envelope circles", Zhou et al. 2024). An eccentric groove moves the
   centre on a circle and does not show at all.
 - ``error_motion``: range of a fixed indicator's reading less its best-fitting once-per-turn part, as of a spindle.
 """
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linprog
 
 from rbdyn.arrays import Array
-from rbdyn.quasistatic.runout.roundness import diameter, least_squares_circle, minimum_zone
 
 # Places round the face where the axial indicator may stand.
 PLACES = 72
+STEPS = 60
 
 
 @dataclass(frozen=True)
@@ -51,9 +52,8 @@ def runout(path: Array, turns: int, face_radius: float) -> Runout:
     """
     steps, left = divmod(len(path), turns)
     if left or steps < 3:
-        raise ValueError(
-            f"{len(path)} steps in {turns} turns: not whole turns of at least three steps; mend the number of turns"
-        )
+        what = f"{len(path)} steps in {turns} turns: not whole turns of at least three steps"
+        raise ValueError(f"{what}; mend the number of turns")
     orbit, axial = path[:, :2], path[:, 2]
     # Far from the origin, digits of the small motion would be lost.
     orbit = orbit - orbit.mean(axis=0)
@@ -101,3 +101,134 @@ def error_motion(angle: Array, reading: Array) -> float:
         method="highs",
     )
     return scale * float(np.ptp(level - wave @ optimum.x[:2]))
+
+
+class Zone(NamedTuple):
+    """Two circles about one centre (x, y) that hold all points between them; radii in the unit of the points."""
+
+    x: float
+    y: float
+    inner: float
+    outer: float
+
+    @property
+    def width(self) -> float:
+        """Difference of the radii."""
+        return self.outer - self.inner
+
+
+def convex_hull(points: Array) -> Array:
+    """Corners of the convex hull of (n, 2) points, anticlockwise; the ends of a line, or one point, where flat."""
+    ordered = np.unique(points, axis=0)
+    if len(ordered) < 3:
+        return ordered
+
+    def chain(places: Array) -> list[tuple[float, float]]:
+        corners: list[tuple[float, float]] = []
+        for x, y in places.tolist():
+            while len(corners) > 1:
+                (ax, ay), (bx, by) = corners[-2], corners[-1]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                    break
+                corners.pop()
+            corners.append((x, y))
+        return corners
+
+    return np.array(chain(ordered)[:-1] + chain(ordered[::-1])[:-1])
+
+
+def diameter(points: Array) -> float:
+    """Largest distance between two of (n, 2) points: the largest reading of an indicator in any fixed direction."""
+    corners = convex_hull(points)
+    if len(corners) < 2:
+        return 0.0
+    apart = corners[:, np.newaxis] - corners
+    return float(np.sqrt((apart**2).sum(axis=2).max()))
+
+
+def least_squares_circle(points: Array) -> Zone:
+    """Zone about the centre of the least-squares circle (Gauss-Newton on the distances, from the mean)."""
+    centre = points.mean(axis=0)
+    for _ in range(STEPS):
+        away = points - centre
+        distance = np.hypot(*away.T)
+        if distance.min() == 0.0:
+            break
+        # r - u.d = R: unknown step d of the centre and radius R.
+        directions = away / distance[:, np.newaxis]
+        system = np.column_stack((directions, np.ones(len(points))))
+        step = np.linalg.lstsq(system, distance, rcond=1e-10)[0][:2]
+        # A flat or nearly flat set has its best circle far away: keep to a centre among the points.
+        limit = np.ptp(points, axis=0).max()
+        if np.hypot(*step) > limit:
+            break
+        centre = centre + step
+        if np.hypot(*step) <= 1e-14 * limit:
+            break
+    return zone_about(points, *centre)
+
+
+def zone_about(points: Array, x: float, y: float) -> Zone:
+    """The zone of (n, 2) points about a given centre."""
+    distance = np.hypot(points[:, 0] - x, points[:, 1] - y)
+    return Zone(float(x), float(y), float(distance.min()), float(distance.max()))
+
+
+def minimum_zone(points: Array) -> Zone:
+    """Narrowest zone whose centre lies within the convex hull of (n, 2) points.
+
+    Without that bound an elongated orbit would lie between circles of infinite radius. From the least-squares centre,
+    the width is made least by linear programmes in the step of the centre, the distances linearised, within a trust
+    region; at the optimum four points touch the circles, where this converges quadratically. A local minimum: for
+    points round a centre, the minimum zone.
+    """
+    corners = convex_hull(points)
+    size = float(np.ptp(points, axis=0).max())
+    if len(corners) < 3:
+        return zone_about(points, *corners.mean(axis=0))
+    along = np.roll(corners, -1, axis=0) - corners
+    normal = np.column_stack((along[:, 1], -along[:, 0])) / np.hypot(*along.T)[:, np.newaxis]
+    offset = (normal * corners).sum(axis=1)
+    best = least_squares_circle(points)
+    if np.any(normal @ (best.x, best.y) > offset):
+        best = zone_about(points, *points.mean(axis=0))
+    # Distances smaller than this are round-off.
+    rounding = 8.0 * np.finfo(float).eps * float(np.abs(points).max())
+    trust = size
+    for _ in range(STEPS):
+        step, predicted = _best_step(points, best, normal, offset, trust)
+        gain = best.width - predicted
+        if gain <= max(1e-10 * best.width, rounding):
+            return best
+        trial = zone_about(points, best.x + step[0], best.y + step[1])
+        if best.width - trial.width < 0.25 * gain:
+            trust = 0.25 * min(trust, max(float(np.abs(step).max()), 1e-12 * size))
+        if trial.width < best.width:
+            best = trial
+    return best
+
+
+def _best_step(points: Array, zone: Zone, normal: Array, offset: Array, trust: float) -> tuple[Array, float]:
+    """Step of the centre that makes the linearised zone narrowest, and the width it promises."""
+    away = points - (zone.x, zone.y)
+    distance = np.hypot(*away.T)
+    # At a point itself any direction would do.
+    directions = away / np.maximum(distance, np.finfo(float).tiny)[:, np.newaxis]
+    middle, scale = 0.5 * (zone.inner + zone.outer), max(zone.width, math.ulp(zone.outer))
+    ones = np.ones((len(points), 1))
+    # Unknowns in units of the width: step (2), outer and inner radius above the middle of the zone.
+    reading = (distance - middle)[:, np.newaxis] / scale
+    inside = np.hstack((-directions, -ones, 0.0 * ones))
+    outside = np.hstack((directions, 0.0 * ones, ones))
+    within = np.hstack((normal, np.zeros((len(normal), 2))))
+    room = (offset - normal @ (zone.x, zone.y)) / scale
+    optimum = linprog(
+        [0.0, 0.0, 1.0, -1.0],
+        A_ub=np.vstack((inside, outside, within)),
+        b_ub=np.concatenate((-reading[:, 0], reading[:, 0], np.maximum(room, 0.0))),
+        bounds=[(-trust / scale, trust / scale)] * 2 + [(None, None)] * 2,
+        method="highs",
+    )
+    if not optimum.success:
+        return np.zeros(2), zone.width
+    return scale * optimum.x[:2], float(scale * optimum.fun)

@@ -18,16 +18,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Whole
 
 
 @dataclass(frozen=True)
 class Waviness:
     """Sum of amplitude cos(order (angle - phase)) over harmonics: orders [-], amplitudes [m], phases [rad]."""
 
-    order: NDArray[np.int64]
+    order: Whole
     amplitude: Array
     phase: Array
 

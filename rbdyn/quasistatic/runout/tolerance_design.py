@@ -14,8 +14,7 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.row import Row
-from rbdyn.quasistatic.runout.linear import LinearResponse, linear_response
-from rbdyn.quasistatic.runout.lots import RACES, Lot, Parts, Readings, bearing_errors, draw_parts, readings
+from rbdyn.quasistatic.runout import lots
 from rbdyn.quasistatic.runout.race_errors import Turning, ball_path
 from rbdyn.quasistatic.runout.turn import follow
 
@@ -86,7 +85,7 @@ class Bench:
 
 def design(
     bench: Bench,
-    lot: Lot,
+    lot: lots.Lot,
     *,
     radial_limit: float,
     axial_limit: float,
@@ -107,7 +106,7 @@ def design(
     """
     if not 0.0 < wanted < 1.0:
         raise ValueError(f"wanted = {wanted:g}: a yield lies between 0 and 1; give a share such as 0.95")
-    response = linear_response(bench.row, bench.control, bench.load, bench.given)
+    response = lots.linear_response(bench.row, bench.control, bench.load, bench.given)
     parts, read = _lot(bench, lot, response, bearings, seed)
     allowed = np.array([radial_limit, axial_limit])
     shares = (np.array([1.0, outer_share, share, share * outer_share]) for share in sway_shares)
@@ -127,7 +126,7 @@ def design(
     proportional = float(good.mean())
     gap, gap_error = (0.0, 0.0) if check is None else (check.gap, check.gap_error)
     return RaceLimits(
-        **dict(zip(RACES, limits.tolist(), strict=True)),
+        **dict(zip(lots.RACES, limits.tolist(), strict=True)),
         radial_limit=radial_limit,
         axial_limit=axial_limit,
         yielded=min(proportional + gap, 1.0),
@@ -143,32 +142,34 @@ def design(
     )
 
 
-def runouts(read: Readings, limits: Sequence[float] | Array) -> tuple[Array, Array]:
+def runouts(read: lots.Readings, limits: Sequence[float] | Array) -> tuple[Array, Array]:
     """Radial and face runout [m] of each bearing of a lot at the limits [m] of ``RACES``."""
     radial = np.tensordot(limits, read.radial, 1) + read.radial_balls
     face = np.tensordot(limits, read.face, 1) + read.face_balls
     return np.ptp(radial, axis=1), np.ptp(face, axis=1)
 
 
-def full_runouts(bench: Bench, parts: Parts, limits: Array, bearing: int) -> tuple[float, float]:
+def full_runouts(bench: Bench, parts: lots.Parts, limits: Array, bearing: int) -> tuple[float, float]:
     """Radial and face runout [m] of one bearing of a lot by full equilibria, read as in ``readings``."""
-    errors = bearing_errors(parts, bearing, limits)
+    errors = lots.bearing_errors(parts, bearing, limits)
     path = ball_path(errors, bench.turning, bench.steps, bench.turns)
     place = follow(bench.row, bench.control, bench.load, path, bench.turns, bench.given).path
     return float(np.ptp(place[:, 0])), float(np.ptp(place[:, 2] - bench.face_radius * place[:, 4]))
 
 
-def full_lot(bench: Bench, parts: Parts, limits: Array, count: int) -> Array:
+def full_lot(bench: Bench, parts: lots.Parts, limits: Array, count: int) -> Array:
     """Full runouts [m] of the first ``count`` bearings of a lot, (count, 2)."""
     return np.array([full_runouts(bench, parts, limits, bearing) for bearing in range(count)])
 
 
-def _lot(bench: Bench, lot: Lot, response: LinearResponse, bearings: int, seed: int) -> tuple[Parts, Readings]:
-    parts = draw_parts(lot, len(bench.row.axial), bearings, seed)
-    return parts, readings(parts, response, bench.turning, bench.steps, bench.turns, bench.face_radius)
+def _lot(
+    bench: Bench, lot: lots.Lot, response: lots.LinearResponse, bearings: int, seed: int
+) -> tuple[lots.Parts, lots.Readings]:
+    parts = lots.draw_parts(lot, len(bench.row.axial), bearings, seed)
+    return parts, lots.readings(parts, response, bench.turning, bench.steps, bench.turns, bench.face_radius)
 
 
-def _widest(shares: Array, read: Readings, allowed: Array, wanted: float) -> Array:
+def _widest(shares: Array, read: lots.Readings, allowed: Array, wanted: float) -> Array:
     """Largest limits in these shares with which the share ``wanted`` keeps what is ``allowed``, by bisection."""
     radial_races, face_races = np.tensordot(shares, read.radial, 1), np.tensordot(shares, read.face, 1)
 
@@ -190,7 +191,9 @@ def _widest(shares: Array, read: Readings, allowed: Array, wanted: float) -> Arr
     return low * shares
 
 
-def compare(bench: Bench, parts: Parts, read: Readings, limits: Array, allowed: Array, count: int) -> FullCheck:
+def compare(
+    bench: Bench, parts: lots.Parts, read: lots.Readings, limits: Array, allowed: Array, count: int
+) -> FullCheck:
     """Solve the first ``count`` bearings of a lot in full; ``allowed``: radial and face runout of the class [m]."""
     full = full_lot(bench, parts, limits, count)
     proportional = np.column_stack(runouts(read, limits))[:count]

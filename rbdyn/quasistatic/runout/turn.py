@@ -69,9 +69,8 @@ def follow(
     path, figures = np.zeros((steps, RING)), np.zeros((steps, FIGURES))
     reached, newton_steps = walk(Task(control, own, force, free), changes, at, path, figures)
     if reached < steps:
-        raise RunError(
-            f"runout: no equilibrium at step {reached + 1} of {steps}; lessen the form errors or raise the load"
-        )
+        what = f"runout: no equilibrium at step {reached + 1} of {steps}"
+        raise RunError(f"{what}; lessen the form errors or raise the load")
     return Followed(
         ring_angle=balls.ring_angle,
         path=path / component_lengths(row.lever),

@@ -7,7 +7,7 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.life.balls import LOAD_LIFE, RACE_EXPONENT, WEIBULL
-from rbdyn.quasistatic.fatigue import turning_rings
+from rbdyn.life.turns import turning_rings
 from rbdyn.quasistatic.remarks import Rating, pressures
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, OUTER_ANGLE, OUTER_LOAD
 
@@ -51,10 +51,8 @@ def row_columns(balls: Array, ratings: Sequence[Rating]) -> Columns:
     millions = lives(inner_load, outer_load, ratings)
     speed = np.array([abs(rating.speeds[0] - rating.speeds[1]) for rating in ratings])
     with np.errstate(divide="ignore"):
-        return columns | {
-            "L10_Mrev": millions,
-            "L10_h": np.where(speed > 0.0, 1e6 * millions * 2.0 * math.pi / (3600.0 * speed), np.inf),
-        }
+        hours = np.where(speed > 0.0, 1e6 * millions * 2.0 * math.pi / (3600.0 * speed), np.inf)
+    return columns | {"L10_Mrev": millions, "L10_h": hours}
 
 
 def lives(inner_load: Array, outer_load: Array, ratings: Sequence[Rating]) -> Array:

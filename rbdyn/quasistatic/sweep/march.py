@@ -3,9 +3,8 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Whole
 from rbdyn.compiled.kernel import entry, kernel, law
 from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.equilibrium import FIGURES, solve_row
@@ -44,9 +43,9 @@ class Found(NamedTuple):
     matrix: Array
     figures: Array
     residual: Array
-    outcome: NDArray[np.int64]
-    steps: NDArray[np.int64]
-    cold: NDArray[np.int64]
+    outcome: Whole
+    steps: Whole
+    cold: Whole
 
 
 def empty(points: int, balls: int) -> Found:

@@ -29,6 +29,10 @@ class Axis(NamedTuple):
     values: tuple[float, ...]
 
 
+Axes = Sequence[Axis]
+Order = Sequence[tuple[int, ...]]  # of indices of the values at each point
+
+
 def parsed(texts: Sequence[str]) -> dict[str, list[float]]:
     """``key=start:stop:count`` (evenly spaced) or ``key=a,b,c`` as the command line has them. Raises InputError."""
     keys: dict[str, list[float]] = {}
@@ -121,7 +125,7 @@ def tables(scene: BallScene) -> dict[str, Any]:
     return scene.model_dump(mode="json", exclude_none=True)
 
 
-def snake(axes: Sequence[Axis]) -> list[tuple[int, ...]]:
+def snake(axes: Axes) -> list[tuple[int, ...]]:
     """Indices of the values at each point, in an order in which only one changes at a time, and by one."""
     order: list[tuple[int, ...]] = [()]
     for axis in axes:
@@ -134,9 +138,7 @@ def snake(axes: Sequence[Axis]) -> list[tuple[int, ...]]:
     return order
 
 
-def scenes(
-    scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]]
-) -> Iterator[tuple[tuple[float, ...], BallScene]]:
+def scenes(scene: BallScene, axes: Axes, order: Order) -> Iterator[tuple[tuple[float, ...], BallScene]]:
     """Values and validated scene of each point. Raises InputError naming a point that the scene refuses."""
     whole, kind = tables(scene), type(scene)
     # Tables that no key touches are valid as they are; the others stay in ``whole``, which can so be read again as one.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Whole
 from rbdyn.quasistatic.result import ball_columns, ball_records
 from rbdyn.records.record import finite, plain
 from rbdyn.result import read_record, versions, write_json
@@ -37,7 +37,7 @@ class SweepResult:
     cold: int
     wall_s: float
     scene: dict[str, Any]
-    figures: dict[str, list[tuple[NDArray[np.int64], Array]]] = field(default_factory=dict, repr=False)
+    figures: dict[str, list[tuple[Whole, Array]]] = field(default_factory=dict, repr=False)
     notes: list[dict[str, Any]] = field(default_factory=list)
 
     @property

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbdyn.arrays import Array
+from rbdyn.arrays import Array, Whole
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.fatigue import reference_capacities
 from rbdyn.quasistatic.remarks import Rating, Remark, overloads, remarks, tipping
@@ -27,7 +26,7 @@ from rbdyn.quasistatic.row.space import space
 from rbdyn.quasistatic.sweep.figures import Columns, ring_columns, row_columns
 from rbdyn.quasistatic.sweep.march import LEVER, Points, empty, leaves, march_through
 from rbdyn.quasistatic.sweep.partial import Partial, Solved, as_text, from_text
-from rbdyn.quasistatic.sweep.points import Axis, axes_of, scenes, snake
+from rbdyn.quasistatic.sweep.points import Axes, Order, axes_of, scenes, snake
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.records.kept import code_version, run_key
 from rbdyn.scene import BallScene, Scene, balls_only
@@ -45,7 +44,8 @@ LOAD_KEYS = (
 # Points between two reports of progress, and two looks for Ctrl-C.
 CHUNK = 2000
 Progress = Callable[[int, int], None]
-Group = tuple[NDArray[np.int64], Array]
+Reporter = Progress | None
+Group = tuple[Whole, Array]
 
 
 class Walked(NamedTuple):
@@ -61,7 +61,7 @@ class Walked(NamedTuple):
 def sweep(
     scene: BallScene | Scene,
     keys: Mapping[str, Sequence[float]],
-    progress: Progress | None = None,
+    progress: Reporter = None,
     kept_in: Path | None = None,
 ) -> SweepResult:
     """Equilibrium at every point of the grid of ``keys``: dotted names of numbers in the scene, and their values.
@@ -100,9 +100,7 @@ def sweep(
     )
 
 
-def grouped(
-    told: Sequence[tuple[int, Remark]], visited: NDArray[np.int64], statuses: Sequence[str]
-) -> list[dict[str, Any]]:
+def grouped(told: Sequence[tuple[int, Remark]], visited: Whole, statuses: Sequence[str]) -> list[dict[str, Any]]:
     """Notes by what they are about: the sentence of the first point in the table, and the points, counted from 0.
 
     ``told``: remarks, each with the place of its first point on the walk; ``visited``: the table's place of each point walked.
@@ -119,7 +117,7 @@ def grouped(
     return notes
 
 
-def _sorted(balls: Sequence[Array] | Array, back: NDArray[np.int64]) -> list[Group]:
+def _sorted(balls: Sequence[Array] | Array, back: Whole) -> list[Group]:
     """Arrays (Z, 6) in the order of the table, those of equal Z together."""
     if isinstance(balls, np.ndarray):
         return [(np.arange(len(balls)), balls[back])]
@@ -129,9 +127,7 @@ def _sorted(balls: Sequence[Array] | Array, back: NDArray[np.int64]) -> list[Gro
     return [(np.array(places), np.array([balls[back[place]] for place in places])) for places in sizes.values()]
 
 
-def _march(
-    scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress, partial: Partial
-) -> Walked:
+def _march(scene: BallScene, axes: Axes, order: Order, progress: Progress, partial: Partial) -> Walked:
     """A single row through the compiled loop."""
     assert isinstance(scene, SingleRowScene)
     model, points, ratings = _packed(scene, axes, order)
@@ -148,10 +144,8 @@ def _march(
         for first in range(done, count, CHUNK):
             last = min(first + CHUNK, count)
             # An interrupt may fall between the call and what follows it.
-            whole = {f"start_{name}": array.copy() for name, array in at._asdict().items()} | {
-                "warm": warm,
-                "done": first,
-            }
+            start = {f"start_{name}": array.copy() for name, array in at._asdict().items()}
+            whole = start | {"warm": warm, "done": first}
             warm = march_through(model.control, row.cosine, row.sine, points, first, last, warm, at, found)
             progress(last, count)
     except KeyboardInterrupt:
@@ -172,9 +166,7 @@ def _march(
     return Walked(columns, statuses, {"row": balls}, int(found.cold.sum()), notes)
 
 
-def _packed(
-    scene: SingleRowScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]]
-) -> tuple[RowModel, Points, list[Rating]]:
+def _packed(scene: SingleRowScene, axes: Axes, order: Order) -> tuple[RowModel, Points, list[Rating]]:
     """The last row, and what changes from point to point; each part is made again only where a key that it depends on changes."""
     loading = [place for place, axis in enumerate(axes) if axis.key.startswith(LOAD_KEYS)]
     shaping = [place for place in range(len(axes)) if place not in loading]
@@ -219,9 +211,7 @@ def _units(numbers: Array) -> Array:
     return units
 
 
-def _one_by_one(
-    scene: BallScene, axes: Sequence[Axis], order: Sequence[tuple[int, ...]], progress: Progress, partial: Partial
-) -> Walked:
+def _one_by_one(scene: BallScene, axes: Axes, order: Order, progress: Progress, partial: Partial) -> Walked:
     """Any bearing, through ``rbdyn.equilibrium``."""
     left = partial.read()
     solved = from_text(str(left["points"])) if left else []
