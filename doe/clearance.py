@@ -65,7 +65,9 @@ def read_scene(study: Study) -> dict[str, Any]:
         for table, _, key in (factor.key.rpartition("."),)
         if not isinstance(data.get(table), dict) or key not in data[table]
     ]
-    known = plain_values(Scene.from_dict(data, str(path), study.scene.set)) if left_out else ()
+    known: Mapping[str, Any] = {}
+    with suppress(InputError):
+        known = plain_values(Scene.from_dict(data, str(path), study.scene.set)) if left_out else {}
     refuse(
         f"{study.path}: factor.key = {key!r}: no such key in {path}; write table.key as in that file"
         for key in left_out

@@ -155,12 +155,16 @@ def decides(
     for gain, variance, free in zip(gains.T, variances.T, freedom.T, strict=True):
         smooth = pooled_variances(quantiles, variance, free)
         emulator = fit_emulator(quantiles, gain, smooth, trend="linear")
-        missed = gain - emulator.leave_one_out()[0]
+        others = emulator.leave_one_out()[0]
+        # What the other rows foretell counts by as much as a row's gain follows it: nothing where it follows by chance only.
+        follows = float(np.cov(gain, others)[0, 1] / max(others.var(ddof=1), 1e-300))
+        follow = min(max(follows, 0.0), 1.0), float(others.mean()), float(gain.mean())
+        missed = gain - _followed(others, *follow)
         whole = max(float(gain.var(ddof=1) - smooth.mean()), 1e-300)
         left = max(float((missed**2).mean() - smooth.mean()), 0.0)
         # What noise makes of the misses is not the truth's.
         residuals.append(missed * np.sqrt(left / max(float((missed**2).mean()), 1e-300)))
-        emulators.append(emulator)
+        emulators.append((emulator, follow))
         q2.append(max(1.0 - left / whole, 0.0))
     spread = _root(np.cov(np.array(residuals), ddof=0).reshape(len(q2), -1))
     missing = random.standard_normal((RESIDUALS, len(q2))) @ spread.T
@@ -168,7 +172,7 @@ def decides(
     missing = np.vstack([missing, -missing])
 
     def all_better(at: Array) -> Array:
-        foretold = np.array([emulator.mean(at) for emulator in emulators]).T
+        foretold = np.array([_followed(emulator.mean(at), *follow) for emulator, follow in emulators]).T
         positive: Array = (foretold[None] + missing[:, None] > 0.0).all(axis=2).mean(axis=0)
         return positive
 
@@ -198,6 +202,10 @@ def decides(
         q2,
         float(all_better(0.25 + 0.5 * fresh).mean()) - whole_p,
     )
+
+
+def _followed(foretold: Array, slope: float, middle: float, mean: float) -> Array:
+    return mean + slope * (foretold - middle)
 
 
 def _binned(values: Array, along: Sequence[Array], bins: int) -> Array:

@@ -58,7 +58,7 @@ def _held(summary: Record) -> Table:
 
 def _kept(gain: float | None, share: Sequence[float] | None) -> str:
     kept = "" if gain is None else f"{100.0 * gain:.1f} %, "
-    return "" if share is None else f"{kept}{100.0 * share[0]:.0f}"
+    return "" if share is None else f"{kept}{100.0 * share[0]:.0f} ({100.0 * share[1]:.0f} to {100.0 * share[2]:.0f})"
 
 
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:

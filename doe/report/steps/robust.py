@@ -103,15 +103,17 @@ def _of_front(robust: Robust, factors: Sequence[str]) -> list[str]:
         return [] if front is None else [f"Robust front: {front.note}."]
     pick, *others = front.confirmed.values()
     best = max(others, key=lambda each: each.better.all.value)
+    lost = [quantity(name)[0] for name, q2 in zip(robust.responses, front.q2, strict=True) if q2 < FORETOLD]
+    loose = f"; emulators foretell little of {' and '.join(lost)}, so a better one may exist" if lost else ""
     if best.better.all.value <= pick.better.all.value:
-        return ["No point of the robust front that was simulated gains in all in more cases than the pick."]
+        return [f"No point of the robust front that was simulated gains in all in more cases than the pick{loose}."]
     place = ", ".join(
         f"{quantity(name)[0]} {shown(float(x))} {quantity(name)[1]}".rstrip()
         for name, x in zip(factors, best.point, strict=True)
     )
     return [
         f"Surer is {place}: better in all in {_cases(best.better.all)}, the pick at the same input sets in "
-        f"{_cases(pick.better.all)}."
+        f"{_cases(pick.better.all)}{loose}."
     ]
 
 
@@ -119,19 +121,20 @@ def print_robust_front(robust: Robust, factors: Sequence[str]) -> None:
     """The pick and points of the robust front, simulated at the same input sets."""
     if robust.front is None:
         return
-    names = [quantity(name)[0] for name in robust.responses]
     rows = [
         (
-            name,
+            name.removeprefix("robust "),
             *(shown(float(x)) for x in each.point),
-            *(f"{100.0 * gain:.1f}" for gain in each.gains),
-            *(f"{100.0 * share.value:.0f}" for share in (*each.better.each, each.better.all)),
+            *(f"{100.0 * gain:.1f}, {_cases(p)}" for gain, p in zip(each.gains, each.better.each, strict=True)),
+            _cases(each.better.all),
         )
         for name, each in robust.front.confirmed.items()
     ]
     if rows:
-        header = ("", *factors, *(f"{name} [%]" for name in names), *(f"P {name}" for name in names), "P all")
-        print_table("over what is not known: gain that is kept, and in how many of 100 cases it is one", header, rows)
+        header = ("", *(quantity(name)[0] for name in (*factors, *robust.responses)), "all")
+        print_table(
+            "over what is not known: gain that is kept [%], and in how many of 100 cases it is one", header, rows
+        )
 
 
 def _cases(share: Share) -> str:
