@@ -145,9 +145,10 @@ def _decision(robust: Robust) -> str:
     chance, p = next(iter(robust.decides), None), robust.better.all.value
     if chance is not None and chance.worth >= WORTH:
         unit = quantity(chance.key)[1]
-        flip = shown(chance.flip, 3) if isinstance(chance.flip, float | int) else f'"{chance.flip}"'
         side = "below" if chance.above else "above"
-        keep = "" if chance.flip is None else f" {side} {flip} {unit}".rstrip() + " keep the original;"
+        # Choices have no above.
+        number = isinstance(chance.flip, float | int)
+        keep = f" {side} {shown(chance.flip, 3)} {unit}".rstrip() + " keep the original;" if number else ""
         return (
             f"{chance.key} decides most:{keep} measure it first, which raises the chance of choosing rightly by "
             f"{100.0 * chance.worth:.0f} of 100."
