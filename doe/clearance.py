@@ -25,6 +25,7 @@ from rbdyn.faults import InputError, RunError, read_toml, refuse
 from rbdyn.records.kept import code_version, run_key
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
+from rbdyn.scene.unknown import plain_values
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.ensemble import Stop
@@ -55,14 +56,22 @@ def check_responses(study: Study) -> None:
 
 
 def read_scene(study: Study) -> dict[str, Any]:
-    """Tables of the study's scene file. Raises InputError when the file or a factor's key is not there."""
+    """Tables of the study's scene file. Raises InputError when the file is not there or a factor's key is none of a scene."""
     path = study.beside(study.scene.file)
     data = read_toml(path)
-    refuse(
-        f"{study.path}: factor.key = {factor.key!r}: no such key in {path}; write table.key as in that file"
+    left_out = [
+        factor.key
         for factor in study.file.factor
         for table, _, key in (factor.key.rpartition("."),)
         if not isinstance(data.get(table), dict) or key not in data[table]
+    ]
+    known: Mapping[str, Any] = {}
+    with suppress(InputError):
+        known = plain_values(Scene.from_dict(data, str(path), study.scene.set)) if left_out else {}
+    refuse(
+        f"{study.path}: factor.key = {key!r}: no such key in {path}; write table.key as in that file"
+        for key in left_out
+        if key not in known
     )
     return data
 

@@ -22,6 +22,8 @@ LARGEST_FILE, DEEPEST = 20_000_000, 20
 # What takes the parser of TOML long, and what it cannot convert.
 DOTTED_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}""")
 DIGITS = re.compile(r"[0-9][0-9_]{4000}")
+# A part of a dotted key with the dot behind it; within quotes a dot is no end.
+PART = r'("[^"]*"|[^."]*)\.'
 
 
 class InputError(Exception):
@@ -199,8 +201,8 @@ def set_key(data: dict[str, Any], assignment: str) -> None:
 
 def put_key(data: dict[str, Any], path: str, value: Any, source: str) -> None:
     """Put a value under the dotted ``path`` of nested tables. Raises InputError when that is none, or runs through a value."""
-    keys = [key.strip() for key in path.split(".")]
-    if not all(keys) or len(keys) > DEEPEST:
+    keys = [key.strip().strip('"') for key in re.findall(PART, f"{path}.")]
+    if not all(keys) or len(keys) > DEEPEST or not re.fullmatch(f"({PART})+", f"{path}."):
         raise InputError([f"{source}: write it as key.path=value"])
     table = data
     for key in keys[:-1]:

@@ -1,8 +1,8 @@
 """Input sets of a scene whose inputs are not known: which inputs vary, the scenes at values of them, their runs."""
 
 import copy
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +13,20 @@ from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.running.failure import Failure, sentence
+from doe.study_file.table import NUMBER, fields
 from doe.unknown import laws, plan, screening
-from rbdyn.faults import InputError, RunError, read_toml, set_key
+from doe.unknown.joint import Joint
+from rbdyn.faults import InputError, RunError, read_toml, refuse, set_key
+from rbdyn.records.words import shown
 from rbdyn.scene import Scene, rollers_only
-from rbdyn.scene.uncertain import Correlation, Uncertain
+from rbdyn.scene.uncertain import Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, value_of, with_values
 
 # Share of input sets that may be impossible or fail.
 HOLES = 0.05
 SCREENING_SEEDS = 500_000
+# Quantiles of a law at which its scenes must be possible: no plan of as many input sets as we run goes farther out.
+ENDS = np.array([1e-3, 1.0 - 1e-3])
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,8 @@ class Sets:
 
 @dataclass(frozen=True)
 class Case:
-    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, ``overrides`` of all runs."""
+    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, ``overrides`` of all runs,
+    and by key what stands in the rows of a posterior ``sample``."""
 
     source: str
     data: dict[str, Any]
@@ -50,11 +56,17 @@ class Case:
     every: list[Input]
     outputs: tuple[str, ...]
     overrides: tuple[str, ...] = ()
+    sample: Mapping[str, Sequence[Any]] = field(default_factory=dict)
 
     def scenes(
-        self, inputs: Sequence[Input], values: Sequence[Mapping[str, Any]], seed: int, more: Sequence[str] = ()
+        self,
+        inputs: Sequence[Input],
+        values: Sequence[Mapping[str, Any]],
+        seed: int,
+        more: Sequence[str] = (),
+        own: Sequence[Sequence[str]] = (),
     ) -> list[Scene | str]:
-        """A scene an input set, or why there is none; ``more`` overrides come last."""
+        """A scene an input set, or why there is none; ``more`` overrides come last, then the set's ``own``."""
         by_key = {each.key: each.law for each in self.every}
         keys = {each.key for each in inputs}
         # What multiplies an input that varies goes with it, in the ratio that the scene has.
@@ -66,6 +78,7 @@ class Case:
         found: list[Scene | str] = []
         for number, row in enumerate(values):
             overrides = [*self.overrides, *self.uncertain.set, f"numerics.seed={seed + number}", *more]
+            overrides += own[number] if own else ()
             try:
                 tables = with_values(self.data, self.source, by_key, {**row, **tied})
                 found.append(Scene.from_dict(tables, self.source, overrides))
@@ -78,11 +91,13 @@ class Case:
         """Replicates of a run."""
         return Scene.from_dict(self.data, self.source, [*self.overrides, *self.uncertain.set]).numerics.replicates
 
-    def copula(self, inputs: Sequence[Input]) -> Array | None:
-        """How the inputs depend on each other; None where they do not."""
-        present = {each.key for each in inputs}
-        pairs: list[Correlation] = [pair for pair in self.uncertain.correlation if present.issuperset(pair.keys)]
-        return laws.copula([each.key for each in inputs], pairs)
+    def joint(self, inputs: Sequence[Input]) -> Joint:
+        """How the inputs depend on each other. Raises InputError where correlations contradict each other."""
+        keys = [each.key for each in inputs]
+        pairs = [pair for pair in self.uncertain.correlation if set(keys).issuperset(pair.keys)]
+        columns = tuple(place for place, key in enumerate(keys) if key in self.sample)
+        rows = np.column_stack([laws.ranks(self.sample[keys[place]]) for place in columns]) if columns else None
+        return Joint(len(keys), laws.copula(keys, pairs), rows, columns)
 
 
 def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> Case:
@@ -100,25 +115,53 @@ def case_of(
     declared: Uncertain | None = None,
     fixed: frozenset[str] = frozenset(),
     overrides: Sequence[str] = (),
+    beside: Path | None = None,
 ) -> Case:
-    """Tables of a scene with what is not known of it; ``declared`` counts instead of the scene's own, keys ``fixed`` vary
-    otherwise. Raises InputError, also where all is known."""
+    """Tables of a scene with what is not known of it; ``declared``, in the folder ``beside``, counts instead of the scene's
+    own, keys ``fixed`` vary otherwise. Raises InputError, also where all is known."""
     scene = rollers_only(Scene.from_dict(data, source))
     uncertain = declared or scene.uncertain or Uncertain()
-    every = inputs_of(scene, data, uncertain, fixed)
+    folder = beside if declared and beside else Path(source).parent
+    sample = {} if uncertain.sample is None else read_sample(folder / uncertain.sample)
+    found = {
+        key: Sampled(tuple(column[place] for place in np.argsort(laws.ranks(column)))) for key, column in sample.items()
+    }
+    every = inputs_of(scene, data, uncertain, fixed, found)
     if not every:
         raise InputError(
             [
                 f"{source}: uncertain: nothing is unknown; name keys as \"table.key\" = {{law = ...}} or leave out defaults = 'none'"
             ]
         )
-    return Case(source, data, scene, uncertain, every, tuple(outputs), tuple(overrides))
+    case = Case(source, data, scene, uncertain, every, tuple(outputs), tuple(overrides), sample)
+    case.joint(every)
+    refuse(_impossible(case))
+    return case
 
 
-def coordinates(inputs: int, points: int, seed: int, factor: Array | None) -> Array:
-    """Quantiles (points, inputs + 1) of input sets, nested; the last input does nothing: it shows what chance does."""
-    quantiles = plan.nested(inputs + 1, points, seed)
-    return np.column_stack([laws.dependent(quantiles[:, :-1], factor), quantiles[:, -1]])
+def read_sample(path: Path) -> dict[str, list[Any]]:
+    """Columns of a posterior sample by key: numbers, or choices. Raises InputError, also for fewer than two rows."""
+    header, rows = fields(path)
+    if len(rows) < 2:
+        raise InputError([f"{path}: has one row; a sample needs two at least"])
+    columns: dict[str, list[Any]] = {}
+    for key, *texts in zip(header, *rows, strict=True):
+        numbers = all(NUMBER.fullmatch(text.strip()) for text in texts)
+        columns[key] = [float(text) if numbers else text.strip() for text in texts]
+    return columns
+
+
+def _impossible(case: Case) -> Iterator[str]:
+    """What is wrong with the scene at an end of each law that is not documented, one by one."""
+    for each in case.every:
+        if isinstance(each.law, Law) and each.reason != "declared":
+            continue
+        for value in dict.fromkeys(laws.values_of(each.law, ENDS)):
+            (found,) = case.scenes([each], [{each.key: value}], 0)
+            if isinstance(found, str):
+                why = found.removeprefix(f"{case.source}: ")
+                yield f'{case.source}: uncertain."{each.key}" at {shown(value)}: {why}; mend its law'
+                break
 
 
 def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[str, float]]:
@@ -135,7 +178,7 @@ def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[st
     share = screening.shares(
         sets.quantiles[:, :-1], np.where(positive, np.log(np.where(positive, sets.outputs, 1.0)), sets.outputs)
     )
-    declared = [place for place, each in enumerate(every) if each.key in case.uncertain.laws]
+    declared = [place for place, each in enumerate(every) if each.key in {*case.uncertain.laws, *case.sample}]
     stay = screening.kept(share, declared, case.uncertain.inputs)
     left = [place for place in range(len(every)) if place not in stay]
     return [every[place] for place in stay], {every[place].key: float(share[place].max()) for place in left}
@@ -149,11 +192,12 @@ def run(
     seeds: int = 0,
     more: Sequence[str] = (),
     title: str = "input sets",
+    own: Sequence[Sequence[str]] = (),
 ) -> Sets:
-    """Run input sets. Raises RunError where too many are impossible or fail, InputError, KeyboardInterrupt."""
+    """Run input sets, with overrides ``more`` for all and its ``own`` for each. Raises RunError where too many are impossible or fail, InputError, KeyboardInterrupt."""
     values = laws.table_of({each.key: each.law for each in inputs}, quantiles)
     title = "screening" if seeds == SCREENING_SEEDS else title
-    scenes = case.scenes(inputs, values, case.scene.numerics.seed + clearance.INPUT_SEEDS + seeds, more)
+    scenes = case.scenes(inputs, values, case.scene.numerics.seed + clearance.INPUT_SEEDS + seeds, more, own)
     possible = [place for place, scene in enumerate(scenes) if isinstance(scene, Scene)]
     labels = [f"{title} {place + 1}" for place in possible]
     ran = simulations.run([scene for scene in scenes if isinstance(scene, Scene)], labels, simulations.progress(title))

@@ -4,19 +4,20 @@ Both designs are simulated at the same input sets. Sets of which a gain is in do
 nothing first, until the share of further runs that the study allows is spent.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from doe import clearance
-from doe.arrays import Array, Whole
+from doe.arrays import Array
 from doe.clearance import Simulations
-from doe.pareto import Goals
 from doe.running.failure import Failure
 from doe.study.goals import goals_of
-from doe.study.input_sets import Case, case_of, coordinates, run, screened
+from doe.study.input_sets import Case, case_of, screened
+from doe.study.pairs import at, simulated
+from doe.study.robust_front import RobustFront, find_robust_front
 from doe.study_file import Study
 from doe.unknown import laws
 from doe.unknown.decision import Better, better, decides, in_doubt
@@ -30,24 +31,29 @@ FRESH = 8192
 
 @dataclass(frozen=True)
 class Decider:
-    """An unknown input that decides: the value where the better design changes, None where none does, and what knowing it
-    is worth in chances of choosing rightly."""
+    """An unknown input that decides: the value where the better design changes, None where none does, what measuring it is
+    worth in chances of choosing rightly, and whether the pick is better above that value."""
 
     key: str
     flip: Any
     worth: float
+    above: bool
 
 
 @dataclass(frozen=True)
 class Robust:
     """The judgement: ``responses`` with a goal, how likely each and all gains are, deciding inputs by worth, the two
-    that are worth most together, how well inputs foretell each gain, what a screening left out, and the cost in runs."""
+    that are worth most together, how well inputs foretell each gain, by how much the chance of all gains changes with ranges
+    half as wide, the front of points that hold over the inputs, None where the study wants none, what a screening left out,
+    and the cost in runs."""
 
     responses: list[str]
     better: Better
     decides: list[Decider]
     pair: tuple[str, str, float] | None
     foretold: list[float]
+    halved: float
+    front: RobustFront | None
     inputs: list[Input]
     screened: dict[str, float]
     pairs: int
@@ -63,20 +69,20 @@ def declared(study: Study) -> bool:
 
 def check_robust(study: Study) -> None:
     """Raises InputError where what is not known of the study's scene is declared wrongly."""
-    _case(study).copula(_case(study).every)
+    _case(study)
 
 
 def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     """Judge the pick (k,) beside the baseline. Raises InputError, RunError, KeyboardInterrupt."""
     case, goals = _case(study), goals_of(study)
     inputs, rest = screened(case, simulations)
-    factor, seed = case.copula(inputs), case.uncertain.seed
-    quantiles = coordinates(len(inputs), study.file.robust.points, seed, factor)
-    designs = {"baseline": _at(study, study.baseline), "pick": _at(study, pick)}
-    pairs, failures = _simulated(case, inputs, quantiles, designs, simulations, 0, [])
+    joint, seed = case.joint(inputs), case.uncertain.seed
+    quantiles = joint.sets(study.file.robust.points, seed)
+    designs = {"baseline": at(study, study.baseline), "pick": at(study, pick)}
+    pairs, failures = simulated(case, inputs, quantiles, designs, simulations)
     spent, allowed = 2 * len(pairs.quantiles), round(2 * len(pairs.quantiles) * (1.0 + study.file.robust.settle))
     replicates = case.replicates
-    rows = in_doubt(*_gains(goals, pairs)[:2])
+    rows = in_doubt(*pairs.gains(goals)[:2])
     for again in range(ROUNDS):
         # As many replicates again as there are; a run of twice the replicates counts as two.
         many = 2**again
@@ -84,21 +90,32 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
         if rows.size == 0:
             break
         more = [f"numerics.replicates={replicates * many}"]
-        new, lost = _simulated(
+        new, lost = simulated(
             case, inputs, pairs.quantiles[rows], designs, simulations, (again + 1) * ROUND_SEEDS, more
         )
         rows, spent, failures = rows[new.places], spent + 2 * many * len(rows), (*failures, *lost)
         pairs = pairs.joined(rows, new)
-        still = in_doubt(*_gains(goals, pairs)[:2])
+        still = in_doubt(*pairs.gains(goals)[:2])
         rows = still[np.isin(still, rows)]
-    gains, variances, freedom = _gains(goals, pairs)
-    found = decides(pairs.quantiles, gains, variances, freedom, coordinates(len(inputs), FRESH, seed + 1, factor), seed)
+    gains, variances, freedom = pairs.gains(goals)
+    fresh = joint.sets(FRESH, seed + 1)
+    knowable = [place for place, each in enumerate(inputs) if each.law.kind == "unknown"]
+    found = decides(pairs.quantiles, gains, variances, freedom, fresh, seed, _read(case, inputs, fresh, seed), knowable)
+    front = None
+    if study.file.robust.front != "none":
+        front, more_runs, lost = find_robust_front(study, case, inputs, joint, pick, simulations)
+        spent, failures = spent + more_runs, (*failures, *lost)
     return Robust(
         [study.responses[index] for index in goals.objectives],
         better(gains, variances, seed),
-        [Decider(inputs[one.place].key, _value(case, inputs[one.place], one.flip), one.worth) for one in found.inputs],
+        [
+            Decider(inputs[one.place].key, _value(case, inputs[one.place], one.flip), one.worth, one.above)
+            for one in found.inputs
+        ],
         None if found.pair is None else (inputs[found.pair[0]].key, inputs[found.pair[1]].key, found.pair[2]),
         found.foretold,
+        found.halved,
+        front,
         inputs,
         rest,
         len(gains),
@@ -108,59 +125,6 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     )
 
 
-@dataclass(frozen=True)
-class _Pairs:
-    """Both designs at the same input sets: ``places`` of these in what was asked for, their quantiles (n, d), outputs,
-    variances and degrees of freedom (2, n, m)."""
-
-    places: Whole
-    quantiles: Array
-    outputs: Array
-    variances: Array
-    freedom: Whole
-
-    def joined(self, rows: Whole, other: "_Pairs") -> "_Pairs":
-        """The same, at some rows joined with as many replicates more."""
-        outputs, variances, freedom = self.outputs.copy(), self.variances.copy(), self.freedom.copy()
-        outputs[:, rows] = 0.5 * (outputs[:, rows] + other.outputs)
-        variances[:, rows] = 0.25 * (variances[:, rows] + other.variances)
-        freedom[:, rows] += other.freedom + 1
-        return replace(self, outputs=outputs, variances=variances, freedom=freedom)
-
-
-def _simulated(
-    case: Case,
-    inputs: Sequence[Input],
-    quantiles: Array,
-    designs: Mapping[str, Sequence[str]],
-    simulations: Simulations,
-    seeds: int,
-    more: Sequence[str],
-) -> tuple[_Pairs, tuple[Failure, ...]]:
-    """Both designs at input sets; one at which either failed is left out."""
-    both = [
-        run(
-            case,
-            inputs,
-            quantiles,
-            simulations,
-            seeds,
-            [*design, *more],
-            f"input sets of the {name}, from seed {seeds},",
-        )
-        for name, design in designs.items()
-    ]
-    first, second = (sets.places for sets in both)
-    places = first[np.isin(first, second)]
-    kept = [np.flatnonzero(np.isin(sets.places, places)) for sets in both]
-    outputs, variances, freedom = (
-        np.array([array[rows] for array, rows in zip(arrays, kept, strict=True)])
-        for arrays in zip(*((sets.outputs, sets.variances, sets.freedom) for sets in both), strict=True)
-    )
-    lost = tuple(failure for sets in both for failure in sets.failures)
-    return _Pairs(places, quantiles[places], outputs, variances, freedom), lost
-
-
 def _case(study: Study) -> Case:
     """The study's scene with what is not known of it; factors are known."""
     path = study.beside(study.scene.file)
@@ -168,23 +132,18 @@ def _case(study: Study) -> Case:
     for override in study.scene.set:
         set_key(data, override)
     fixed = frozenset(factor.key for factor in study.file.factor)
-    return case_of(str(path), data, study.responses, study.file.uncertain, fixed)
+    return case_of(str(path), data, study.responses, study.file.uncertain, fixed, beside=study.path.parent)
 
 
-def _at(study: Study, point: Array) -> list[str]:
-    """Overrides of the scene at factor values (k,)."""
-    return [f"{factor.key}={float(x)!r}" for factor, x in zip(study.file.factor, point, strict=True)]
-
-
-def _gains(goals: Goals, pairs: _Pairs) -> tuple[Array, Array, Whole]:
-    """Relative gains of the pick (n, q), their variances, and the degrees of freedom behind these."""
-    index = goals.objectives
-    scale = np.abs(pairs.outputs[0][:, index])
-    before, after = (goals.costs(each) for each in pairs.outputs)
-    gains = (before - after) / scale
-    noise, other = (each[:, index] for each in pairs.variances)
-    # The baseline stands in the denominator too.
-    return gains, (other + (1.0 - gains) ** 2 * noise) / scale**2, pairs.freedom[:, :, index].sum(axis=0)
+def _read(case: Case, inputs: Sequence[Input], fresh: Array, seed: int) -> Array:
+    """Quantiles (k, d + 1) of what is read of input sets: those of the inputs, of measured ones with the measurement's error."""
+    random, read = np.random.default_rng(seed), fresh.copy()
+    for place, each in enumerate(inputs):
+        if each.law.measurable is not None:
+            scale = 1.0 if each.law.times is None else abs(value_of(case.scene, each.law.times))
+            values = scale * np.array(laws.values_of(each.law, fresh[:, place]), float)
+            read[:, place] = laws.ranks(values + each.law.measurable * random.standard_normal(len(values)))
+    return read
 
 
 def _value(case: Case, one: Input, quantile: float | None) -> Any:

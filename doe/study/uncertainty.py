@@ -6,8 +6,9 @@ from pathlib import Path
 
 from doe.clearance import Simulations
 from doe.running.failure import Failure
-from doe.study.input_sets import Sets, coordinates, read_case, run, screened
-from doe.unknown.sensitivity import Index, Indices, sobol
+from doe.study.input_sets import Sets, read_case, run, screened
+from doe.unknown.joint import Joint
+from doe.unknown.sensitivity import Index, Indices, shapley, sobol
 from doe.unknown.spread import Emulated, Runs, Spread, emulated, spread_of
 from rbdyn.faults import InputError, RunError
 from rbdyn.result import Quantity, SimulationResult
@@ -23,12 +24,20 @@ NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
 
 @dataclass(frozen=True)
 class OutputRange:
-    """One output: at the scene's own inputs with its errors, its range over what is not known, and which input makes it."""
+    """One output: at the scene's own inputs with its errors, its range over what is not known, and which input makes it: by
+    Sobol' ``indices``, where inputs depend on each other by ``shapley`` effects, where emulators are not trusted by none.
+    ``floor``: what an input seems to make that does nothing."""
 
     nominal: Quantity
     spread: Spread
-    indices: Indices | None
-    floor: Index | None
+    indices: Indices | None = None
+    shapley: list[Index] | None = None
+    floor: Index | None = None
+
+    @property
+    def shares(self) -> list[Index] | None:
+        """What each input makes: its total index, or its Shapley effect."""
+        return self.shapley if self.indices is None else self.indices.total
 
 
 @dataclass(frozen=True)
@@ -60,18 +69,18 @@ def find_uncertainty(
         raise RunError(f"{path}: as the scene says: {nominal.cause}")
     inputs, rest = screened(case, simulations)
     seed = case.uncertain.seed
-    factor = case.copula(inputs)
-    fresh = coordinates(len(inputs), FRESH, seed + 1, factor)
+    joint = case.joint(inputs)
+    fresh = joint.sets(FRESH, seed + 1)
     count = asked
     while True:
-        sets = run(case, inputs, coordinates(len(inputs), count, seed, factor), simulations)
+        sets = run(case, inputs, joint.sets(count, seed), simulations)
         fitted = [_emulated(sets, nominal, place) for place in range(len(OUTPUTS))]
         spreads = [spread_of(runs, each, fresh, seed) for runs, each in fitted]
         if count >= MOST or all(each.known <= target for each in spreads):
             break
         count *= 2
     outputs = {
-        name: _output(nominal, name, spread, each, len(inputs), seed, independent=factor is None)
+        name: _output(_quantity(nominal, name), spread, each, joint, seed)
         for name, spread, (_, each) in zip(OUTPUTS, spreads, fitted, strict=True)
     }
     return Uncertainty(path, inputs, rest, outputs, sets, seed, _notes(sets, spreads, count, target))
@@ -99,14 +108,14 @@ def _quantity(nominal: SimulationResult, name: str) -> Quantity:
     return Quantity.from_dict(nominal.as_dict()[name])
 
 
-def _output(
-    nominal: SimulationResult, name: str, spread: Spread, fitted: Emulated, inputs: int, seed: int, *, independent: bool
-) -> OutputRange:
-    quantity = _quantity(nominal, name)
-    if not (spread.by_emulator and independent):
-        return OutputRange(quantity, spread, None, None)
-    found = sobol(fitted, inputs + 1, seed)
-    return OutputRange(quantity, spread, Indices(found.first[:-1], found.total[:-1]), found.total[-1])
+def _output(nominal: Quantity, spread: Spread, fitted: Emulated, joint: Joint, seed: int) -> OutputRange:
+    if not spread.by_emulator:
+        return OutputRange(nominal, spread)
+    if not joint.independent:
+        *effects, floor = shapley(fitted, joint, seed)
+        return OutputRange(nominal, spread, shapley=effects, floor=floor)
+    found = sobol(fitted, joint.inputs + 1, seed)
+    return OutputRange(nominal, spread, Indices(found.first[:-1], found.total[:-1]), floor=found.total[-1])
 
 
 def _notes(sets: Sets, spreads: Sequence[Spread], count: int, target: float) -> tuple[str, ...]:

@@ -121,6 +121,11 @@ class Robust(Strict):
     """Input sets, a power of two; the baseline and the pick are simulated at each."""
     settle: Annotated[float, Field(ge=0.0, le=4.0)] = 0.5
     """Further simulations, as a share of the first, spent on the input sets where a gain is in doubt."""
+    front: Literal["quantile", "mean", "none"] = "quantile"
+    """A front of what holds over the unknowns: the quantile or the mean of each gain over the baseline; some of its points are
+    simulated beside the pick."""
+    quantile: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.1
+    """Quantile of a robust front: in how many of the cases a gain may be less."""
 
     @model_validator(mode="after")
     def _power_of_two(self) -> Self:

@@ -2,6 +2,7 @@
 
 - ``laws``: distributions of inputs and their dependence
 - ``plan``: nested input sets
+- ``joint``: how inputs depend on each other, and sets that share some of them
 - ``screening``: which of many inputs matter
 - ``spread``: what an output ranges over, and how much of that is noise
 - ``sensitivity``: which input makes it

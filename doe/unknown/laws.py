@@ -8,14 +8,17 @@ from scipy import special, stats
 
 from doe.arrays import Array
 from rbdyn.faults import InputError
-from rbdyn.scene.uncertain import Correlation, Law
+from rbdyn.scene.uncertain import Correlation, Law, Sampled
 
 # Numbers nearer to 0 and 1 than this are as good as at the ends.
 EDGE = 1e-12
 
 
-def values_of(law: Law, quantiles: Array) -> list[Any]:
+def values_of(law: Law | Sampled, quantiles: Array) -> list[Any]:
     """Values (n,) of a law at quantiles (n,) between 0 and 1: numbers, or choices."""
+    if isinstance(law, Sampled):
+        count = len(law.values)
+        return [law.values[min(int(quantile * count), count - 1)] for quantile in quantiles]
     if law.law == "choices":
         choices = law.values or []
         bounds = np.cumsum(_shares(law))[:-1]
@@ -81,7 +84,12 @@ def dependent(quantiles: Array, factor: Array | None) -> Array:
     return quantiles if factor is None else special.ndtr(special.ndtri(quantiles.clip(EDGE, 1.0 - EDGE)) @ factor.T)
 
 
-def table_of(laws: Mapping[str, Law], quantiles: Array) -> list[dict[str, Any]]:
+def ranks(column: Sequence[Any] | Array) -> Array:
+    """Quantiles (n,) of the values of a sample within it; equal values follow each other."""
+    return (np.argsort(np.argsort(np.array(column), kind="stable")) + 0.5) / len(column)
+
+
+def table_of(laws: Mapping[str, Law | Sampled], quantiles: Array) -> list[dict[str, Any]]:
     """Input sets by key, a dictionary a row of quantiles (n, d)."""
     columns = [values_of(law, quantiles[:, place]) for place, law in enumerate(laws.values())]
     return [dict(zip(laws, row, strict=True)) for row in zip(*columns, strict=True)]

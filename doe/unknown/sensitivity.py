@@ -3,12 +3,13 @@
 First-order index of an input: the share of the output's variance that would vanish if the input were known; total index:
 the share that would be left if all others were. Both by scipy's Saltelli scheme on the emulator's mean. Intervals by
 parametric bootstrap: functions drawn from the emulator take the truth's place, are run with fresh noise and emulated anew;
-by how much their indices are missed is the error of ours, its mean the bias that is taken off. Of inputs
-that depend on each other these indices mean nothing; there the first-order index is the variance of the mean given the
-input, and effects of Shapley share the rest.
+by how much their indices are missed is the error of ours, its mean the bias that is taken off. Of inputs that depend on each
+other these indices mean nothing. There Shapley's effects share the variance: what an input adds to the variance explained,
+Var E[y | those known], on average over all orders in which the inputs become known.
 
 Sources: Saltelli et al., Computer Physics Communications 181 (2010) 259; Marrel et al., Reliability Engineering and System
-Safety 94 (2009) 742; Song, Nelson and Staum, SIAM/ASA J. Uncertainty Quantification 4 (2016) 1060.
+Safety 94 (2009) 742; Song, Nelson and Staum, SIAM/ASA J. Uncertainty Quantification 4 (2016) 1060; Broto, Bachoc and Depecker,
+SIAM/ASA J. Uncertainty Quantification 8 (2020) 693 (nearest neighbours in place of conditional draws).
 """
 
 from collections.abc import Callable
@@ -20,10 +21,17 @@ from scipy import stats
 
 from doe.arrays import Array
 from doe.emulator import Emulator, fit_emulator
+from doe.unknown.joint import Joint
+from doe.unknown.plan import nested
 from doe.unknown.spread import Emulated
 
 # Points of an index (a power of two), refits of its interval, and the share of cases that the interval should hold.
 POINTS, POINTS_OF_REFITS, REFITS, CONFIDENCE = 1024, 256, 16, 0.9
+# Orders of the inputs over which Shapley's effects are averaged, each with its reverse.
+ORDERS = 8
+
+Function = Callable[[Array], Array]  # of quantiles (n, d)
+Measure = Callable[[Function, int, int], Array]  # of a function, by so many points and a seed
 
 
 class Index(NamedTuple):
@@ -43,8 +51,22 @@ class Indices(NamedTuple):
 
 def sobol(fitted: Emulated, inputs: int, seed: int) -> Indices:
     """Sobol' indices of independent inputs, uniform in their quantiles."""
+    ends = _with_intervals(fitted, lambda *of: np.array(_indices(inputs, *of)), seed)
+    first, total = ([Index(*map(float, ends[:, kind, each])) for each in range(inputs)] for kind in (0, 1))
+    return Indices(first, total)
+
+
+def shapley(fitted: Emulated, joint: Joint, seed: int) -> list[Index]:
+    """Shapley's effects of inputs that depend on each other, and of one that does nothing, the last; their sum is 1."""
+    # Rows of a sample are no even plan: they need more of them.
+    ends = _with_intervals(fitted, lambda *of: _effects(joint, *of), seed, 4 * POINTS)
+    return [Index(*map(float, each)) for each in ends.T]
+
+
+def _with_intervals(fitted: Emulated, measure: Measure, seed: int, points: int = POINTS) -> Array:
+    """Shares (3, ...) of the variance, with the ends of their intervals."""
     random = np.random.default_rng(seed)
-    emulator, whole = fitted.emulator, np.array(_indices(fitted, inputs, POINTS, seed))
+    emulator, whole = fitted.emulator, measure(fitted, points, seed)
     noise = np.sqrt(emulator.variances + emulator.hyperparameters.nugget)
     misses = []
     for again in range(REFITS):
@@ -53,7 +75,7 @@ def sobol(fitted: Emulated, inputs: int, seed: int) -> Indices:
         refit = replace(fitted, emulator=_refitted(emulator, values))
         # Both by the same points, whose own error then hardly shows in the difference.
         ours, true = (
-            np.array(_indices(function, inputs, POINTS_OF_REFITS, seed + 1 + again))
+            measure(function, POINTS_OF_REFITS, seed + 1 + again)
             for function in (refit, lambda at, truth=truth: fitted.back(truth(at)[0]))
         )
         misses.append(ours - true)
@@ -61,16 +83,14 @@ def sobol(fitted: Emulated, inputs: int, seed: int) -> Indices:
     half = (
         stats.t.ppf(0.5 + 0.5 * CONFIDENCE, REFITS - 1) * np.std(misses, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / REFITS)
     )
-    ends = np.stack([middle, middle - half, middle + half]).clip(0.0, 1.0)
-    first, total = ([Index(*map(float, ends[:, kind, each])) for each in range(inputs)] for kind in (0, 1))
-    return Indices(first, total)
+    return np.stack([middle, middle - half, middle + half]).clip(0.0, 1.0)
 
 
 def _refitted(emulator: Emulator, values: Array) -> Emulator:
     return fit_emulator(emulator.points, values, emulator.variances, trend="linear", start=emulator.hyperparameters)
 
 
-def _indices(function: Callable[[Array], Array], inputs: int, points: int, seed: int) -> tuple[Array, Array]:
+def _indices(inputs: int, function: Function, points: int, seed: int) -> tuple[Array, Array]:
     """First and total indices (d,) of a function of quantiles (n, d)."""
     found = stats.sobol_indices(
         func=lambda columns: function(columns.T)[None],
@@ -79,3 +99,28 @@ def _indices(function: Callable[[Array], Array], inputs: int, points: int, seed:
         rng=np.random.default_rng(seed),
     )
     return np.asarray(found.first_order).reshape(inputs), np.asarray(found.total_order).reshape(inputs)
+
+
+def _effects(joint: Joint, function: Function, points: int, seed: int) -> Array:
+    """Shapley's effects (d + 1,) of a function, as shares of its variance."""
+    random = np.random.default_rng(seed)
+    count = joint.inputs + 1
+    # Points of one sequence: of two, whatever their scrambling, those at one place go together.
+    even = nested(2 * count, points, seed)
+    sets, fresh = joint.placed(even[:, :count]), even[:, count:]
+    values = function(sets)
+    whole = float(values.var())
+    # Known of nothing and of everything.
+    explained = {bytes(count): 0.0, bytes([1] * count): whole}
+    found = np.zeros(count)
+    for order in (order for _ in range(ORDERS) for one in (random.permutation(count),) for order in (one, one[::-1])):
+        known, before = np.zeros(count, dtype=bool), 0.0
+        for place in order:
+            known[place] = True
+            if (key := known.tobytes()) not in explained:
+                again = function(joint.redrawn(sets, known, fresh))
+                # Half of what two sets with these inputs in common differ by is what the others make (Jansen 1999).
+                explained[key] = whole - 0.5 * float(((values - again) ** 2).mean())
+            found[place] += explained[key] - before
+            before = explained[key]
+    return found / (2 * ORDERS * whole)

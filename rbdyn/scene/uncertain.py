@@ -7,6 +7,7 @@ changes a run: they tell how the scenes around it differ.
 import functools
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import resources
 from typing import Annotated, Any, Literal, Self
 
@@ -86,7 +87,24 @@ class Law(Strict):
             found.append(f"weights = {self.weights}: not one for each of the values; mend them")
         if self.times is not None and self.law == "choices":
             found.append(f"times = '{self.times}': choices are no numbers to multiply; leave it out")
+        if self.measurable is not None and self.law == "choices":
+            found.append(f"measurable = {self.measurable:g}: a choice is not measured to a deviation; leave it out")
         return or_refuse(self, found)
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """How an input of a posterior sample is distributed: its ``values``, sorted."""
+
+    values: tuple[Any, ...]
+    law: Literal["sample"] = "sample"
+    times: None = None
+    kind: Literal["unknown"] = "unknown"
+    measurable: None = None
+
+    def model_dump(self, **_: Any) -> dict[str, Any]:
+        """As a declared law is told in a record."""
+        return {"law": self.law, "rows": len(self.values), "low": self.values[0], "high": self.values[-1]}
 
 
 class Correlation(Strict):
@@ -119,7 +137,8 @@ class Uncertain(Strict):
     """Keys of the scene that are otherwise in the runs of input sets, as key=value: many short runs tell more of inputs
     than few long ones."""
     sample: str | None = None
-    """CSV of a posterior sample, a row an input set, whose columns are keys; replaces their laws."""
+    """CSV of a posterior sample, a row an input set, whose columns are keys; replaces their laws. Its path is from the
+    folder of this file."""
     correlation: list[Correlation] = []
     """Rank correlations of inputs."""
 

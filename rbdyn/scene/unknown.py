@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from copy import deepcopy
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from rbdyn.faults import InputError, refuse
 from rbdyn.scene import Scene
-from rbdyn.scene.uncertain import LEFT_OUT, Law, Uncertain, documented
+from rbdyn.scene.uncertain import LEFT_OUT, Law, Sampled, Uncertain, documented
 
 # What a key is worth that is left out and follows from the rest, in its own unit.
 DERIVED: Mapping[str, Callable[[Scene], float]] = {
@@ -22,23 +23,30 @@ class Input(NamedTuple):
     """An input that is not known: its key, its law, and why that law."""
 
     key: str
-    law: Law
+    law: Law | Sampled
     reason: str
 
 
 def inputs_of(
-    scene: Scene, data: Mapping[str, Any], uncertain: Uncertain, fixed: frozenset[str] = frozenset()
+    scene: Scene,
+    data: Mapping[str, Any],
+    uncertain: Uncertain,
+    fixed: frozenset[str] = frozenset(),
+    sample: Mapping[str, Sampled] = MappingProxyType({}),
 ) -> list[Input]:
     """Inputs of a scene that are not known, sorted by key: what is declared, and what is documented of the rest.
 
     ``data``: the tables that the scene was read from: what stands there is known unless it is named as estimated.
-    ``fixed``: keys that vary otherwise. Raises InputError for keys that cannot vary.
+    ``fixed``: keys that vary otherwise; ``sample``: those of a posterior sample. Raises InputError for keys that cannot vary.
     """
     values, faults = plain_values(scene), []
     ranges = {each.key: each for each in documented() if each.key in values and each.counts(values)}
-    for key in uncertain.laws:
+    for key in {**uncertain.laws, **sample}:
         if key in fixed:
             faults.append(f'uncertain."{key}": is a factor of the study too; take it out of one of them')
+        elif key in sample:
+            pairs = [pair.keys for pair in uncertain.correlation if key in pair.keys]
+            faults += [f'uncertain.correlation.keys = {keys}: "{key}" is in the sample; take it out' for keys in pairs]
         elif (times := uncertain.laws[key].times) is not None:
             if times != key and times in uncertain.laws and uncertain.laws[times].times is not None:
                 faults.append(f'uncertain."{key}".times = "{times}": is itself relative to another key; name that one')
@@ -51,13 +59,13 @@ def inputs_of(
         if key not in known
     ]
     refuse(faults)
-    found = [Input(key, law, "declared") for key, law in uncertain.laws.items()]
+    found = [Input(key, law, "declared") for key, law in uncertain.laws.items() if key not in sample]
+    found += [Input(key, values, "posterior sample") for key, values in sample.items()]
     if uncertain.defaults == "documented":
         found += [
             Input(key, each.as_law, each.reason)
             for key, each in ranges.items()
-            if key not in uncertain.laws
-            and key not in fixed
+            if key not in {*uncertain.laws, *sample, *fixed}
             and not each.asked
             and (key in uncertain.estimated or not _given(data, key))
         ]
@@ -65,7 +73,7 @@ def inputs_of(
 
 
 def with_values(
-    data: Mapping[str, Any], source: str, laws: Mapping[str, Law], values: Mapping[str, Any]
+    data: Mapping[str, Any], source: str, laws: Mapping[str, Law | Sampled], values: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Tables of the scene at values of its inputs; numbers that multiply another key's value do so here.
 

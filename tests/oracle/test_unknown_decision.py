@@ -94,3 +94,16 @@ def test_what_cannot_be_foretold_is_worth_nothing() -> None:
     found = decides(nested(3, 256, 9), gains, variances, freedom, nested(3, 4096, 10), 1)
     assert found.foretold[0] < 0.2
     assert max(each.worth for each in found.inputs) < 0.06
+
+
+def test_worth_of_knowing_a_normal_input() -> None:
+    """D = a + 3 b of normals plus 1: p = Phi(1/sqrt 10), given b Phi(1 + 3 b), whose E max(p, 1 - p) is known by quadrature."""
+    quantiles, fresh = nested(3, 512, 11), nested(3, 8192, 12)
+    gains, variances, freedom = _noisy(1.0 + stats.norm.ppf(quantiles[:, :2]) @ [[1.0], [3.0]], 0.1, 11)
+    found = decides(quantiles, gains, variances, freedom, fresh, 1)
+    b = stats.norm.ppf((np.arange(20000) + 0.5) / 20000)
+    given = stats.norm.cdf(1.0 + 3.0 * b)
+    truth = float(np.maximum(given, 1.0 - given).mean() - stats.norm.cdf(1.0 / np.sqrt(10.0)))
+    assert found.inputs[0].place == 1 and found.inputs[0].above
+    assert found.inputs[0].worth == pytest.approx(truth, abs=0.02 * 0.87)
+    assert found.inputs[0].flip == pytest.approx(stats.norm.cdf(-1.0 / 3.0), abs=0.03)

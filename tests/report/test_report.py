@@ -364,3 +364,25 @@ def test_pictures_keep_their_words_off_the_curves(monkeypatch, tmp_path):
     for axis, held in zip(kept["surface"].axes, ("pocket clearance 0.3 mm", "guide clearance 0.15 mm"), strict=True):
         assert axis.get_zlabel() == "impact force [N]" and held in axis.get_title()
         assert all(len(ticks) <= 6 for ticks in (axis.get_xticks(), axis.get_yticks(), axis.get_zticks()))
+
+
+def test_the_verdict_over_what_is_not_known_comes_first():
+    """Before any clearance or gain; names of responses are spelt, points of the robust front stand in a table."""
+    names = RESPONSES
+    sentence = (
+        "Of 100 cases the pick is better in all of these in 57 (51 to 63): the gains depend on what is not known."
+    )
+    point = {
+        "name": "robust knee",
+        "factors": {each: 0.1 for each in FACTORS},
+        "gains": {name: 0.031 for name in names},
+        "better": {name: [0.8, 0.7, 0.9] for name in names},
+        "all": [0.57, 0.51, 0.63],
+    }
+    record = summary() | {"robust": {"sentences": [sentence], "front": {"confirmed": [point]}}}
+    page = html_report(record, motion())
+    words, section = " ".join(Outline(page).words), page[page.index('id="answer"') :]
+    assert section[: section.index("</p>")].endswith(sentence)
+    assert words.index(sentence) < words.index("Over what is not known")
+    assert "3.1 %, 80 (70 to 90)" in words and "57 (51 to 63)" in words
+    assert sentence in markdown_report(record, [])

@@ -31,11 +31,34 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         if plays := [CLEARANCES[each.key] for each in factors(summary) if each.key in CLEARANCES]:
             blocks.append(Words(f"Clearances: {', '.join(plays)}.", "note"))
     blocks += [Words(statement(summary), "statement"), _gains(summary), limits(summary, ("baseline", "pick"))]
+    blocks.append(_held(summary))
     blocks += [Words(part(summary, "edge", "sentence") or ""), part_dimensions(summary)]
     reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
     if reason:
         blocks.append(Words(f"Why this point: {reason}.", "note"))
     return Section("answer", "The answer", blocks)
+
+
+def _held(summary: Record) -> Table:
+    """Pick and points of the robust front over what is not known: the gain that they keep, and in how many cases it is one."""
+    names = [each["name"] for each in responses(summary)]
+    rows = [
+        [
+            point["name"],
+            *(each.text(part(point, "factors", each.name), 1) for each in factors(summary)),
+            *(_kept(part(point, "gains", name), part(point, "better", name)) for name in names),
+            _kept(None, point["all"]),
+        ]
+        for point in part(summary, "robust", "front", "confirmed") or []
+    ]
+    header = ("", *(label(each.name) for each in factors(summary)), *(quantity(name)[0] for name in names), "all")
+    note = "Gain over the baseline that is kept over what is not known, and in how many of 100 cases it is one."
+    return Table("Over what is not known", header, rows, note)
+
+
+def _kept(gain: float | None, share: Sequence[float] | None) -> str:
+    kept = "" if gain is None else f"{100.0 * gain:.1f} %, "
+    return "" if share is None else f"{kept}{100.0 * share[0]:.0f} ({100.0 * share[1]:.0f} to {100.0 * share[2]:.0f})"
 
 
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:

@@ -36,13 +36,14 @@ def record_of(found: Uncertainty) -> dict[str, Any]:
 
 
 def _output(output: OutputRange, keys: list[str]) -> dict[str, Any]:
-    spread, indices = output.spread, output.indices
+    spread, indices, shapley = output.spread, output.indices, output.shapley
     return {
         **output.nominal.as_dict(),
         "input": {"low": spread.low, "median": spread.median, "high": spread.high, "errors": list(spread.errors)},
         "variance": spread.variance,
         "first": None if indices is None else dict(zip(keys, map(list, indices.first), strict=True)),
         "total": None if indices is None else dict(zip(keys, map(list, indices.total), strict=True)),
+        "shapley": None if shapley is None else dict(zip(keys, map(list, shapley), strict=True)),
         "floor": None if output.floor is None else list(output.floor),
         "q2": spread.q2,
         "ceiling": spread.ceiling,
@@ -58,14 +59,15 @@ def sentence(name: str, output: OutputRange, keys: list[str]) -> str:
     ends = f"{shown(spread.low)} to {shown(spread.high)} {unit}".rstrip()
     if spread.hidden:
         return f"{head}; noise of the simulation hides what the inputs do"
-    return f"{head}; {ends} in 90 % of the cases over what is not known; {_decides(output, keys)}"
+    outside = "" if spread.low <= nominal.value <= spread.high else ", which what the scene says lies outside of"
+    return f"{head}; {ends} in 90 % of the cases over what is not known{outside}; {_decides(output, keys)}"
 
 
 def _decides(output: OutputRange, keys: list[str]) -> str:
-    if output.indices is None or output.floor is None:
+    if output.shares is None or output.floor is None:
         return "which input makes it cannot be told"
     floor = output.floor.high
-    ranked = sorted(zip(output.indices.total, keys, strict=True), reverse=True)
+    ranked = sorted(zip(output.shares, keys, strict=True), reverse=True)
     above = [(index, key) for index, key in ranked if index.value > max(floor, WORTH)][:NAMED]
     return " and ".join(f"{key} makes {100.0 * index.value:.0f} %" for index, key in above) or "no input stands out"
 
@@ -76,11 +78,11 @@ def print_uncertainty(found: Uncertainty) -> None:
     for name, output in found.outputs.items():
         print(sentence(name, output, keys))
     rows = [
-        (key, *(_share(output.indices.total[place] if output.indices else None) for output in found.outputs.values()))
+        (key, *(_share(output.shares[place] if output.shares else None) for output in found.outputs.values()))
         for place, key in enumerate(keys)
     ]
     floor = ("an input that does nothing", *(_share(output.floor) for output in found.outputs.values()))
-    title = f"share of the variance that is left while an input is unknown [%], {100.0 * CONFIDENCE:.0f} % intervals"
+    title = f"{_what(found)} [%], {100.0 * CONFIDENCE:.0f} % intervals"
     print_table(title, ("input", *(quantity(name)[0] for name in found.outputs)), [*rows, floor])
     parts = [
         (quantity(name)[0], *(f"{100.0 * share:.1f}" for share in output.spread.variance.values()))
@@ -95,6 +97,13 @@ def print_uncertainty(found: Uncertainty) -> None:
         )
     for note in found.notes:
         print(f"note: {note}")
+
+
+def _what(found: Uncertainty) -> str:
+    """What the shares are of."""
+    if any(output.shapley for output in found.outputs.values()):
+        return "share of the variance, divided among inputs that go together (Shapley)"
+    return "share of the variance that is left while an input is unknown"
 
 
 def _share(index: Index | None) -> str:
@@ -132,17 +141,17 @@ def draw(found: Uncertainty, path: Path) -> None:
         plain(above)
         plain(below)
         places = range(len(keys))
-        if output.indices is None or output.floor is None:
+        if output.shares is None or output.floor is None:
             below.text(0.5, 0.5, "cannot be told", transform=below.transAxes, ha="center", color=GREY)
         else:
-            total = output.indices.total
-            below.barh(places, [100.0 * each.value for each in total], color=BLUE, alpha=0.6)
+            shares = output.shares
+            below.barh(places, [100.0 * each.value for each in shares], color=BLUE, alpha=0.6)
             below.hlines(
-                places, [100.0 * each.low for each in total], [100.0 * each.high for each in total], color=GREY
+                places, [100.0 * each.low for each in shares], [100.0 * each.high for each in shares], color=GREY
             )
             below.axvline(100.0 * output.floor.high, color=GREY, linestyle=":")
         below.set(yticks=places, yticklabels=keys if column == 0 else [], xlim=(0.0, 100.0),
-                  xlabel="share left while unknown [%]")  # fmt: skip
+                  xlabel="share of the variance [%]")  # fmt: skip
         below.invert_yaxis()
     axes[0, 0].legend(fontsize=8)
     save(figure, path)

@@ -9,7 +9,7 @@ import numpy as np
 from doe.clearance import direct_run
 from doe.report.steps.adaptive import adaptive_sentence
 from doe.report.steps.chain import print_chain
-from doe.report.steps.robust import robust_sentences
+from doe.report.steps.robust import print_robust_front, robust_sentences
 from doe.report.words import rounded_down
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
@@ -35,7 +35,7 @@ def print_outcome(outcome: StudyResult, quiet: bool) -> None:
 def print_verdict(outcome: StudyResult) -> None:
     """Whether the pick is better over what is not known, and what became of the limits: the first that is to be read."""
     if outcome.robust is not None:
-        print("\n".join(robust_sentences(outcome.robust)))
+        print("\n".join(robust_sentences(outcome.robust, outcome.study.factors)))
     if outcome.limits_sentence:
         print(outcome.limits_sentence)
 
@@ -67,6 +67,8 @@ def _print_answer(outcome: StudyResult) -> None:
         rows.append((gain.response, *cells, improvement(gain.percent, gain.error, gain.goal), gain.verdict))
     print_table("confirmed by simulation (95 % intervals)", ("", "baseline", "pick", "change", "verdict"), rows)
     print(statement(outcome.gains["pick"]))
+    if outcome.robust is not None:
+        print_robust_front(outcome.robust, study.factors)
     _print_limits(outcome)
     print(f"pick: {outcome.pick.reason}")
     print(outcome.edge.sentence)

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from doe.response_surface import Surface
 from doe.study.design import design_of
+from doe.study.robust_front import RobustFront
 from doe.study.whole import StudyResult
 from doe.study_file import Study
 from rbdyn.records.words import label, quantity
@@ -106,6 +107,32 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
     # Below the figure, where no point lies.
     figure.legend(
         *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=6, fontsize=8
+    )
+    figure.savefig(path, dpi=130, bbox_inches="tight")
+    plt.close(figure)
+
+
+def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
+    """Every pair of gains that are kept over what is not known: foretold of the front, and simulated."""
+    pairs = list(combinations(range(len(responses)), 2))
+    figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
+    for axis, (i, j) in zip(axes[0], pairs, strict=True):
+        gains = 100.0 * front.gains
+        axis.plot(gains[:, i], gains[:, j], ".", color="tab:blue", markersize=4, label="foretold by emulators")
+        for (name, each), marker in zip(front.confirmed.items(), "*o^v", strict=False):
+            x, y = 100.0 * each.gains[[i, j]]
+            words = f"{name}, simulated: better in all in {100.0 * each.better.all.value:.0f} %"
+            axis.plot(
+                x, y, marker, mfc="none", color="tab:red" if marker == "*" else "black", markersize=9, label=words
+            )
+        axis.axhline(0.0, color="tab:gray", linewidth=1.0)
+        axis.axvline(0.0, color="tab:gray", linewidth=1.0)
+        axis.set_xlabel(f"gain in {quantity(responses[i])[0]} [%]")
+        axis.set_ylabel(f"gain in {quantity(responses[j])[0]} [%]")
+        axis.grid(alpha=0.3)
+    figure.tight_layout()
+    figure.legend(
+        *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=2, fontsize=8
     )
     figure.savefig(path, dpi=130, bbox_inches="tight")
     plt.close(figure)

@@ -63,7 +63,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
     if outcome.direct_pick is not None:
         record["direct" if outcome.adaptive is None else "adaptive"]["chosen"] = _chosen_record(outcome.direct_pick)
     if outcome.robust is not None:
-        record["robust"] = robust_record(outcome.robust)
+        record["robust"] = robust_record(outcome.robust, study.factors)
     if outcome.tolerances is not None:
         record["tolerances"] = outcome.tolerances.as_dict(study.factors)
         record["tolerances_sentence"] = outcome.tolerances.sentence

@@ -1,0 +1,82 @@
+"""Designs at the same input sets: what they gain over the first of them, input set by input set."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from doe.arrays import Array, Whole
+from doe.clearance import Simulations
+from doe.pareto import Goals
+from doe.running.failure import Failure
+from doe.study.input_sets import Case, run
+from doe.study_file import Study
+from rbdyn.scene.unknown import Input
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """p designs at the same input sets: ``places`` of these in what was asked for, their quantiles (n, d), outputs, variances
+    and degrees of freedom (p, n, m)."""
+
+    places: Whole
+    quantiles: Array
+    outputs: Array
+    variances: Array
+    freedom: Whole
+
+    def joined(self, rows: Whole, other: "Pairs") -> "Pairs":
+        """The same, at some rows joined with as many replicates more."""
+        outputs, variances, freedom = self.outputs.copy(), self.variances.copy(), self.freedom.copy()
+        outputs[:, rows] = 0.5 * (outputs[:, rows] + other.outputs)
+        variances[:, rows] = 0.25 * (variances[:, rows] + other.variances)
+        freedom[:, rows] += other.freedom + 1
+        return replace(self, outputs=outputs, variances=variances, freedom=freedom)
+
+    def gains(self, goals: Goals, design: int = 1) -> tuple[Array, Array, Whole]:
+        """Relative gains (n, q) of a design over the first, their variances, and the degrees of freedom behind these."""
+        index, both = goals.objectives, [0, design]
+        scale = np.abs(self.outputs[0][:, index])
+        before, after = (goals.costs(each) for each in self.outputs[both])
+        gains = (before - after) / scale
+        noise, other = (each[:, index] for each in self.variances[both])
+        # The first stands in the denominator too.
+        return gains, (other + (1.0 - gains) ** 2 * noise) / scale**2, self.freedom[both][:, :, index].sum(axis=0)
+
+
+def simulated(
+    case: Case,
+    inputs: Sequence[Input],
+    quantiles: Array,
+    designs: Mapping[str, Sequence[str]],
+    simulations: Simulations,
+    seeds: int = 0,
+    more: Sequence[str] = (),
+) -> tuple[Pairs, tuple[Failure, ...]]:
+    """Designs, each as overrides of the scene, at input sets; one at which any failed is left out."""
+    every = [
+        run(
+            case,
+            inputs,
+            quantiles,
+            simulations,
+            seeds,
+            [*design, *more],
+            f"input sets of the {name}, from seed {seeds},",
+        )
+        for name, design in designs.items()
+    ]
+    places = reduce(np.intersect1d, (sets.places for sets in every))
+    kept = [np.flatnonzero(np.isin(sets.places, places)) for sets in every]
+    outputs, variances, freedom = (
+        np.array([array[rows] for array, rows in zip(arrays, kept, strict=True)])
+        for arrays in zip(*((sets.outputs, sets.variances, sets.freedom) for sets in every), strict=True)
+    )
+    lost = tuple(failure for sets in every for failure in sets.failures)
+    return Pairs(places, quantiles[places], outputs, variances, freedom), lost
+
+
+def at(study: Study, point: Array) -> list[str]:
+    """Overrides of the scene at factor values (k,)."""
+    return [f"{factor.key}={float(x)!r}" for factor, x in zip(study.file.factor, point, strict=True)]
