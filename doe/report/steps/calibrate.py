@@ -14,7 +14,7 @@ from doe.unknown import laws
 from doe.unknown.posterior import seen
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.kept import digest_of
-from rbdyn.records.words import label, quantity, shown
+from rbdyn.records.words import quantity, shown
 from rbdyn.result import write_json
 from rbdyn.scene.unknown import Input
 
@@ -23,8 +23,8 @@ RECORD, SAMPLE, OF_SAMPLE = "calibration.json", "posterior.csv", "posterior.json
 CORNER, COMPARED = "corner.png", "measured.png"
 ENDS = (0.05, 0.5, 0.95)
 TAUS = (0.5, 0.05, 0.95)
-# Inputs that a corner plot shows at most: those that were learned best.
-SHOWN = 8
+# Inputs that a corner plot shows at most, those that were learned best; what it leaves out at the ends of their ranges.
+SHOWN, END = 8, 1e-3
 
 
 def record_of(found: Calibration, made_of: str) -> dict[str, Any]:
@@ -88,13 +88,18 @@ def _inputs(found: Calibration) -> dict[str, Any]:
             listed[each.key] = {"shares": {str(value): count / len(column) for value, count in Counter(column).items()}}
         else:
             listed[each.key] = dict(zip(("low", "median", "high"), np.quantile(column, ENDS).tolist(), strict=True))
-            ends = _values(
-                found, np.full((2, sample.shape[1]), 0.5) + np.outer([-0.45, 0.45], np.arange(sample.shape[1]) == place)
-            )
-            listed[each.key]["before"] = [row[each.key] for row in ends]
+            listed[each.key]["before"] = list(_range(found, place, ENDS[0]))
         assert found.learnt is not None
         listed[each.key]["seen"] = seen(float(found.learnt.contraction[place]))
     return listed
+
+
+def _range(found: Calibration, place: int, cut: float) -> tuple[float, float]:
+    """What the scene has at an input's quantiles ``cut`` and 1 - ``cut``, all others at their middle."""
+    quantiles = np.full((2, len(found.inputs)), 0.5)
+    quantiles[:, place] = cut, 1.0 - cut
+    low, high = (row[found.inputs[place].key] for row in _values(found, quantiles))
+    return low, high
 
 
 def _values(found: Calibration, quantiles: Array) -> list[dict[str, Any]]:
@@ -222,9 +227,9 @@ def draw_corner(found: Calibration, record: dict[str, Any], path: Path) -> None:
 
     ranked = sorted(range(len(found.inputs)), key=lambda place: -record["learned"][found.inputs[place].key])
     chosen = [place for place in ranked if found.inputs[place].law.law != "choices"][:SHOWN]
-    sample = found.sample()
-    values = _values(found, sample)
-    columns = [np.array([row[found.inputs[place].key] for row in values]) for place in chosen]
+    values = _values(found, found.sample())
+    columns = [[row[found.inputs[place].key] for row in values] for place in chosen]
+    ranges = [_range(found, place, END) for place in chosen]
     count = max(len(chosen), 1)
     figure, axes = plt.subplots(count, count, figsize=(1.7 * count + 1.5, 1.7 * count + 0.8), squeeze=False)
     for (down, across), axis in np.ndenumerate(axes):
@@ -233,15 +238,17 @@ def draw_corner(found: Calibration, record: dict[str, Any], path: Path) -> None:
             continue
         plain(axis)
         key, other = (found.inputs[chosen[place]] for place in (across, down))
-        low, high = record["inputs"][key.key]["before"]
-        _scaled(axis.set_xscale, axis.set_xlim, key, low, high)
+        ticks = _along(key, *ranges[across], 3)
+        axis.set(xscale=_scale(key), xlim=ranges[across])
+        axis.set_xticks(ticks, [f"{tick:.2g}" for tick in ticks])
         if across == down:
-            edges = np.geomspace(low, high, 21) if key.law.law == "log_uniform" else np.linspace(low, high, 21)
-            axis.hist(columns[across], bins=edges, color=BLUE, alpha=0.6)
+            axis.hist(columns[across], bins=_along(key, *ranges[across], 21), color=BLUE, alpha=0.6)
             axis.set_yticks([])
         else:
             axis.plot(columns[across], columns[down], ".", color=BLUE, markersize=1.5, alpha=0.35)
-            _scaled(axis.set_yscale, axis.set_ylim, other, *record["inputs"][other.key]["before"])
+            ticks = _along(other, *ranges[down], 3)
+            axis.set(yscale=_scale(other), ylim=ranges[down])
+            axis.set_yticks(ticks, [f"{tick:.2g}" for tick in ticks])
         axis.tick_params(labelsize=6)
         axis.minorticks_off()
         if down == count - 1:
@@ -249,52 +256,47 @@ def draw_corner(found: Calibration, record: dict[str, Any], path: Path) -> None:
         if across == 0 and down > 0:
             axis.set_ylabel(other.key.replace(".", ".\n"), fontsize=6.5)
     figure.suptitle(
-        f"inputs after the measurements, each axis 5 to 95 % of its range before; {record['verdict']}",
-        fontsize=8,
-        color=GREY,
+        f"inputs after the measurements, over their range before; {record['verdict']}", fontsize=8, color=GREY
     )
     save(figure, path)
 
 
-def _scaled(scale: Any, limits: Any, each: Input, low: float, high: float) -> None:
-    if each.law.law == "log_uniform":
-        scale("log")
-    limits(low, high)
+def _scale(each: Input) -> str:
+    return "log" if each.law.law == "log_uniform" else "linear"
+
+
+def _along(each: Input, low: float, high: float, count: int) -> list[float]:
+    """Evenly spread values of an input's range."""
+    found: list[float] = (np.geomspace if _scale(each) == "log" else np.linspace)(low, high, count).tolist()
+    return found
 
 
 def draw_compared(record: dict[str, Any], path: Path) -> None:
-    """A panel an output: what was measured by row, with what the simulation gives before and after."""
+    """A panel an output: by how much the simulation was off before and after, by row, in percent of what was measured."""
     from rbdyn.plots.style import BLUE, GREY, ORANGE, VERMILION, plain, plt, save
 
-    cells = record["cells"]
-    outputs = list(dict.fromkeys(each["output"] for each in cells))
+    outputs = list(dict.fromkeys(each["output"] for each in record["cells"]))
     figure, axes = plt.subplots(1, len(outputs), figsize=(4.2 * len(outputs), 3.6), squeeze=False)
     for axis, name in zip(axes[0], outputs, strict=True):
         plain(axis)
-        own = [each for each in cells if each["output"] == name]
-        rows = [each["row"] for each in own]
-        for key, colour, width, words in (("before", GREY, 9.0, "before"), ("after", BLUE, 6.0, "after")):
+        own = [each for each in record["cells"] if each["output"] == name]
+        rows, measured = [each["row"] for each in own], np.array([each["measured"] for each in own])
+        for key, colour, width in (("before", GREY, 9.0), ("after", BLUE, 5.0)):
             if own[0][key] is not None:
-                low, middle, high = zip(*(each[key] for each in own), strict=True)
-                axis.vlines(
-                    rows, low, high, color=colour, linewidth=width, alpha=0.35, label=f"simulated, {words} (5 to 95 %)"
-                )
+                low, middle, high = 100.0 * (np.array([each[key] for each in own]).T / measured - 1.0)
+                words = f"simulated, 5 to 95 % of the inputs {key}"
+                axis.vlines(rows, low, high, color=colour, linewidth=width, alpha=0.35, label=words)
                 axis.plot(rows, middle, "_", color=colour, markersize=8)
-        axis.plot(
-            rows,
-            [each["as_the_scene_says"] for each in own],
-            "x",
-            color=ORANGE,
-            markersize=4,
-            label="as the scene says",
-        )
-        for held, mark, words in ((False, "o", "measured"), (True, "s", "measured, held out")):
-            those = [each for each in own if each["held"] is held]
-            if those:
-                axis.errorbar(
-                    [each["row"] for each in those], [each["measured"] for each in those],
-                    yerr=[NORMAL * each["sd"] for each in those], fmt=mark, color=VERMILION, markersize=3.5, label=words,
-                )  # fmt: skip
-        axis.set(xlabel="row", ylabel=label(name), xticks=rows)
-    axes[0, 0].legend(fontsize=7)
+        said = np.array([each["as_the_scene_says"] for each in own])
+        axis.plot(rows, 100.0 * (said / measured - 1.0), "x", color=ORANGE, markersize=4, label="as the scene says")
+        for held, mark, words in ((False, "o", "measured, 95 %"), (True, "s", "measured and held out")):
+            errors = {
+                each["row"]: 100.0 * NORMAL * each["sd"] / each["measured"] for each in own if each["held"] is held
+            }
+            if errors:
+                axis.errorbar([*errors], [0.0] * len(errors), yerr=[*errors.values()], fmt=mark, color=VERMILION,
+                              markersize=3.5, label=words)  # fmt: skip
+        axis.set(xlabel="row", ylabel=f"{quantity(name)[0]}, off what was measured [%]", xticks=rows)
+    handles, words = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, words, fontsize=7, loc="lower center", ncols=len(words), bbox_to_anchor=(0.5, -0.06))
     save(figure, path)
