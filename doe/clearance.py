@@ -42,6 +42,8 @@ DIRECT_SEEDS = 2_000_000
 # And the runs of an adaptive search.
 ADAPTIVE_SEEDS = 4_000_000
 INPUT_SEEDS = 3_000_000
+# And the input sets of a calibration.
+CALIBRATION_SEEDS = 5_000_000
 # Of a motion that goes into a report.
 ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 

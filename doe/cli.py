@@ -5,6 +5,7 @@ from rbdyn.cli.loading import Loading
 with Loading():
     import typer
 
+    from doe.commands.calibrate import calibrate
     from doe.commands.chain import chain
     from doe.commands.design import design
     from doe.commands.fit import fit
@@ -19,7 +20,7 @@ with Loading():
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 
-for command in (new, study, status, design, fit, front, chain, uncertainty, keys):
+for command in (new, study, status, design, fit, front, chain, uncertainty, calibrate, keys):
     app.command()(command)
 
 

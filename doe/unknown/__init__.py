@@ -6,4 +6,7 @@
 - ``screening``: which of many inputs matter
 - ``spread``: what an output ranges over, and how much of that is noise
 - ``sensitivity``: which input makes it
+- ``decision``: whether one design beats another all the same
+- ``cells``, ``matching``, ``discrepancy``, ``sampler``, ``calibration``: inputs from measurements
+- ``posterior``, ``verdict``: what these taught, and whether that may be called calibrated
 """

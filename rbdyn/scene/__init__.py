@@ -20,7 +20,7 @@ from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_tract
 from rbdyn.scene.mounting import Mounting, material_of, misfits
 from rbdyn.scene.operation import Operation, Support
 from rbdyn.scene.reading import SceneFile
-from rbdyn.scene.uncertain import Uncertain
+from rbdyn.scene.uncertain import Calibrate, Uncertain
 from rbdyn.scene.units import unit_notes
 
 if TYPE_CHECKING:
@@ -67,6 +67,8 @@ class Scene(SceneFile):
     """Tolerance, length and replication of a run."""
     uncertain: Annotated[Uncertain | None, Field(exclude=True)] = None
     """What is not known of all this; no run depends on it."""
+    calibrate: Annotated[Calibrate, Field(exclude=True)] = Calibrate()
+    """How doe calibrate finds that out; no run depends on it."""
 
     @classmethod
     def _of_kind(cls, data: dict[str, Any]) -> type[Self]:

@@ -161,6 +161,18 @@ class Uncertain(Strict):
         return or_refuse(self, found)
 
 
+class Calibrate(Strict):
+    """How inputs are found from measurements by doe calibrate."""
+
+    discrepancy: dict[str, Annotated[float, Field(gt=0.0, le=1.0)]] | Literal["none"] = {}
+    """By how much the simulation itself may err in an output, as a share, by the output's name (0.1 where not named); "none":
+    it is taken as exact, and intervals are far too narrow where it is not."""
+    waves: Annotated[int, Field(ge=1, le=8)] = 4
+    """Waves of input sets at most."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of input sets and samples."""
+
+
 class Documented(Strict):
     """Documented range of a key: its law and the circumstances in which it counts."""
 

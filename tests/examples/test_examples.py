@@ -257,3 +257,17 @@ def test_literature_finite_search(monkeypatch):
     assert 1.0 < found["sign_gap"] < 15.0
     spread = [both[0].max() - both[1].min() for both in found["curves"]["search"].values()]
     assert spread == sorted(spread)
+
+
+def test_oracle_table_4_agrees_with_itself_alone():
+    """Oracle: the paper's own outputs have its levels, signs and ranks; half of them only its signs and ranks; the table
+    upside down neither."""
+    module = script("calibrate_table4")
+    means, scatter = module.table()
+    assert means.shape == (15, 3) and (scatter > 0.0).all().all()
+    theirs = means.to_numpy()
+    frame = module.agreement(np.stack([theirs, 0.5 * theirs, 2.0 * theirs.mean(axis=0) - theirs]))
+    assert frame["level"].to_numpy() == pytest.approx(np.tile([1.0, 0.5, 1.0], 3))
+    assert frame["rank"].to_numpy() == pytest.approx(np.tile([1.0, 1.0, -1.0], 3))
+    assert frame["signs"].tolist() == [3, 3, 0] * 3
+    assert module.told(frame)[-1] == "all three responses together: 1 of 3 input sets"

@@ -19,7 +19,9 @@ from rbdyn.scene.unknown import inputs_of, plain_values, with_values
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCENE = EXAMPLES / "cylindrical_roller.toml"
 # Tables whose numbers belong to the run, to the drawing of the surroundings, or to this very declaration.
-APART = ("numerics.", "mounting.", "uncertain.", "materials.", "support.", "errors.", "operation.schedule.")
+APART = (
+    "numerics.", "mounting.", "uncertain.", "calibrate.", "materials.", "support.", "errors.", "operation.schedule.",
+)  # fmt: skip
 # Of five inputs and seed 7: another stream would spoil every stored plan.
 FIRST = [0.6504268515855074, 0.9173101615160704, 0.10045647248625755, 0.9323312602937222, 0.7118372824043036]
 

@@ -1,0 +1,61 @@
+"""``doe calibrate``."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from doe.commands.options import Quiet, Retry, Scheduler
+from doe.commands.steps import keeping_runs
+from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
+from rbdyn.cli.terminal import guarded, hand_over, output_folder, progress_bar
+
+
+def calibrate(
+    path: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene of a roller bearing.")],
+    data: Annotated[
+        Path, typer.Option(metavar="RIG.csv", help="Measurements, a row a condition: scene keys, outputs, their _sd.")
+    ],
+    free: Annotated[
+        list[str] | None, valued("KEY", "Key to be found; repeatable.", "all that is unknown", "--free")
+    ] = None,
+    overrides: Set = None,
+    out: Annotated[
+        Path | None, folder_option("Folder of results and of the store of finished runs.", "SCENE_calibration")
+    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry: Retry = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find what is not known of a scene from measurements on a rig, and tell whether it may be called calibrated."""
+    folder = out or Path(f"{path.stem}_calibration")
+    with guarded(as_json), keeping_runs(folder, path), ExitStack() as bars:
+        from doe.clearance import Simulations
+        from doe.report.steps.calibrate import files_of, print_calibration, record_of, stored, write
+        from doe.running.store import Store
+        from doe.study.calibration import find_calibration
+        from doe.study.calibration_question import question_of, read_question
+        from doe.study.runs import STORE
+
+        asked = read_question(path, data, free or (), overrides or ())
+        made_of = question_of(asked)
+        output_folder(folder, "doe", path)
+        record = None if retry else stored(folder, made_of)
+        if record is None:
+            with Store(folder / STORE, path.stem) as store:
+                simulations = Simulations(
+                    store,
+                    workers,
+                    scheduler,
+                    retry,
+                    lambda title: bars.enter_context(progress_bar(title, quiet or as_json)),
+                )
+                found = find_calibration(asked, simulations)
+            bars.close()
+            record = record_of(found, made_of)
+            write(found, record, folder)
+        known = record
+        hand_over(lambda: known, as_json, lambda: print_calibration(known), folder, files_of(known))

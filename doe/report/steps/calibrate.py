@@ -1,0 +1,302 @@
+"""What measurements on a rig taught of a scene's inputs, on the terminal, as JSON, as tables and as pictures."""
+
+import csv
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from doe.arrays import Array
+from doe.study.calibration import NORMAL, Calibration
+from doe.unknown import laws
+from doe.unknown.posterior import seen
+from rbdyn.cli.terminal import print_table
+from rbdyn.records.kept import digest_of
+from rbdyn.records.words import quantity, shown
+from rbdyn.result import write_json
+from rbdyn.scene.unknown import Input
+
+FORMAT, POSTERIOR = "doe.calibration/1", "doe.posterior/1"
+RECORD, SAMPLE, OF_SAMPLE = "calibration.json", "posterior.csv", "posterior.json"
+CORNER, COMPARED = "corner.png", "measured.png"
+ENDS = (0.05, 0.5, 0.95)
+TAUS = (0.5, 0.05, 0.95)
+# Inputs that a corner plot shows at most, those that were learned best; what it leaves out at the ends of their ranges.
+SHOWN, END = 8, 1e-3
+
+
+def record_of(found: Calibration, made_of: str) -> dict[str, Any]:
+    """JSON record of ``doe calibrate``; ``made_of`` tells what it was asked of."""
+    keys = [each.key for each in found.inputs]
+    posterior = found.found.sampled
+    taught, tried = found.learnt, found.trial
+    taus = [] if posterior is None else np.quantile(found.found.taus(posterior.points), TAUS, axis=0).T.tolist()
+    return {
+        "format": FORMAT,
+        "made_of": made_of,
+        "scene": found.case.source,
+        "data": str(found.rig.path),
+        "verdict": found.verdict,
+        "reasons": list(found.objections) or [_refuted(found)] * bool(found.found.refuted),
+        "learned": {} if taught is None else dict(zip(keys, taught.contraction.tolist(), strict=True)),
+        "combinations": [
+            {
+                "powers": {keys[place]: power for place, power in each.powers.items()},
+                "sd_percent": 100.0 * each.after,
+                "sd_percent_before": 100.0 * each.before,
+            }
+            for each in (taught.combinations if taught else ())
+        ],
+        "discrepancy": dict(zip(found.rig.outputs, taus, strict=False)),
+        "held_out": None if tried is None else {
+            "rows": "held out" if tried.held else "each condition in turn",
+            "values": tried.cells,
+            "inside_90_percent": tried.inside,
+            "crps": tried.crps,
+            "crps_before": tried.crps_before,
+        },
+        "posterior": None if posterior is None else SAMPLE,
+        "inputs": {} if posterior is None else _inputs(found),
+        "outliers": [_cell(found, place) for place in found.outliers()],
+        "without_outliers": found.without,
+        "cells": [_cell(found, place) for place in range(len(found.cells))],
+        "log_evidence": None if posterior is None else posterior.log_evidence,
+        "volumes": found.found.volumes,
+        "screened": found.screened,
+        "runs": found.runs,
+        "seed": found.case.scene.calibrate.seed,
+        "notes": list(found.notes),
+    }  # fmt: skip
+
+
+def _refuted(found: Calibration) -> str:
+    told = ", ".join(
+        f"{quantity(name)[0]} of row {row}" for row, name in (found.cells[place] for place in found.found.refuted)
+    )
+    return f"no input set within the laws gives what was measured: {told}"
+
+
+def _inputs(found: Calibration) -> dict[str, Any]:
+    sample = found.sample()
+    listed = dict[str, dict[str, Any]]()
+    values = _values(found, sample)
+    for place, each in enumerate(found.inputs):
+        column = [row[each.key] for row in values]
+        if each.law.law == "choices":
+            listed[each.key] = {"shares": {str(value): count / len(column) for value, count in Counter(column).items()}}
+        else:
+            listed[each.key] = dict(zip(("low", "median", "high"), np.quantile(column, ENDS).tolist(), strict=True))
+            listed[each.key]["before"] = list(_range(found, place, ENDS[0]))
+        assert found.learnt is not None
+        listed[each.key]["seen"] = seen(float(found.learnt.contraction[place]))
+    return listed
+
+
+def _range(found: Calibration, place: int, cut: float) -> tuple[float, float]:
+    """What the scene has at an input's quantiles ``cut`` and 1 - ``cut``, all others at their middle."""
+    quantiles = np.full((2, len(found.inputs)), 0.5)
+    quantiles[:, place] = cut, 1.0 - cut
+    low, high = (row[found.inputs[place].key] for row in _values(found, quantiles))
+    return low, high
+
+
+def _values(found: Calibration, quantiles: Array) -> list[dict[str, Any]]:
+    """What the scene has at each input, a dictionary an input set."""
+    rows = []
+    for row in laws.table_of({each.key: each.law for each in found.inputs}, quantiles):
+        tables = found.case.tables(found.inputs, row)
+        rows.append({key: _at(tables, key) for key in found.case.moving(found.inputs)})
+    return rows
+
+
+def _at(tables: Any, key: str) -> Any:
+    for part in key.split("."):
+        tables = tables[part]
+    return tables
+
+
+def _cell(found: Calibration, place: int) -> dict[str, Any]:
+    (row, name), measured = found.cells[place], found.found.measured
+    value = float(np.exp(measured.values[place]))
+    return {
+        "row": row,
+        "output": name,
+        "measured": value,
+        "sd": value * float(np.sqrt(measured.variances[place])),
+        "held": bool(measured.held[place]),
+        "as_the_scene_says": float(np.exp(found.nominal[place])),
+        "before": _ends(found.before[:, place]),
+        "after": None if found.after is None else _ends(found.after[:, place]),
+        "residual": None if found.residuals is None else float(found.residuals[place]),
+    }
+
+
+def _ends(logarithms: Array) -> list[float]:
+    return np.exp(np.quantile(logarithms, ENDS)).tolist()
+
+
+def print_calibration(record: dict[str, Any]) -> None:
+    """The verdict with its reasons, a table of inputs, what goes together, how well the rest is foretold."""
+    reasons = record["reasons"]
+    print(f"{record['verdict']}{': ' if reasons else ''}{'; '.join(reasons)}")
+    rows = [
+        (key, record["learned"][key], each)
+        for key, each in sorted(record["inputs"].items(), key=lambda pair: -record["learned"][pair[0]])
+    ]
+    if rows:
+        print_table(
+            "inputs, 5 to 95 % of what is likely",
+            ("input", "before", "after", "median", "contraction", ""),
+            [(key, *_interval(each), f"{share:.2f}", each["seen"]) for key, share, each in rows],
+        )
+    for each in record["combinations"]:
+        powers = " · ".join(f"{key}^{power:.2g}" for key, power in each["powers"].items())
+        print(f"known together: {powers} to {each['sd_percent']:.2g} % (before {each['sd_percent_before']:.2g} %)")
+    for name, (median, low, high) in record["discrepancy"].items():
+        print(
+            f"{quantity(name)[0]}: the simulation errs by {100.0 * median:.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f}); "
+            "such an error takes the level, only patterns over rows and outputs teach inputs"
+        )
+    if tried := record["held_out"]:
+        print(
+            f"{tried['rows']}: {tried['inside_90_percent']} of {tried['values']} values in their 90 % interval, "
+            f"CRPS {tried['crps']:.2g} (before {tried['crps_before']:.2g})"
+        )
+    for each in record["outliers"]:
+        print(
+            f"{quantity(each['output'])[0]} of row {each['row']} is {each['residual']:.1f} standard deviations off the others"
+        )
+    if record["without_outliers"]:
+        told = ", ".join(f"{key} {share:.2f}" for key, share in record["without_outliers"].items())
+        print(f"contraction without these: {told}")
+    if record["screened"]:
+        most = max(record["screened"], key=lambda key: record["screened"][key])
+        print(
+            f"{len(record['screened'])} more inputs stay as they are: in a screening none made more than "
+            f"{100.0 * record['screened'][most]:.2g} % of an output's variance ({most})"
+        )
+    for note in record["notes"]:
+        print(f"note: {note}")
+
+
+def _interval(each: dict[str, Any]) -> tuple[str, str, str]:
+    if "shares" in each:
+        return "", ", ".join(f"{value} {100.0 * share:.0f} %" for value, share in each["shares"].items()), ""
+    before, after = each["before"], (each["low"], each["high"])
+    told = [f"{shown(low)} to {shown(high)}" for low, high in (before, after)]
+    return told[0], told[1], shown(each["median"])
+
+
+def write(found: Calibration, record: dict[str, Any], folder: Path) -> None:
+    """calibration.json, the posterior sample with its verdict, and the pictures."""
+    draw_compared(record, folder / COMPARED)
+    if found.found.sampled is not None:
+        rows = _values(found, found.sample())
+        with (folder / SAMPLE).open("w", newline="", encoding="utf-8") as file:
+            table = csv.DictWriter(file, list(rows[0]))
+            table.writeheader()
+            table.writerows(rows)
+        told = {name: record[name] for name in ("verdict", "reasons", "scene", "data", "made_of")}
+        sha256 = digest_of((folder / SAMPLE).read_bytes())
+        write_json(folder / OF_SAMPLE, {"format": POSTERIOR, "sample": SAMPLE, "sha256": sha256, **told})
+        draw_corner(found, record, folder / CORNER)
+    # Last, for it says that all is there.
+    write_json(folder / RECORD, record)
+
+
+def files_of(record: dict[str, Any]) -> list[str]:
+    """Names of the files of a calibration."""
+    return [RECORD, *((SAMPLE, OF_SAMPLE, CORNER) if record["posterior"] else ()), COMPARED]
+
+
+def stored(folder: Path, made_of: str) -> dict[str, Any] | None:
+    """The record in a folder, where it was made of the same question by the same code and its files are there."""
+    try:
+        record = json.loads((folder / RECORD).read_text("utf-8"))
+        whole = record["made_of"] == made_of and all((folder / name).exists() for name in files_of(record))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return dict(record) if whole else None
+
+
+def draw_corner(found: Calibration, record: dict[str, Any], path: Path) -> None:
+    """The posterior of the inputs that were learned best: each over its range before, each pair as a cloud."""
+    from rbdyn.plots.style import BLUE, GREY, plain, plt, save
+
+    ranked = sorted(range(len(found.inputs)), key=lambda place: -record["learned"][found.inputs[place].key])
+    chosen = [place for place in ranked if found.inputs[place].law.law != "choices"][:SHOWN]
+    values = _values(found, found.sample())
+    columns = [[row[found.inputs[place].key] for row in values] for place in chosen]
+    ranges = [_range(found, place, END) for place in chosen]
+    count = max(len(chosen), 1)
+    figure, axes = plt.subplots(count, count, figsize=(1.7 * count + 1.5, 1.7 * count + 0.8), squeeze=False)
+    for (down, across), axis in np.ndenumerate(axes):
+        if across > down or not chosen:
+            axis.set_visible(False)
+            continue
+        plain(axis)
+        key, other = (found.inputs[chosen[place]] for place in (across, down))
+        ticks = _along(key, *ranges[across], 3)
+        axis.set(xscale=_scale(key), xlim=ranges[across])
+        axis.set_xticks(ticks, [f"{tick:.2g}" for tick in ticks])
+        if across == down:
+            axis.hist(columns[across], bins=_along(key, *ranges[across], 21), color=BLUE, alpha=0.6)
+            axis.set_yticks([])
+        else:
+            axis.plot(columns[across], columns[down], ".", color=BLUE, markersize=1.5, alpha=0.35)
+            ticks = _along(other, *ranges[down], 3)
+            axis.set(yscale=_scale(other), ylim=ranges[down])
+            axis.set_yticks(ticks, [f"{tick:.2g}" for tick in ticks])
+        axis.tick_params(labelsize=6)
+        axis.minorticks_off()
+        if down == count - 1:
+            axis.set_xlabel(key.key.replace(".", ".\n"), fontsize=6.5)
+        if across == 0 and down > 0:
+            axis.set_ylabel(other.key.replace(".", ".\n"), fontsize=6.5)
+    figure.suptitle(
+        f"inputs after the measurements, over their range before; {record['verdict']}", fontsize=8, color=GREY
+    )
+    save(figure, path)
+
+
+def _scale(each: Input) -> str:
+    return "log" if each.law.law == "log_uniform" else "linear"
+
+
+def _along(each: Input, low: float, high: float, count: int) -> list[float]:
+    """Evenly spread values of an input's range."""
+    found: list[float] = (np.geomspace if _scale(each) == "log" else np.linspace)(low, high, count).tolist()
+    return found
+
+
+def draw_compared(record: dict[str, Any], path: Path) -> None:
+    """A panel an output: by how much the simulation was off before and after, by row, in percent of what was measured."""
+    from rbdyn.plots.style import BLUE, GREY, ORANGE, VERMILION, plain, plt, save
+
+    outputs = list(dict.fromkeys(each["output"] for each in record["cells"]))
+    figure, axes = plt.subplots(1, len(outputs), figsize=(4.2 * len(outputs), 3.6), squeeze=False)
+    for axis, name in zip(axes[0], outputs, strict=True):
+        plain(axis)
+        own = [each for each in record["cells"] if each["output"] == name]
+        rows, measured = [each["row"] for each in own], np.array([each["measured"] for each in own])
+        for key, colour, width in (("before", GREY, 9.0), ("after", BLUE, 5.0)):
+            if own[0][key] is not None:
+                low, middle, high = 100.0 * (np.array([each[key] for each in own]).T / measured - 1.0)
+                words = f"simulated, 5 to 95 % of the inputs {key}"
+                axis.vlines(rows, low, high, color=colour, linewidth=width, alpha=0.35, label=words)
+                axis.plot(rows, middle, "_", color=colour, markersize=8)
+        said = np.array([each["as_the_scene_says"] for each in own])
+        axis.plot(rows, 100.0 * (said / measured - 1.0), "x", color=ORANGE, markersize=4, label="as the scene says")
+        for held, mark, words in ((False, "o", "measured, 95 %"), (True, "s", "measured and held out")):
+            errors = {
+                each["row"]: 100.0 * NORMAL * each["sd"] / each["measured"] for each in own if each["held"] is held
+            }
+            if errors:
+                axis.errorbar([*errors], [0.0] * len(errors), yerr=[*errors.values()], fmt=mark, color=VERMILION,
+                              markersize=3.5, label=words)  # fmt: skip
+        axis.set(xlabel="row", ylabel=f"{quantity(name)[0]}, off what was measured [%]", xticks=rows)
+    handles, words = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, words, fontsize=7, loc="lower center", ncols=len(words), bbox_to_anchor=(0.5, -0.06))
+    save(figure, path)

@@ -1,0 +1,284 @@
+"""Inputs of a scene from measurements on a rig: ``doe calibrate``."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import special
+from scipy.stats import t as student
+
+from doe import clearance
+from doe.arrays import Array, Whole
+from doe.clearance import Simulations
+from doe.running.failure import Failure, sentence
+from doe.study.calibration_question import Question, cases_of
+from doe.study.input_sets import HOLES, Case, screened
+from doe.study.rig_file import Rig
+from doe.unknown import laws
+from doe.unknown.calibration import Batch, Matched, Unknowns, matched
+from doe.unknown.discrepancy import Measured
+from doe.unknown.posterior import Learnt, contraction, learnt
+from doe.unknown.verdict import ENOUGH, FAR, Foretold, Trial, by_others, held_out, objections, reweighed, trial
+from rbdyn.faults import RunError
+from rbdyn.result import SimulationResult
+from rbdyn.scene import Scene
+from rbdyn.scene.unknown import Input
+
+# By how much the simulation may err in an output unless the scene says otherwise, as a share.
+DISCREPANCY = 0.1
+# Seeds of a stage and of a condition in it.
+STAGE_SEEDS, CONDITION_SEEDS = 200_000, 1_000
+NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
+# Rows of the posterior sample, and input sets that tell what was likely before.
+SAMPLE, BEFORE = 1000, 2000
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Everything a report needs. ``case`` is the scene with its unknowns, ``inputs`` those that were sought, ``screened`` what
+    was left at its value; ``cells``: row, output; ``nominal``: cells as the scene says, in logarithms; ``before`` and ``after``:
+    cells over the prior and the posterior (n, c); the rest None where everything is ``refuted``."""
+
+    case: Case
+    rig: Rig
+    inputs: list[Input]
+    screened: dict[str, float]
+    cells: list[tuple[int, str]]
+    nominal: Array
+    found: Matched
+    before: Array
+    after: Array | None
+    learnt: Learnt | None
+    trial: Trial | None
+    residuals: Array | None
+    without: dict[str, float] | None
+    objections: tuple[str, ...]
+    runs: int
+    notes: tuple[str, ...]
+
+    @property
+    def verdict(self) -> str:
+        """calibrated, not calibrated or refuted."""
+        return "refuted" if self.found.refuted else "not calibrated" if self.objections else "calibrated"
+
+    def sample(self) -> Array:
+        """Quantiles (n, d) of the inputs, as likely as the posterior."""
+        if self.found.sampled is None:
+            raise RunError("calibration: no input set is left to sample")
+        points = self.found.sampled.points
+        return self.found.quantiles(points[np.linspace(0, len(points) - 1, SAMPLE).astype(int)])
+
+    def outliers(self) -> list[int]:
+        """Places of the cells that the others foretell badly."""
+        return [] if self.residuals is None else np.flatnonzero(np.abs(self.residuals) > FAR).tolist()
+
+
+@dataclass
+class _Rows:
+    """Simulations of all conditions: a case a condition, and where each measured cell is found in them."""
+
+    cases: list[Case]
+    inputs: list[Input]
+    outputs: tuple[str, ...]
+    cells: list[tuple[int, int]]
+    simulations: Simulations
+    runs: int = 0
+
+    def simulate(self, quantiles: Array, stage: int) -> Batch:
+        """Input sets at all conditions. Raises RunError where too many are impossible or fail."""
+        title = f"wave {stage + 1}" if stage < 100 else "posterior"
+        values = laws.table_of({each.key: each.law for each in self.inputs}, quantiles)
+        first = clearance.CALIBRATION_SEEDS + stage * STAGE_SEEDS
+        scenes = [
+            scene
+            for place, case in enumerate(self.cases)
+            for scene in case.scenes(self.inputs, values, case.scene.numerics.seed + first + place * CONDITION_SEEDS)
+        ]
+        labels = [
+            f"{title}, input set {n + 1}, condition {c + 1}" for c in range(len(self.cases)) for n in range(len(values))
+        ]
+        ran = self.run(scenes, labels, title)
+        table = [ran[place :: len(values)] for place in range(len(values))]
+        good = [n for n, row in enumerate(table) if not any(isinstance(each, Failure | str) for each in row)]
+        if len(table) - len(good) > HOLES * len(table):
+            bad = [each for row in table for each in row if isinstance(each, Failure | str)]
+            failures = [each for each in bad if isinstance(each, Failure)]
+            raise RunError(
+                f"{len(table) - len(good)} of {len(table)} input sets gave no result at some condition, more than "
+                f"{100.0 * HOLES:g} %: {sentence(failures) if failures else bad[0]}; narrow the laws of the inputs"
+            )
+        cells, variances, freedom = self.figures([each for n in good for each in table[n]])
+        return Batch(quantiles[good], cells, variances, freedom)
+
+    def run(self, scenes: Sequence[Scene | str], labels: Sequence[str], title: str) -> list[Any]:
+        """Results, failures, or why there is no scene."""
+        places = [place for place, scene in enumerate(scenes) if isinstance(scene, Scene)]
+        self.runs += len(places)
+        ran = self.simulations.run(
+            [scene for scene in scenes if isinstance(scene, Scene)],
+            [labels[place] for place in places],
+            self.simulations.progress(title),
+        )
+        found: list[Any] = list(scenes)
+        for place, result in zip(places, ran, strict=True):
+            found[place] = result
+        return found
+
+    def figures(self, results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
+        """Cells (n, c) in logarithms, their variances and the degrees of freedom behind these, of results by condition."""
+        outputs, errors, samples = clearance.figures(self.outputs, results)
+        if not (outputs > 0.0).all():
+            name = self.outputs[int(np.argmin(outputs.min(axis=0)))]
+            raise RunError(
+                f"{name}: is nothing in a simulation, so no share of it can be compared; leave its column out"
+            )
+        freedom = np.maximum(samples - 1, 1)
+        variances = (np.nan_to_num(errors) / student.ppf(0.975, freedom) / outputs) ** 2
+        conditions, names = np.array(self.cells).T
+        shape = (-1, len(self.cases), len(self.outputs))
+        return (
+            np.log(outputs).reshape(shape)[:, conditions, names],
+            variances.reshape(shape)[:, conditions, names],
+            freedom.reshape(shape)[:, conditions, names],
+        )
+
+
+def find_calibration(question: Question, simulations: Simulations) -> Calibration:
+    """Find the unknown inputs of a scene from a rig's table. Raises RunError, KeyboardInterrupt."""
+    case, sought, rig, notes = question
+    conditions = rig.conditions
+    cases = cases_of(case, rig)
+    inputs, rest = screened(replace(case, every=sought), simulations)
+    places = [(row, name) for row in rig.rows for name in row.values]
+    at = [(conditions.index(row.keys), rig.outputs.index(name)) for row, name in places]
+    rows = _Rows(cases, inputs, rig.outputs, at, simulations)
+    nominal, variances, turns, numerical = _nominal(rows)
+    measured = _measured(case, rig, variances, turns, numerical)
+    found = matched(
+        rows.simulate, measured, _unknowns(case, inputs), case.scene.calibrate.seed, case.scene.calibrate.waves
+    )
+    cells = [(row.number, name) for row, name in places]
+    before = found.cells.mean(found.unknowns.at(np.random.default_rng(0).standard_normal((BEFORE, len(inputs)))))
+    whole = Calibration(
+        case, rig, inputs, rest, cells, nominal, found, before, None, None, None, None, None, (), rows.runs, notes
+    )
+    return whole if found.sampled is None else _judged(whole)
+
+
+def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
+    """Cells as the scene says, in logarithms, variances of one run of each, its counted turns, variances by integration."""
+    scenes = [
+        Scene.from_dict(case.data, case.source, [*case.overrides, *case.uncertain.set, "numerics.companion=true"])
+        for case in rows.cases
+    ]
+    labels = [f"as the scene says, condition {place + 1}" for place in range(len(scenes))]
+    ran = rows.run(scenes, labels, "as the scene says")
+    for result, label in zip(ran, labels, strict=True):
+        if isinstance(result, Failure):
+            raise RunError(f"{label}: {result.cause}")
+    values, variances, _ = rows.figures(ran)
+    turns = np.array([result.counted_turns * result.replicates for result in ran])
+    records = [result.as_dict() for result in ran]
+    numerical = [
+        (records[condition][rows.outputs[name]]["numerical_error"] or 0.0) / NORMAL / np.exp(value)
+        for (condition, name), value in zip(rows.cells, values[0], strict=True)
+    ]
+    return values[0], variances[0], turns[[condition for condition, _ in rows.cells]], np.array(numerical) ** 2
+
+
+def _measured(case: Case, rig: Rig, variances: Array, turns: Array, numerical: Array) -> Measured:
+    scales = case.scene.calibrate.discrepancy
+    cells = [(row, name) for row in rig.rows for name in row.values]
+    found = []
+    for place, (row, name) in enumerate(cells):
+        sd = row.sds[name]
+        # A run as long as the measurement scatters as that does.
+        found.append((sd / row.values[name]) ** 2 if sd else variances[place] * turns[place] / (row.turns or 1.0))
+    conditions = rig.conditions
+    return Measured(
+        np.log([row.values[name] for row, name in cells]),
+        np.array(found) + numerical,
+        np.array([rig.outputs.index(name) for _, name in cells]),
+        np.array([conditions.index(row.keys) for row, _ in cells]),
+        np.array([0.0 if scales == "none" else scales.get(name, DISCREPANCY) for name in rig.outputs]),
+        np.array([row.held for row, _ in cells]),
+    )
+
+
+def _unknowns(case: Case, inputs: Sequence[Input]) -> Unknowns:
+    factor = case.copula(inputs)
+    choices = [place for place, each in enumerate(inputs) if each.law.law == "choices"]
+
+    def at(scores: Array) -> Array:
+        quantiles = special.ndtr(scores if factor is None else scores @ factor.T)
+        for place in choices:
+            law = inputs[place].law
+            quantiles[:, place] = laws.quantiles_of(law, laws.values_of(law, quantiles[:, place]))
+        return quantiles
+
+    return Unknowns(len(inputs), at)
+
+
+def _judged(given: Calibration) -> Calibration:
+    """What was learned, how well the rest is foretold, and what may be claimed."""
+    found, seed = given.found, given.case.scene.calibrate.seed
+    assert found.sampled is not None
+    points, measured = found.sampled.points, found.measured
+    others = by_others(found.sampled, found.joint, measured, seed)
+    enough = len(np.unique(measured.row[measured.held])) >= ENOUGH
+    test = held_out(found.sampled, found.joint, measured, seed) if enough else others
+    result = trial(test, measured, held=enough)
+    residuals = np.zeros(measured.values.size)
+    parts: list[Foretold] = [others, *([test] if enough else [])]
+    for part in parts:
+        residuals[part.places] = part.residuals
+    quantiles = found.quantiles(points)
+    prior = found.quantiles(np.random.default_rng(1).standard_normal((BEFORE, len(given.inputs))))
+    taught = learnt(quantiles, _logarithms(given.inputs, quantiles), _logarithms(given.inputs, prior))
+    taus = dict(
+        zip(given.rig.outputs, zip(np.median(found.taus(points), axis=0), measured.scales, strict=True), strict=True)
+    )
+    against = objections(result, taus, anything=taught.anything, foretells=found.misfit < 2.0)
+    rows = np.linspace(0, len(points) - 1, SAMPLE).astype(int)
+    after = found.cells.mean(quantiles[rows])
+    notes = [
+        *given.notes,
+        *(
+            f"{given.inputs[place].key}: the posterior crowds at an end of its range, which may be too narrow"
+            for place in taught.narrow
+        ),
+    ]
+    whole = replace(
+        given,
+        after=after,
+        learnt=taught,
+        trial=result,
+        residuals=residuals,
+        objections=tuple(against),
+        notes=tuple(notes),
+    )
+    return replace(whole, without=_without(whole))
+
+
+def _without(given: Calibration) -> dict[str, float] | None:
+    """Contraction by key without the cells that the others foretell badly; None where there are none that teach."""
+    found = given.found
+    assert found.sampled is not None
+    left = np.setdiff1d(found.measured.learnt, given.outliers())
+    if left.size in (0, found.measured.learnt.size):
+        return None
+    points = reweighed(found.sampled, found.joint, found.measured, left, given.case.scene.calibrate.seed)
+    shares = contraction(found.quantiles(points)).tolist()
+    return dict(zip((each.key for each in given.inputs), shares, strict=True))
+
+
+def _logarithms(inputs: Sequence[Input], quantiles: Array) -> Array:
+    """Logarithms (n, d) of inputs that are positive numbers; NaN of the others."""
+    found = np.full(quantiles.shape, np.nan)
+    for place, each in enumerate(inputs):
+        if each.law.law != "choices":
+            values = np.array(laws.values_of(each.law, quantiles[:, place]))
+            if (values > 0.0).all():
+                found[:, place] = np.log(values)
+    return found

@@ -1,0 +1,132 @@
+"""What is asked of a scene and a rig's table: checked before anything runs."""
+
+import copy
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from doe import clearance
+from doe.study.input_sets import Case, case_of
+from doe.study.rig_file import Rig, read_rig
+from doe.unknown import laws
+from rbdyn.faults import InputError, read_toml, refuse, set_key
+from rbdyn.records.kept import code_version, digest_of
+from rbdyn.scene import Scene
+from rbdyn.scene.uncertain import Uncertain, documented
+from rbdyn.scene.unknown import Input, put
+
+# Quantiles at which a declared law must give a scene.
+LOWEST, HIGHEST = 1e-3, 1.0 - 1e-3
+
+
+class Question(NamedTuple):
+    """A scene with what is not known of it, the inputs that are ``sought``, a rig's table, and notes."""
+
+    case: Case
+    sought: list[Input]
+    rig: Rig
+    notes: tuple[str, ...]
+
+
+def question_of(question: Question) -> str:
+    """What tells one question from another: its scene, its rig, what is sought, and the code that answers it."""
+    case, sought, rig, _ = question
+    sought_of = [[each.key, each.law.model_dump(mode="json")] for each in sought]
+    declared = [case.uncertain.model_dump(mode="json"), case.scene.calibrate.model_dump(mode="json")]
+    rows = [[row.keys, row.values, row.sds, row.turns, row.held] for row in rig.rows]
+    scene = case.scene.model_dump(mode="json")
+    version = code_version(clearance.SIMULATION, "doe.study.calibration")
+    return digest_of(
+        json.dumps([version, scene, declared, sought_of, rows, case.source, str(rig.path)], sort_keys=True)
+    )
+
+
+def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequence[str]) -> Question:
+    """What is asked of a scene and a rig's table; ``free``: keys that are sought, all unknown ones unless named.
+
+    Raises InputError for all that is wrong with them, before anything runs.
+    """
+    rig = read_rig(data)
+    tables = copy.deepcopy(read_toml(path))
+    for override in overrides:
+        set_key(tables, override)
+    base = Scene.from_dict(tables, str(path))
+    given = getattr(base, "uncertain", None) or Uncertain()
+    known = {each.key for each in documented()}
+    laid = set(given.laws)
+    refuse(
+        [
+            f"{data}: column {key} is sought too ({path}: uncertain or --free); take it out of one of them"
+            for key in rig.keys
+            if key in laid or key in free
+        ]
+        + [
+            f'--free {key}: has neither a law in uncertain nor a documented range; write uncertain."{key}" = {{law = ...}}'
+            for key in free
+            if key not in laid and key not in known
+        ]
+    )
+    asked = [key for key in free if key not in laid]
+    declared = given.model_copy(
+        update={"estimated": [*given.estimated, *asked], "defaults": "documented"} if free else {}
+    )
+    case = case_of(str(path), tables, rig.outputs, declared, frozenset(rig.keys))
+    sought = [each for each in case.every if each.law.kind == "unknown" and (not free or each.key in free)]
+    notes = [f"{each.key} varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the key that it multiplies"
+             for each in case.every if each.law.kind == "varies"]  # fmt: skip
+    refuse(
+        f"--free {key}: its documented range does not count in this scene (rbdyn keys {key}); give it a law"
+        for key in free
+        if key not in {each.key for each in case.every}
+    )
+    refuse([] if sought else [f"{path}: uncertain: nothing is unknown that could be found; name keys with a law"])
+    if case.scene.calibrate.discrepancy == "none":
+        notes.append(
+            "discrepancy = none: the simulation is taken as exact; where it is not, intervals are far too narrow"
+        )
+    else:
+        refuse(
+            f"{path}: calibrate.discrepancy: {name} is not measured; known are {', '.join(rig.outputs)}"
+            for name in case.scene.calibrate.discrepancy
+            if name not in rig.outputs
+        )
+    _check_ends(case, sought, cases_of(case, rig))
+    return Question(case, sought, rig, tuple(notes))
+
+
+def cases_of(case: Case, rig: Rig) -> list[Case]:
+    """The case at every condition. Raises InputError for conditions that no scene has."""
+    cases, faults = [], dict[str, None]()
+    for keys in rig.conditions:
+        row = next(each.number for each in rig.rows if each.keys == keys)
+        tables = copy.deepcopy(case.data)
+        try:
+            for key, value in keys.items():
+                put(tables, key, value)
+            scene = Scene.from_dict(tables, f"{rig.path}: row {row}")
+            cases.append(replace(case, data=tables, scene=scene, source=f"{rig.path}: row {row}"))
+        except InputError as error:
+            faults |= dict.fromkeys(error.faults)
+    refuse(faults)
+    return cases
+
+
+def _check_ends(case: Case, sought: Sequence[Input], cases: Sequence[Case]) -> None:
+    """Raises InputError where a declared law reaches beyond what a scene can be."""
+    faults = []
+    for each in sought:
+        if each.key not in case.uncertain.laws or each.law.law == "choices":
+            continue
+        values = [{each.key: value} for value in laws.values_of(each.law, np.array([LOWEST, HIGHEST]))]
+        for row, value in ((row, value) for row in cases for value in values):
+            (scene,) = row.scenes([each], [value], 0)
+            if isinstance(scene, str):
+                faults.append(
+                    f'uncertain."{each.key}": at {value[each.key]:.4g} there is no scene: {scene}; narrow the law'
+                )
+                break
+    refuse(faults)

@@ -1,0 +1,126 @@
+"""Measurements on a rig: a CSV table, a row an operating condition with what was measured there."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from doe.study_file.table import NUMBER, fields_of, listed
+from rbdyn.faults import refuse
+
+# What can be measured, by its name in the results of a simulation; the others of these are no positive numbers.
+OUTPUTS = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
+SD, TURNS, HOLD = "_sd", "turns", "hold"
+YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")
+# Rows that teach.
+FEWEST = 3
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row: its number in the file, values of scene keys, measured values by output with their standard deviations (None
+    where the scatter of ``turns`` shaft turns is to be taken), and whether it is ``held`` out to try what was learned."""
+
+    number: int
+    keys: dict[str, Any]
+    values: dict[str, float]
+    sds: dict[str, float | None]
+    turns: float | None
+    held: bool
+
+    @property
+    def condition(self) -> tuple[tuple[str, Any], ...]:
+        """What tells rows of one condition."""
+        return tuple(self.keys.items())
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig's table: its rows, the scene keys that are its columns, the outputs that were measured."""
+
+    path: Path
+    rows: list[Row]
+    keys: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def conditions(self) -> list[dict[str, Any]]:
+        """Different conditions, in their order."""
+        return [dict(each) for each in dict.fromkeys(row.condition for row in self.rows)]
+
+
+def read_rig(path: Path) -> Rig:
+    """Read a rig's table. Raises InputError with all faults."""
+    header, rows = fields_of(path)
+    header = [name.strip() for name in header]
+    keys = tuple(name for name in header if "." in name)
+    outputs = tuple(name for name in header if name in OUTPUTS)
+    known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD}
+    faults = [f"{path}: {_unknown(name, outputs)}" for name in header if name not in known]
+    faults += [
+        f"{path}: column {name} comes twice; remove one" for name in dict.fromkeys(header) if header.count(name) > 1
+    ]
+    if not outputs:
+        faults.append(f"{path}: no measured output; add a column of {listed(OUTPUTS)}")
+    if not keys:
+        faults.append(f"{path}: no operating condition; add a column of a scene key such as operation.inner_speed_rpm")
+    refuse(faults)
+    found = [
+        _row(
+            dict(zip(header, map(str.strip, row), strict=True)), number, keys, outputs, f"{path}: row {number}", faults
+        )
+        for number, row in enumerate(rows, 1)
+    ]
+    teaching = sum(not row.held for row in found)
+    if teaching < FEWEST:
+        faults.append(f"{path}: {teaching} rows to learn from; give {FEWEST} at least that are not on hold")
+    refuse(faults)
+    return Rig(path, found, keys, outputs)
+
+
+def _unknown(name: str, outputs: Sequence[str]) -> str:
+    if name.endswith(SD):
+        return f"column {listed([name])}: no output {listed([name.removesuffix(SD)])} is measured here; add it or remove this"
+    if name == "cage_slip":
+        return "column cage_slip: may be nothing or less; give cage_speed_rpm, which tells the same"
+    if name.startswith("signal"):
+        return f"column {name}: raw signals are not read; reduce them to {listed(OUTPUTS)} with their {SD} first"
+    return (
+        f"column {listed([name])}: neither a key of a scene (table.key), an output ({listed(OUTPUTS)}), its {SD}, "
+        f"{TURNS} nor {HOLD}; rename or remove it"
+    )
+
+
+def _row(
+    cells: Mapping[str, str], number_of: int, keys: Sequence[str], outputs: Sequence[str], where: str, faults: list[str]
+) -> Row:
+    def number(name: str) -> float | None:
+        text = cells.get(name, "")
+        if text in ("", "nan"):
+            return None
+        if NUMBER.fullmatch(text) and float(text) > 0.0:
+            return float(text)
+        faults.append(f"{where}: {name} = {text!r}: not a positive number; mend it")
+        return 1.0
+
+    values = {name: value for name in outputs if (value := number(name)) is not None}
+    sds, turns = {name: number(name + SD) for name in values}, number(TURNS)
+    if not values:
+        faults.append(f"{where}: nothing measured; remove it")
+    faults += [
+        f"{where}: {name}{SD} is missing; give it, or {TURNS} for the scatter of a run of so many shaft turns"
+        for name, sd in sds.items()
+        if sd is None and turns is None
+    ]
+    faults += [f"{where}: {key} is missing; every row needs a value" for key in keys if not cells[key]]
+    hold = cells.get(HOLD, "").lower()
+    if hold not in (*YES, *NO):
+        faults.append(f"{where}: {HOLD} = {hold!r}: write 1 for a row that is held out, else 0")
+    return Row(number_of, {key: _value(cells[key]) for key in keys}, values, sds, turns, hold in YES)
+
+
+def _value(text: str) -> Any:
+    """A field as TOML would give it."""
+    if NUMBER.fullmatch(text):
+        return int(text) if text.lstrip("+-").isdigit() else float(text)
+    return {"true": True, "false": False}.get(text.lower(), text)

@@ -1,0 +1,162 @@
+"""Inputs of a simulation from measurements: waves of history matching, then a sampled posterior that is simulated again."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from scipy import special
+
+from doe.arrays import Array, Mask, Whole
+from doe.unknown import matching, plan
+from doe.unknown.cells import Cells, fit_cells
+from doe.unknown.discrepancy import BY_ROW, Joint, Measured, joint
+from doe.unknown.sampler import PARTICLES, Sampled, sampled
+
+# Input sets of a wave: so many, and so many an input; candidates that tell what is left; sets that try the posterior.
+FEWEST, EACH, CANDIDATES, TRIED = 64, 10, 16384, 50
+# Emulators miss where squared residuals of the posterior's simulations average more than this.
+MISSED = 2.0
+
+
+class Batch(NamedTuple):
+    """Simulated cells (n, c) in logarithms at quantiles (n, d), their variances (n, c) and degrees of freedom (n, c)."""
+
+    quantiles: Array
+    values: Array
+    variances: Array
+    freedom: Whole
+
+    def joined(self, other: "Batch") -> "Batch":
+        """Both."""
+        return Batch(*(np.concatenate(each) for each in zip(self, other, strict=True)))
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """``inputs`` that are to be found: ``at`` turns normal scores (n, d) into quantiles, as they depend on each other."""
+
+    inputs: int
+    at: Callable[[Array], Array] = special.ndtr
+
+
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """What was found. ``volumes``: share of the prior that each wave left; ``refuted``: places of the cells that rule out
+    everything, else none; ``sampled`` and ``quantiles`` (n, d) of the posterior, None where all is refuted; ``tried``: its
+    simulations, and the mean square ``misfit`` of the emulators there."""
+
+    measured: Measured
+    unknowns: Unknowns
+    batch: Batch
+    cells: Cells
+    volumes: list[float]
+    refuted: list[int]
+    sampled: Sampled | None
+    tried: Batch | None
+    misfit: float
+
+    def quantiles(self, points: Array) -> Array:
+        """Quantiles (n, d) of the inputs of particles."""
+        return self.unknowns.at(points[:, : self.unknowns.inputs])
+
+    def taus(self, points: Array) -> Array:
+        """Discrepancies (n, m) of particles."""
+        return self.measured.taus(points[:, self.unknowns.inputs :])
+
+    def joint(self, points: Array) -> Joint:
+        """Measured cells at particles."""
+        return joint(self.cells, self.measured, self.quantiles(points), self.taus(points))
+
+
+Simulate = Callable[[Array, int], Batch]
+
+
+def matched(
+    simulate: Simulate, measured: Measured, unknowns: Unknowns, seed: int, waves: int = 4, particles: int = PARTICLES
+) -> Matched:
+    """Find the inputs whose simulation is like what was measured.
+
+    ``simulate(quantiles, number)`` runs input sets of the stage of that number. Raises what that raises, and RunError.
+    """
+    random = np.random.default_rng(seed)
+    count, inputs = max(FEWEST, EACH * unknowns.inputs), unknowns.inputs
+    candidates = plan.nested(inputs, CANDIDATES, seed)
+    points, volumes, batch, cells = candidates[:count], list[float](), None, None
+    for wave in range(waves):
+        new = simulate(_dependent(unknowns, points), wave)
+        batch = new if batch is None else batch.joined(new)
+        cells = _emulated(batch, measured, cells)
+        apart, share = matching.implausibility(cells, measured, _dependent(unknowns, candidates))
+        fits = matching.kept(apart, wave)
+        volumes.append(float(fits.mean()))
+        if not fits.any():
+            worst = measured.learnt[matching.ruling_out(apart)].tolist()
+            return Matched(measured, unknowns, batch, cells, volumes, worst, None, None, 0.0)
+        steady = wave > 0 and abs(volumes[-1] - volumes[-2]) < matching.STEADY * volumes[-2]
+        if steady or float(np.median(share[fits], axis=0).max()) < matching.GOOD or wave == waves - 1:
+            break
+        points = _spread_over(candidates[fits], unknowns, cells, measured, wave, count, random)
+    assert batch is not None and cells is not None
+    return _posterior(simulate, measured, unknowns, batch, cells, volumes, seed, particles, random)
+
+
+def _posterior(
+    simulate: Simulate, measured: Measured, unknowns: Unknowns, batch: Batch, cells: Cells, volumes: list[float],
+    seed: int, particles: int, random: np.random.Generator,
+) -> Matched:  # fmt: skip
+    """Sample, simulate some of the posterior; where emulators miss it, they learn from that and it is sampled again."""
+    for stage in (0, 1):
+        found = Matched(measured, unknowns, batch, cells, volumes, [], None, None, 0.0)
+        density = partial(_density, found)
+        sample = sampled(density, unknowns.inputs + measured.scales.size, seed, particles)
+        rows = random.choice(particles, TRIED, replace=False)
+        tried = simulate(found.quantiles(sample.points[rows]), 100 + stage)
+        misfit = _misfit(cells, tried)
+        if misfit < MISSED:
+            break
+        if stage == 0:
+            batch = batch.joined(tried)
+            cells = _emulated(batch, measured, cells)
+    return Matched(measured, unknowns, batch, found.cells, volumes, [], sample, tried, misfit)
+
+
+def _density(found: Matched, points: Array) -> Array:
+    return found.joint(points).log_density(found.measured.values, found.measured.learnt)
+
+
+def _dependent(unknowns: Unknowns, quantiles: Array) -> Array:
+    return unknowns.at(special.ndtri(quantiles.clip(1e-9, 1.0 - 1e-9)))
+
+
+def _spread_over(
+    left: Array,
+    unknowns: Unknowns,
+    cells: Cells,
+    measured: Measured,
+    wave: int,
+    count: int,
+    random: np.random.Generator,
+) -> Array:
+    def fits(quantiles: Array) -> Mask:
+        return matching.kept(matching.implausibility(cells, measured, _dependent(unknowns, quantiles))[0], wave)
+
+    candidates = matching.more(left, fits, 4 * count, random)
+    if len(candidates) > 20 * count:
+        candidates = random.permutation(candidates)[: 20 * count]
+    return matching.spread_out(candidates, candidates[:1], count)
+
+
+def _emulated(batch: Batch, measured: Measured, before: Cells | None) -> Cells:
+    compared = measured.variances + (BY_ROW * measured.scales[measured.output]) ** 2
+    # An exact rig and no discrepancy still leave what the runs themselves scatter.
+    compared = np.maximum(compared, 1e-3 * batch.values.var(axis=0) + 1e-12)
+    return fit_cells(*batch, compared=compared, before=before)
+
+
+def _misfit(cells: Cells, tried: Batch) -> float:
+    """Mean square of how far simulations lie from the emulators, in their doubt and the runs' own error."""
+    mean, doubt = cells.predict(tried.quantiles)
+    whole = (doubt**2).sum(axis=2) + cells.rest + tried.variances.mean(axis=0)
+    return float(((tried.values - mean) ** 2 / whole).mean())

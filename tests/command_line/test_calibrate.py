@@ -1,0 +1,214 @@
+"""``doe calibrate``: bad input in one sentence each, a rig of one's own recovered, files, the answer again."""
+
+import csv
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from doe.cli import app
+from doe.report.steps.calibrate import files_of, print_calibration, record_of, stored, write
+from doe.study.calibration import find_calibration
+from doe.study.calibration_question import read_question
+from rbdyn.scene import Scene
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SHORT = [
+    "numerics.turns=2", "numerics.discard_turns=1", "numerics.impact_window_turns=1", "numerics.replicates=2",
+    "numerics.extend=false", "numerics.companion=false",
+]  # fmt: skip
+UNCERTAIN = f"""
+[uncertain]
+defaults = "none"
+set = {json.dumps(SHORT)}
+"model.pocket_bar_stiffness_N_m" = {{ law = "log_uniform", low = 1e7, high = 2e8 }}
+"lubricant.oil_fraction" = {{ law = "log_uniform", low = 0.005, high = 0.1 }}
+"model.drag_coefficient" = {{ law = "log_uniform", low = 0.3, high = 1.2 }}
+"cage.mass_g" = {{ law = "uniform", low = 40.0, high = 50.0 }}
+"""
+HEADER = "operation.inner_speed_rpm,impact_force_N,impact_force_N_sd,power_loss_W,power_loss_W_sd"
+ROWS = ["12000,40,1,40,1", "18000,60,1,100,2", "24000,80,2,180,3"]
+
+
+def _files(folder: Path, uncertain: str = UNCERTAIN, header: str = HEADER, rows: Sequence[str] = ROWS) -> list[str]:
+    scene, rig = folder / "scene.toml", folder / "rig.csv"
+    scene.write_text((EXAMPLES / "cylindrical_roller.toml").read_text("utf-8") + uncertain, "utf-8")
+    rig.write_text("\n".join([header, *rows]) + "\n", "utf-8")
+    return [str(scene), "--data", str(rig), "--out", str(folder / "out")]
+
+
+def _run(arguments: Sequence[str]) -> Any:
+    return CliRunner().invoke(app, ["calibrate", *arguments])
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"header": HEADER.replace("inner_speed", "inner_sped")}, "inner_sped_rpm: unknown key; did you mean"),
+        ({"header": HEADER.replace("impact_force_N", "impact")}, "column impact: neither a key of a scene"),
+        ({"header": HEADER.replace("power_loss_W_sd", "cage_slip")}, "give cage_speed_rpm, which tells the same"),
+        ({"header": HEADER.replace("power_loss_W_sd", "signal_file")}, "column signal_file: raw signals are not read"),
+        ({"header": HEADER.replace("power_loss_W", "torque_sd", 1)}, "no output torque is measured here"),
+        ({"header": "impact_force_N,impact_force_N_sd", "rows": ["40,1"] * 3}, "no operating condition"),
+        ({"header": "operation.inner_speed_rpm,turns", "rows": ["12000,9"] * 3}, "no measured output"),
+        ({"rows": [*ROWS[:2], "24000,80,,180,3"]}, "row 3: impact_force_N_sd is missing; give it, or turns"),
+        ({"rows": [*ROWS[:2], "24000,-80,2,180,3"]}, "row 3: impact_force_N = '-80': not a positive number"),
+        ({"rows": [*ROWS[:2], "1e12,80,2,180,3"]}, "row 3: operation.inner_speed_rpm"),
+        ({"rows": ROWS[:2]}, "2 rows to learn from; give 3 at least"),
+        ({"header": HEADER + ",hold", "rows": [f"{row},1" for row in ROWS]}, "0 rows to learn from"),
+        ({"header": HEADER + ",hold", "rows": [f"{row},perhaps" for row in ROWS]}, "write 1 for a row that is held out"),
+        ({"uncertain": UNCERTAIN.replace("low = 40.0", "low = -40.0")}, 'uncertain."cage.mass_g": at -39.91 there is no scene'),
+        ({"uncertain": UNCERTAIN.replace("cage.mass_g", "operation.inner_speed_rpm")}, "is sought too"),
+        ({"uncertain": UNCERTAIN + "[calibrate.discrepancy]\nwhirl = 0.1\n"}, "discrepancy: whirl is not measured"),
+        ({"uncertain": UNCERTAIN + "[calibrate]\ndiscrepancy = 'some'\n"}, "calibrate.discrepancy"),
+    ],
+)  # fmt: skip
+def test_bad_input_ends_in_a_sentence_before_anything_runs(
+    tmp_path: Path, change: dict[str, Any], sentence: str
+) -> None:
+    found = _run(_files(tmp_path, **change))
+    assert found.exit_code == 2, found.output
+    assert sentence in found.output and "Traceback" not in found.output
+    assert not (tmp_path / "out" / "study.sqlite").exists()
+
+
+def test_free_keys_need_a_law(tmp_path: Path) -> None:
+    found = _run([*_files(tmp_path), "--free", "bearing.rollers"])
+    assert (
+        found.exit_code == 2
+        and "--free bearing.rollers: has neither a law in uncertain nor a documented" in found.output
+    )
+
+
+class _Result:
+    """A result of a simulation that never ran."""
+
+    counted_turns, replicates = 40.0, 2
+
+    def __init__(self, values: dict[str, float], errors: dict[str, float]) -> None:
+        self.figures = {
+            name: {
+                "value": value * (1.0 + errors[name] * noise),
+                "statistical_error": 2.4 * errors[name] * value,
+                "numerical_error": 0.0,
+                "effective_samples": 8.0,
+            }
+            for (name, value), noise in zip(values.items(), errors["noise"], strict=True)  # type: ignore[call-overload]
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        return self.figures
+
+
+def _responses(scene: Scene) -> dict[str, float]:
+    """Impact by speed and bar stiffness, losses by a part of the load and one of drag."""
+    speed, load = scene.operation.inner_speed_rpm / 24000.0, scene.operation.radial_load_N / 1300.0
+    drag = 30.0 * scene.model.drag_coefficient * (scene.lubricant.oil_fraction / 0.02) * speed**3
+    stiffness = float(scene.model.pocket_bar_stiffness_N_m) / 5e7
+    impact = 80.0 * stiffness**0.35 * speed * load**0.1 + 10.0 * (scene.cage.mass_g / 45.0) * speed**2
+    return {"impact_force_N": impact, "power_loss_W": 60.0 * load * speed + drag}
+
+
+class _Simulations:
+    def __init__(self, errors: tuple[float, float] = (0.01, 0.003)) -> None:
+        self.errors, self.runs = errors, 0
+
+    def progress(self, title: str) -> Any:
+        return lambda done, total: None
+
+    def run(self, scenes: Sequence[Scene], labels: Sequence[str], progress: Any) -> list[_Result]:
+        self.runs += len(scenes)
+        return [self._one(scene) for scene in scenes]
+
+    def _one(self, scene: Scene) -> _Result:
+        noise = np.random.default_rng(scene.numerics.seed).standard_normal(2)
+        impact, loss = self.errors
+        return _Result(_responses(scene), {"impact_force_N": impact, "power_loss_W": loss, "noise": noise})  # type: ignore[dict-item]
+
+
+CONDITIONS = [(12000.0, 600.0), (12000.0, 2000.0), (18000.0, 600.0), (18000.0, 1300.0), (18000.0, 2500.0),
+              (24000.0, 800.0), (24000.0, 1300.0), (28000.0, 2000.0)]  # fmt: skip
+HIDDEN = {"model.pocket_bar_stiffness_N_m": 3e7, "lubricant.oil_fraction": 0.03, "model.drag_coefficient": 0.6}
+
+
+def _own_rig(folder: Path, more: str = "") -> list[str]:
+    """A rig made from a hidden scene; rows 2, 5 and 7 are held out."""
+    random, rows = np.random.default_rng(1), []
+    hidden = Scene.load(EXAMPLES / "cylindrical_roller.toml").changed(HIDDEN)
+    for place, (speed, load) in enumerate(CONDITIONS):
+        scene = hidden.changed({"operation.inner_speed_rpm": speed, "operation.radial_load_N": load})
+        cells = [
+            f"{value * (1.0 + 0.02 * random.standard_normal()):.6g},{0.02 * value:.4g}"
+            for value in _responses(scene).values()
+        ]
+        rows.append(f"{speed},{load},{','.join(cells)},{int(place in (1, 4, 6))}")
+    header = HEADER.replace("inner_speed_rpm,", "inner_speed_rpm,operation.radial_load_N,") + ",hold"
+    return _files(folder, UNCERTAIN + more, header, rows)
+
+
+def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, _, rig, *_ = _own_rig(tmp_path, "[calibrate.discrepancy]\nimpact_force_N = 0.03\npower_loss_W = 0.03\n")
+    question = read_question(Path(scene), Path(rig), (), ())
+    simulations = _Simulations()
+    found = find_calibration(question, simulations)  # type: ignore[arg-type]
+    record = record_of(found, "made of this")
+    assert json.loads(json.dumps(record)) == record
+    assert record["verdict"] == "calibrated", record["reasons"]
+    assert record["runs"] == simulations.runs <= 8 * (1 + 4 * 64 + 2 * 50)
+    for key, value in HIDDEN.items():
+        assert record["inputs"][key]["low"] < value < record["inputs"][key]["high"]
+    # Bar stiffness by the impact; drag only as a product of two inputs, of which neither is known; the mass by nothing.
+    assert record["inputs"]["model.pocket_bar_stiffness_N_m"]["seen"] == "learned"
+    (ridge,) = record["combinations"]
+    assert set(ridge["powers"]) == {"lubricant.oil_fraction", "model.drag_coefficient"}
+    assert min(ridge["powers"].values()) > 0.8 and ridge["sd_percent"] < 0.25 * ridge["sd_percent_before"]
+    assert record["inputs"]["cage.mass_g"]["seen"] == "not seen"
+    assert record["held_out"]["rows"] == "held out" and record["held_out"]["values"] == 6
+    assert set(record["discrepancy"]) == {"impact_force_N", "power_loss_W"}
+    print_calibration(record)
+    told = capsys.readouterr().out
+    assert told.startswith("calibrated") and "known together: lubricant.oil_fraction^1" in told
+
+    write(found, record, tmp_path)
+    assert all((tmp_path / name).stat().st_size > 0 for name in files_of(record))
+    assert stored(tmp_path, "made of this") == record and stored(tmp_path, "made of that") is None
+    with (tmp_path / "posterior.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 1000 and set(rows[0]) == {each.key for each in question.sought}
+    base = Scene.load(EXAMPLES / "cylindrical_roller.toml")
+    assert base.changed({key: float(value) for key, value in rows[0].items()}).cage.mass_g == float(
+        rows[0]["cage.mass_g"]
+    )
+    assert json.loads((tmp_path / "posterior.json").read_text("utf-8"))["verdict"] == "calibrated"
+
+
+def test_no_discrepancy_warns_and_a_missing_sd_is_that_of_a_run(tmp_path: Path) -> None:
+    scene, _, rig, *_ = _own_rig(tmp_path, '[calibrate]\ndiscrepancy = "none"\nwaves = 1\n')
+    lines = Path(rig).read_text("utf-8").splitlines()
+    cells = [line.split(",") for line in lines]
+    for row in cells[1:]:
+        row[3] = ""
+    text = [",".join([*row, "turns" if place == 0 else "20"]) for place, row in enumerate(cells)]
+    Path(rig).write_text("\n".join(text), "utf-8")
+    found = find_calibration(read_question(Path(scene), Path(rig), (), ()), _Simulations())  # type: ignore[arg-type]
+    assert any("intervals are far too narrow" in note for note in found.notes)
+    # Two replicates of 40 turns err by 1 %, one measurement of 20 turns by twice that.
+    impact = found.found.measured.variances[found.found.measured.output == 0]
+    assert np.sqrt(impact) == pytest.approx(0.02, rel=0.1)
+
+
+@pytest.mark.slow
+def test_the_command_runs_and_answers_again_without_running(tmp_path: Path) -> None:
+    command = [*_files(tmp_path, UNCERTAIN + "[calibrate]\nwaves = 1\n"), "--free", "cage.mass_g", "--json"]
+    first = _run(command)
+    assert first.exit_code == 0, first.output
+    record = json.loads(first.stdout)
+    assert {"verdict", "learned", "combinations", "discrepancy", "held_out", "posterior"} <= set(record)
+    assert set(record["learned"]) <= {"cage.mass_g"} and record["verdict"] != "calibrated"
+    store = (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns
+    assert json.loads(_run(command).stdout) == record
+    assert (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns == store
