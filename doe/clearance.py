@@ -61,10 +61,11 @@ def read_scene(study: Study) -> dict[str, Any]:
     """Tables of the study's scene file. Raises InputError when the file is not there or a factor's key is none of a scene."""
     path = study.beside(study.scene.file)
     data = read_toml(path)
+    named = (*(factor.key for factor in study.file.factor), *(each.key for each in study.file.category))
     left_out = [
-        factor.key
-        for factor in study.file.factor
-        for table, _, key in (factor.key.rpartition("."),)
+        whole
+        for whole in named
+        for table, _, key in (whole.rpartition("."),)
         if not isinstance(data.get(table), dict) or key not in data[table]
     ]
     known: Mapping[str, Any] = {}
@@ -81,8 +82,17 @@ def read_scene(study: Study) -> dict[str, Any]:
 def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
     """The study's scene at factor values, with a seed. Raises InputError when a value is impossible."""
     path = study.beside(study.scene.file)
-    assignments = [f"{factor.key}={float(x)!r}" for factor, x in zip(study.file.factor, factors, strict=True)]
-    return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments])
+    return Scene.from_dict(data, str(path), [*overrides, f"numerics.seed={seed}", *assignments(study, factors)])
+
+
+def assignments(study: Study, factors: Array) -> list[str]:
+    """Keys of the scene at factor values (k,) and at the study's categories, as "key=value"."""
+    numbers = zip(study.file.factor, map(float, factors), strict=True)
+    values = study.categories
+    return [
+        *(f"{factor.key}={round(x) if factor.whole else x!r}" for factor, x in numbers),
+        *(f"{each.key}={values[each.name]}" for each in study.file.category),
+    ]
 
 
 def design_scenes(study: Study, points: Array, order: Sequence[int] | None = None) -> list[Scene]:
@@ -306,7 +316,9 @@ def histories(study: Study, points: dict[str, Array], turns: float) -> "dict[str
     """Motion of the confirmation scene at each point, over at most ``turns`` shaft turns. Raises RunError."""
     from rbdyn.dynamics.motion.history import history
 
-    scenes = {name: confirmation_scene(study, point) for name, point in points.items()}
+    scenes = {
+        name: confirmation_scene(study.at(()) if name == "baseline" else study, at) for name, at in points.items()
+    }
     return {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
 
 

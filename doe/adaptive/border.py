@@ -34,7 +34,7 @@ def faces(place: Place, border: Border, rule: Rule, random: np.random.Generator)
     pick = points[rows[pick_all(costs[rows], emulators.goals, None)[0][rule]]]
     span, draws = region.high - region.low, emulators.draws(DRAWN, random)
     found = []
-    for factor, side in product(range(pick.size), (-1, 1)):
+    for factor, side in product(range(pick.size - len(region.levels)), (-1, 1)):
         face = (region.high if side > 0 else region.low)[factor]
         if abs(pick[factor] - face) > NEAR * span[factor]:
             continue

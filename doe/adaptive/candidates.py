@@ -16,18 +16,21 @@ CHILDREN = 128  # points about a front a round
 ROUNDS = (0.2, 0.1, 0.05, 0.02)  # how far from their parents, in shares of the region
 MOVED = 0.6  # chance of each factor to be moved
 PRICE = 0.03  # of one cost, for what is gained of another
+SWITCHED = 0.2  # chance of each category to be drawn anew
 LIKELY = 0.5  # chance of keeping all limits at which a point counts as allowed
 
 
 class Region(NamedTuple):
     """The box from ``low`` to ``high`` (k,) in coded units. A drawing has the values ``origin`` and whole numbers of ``finest``
-    (k,) from it (NaN: any); points are twins unless they are more than ``apart`` (k,) from each other in some factor."""
+    (k,) from it (NaN: any); points are twins unless they are more than ``apart`` (k,) from each other in some factor. The last
+    coordinates are of categories of so many ``levels``, spread evenly from -1 to 1."""
 
     low: Array
     high: Array
     origin: Array
     finest: Array
     apart: Array
+    levels: tuple[int, ...] = ()
 
     def snap(self, points: Array) -> Array:
         """Points (n, k) as they can be drawn within the box."""
@@ -77,6 +80,9 @@ def candidates(
         parents = pool[np.concatenate([random.choice(rows, CHILDREN // 2) for rows in (sure, possible)])]
         moved = random.random(parents.shape) < MOVED
         new = (parents + reach * span * moved * random.standard_normal(parents.shape)).clip(region.low, region.high)
+        for column, count in enumerate(region.levels, len(span) - len(region.levels)):
+            drawn_anew = 2.0 * random.integers(0, count, len(new)) / (count - 1) - 1.0
+            new[:, column] = np.where(random.random(len(new)) < SWITCHED, drawn_anew, parents[:, column])
     found = np.unique(region.snap(np.vstack([pool, new])), axis=0)
     return found[~region.twins(found, avoid)]
 

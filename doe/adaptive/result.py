@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from doe.adaptive.candidates import Region
 from doe.adaptive.emulators import Emulators
 from doe.adaptive.runs import Face
-from doe.arrays import Array, Whole
+from doe.arrays import Array, Rows, Whole
 from doe.pareto.direct import DirectFront, Samples
 
 
@@ -35,7 +35,7 @@ class AdaptiveFront:
     """A front found by emulators and confirmed by fresh runs.
 
     ``front``: its finalists in factor units with their fresh runs alone, and all runs of the search. ``archive`` (a, k) is the
-    whole front that the emulators foretell, with its ``foretold`` responses (a, m) and their ``deviations`` (a, m).
+    whole front that the emulators foretell, of which the rows ``shown`` have the largest hypervolume, with its ``foretold`` responses (a, m) and their ``deviations`` (a, m).
     ``region`` that was searched in the end. ``history``: state after every batch; ``searched`` (n,) are all runs of design and search, in factor units,
     ``why`` each was made ("design", "improvement", "check", "extension") and the replicates ``spent`` on it (n,); ``moves``: faces moved
     and where to (coded); ``faces`` that the pick lies at in the end.
@@ -46,6 +46,7 @@ class AdaptiveFront:
 
     front: DirectFront
     archive: Array
+    shown: Rows
     foretold: Array
     deviations: Array
     emulators: Emulators

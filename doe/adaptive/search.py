@@ -22,15 +22,14 @@ from doe.adaptive.runs import Border, Evaluate, Face, Runs
 from doe.adaptive.settling import CHECKS, as_foretold, missed, nothing_gained
 from doe.arrays import Array, Whole
 from doe.emulator.emulator import THREADS
-from doe.pareto.archive import spread
+from doe.pareto.archive import best_for_hypervolume, hypervolume, spread
 from doe.pareto.direct import DirectFront, Samples
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume
 from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import NAMES, Rule, pick_all
 
 FRESH = 0.3  # of the budget: fresh runs at the finalists, as in a direct search
-SHOWN, FEW = 200, 2048  # points of a front foretold, and levels, by which its hypervolume is told
+SHOWN, FEW = 200, 2048  # points of a front foretold that are shown, and levels, by which its hypervolume is told
 
 
 @dataclass(frozen=True)
@@ -152,7 +151,7 @@ class _Search:
         good = int(self.runs.good.sum())
         if good < 2 + len(self.centre):
             raise ValueError(f"only {good} runs went well; emulators need {2 + len(self.centre)}")
-        self.emulators = fit_emulators(self.goals, self.runs, self.emulators)
+        self.emulators = fit_emulators(self.goals, self.runs, self.emulators, self.region.levels)
         return self.emulators
 
     def _state(self, emulators: Emulators, points: Array, random: np.random.Generator) -> tuple[Levels, Array, Batch]:
@@ -236,6 +235,7 @@ class _Search:
         return AdaptiveFront(
             front=self._front(emulators, ours, base, fresh),
             archive=self.centre + self.step * archive,
+            shown=best_for_hypervolume(costs[rows], SHOWN),
             foretold=foretold,
             deviations=deviations,
             emulators=emulators,

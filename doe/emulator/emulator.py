@@ -143,12 +143,16 @@ def fit_emulator(
     trend: Trend = "quadratic",
     start: Hyperparameters | None = None,
     search: bool = True,
+    prior: tuple[float, float] = PRIOR,
+    trended: int | None = None,
 ) -> Emulator:
     """Fit an emulator to runs at points (n, k) with values (n,) and known variances (n,) of these.
 
     The trend is the largest up to the one asked for with at most a term for two runs. ``start``: hyperparameters of nearly
     the same runs, from which the search starts in the place of the last of its own starts; without ``search`` they stay as
-    they are. Raises ValueError for numbers that are not finite, variances below 0 or fewer than two runs.
+    they are. ``prior``: mean and deviation of the logarithm of a length in half ranges of one factor alone. ``trended``: the
+    first so many coordinates, all unless told, are those of the trend. Raises ValueError for
+    numbers that are not finite, variances below 0 or fewer than two runs.
     """
     at, y = np.asarray(points, float), np.asarray(values, float)
     known = np.array(np.broadcast_to(np.asarray(variances, float), y.shape))
@@ -158,12 +162,12 @@ def fit_emulator(
         raise ValueError(
             "emulator: a point, value or variance is not a finite number, or a variance is below 0; mend it"
         )
-    terms = _terms(trend, *at.shape)
+    terms = _terms(trend, len(at), at.shape[1] if trended is None else trended)
     with THREADS.limit(limits=1):
         found = start
         if search or found is None:
             rows = slice(None, None, -(-len(at) // MOST_SEARCHED))
-            found = _search(at[rows], y[rows], known[rows], terms, start)
+            found = _search(at[rows], y[rows], known[rows], terms, start, prior)
         columns = model_matrix(at, terms)
         rest = solved(covariance_of(at, known, found), columns, y)
         likelihood = -loss(found.logarithms, squares(at, at), columns, y, known)[0]
@@ -182,7 +186,12 @@ def _terms(trend: Trend, runs: int, factors: int) -> tuple[str, ...]:
 
 
 def _search(
-    points: Array, values: Array, variances: Array, terms: tuple[str, ...], start: Hyperparameters | None
+    points: Array,
+    values: Array,
+    variances: Array,
+    terms: tuple[str, ...],
+    start: Hyperparameters | None,
+    prior: tuple[float, float],
 ) -> Hyperparameters:
     """The hyperparameters of the largest restricted likelihood from every start."""
     columns = model_matrix(points, terms)
@@ -196,12 +205,12 @@ def _search(
     if start is not None:
         firsts[-1] = start.logarithms.clip(*ends.T)
     along = squares(points, points)
-    centre = PRIOR[0] + 0.5 * np.log(half.size) + np.log(half)
+    centre = prior[0] + 0.5 * np.log(half.size) + np.log(half)
 
     def penalised(logarithms: Array) -> tuple[float, Array]:
         value, slope = loss(logarithms, along, columns, values, variances)
-        off = (logarithms[:-2] - centre) / PRIOR[1] ** 2
-        return value + 0.5 * PRIOR[1] ** 2 * float(off @ off), slope + np.concatenate([off, [0.0, 0.0]])
+        off = (logarithms[:-2] - centre) / prior[1] ** 2
+        return value + 0.5 * prior[1] ** 2 * float(off @ off), slope + np.concatenate([off, [0.0, 0.0]])
 
     best = min(
         (

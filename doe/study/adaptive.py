@@ -1,7 +1,9 @@
 """The front found in few runs: emulators learn the simulator, and each run goes where it is expected to gain most."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial, reduce
 from typing import ClassVar
 
 import numpy as np
@@ -22,10 +24,10 @@ from doe.study.design import design_of
 from doe.study.direct import Direct, Evaluator
 from doe.study.front import named_faults
 from doe.study.goals import goals_of, region_of
-from doe.study.runs import Runs
+from doe.study.runs import Runs, ordered_runs, runs_of
 from doe.study.surfaces import independent_values, standard_errors
 from doe.study_file import Study
-from rbdyn.faults import InputError, RunError, refuse
+from rbdyn.faults import InputError, RunError, check_all, refuse
 
 SIGNIFICANT = 0.05
 # Where a drawing has no resolution, points are twins within this share of the half range of the region.
@@ -38,12 +40,15 @@ ABOUT, HALF_LEVEL = 6, 0.5
 class Adaptive:
     """Front found in few runs, every failed run, and wall time [s] of the search and of its emulators alone.
 
-    ``edges`` (k, 2) are the ends of the region, in factor units, that was searched in the end.
+    ``edges`` (k, 2) are the ends of the region, in factor units, that was searched in the end. The categories of its pick are
+    those of ``study``, of whose design are the ``runs``; ``front`` are the finalists of ``found`` with these categories.
     """
 
     name: ClassVar[str] = "adaptive"
     found: AdaptiveFront
     front: DirectFront
+    study: Study
+    runs: Runs
     edges: Array
     failures: tuple[Failure, ...]
     seconds: float
@@ -52,11 +57,19 @@ class Adaptive:
 Searched = Direct | Adaptive
 
 
-def check_adaptive(study: Study) -> None:
-    """Raises InputError where the budget has no room for the design."""
+def check_adaptive(study: Study, wanted: bool) -> None:
+    """Raises InputError where a search that is ``wanted`` is impossible, or categories ask for one that is not."""
+    if not wanted:
+        refuse(
+            f"{study.path}: factor.categories of {each.name}: only the adaptive search changes them; add --adaptive"
+            for each in study.file.category
+        )
+        return
     border_of(study)
+    every = study.every_level
+    check_all([partial(clearance.adaptive_scenes, study.at(at), study.baseline[None], [2], 0) for at in every])
     try:
-        check_budget(plan_of(study), len(design_of(study).coded))
+        check_budget(plan_of(study), len(every) * len(design_of(study).coded))
     except ValueError as error:
         raise InputError([f"{study.path}: adaptive.{error}"]) from None
 
@@ -74,20 +87,25 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
     Raises RunError where the runs of a stage fail, InputError for impossible settings or limits, KeyboardInterrupt.
     """
     plan, goals, started = plan_of(study), goals_of(study), time.perf_counter()
-    evaluate = _Evaluator(study, simulations, plan.budget - len(runs.coded))
-    step = region_of(study) * study.step
+    each = {
+        at: runs if at == study.every_level[0] else _design_at(study.at(at), simulations) for at in study.every_level
+    }
+    known = _known(study, each, plan)
+    evaluate = _Evaluator(study, simulations, plan.budget - len(known.points))
     region = region_in_units(study)
-    with named_faults(study, goals, lambda point: point, ""):
+    counts = len(region.levels)
+    step = np.append(region_of(study) * study.step, np.ones(counts))
+    with named_faults(study, goals, lambda point: point[: len(study.factors)], ""):
         try:
             found = adaptive_front(
                 evaluate,
-                study.centre,
+                np.append(study.centre, np.zeros(counts)),
                 step,
                 region,
-                _known(study, runs, plan),
+                known,
                 goals,
                 plan,
-                study.baseline,
+                np.append(study.baseline, -np.ones(counts)),
                 evaluate.tell,
                 border_of(study),
             )
@@ -98,17 +116,56 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
                 causes = "; ".join(group["cause"] for group in grouped(evaluate.failures))
                 raise RunError(f"adaptive front: {error} ({causes})") from None
             raise InputError([f"{study.path}: adaptive.{error}"]) from None
-    edges = study.centre[:, None] + step[:, None] * np.column_stack([found.region.low, found.region.high])
-    front = replace(found.front, searched=_about(study, found))
-    return Adaptive(found, front, edges, tuple(evaluate.failures), time.perf_counter() - started)
+    ends = np.column_stack([found.region.low, found.region.high])[: len(study.factors)]
+    edges = study.centre[:, None] + step[: len(ends), None] * ends
+    levels = levels_at(study, found.front.points[found.front.pick])
+    chosen = study.at(levels)
+    front = replace(_at_levels(study, found.front, levels), searched=_about(study, found, levels))
+    failures = (
+        *evaluate.failures,
+        *(failure for at, one in each.items() if at != study.every_level[0] for failure in one.failures),
+    )
+    return Adaptive(found, front, chosen, each[levels], edges, failures, time.perf_counter() - started)
+
+
+def levels_at(study: Study, point: Array) -> tuple[int, ...]:
+    """Places of the categories' values at a point (k + c,) of the search."""
+    counts = [len(each.categories) for each in study.file.category]
+    coded = point[len(study.factors) :].tolist()
+    return tuple(round(0.5 * (x + 1.0) * (count - 1)) for x, count in zip(coded, counts, strict=True))
+
+
+def _coded_levels(study: Study, levels: tuple[int, ...]) -> list[float]:
+    counts = [len(each.categories) for each in study.file.category]
+    return [2.0 * place / (count - 1) - 1.0 for place, count in zip(levels, counts, strict=True)]
+
+
+def _design_at(study: Study, simulations: Simulations) -> Runs:
+    words = ", ".join(study.categories.values())
+    ordered = ordered_runs(study)
+    ordered = replace(ordered, labels=[f"{label} with {words}" for label in ordered.labels])
+    return runs_of(study, ordered, simulations, simulations.progress(f"design runs with {words}"))
+
+
+def _at_levels(study: Study, front: DirectFront, levels: tuple[int, ...]) -> DirectFront:
+    """The points of a front with categories at these places, in numbers alone."""
+    rows = np.flatnonzero([levels_at(study, point) == levels for point in front.points])
+    parts = ("points", "values", "standard_errors", "costs", "cost_errors")
+    some = {name: getattr(front, name)[rows] for name in parts}
+    some["points"] = some["points"][:, : len(study.factors)]
+    failures = front.failures[:, : len(study.factors)]
+    return replace(front, **some, failures=failures, pick=int(np.flatnonzero(rows == front.pick)[0]))
 
 
 def region_in_units(study: Study) -> Region:
     """The region of the design as -1 to 1, its points at the resolution of the drawing."""
     half = region_of(study) * study.step
-    finest = np.array([factor.resolution or np.nan for factor in study.file.factor]) / half
+    finest = np.array([factor.finest or np.nan for factor in study.file.factor]) / half
     apart = np.where(np.isnan(finest), ALIKE, finest * (1.0 + 1e-9))
-    return Region(-np.ones(half.size), np.ones(half.size), -study.centre / half, finest, apart)
+    levels = tuple(len(each.categories) for each in study.file.category)
+    one, between = np.ones(half.size + len(levels)), np.array([2.0 / (count - 1) for count in levels])
+    origin = np.append(-study.centre / half, -np.ones(len(levels)))
+    return Region(-one, one, origin, np.append(finest, between), np.append(apart, 0.5 * between), levels)
 
 
 def border_of(study: Study) -> Border | None:
@@ -128,13 +185,16 @@ def border_of(study: Study) -> Border | None:
 
     def possible(corners: Array) -> bool:
         try:
-            clearance.adaptive_scenes(study, study.centre + reach * corners, [2] * len(corners), 0)
+            for corner in corners:
+                numbers = study.centre + reach * corner[: reach.size]
+                clearance.adaptive_scenes(study.at(levels_at(study, corner)), numbers[None], [2], 0)
         except InputError:
             return False
         return True
 
     low, high = (ends - study.centre[:, None]).T / reach
-    return Border(low, high, possible)
+    levels = np.ones(len(study.file.category))
+    return Border(np.append(low, -levels), np.append(high, levels), possible)
 
 
 def advice(study: Study, surfaces: list[Surface]) -> list[str]:
@@ -165,26 +225,33 @@ class _Evaluator(Evaluator):
     def batch(self, points: Array, replicates: Whole) -> tuple[Array, Array, Whole]:
         """Responses (n, m), their standard errors (n, m) and the degrees of freedom (n, m) of these."""
         # As a drawing writes them: no trace of how they were worked out.
-        drawn = np.array([self._study.rounded(point) for point in points])
-        scenes = clearance.adaptive_scenes(self._study, drawn, replicates.tolist(), self.done)
+        scenes = []
+        for number, (point, count) in enumerate(zip(points, replicates.tolist(), strict=True), self.done):
+            drawn = self._study.rounded(point[: len(self._study.factors)])
+            study = self._study.at(levels_at(self._study, point))
+            scenes += clearance.adaptive_scenes(study, drawn[None], [count], number)
         values, errors, samples = self.run(scenes, "adaptive run")
         return values, standard_errors(errors, samples), np.maximum(samples - 1, 0)
 
     __call__ = batch  # type: ignore[assignment]
 
 
-def _known(study: Study, runs: Runs, plan: Plan) -> Known:
-    """The design's runs as the search wants them."""
-    number = independent_values(runs)
-    errors = standard_errors(runs.errors, number)
-    replicates = np.full(len(runs.coded), plan.usual)
-    return Known(runs.coded / region_of(study), runs.values, errors, np.maximum(number - 1, 0), replicates)
+def _known(study: Study, each: Mapping[tuple[int, ...], Runs], plan: Plan) -> Known:
+    """The runs of all designs as the search wants them."""
+    parts = []
+    for levels, runs in each.items():
+        number = independent_values(runs)
+        errors, count = standard_errors(runs.errors, number), len(runs.coded)
+        points = np.hstack([runs.coded / region_of(study), np.tile(_coded_levels(study, levels), (count, 1))])
+        parts.append(Known(points, runs.values, errors, np.maximum(number - 1, 0), np.full(count, plan.usual)))
+    return reduce(Known.plus, parts)
 
 
-def _about(study: Study, found: AdaptiveFront) -> Samples:
+def _about(study: Study, found: AdaptiveFront, levels: tuple[int, ...]) -> Samples:
     """What the emulators say about the finalists, in factor units: it stands for runs where slopes are asked for."""
     reach, factors = region_of(study), len(study.factors)
     offsets = HALF_LEVEL * (2.0 * qmc.Sobol(factors, seed=found.front.seed).random_base2(ABOUT) - 1.0)
-    coded = (study.coded(found.front.points)[:, None] + offsets).reshape(-1, factors)
-    means, deviations = found.emulators.predict(coded / reach)
+    coded = (study.coded(found.front.points[:, :factors])[:, None] + offsets).reshape(-1, factors)
+    beside = np.tile(_coded_levels(study, levels), (len(coded), 1))
+    means, deviations = found.emulators.predict(np.hstack([coded / reach, beside]))
     return Samples(study.actual(coded), means, deviations)

@@ -18,7 +18,7 @@ def check_study(study: Study, adaptive: bool = False) -> Runs | None:
             lambda: clearance.confirmation_scene(study, study.baseline),
             lambda: clearance.check_direct(study),
             lambda: check_chains(study),
-            lambda: check_adaptive(study) if adaptive else None,
+            lambda: check_adaptive(study, adaptive),
         )
     )
     return reference_runs(study)

@@ -72,7 +72,10 @@ def confirm(
     Raises RunError where the baseline or the pick cannot be simulated, InputError, KeyboardInterrupt.
     """
     wanted = {"baseline": Choice(study.baseline, "the original design"), **choices}
-    scenes = [clearance.confirmation_scene(study, choice.point) for choice in wanted.values()]
+    scenes = [
+        clearance.confirmation_scene(study.at(()) if name == "baseline" else study, choice.point)
+        for name, choice in wanted.items()
+    ]
     results = simulations.run(scenes, list(wanted), simulations.progress("confirmation"))
     confirmed, failures = {}, []
     for (name, choice), result in zip(wanted.items(), results, strict=True):

@@ -1,8 +1,11 @@
 """The design of a study: its points and what they can tell about the models asked for."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
+
+import numpy as np
 
 from doe.designs import Design, box_behnken, central_composite, full_factorial, latin_hypercube, sobol
 from doe.designs.model import model_terms
@@ -18,9 +21,11 @@ MAKERS: dict[str, Callable[..., Design]] = {make.__name__: make for make in ALL}
 def design_of(study: Study) -> Design:
     """The design in the order of its runs. Raises InputError when its settings are impossible."""
     try:
-        return _design(study.file.design.model_dump_json(exclude_unset=True), len(study.factors))
+        design = _design(study.file.design.model_dump_json(exclude_unset=True), len(study.factors))
     except ValueError as error:
         raise InputError([f"{study.path}: design.{error}"]) from None
+    whole = np.array([factor.whole for factor in study.file.factor])
+    return replace(design, coded=np.where(whole, study.coded(np.rint(study.actual(design.coded))), design.coded))
 
 
 @cache

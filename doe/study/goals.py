@@ -33,7 +33,7 @@ def region_of(study: Study) -> Array:
 def rounded_within(study: Study, point: Array) -> Array:
     """A point (k,) in factor units at the resolution of the drawing, which does not round it out of the region."""
     reach, rounded = region_of(study) * study.step, study.rounded(point)
-    finest = np.array([factor.resolution or 0.0 for factor in study.file.factor])
+    finest = np.array([factor.finest or 0.0 for factor in study.file.factor])
     out = np.abs(rounded - study.centre) > reach * (1.0 + 1e-9)
     inward = study.rounded(rounded + np.sign(study.centre - rounded) * finest)
     return np.where(out & (np.abs(inward - study.centre) <= reach * (1.0 + 1e-9)), inward, rounded)

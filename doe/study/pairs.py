@@ -11,7 +11,6 @@ from doe.clearance import Simulations
 from doe.pareto import Goals
 from doe.running.failure import Failure
 from doe.study.input_sets import Case, run
-from doe.study_file import Study
 from rbdyn.scene.unknown import Input
 
 
@@ -75,8 +74,3 @@ def simulated(
     )
     lost = tuple(failure for sets in every for failure in sets.failures)
     return Pairs(places, quantiles[places], outputs, variances, freedom), lost
-
-
-def at(study: Study, point: Array) -> list[str]:
-    """Overrides of the scene at factor values (k,)."""
-    return [f"{factor.key}={float(x)!r}" for factor, x in zip(study.file.factor, point, strict=True)]

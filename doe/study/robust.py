@@ -16,7 +16,7 @@ from doe.clearance import Simulations
 from doe.running.failure import Failure
 from doe.study.goals import goals_of
 from doe.study.input_sets import Case, case_of, screened
-from doe.study.pairs import at, simulated
+from doe.study.pairs import simulated
 from doe.study.robust_front import RobustFront, find_robust_front
 from doe.study_file import Study
 from doe.unknown import laws
@@ -78,7 +78,10 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     inputs, rest = screened(case, simulations)
     joint, seed = case.joint(inputs), case.uncertain.seed
     quantiles = joint.sets(study.file.robust.points, seed)
-    designs = {"baseline": at(study, study.baseline), "pick": at(study, pick)}
+    designs = {
+        "baseline": clearance.assignments(study.at(()), study.baseline),
+        "pick": clearance.assignments(study, pick),
+    }
     pairs, failures = simulated(case, inputs, quantiles, designs, simulations)
     spent, allowed = 2 * len(pairs.quantiles), round(2 * len(pairs.quantiles) * (1.0 + study.file.robust.settle))
     replicates = case.replicates

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from doe import clearance
 from doe.arrays import Array
 from doe.clearance import Simulations
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
 from doe.running.failure import Failure
 from doe.study.goals import goals_of, region_of, rounded_within
 from doe.study.input_sets import Case, run
-from doe.study.pairs import at, simulated
+from doe.study.pairs import simulated
 from doe.study_file import Study
 from doe.unknown.decision import Better, better, shrunk
 from doe.unknown.joint import Joint
@@ -62,7 +63,7 @@ def find_robust_front(
     low, high = study.actual(-reach), study.actual(reach)
     even = nested(factors + joint.inputs + 1, settings.points, seed + 2)
     points, quantiles = low + (high - low) * even[:, :factors], joint.placed(even[:, factors:])
-    own = [at(study, point) for point in points]
+    own = [clearance.assignments(study, point) for point in points]
     sets = run(case, inputs, quantiles, simulations, JOINT_SEEDS, (), "runs of the robust front", own)
     places = np.hstack([even[sets.places, :factors], sets.quantiles])
     fitted = [
@@ -87,7 +88,8 @@ def find_robust_front(
         note = "no point keeps the limits over what is not known"
         return RobustFront(low[None][:0], np.empty((0, len(q2))), {}, q2, note), spent, sets.failures
     chosen = {"pick": (pick, "the pick"), **_choices(study, found, foretold)}
-    designs = {"baseline": at(study, study.baseline), **{name: at(study, point) for name, (point, _) in chosen.items()}}
+    designs = {"baseline": clearance.assignments(study.at(()), study.baseline)}
+    designs |= {name: clearance.assignments(study, point) for name, (point, _) in chosen.items()}
     pairs, lost = simulated(case, inputs, joint.sets(CONFIRMED, seed), designs, simulations)
     confirmed = {}
     for number, (name, (point, reason)) in enumerate(chosen.items(), 1):

@@ -94,11 +94,16 @@ def run_design(
     Runs that fail are left out. Raises InputError, KeyboardInterrupt, and RunError when too few are left.
     """
     ordered = ordered_runs(study)
-    design, coded, actual = ordered.design, ordered.design.coded, ordered.actual
-    check_runs(study, design)
+    check_runs(study, ordered.design)
     with Store(folder / STORE, study.path.stem) as store:
         simulations = clearance.Simulations(store, workers, scheduler, retry, lambda title: progress)
-        results = simulations.run(ordered.scenes, ordered.labels, progress, ordered.factors)
+        return runs_of(study, ordered, simulations, progress)
+
+
+def runs_of(study: Study, ordered: Ordered, simulations: clearance.Simulations, progress: Progress) -> Runs:
+    """The same of runs that were checked."""
+    design, coded, actual = ordered.design, ordered.design.coded, ordered.actual
+    results = simulations.run(ordered.scenes, ordered.labels, progress, ordered.factors)
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
     if failures and len(left) < (needed := fewest_runs(study, design)):

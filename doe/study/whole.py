@@ -147,6 +147,11 @@ def run_study(
         searched: Searched | None = None
         if direct or adaptive:
             searched = find_direct(study, found, simulations) if direct else find_adaptive(study, runs, simulations)
+        if isinstance(searched, Adaptive) and searched.runs is not runs:
+            # From here on with the categories of the front's pick.
+            study, runs = searched.study, searched.runs
+            surfaces = with_rivals(fit_surfaces(study, runs))
+            found = find_front(study, surfaces)
         clock.lap("adaptive_s" if adaptive else "direct_s")
         chosen = choose(study, surfaces, found, searched, simulations)
         confirmed, at = chosen.confirmed, None if searched is None else searched.front.points

@@ -29,6 +29,8 @@ class Factor(Consistent):
     """Smallest step that a drawing makes, to which the pick is rounded; not rounded where left out."""
     tolerance: Positive | None = None
     """Half width of what manufacture makes of it."""
+    whole: bool = False
+    """Whether only whole numbers are made, such as rollers; runs and pick are rounded to them."""
     allowed: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     """Ends as far as an adaptive search may go beyond the region of the design; not at all where left out."""
 
@@ -38,6 +40,30 @@ class Factor(Consistent):
         if self.resolution is not None and self.resolution < FINEST * self.step:
             steps = f"makes more than {1.0 / FINEST:g} steps of step = {self.step:g}"
             yield f"resolution = {self.resolution:g}: {steps}; coarsen it"
+        if self.whole and self.resolution is not None:
+            yield f"resolution = {self.resolution:g}: whole = true has none but 1; leave it out"
+        if self.whole and self.step < 1.0:
+            yield f"step = {self.step:g}: is less than a whole number; widen it"
+
+    @property
+    def finest(self) -> float | None:
+        """Smallest step that is made."""
+        return 1.0 if self.whole else self.resolution
+
+
+class Category(Consistent):
+    """A factor without numbers, which only the adaptive search changes; a whole design is made at each of its values."""
+
+    name: Name
+    """Name of the factor in tables and messages."""
+    key: Annotated[str, Field(min_length=3)]
+    """Its key in the scene, such as cage.guidance."""
+    categories: Annotated[list[str | bool], Field(min_length=2, max_length=8)]
+    """Values of the key; the first is the baseline's."""
+
+    def faults(self) -> Iterator[str]:
+        if len(self.categories) > len({*map(str, self.categories)}):
+            yield f"categories = {self.categories}: name each value once"
 
 
 Kind = Literal["central_composite", "box_behnken", "full_factorial", "latin_hypercube", "sobol"]

@@ -1,9 +1,10 @@
 """STUDY.toml: which scene, factors, responses, front, chains. Checked before anything runs."""
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -11,7 +12,7 @@ from pydantic import Field, model_validator
 from doe.arrays import Array
 from doe.designs.design import to_actual, to_coded
 from doe.study_file.chain_section import StudyChain
-from doe.study_file.design_section import Design, Factor, Name
+from doe.study_file.design_section import Category, Design, Factor, Name
 from doe.study_file.front_section import Adaptive, Direct, Front, Goal, Robust, Tolerances
 from doe.study_file.table import COUNT, LABELS, Table, read_table
 from rbdyn.faults import InputError, Strict, read_toml, validated
@@ -79,6 +80,8 @@ class StudyFile(Strict):
     """The scene that every run starts from; none where all runs come from a table."""
     factor: Annotated[list[Factor], Field(min_length=1, max_length=8)]
     """The factors."""
+    category: Annotated[list[Category], Field(max_length=3)] = []
+    """Factors without numbers; a [[factor]] that has "categories" is one of these."""
     response: Annotated[list[Response], Field(min_length=1)]
     """The responses."""
     design: Design = Design()
@@ -104,16 +107,28 @@ class StudyFile(Strict):
     reference: Reference | None = None
     """A published table of the same design to stand beside."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _categories_apart(cls, data: Any) -> Any:
+        factors = data.get("factor") if isinstance(data, dict) else None
+        if not isinstance(factors, list):
+            return data
+        apart = [isinstance(one, dict) and "categories" in one for one in factors]
+        moved, kept = (
+            [one for one, is_one in zip(factors, apart, strict=True) if is_one is side] for side in (True, False)
+        )
+        return {**data, "factor": kept, "category": [*data.get("category", []), *moved]} if moved else data
+
     @model_validator(mode="after")
     def _names_agree(self) -> Self:
         names, responses = [factor.name for factor in self.factor], [response.name for response in self.response]
-        keys = [factor.key for factor in self.factor if factor.key]
+        keys = [factor.key for factor in self.factor if factor.key] + [each.key for each in self.category]
         faults = []
         if self.scene is not None:
             faults += [f"factor[{n}].key: missing; add it" for n, one in enumerate(self.factor, 1) if not one.key]
             faults += ["factor: one is too few to simulate; add another"] * (len(names) == 1)
         for kind, given in (
-            ("factor.name", names),
+            ("factor.name", [*names, *(each.name for each in self.category)]),
             ("factor.key", keys),
             ("response.name", responses),
             ("chain.name", [chain.name for chain in self.chain]),
@@ -140,6 +155,8 @@ class Study:
 
     path: Path
     file: StudyFile
+    levels: tuple[int, ...] = ()
+    """Places of the values of its categories; the first of each, which are the baseline's, where there are none."""
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
@@ -191,6 +208,21 @@ class Study:
         """Factor values of coded points (..., k)."""
         return to_actual(coded, self.centre, self.step)
 
+    def at(self, levels: tuple[int, ...]) -> Self:
+        """The study with its categories at these places."""
+        return replace(self, levels=levels)
+
+    @property
+    def every_level(self) -> list[tuple[int, ...]]:
+        """Places of all combinations of the categories' values."""
+        return list(product(*(range(len(each.categories)) for each in self.file.category)))
+
+    @property
+    def categories(self) -> dict[str, str]:
+        """Values of the categories by name."""
+        places = self.levels or self.every_level[0]
+        return {each.name: str(each.categories[at]) for each, at in zip(self.file.category, places, strict=True)}
+
     def by_factor(self, point: Array) -> dict[str, float]:
         """Values (k,) by name of the factor."""
         return dict(zip(self.factors, point.tolist(), strict=True))
@@ -198,7 +230,7 @@ class Study:
     def rounded(self, point: Array) -> Array:
         """A point with every factor at its resolution."""
         values = []
-        for fine, x in zip((factor.resolution for factor in self.file.factor), point.tolist(), strict=True):
+        for fine, x in zip((factor.finest for factor in self.file.factor), point.tolist(), strict=True):
             values.append(x if fine is None else round(round(x / fine) * fine, 12))
         return np.array(values)
 

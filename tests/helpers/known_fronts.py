@@ -6,14 +6,17 @@ Zitzler, Scalable test problems for evolutionary multiobjective optimization (20
 
 from __future__ import annotations
 
+from functools import cache
+from pathlib import Path
+
 import numpy as np
+from scipy import ndimage
 from scipy.stats import qmc
 
 from doe.adaptive import Plan, Runs, adaptive_front
 from doe.adaptive.candidates import Region
-from doe.pareto.archive import spread
+from doe.pareto.archive import best_for_hypervolume, hypervolume, non_dominated, spread
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume
 
 FACTORS, NOISE = 4, 0.02  # of the ranges of the fronts, which are 0 to 1
 
@@ -83,3 +86,56 @@ def share(problem, points):
     front = true_front(problem, len(points))
     ends = np.zeros(front.shape[1]), np.ones(front.shape[1])
     return hypervolume(problem(points), *ends) / hypervolume(front, *ends)
+
+
+@cache
+def _filtered():
+    """Splines through 11 levels from -1 to 1 of each of three clearances: 1962 runs of the example bearing, smoothed."""
+    table = np.loadtxt(Path(__file__).parent / "bearing_table.csv", delimiter=",", skiprows=1)
+    return [ndimage.spline_filter(column.reshape(11, 11, 11), mode="mirror") for column in (table * [1.0, 1e-3, 1.0]).T]
+
+
+def bearing(points):
+    """Impact, whirl and power loss of the example bearing between clearances (n, 3) of -1 to 1."""
+    at = 5.0 * (points.clip(-1.0, 1.0).T + 1.0)
+    return np.column_stack([ndimage.map_coordinates(each, at, mode="mirror", prefilter=False) for each in _filtered()])
+
+
+# Of a replicate, as shares of the responses: as the simulation scatters about the baseline.
+SCATTER = np.array([0.012, 0.03, 0.0003])
+
+
+def bearing_runs(seed):
+    """Runs of it with normal scatter, and standard errors that the replicates tell."""
+    random = np.random.default_rng(seed)
+
+    def evaluate(points, replicates):
+        true = bearing(points)
+        deviation = SCATTER * true / np.sqrt(replicates)[:, None]
+        freedom = np.maximum(2 * replicates - 1, 1)[:, None] * np.ones(true.shape, dtype=np.int64)
+        told = deviation * np.sqrt(random.chisquare(freedom) / freedom)
+        return true + deviation * random.standard_normal(true.shape), told, freedom
+
+    return evaluate
+
+
+@cache
+def bearing_front():
+    """Costs of the front of it, dense."""
+    random = np.random.default_rng(1)
+    points = qmc.Sobol(3, seed=1).random_base2(13) * 2.0 - 1.0
+    for reach in (0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.01, 0.005):
+        costs = bearing(points)
+        rows = non_dominated(costs)
+        rows = rows[spread(costs[rows], 1000)]
+        children = points[random.choice(rows, 3000)] + reach * random.standard_normal((3000, 3))
+        points = np.vstack([points[rows], children.clip(-1.0, 1.0)])
+    costs = bearing(points)
+    return costs[non_dominated(costs)]
+
+
+def bearing_share(points):
+    """Hypervolume of the true costs of points over that of the best as many of the front."""
+    front = bearing_front()
+    ends, best = (front.min(axis=0), front.max(axis=0)), front[best_for_hypervolume(front, len(points))]
+    return hypervolume(bearing(points), *ends) / hypervolume(best, *ends)

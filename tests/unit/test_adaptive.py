@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
-from known_fronts import box, dtlz2, first_runs, noisy, search, share, zdt1
+from known_fronts import bearing_runs, bearing_share, box, dtlz2, first_runs, noisy, search, share, zdt1
 from scipy import special
 
 from doe.adaptive import Batch, Border, Plan, adaptive_front
-from doe.adaptive.candidates import candidates, worth_it
-from doe.adaptive.emulators import fit_emulators
+from doe.adaptive.candidates import Region, candidates, worth_it
+from doe.adaptive.emulators import embedded, fit_emulators
 from doe.adaptive.improvement import Known, batch, dominated, levels_of
 from doe.adaptive.runs import Runs
 from doe.adaptive.settling import as_foretold, missed, nothing_gained
+from doe.designs import central_composite
+from doe.pareto.archive import best_for_hypervolume, hypervolume, spread
 from doe.pareto.goals import Goals
-from doe.pareto.indicators import hypervolume
 from doe.pareto.nsga2 import InfeasibleError
 
 TWO = Goals.of(["min", "min"])
@@ -262,3 +264,67 @@ def test_literature_80_runs_find_the_front_under_noise(problem):
     even = [share(problem, search(problem, seed, first=55, batch=1).front.points) for seed in range(1, 6)]
     assert np.median(ours) >= 0.97
     assert np.median(ours) > np.median(even)
+
+
+@pytest.mark.slow
+def test_a_tabulated_bearing_100_runs():
+    """Whirl turns several times there, and its least lies in a narrow valley on a face of the region. Measured: 0.91 to 0.98
+    of the front, in the mean of 8 seeds 0.95; 2000 runs of the direct search find 0.99."""
+    shares = [bearing_share(bearing_search(seed).front.points) for seed in (1, 2, 3)]
+    assert np.mean(shares) > 0.92
+    assert min(shares) > 0.87
+
+
+def bearing_search(seed, budget=100):
+    """From a central composite design as in the example, on a drawing of micrometres."""
+    evaluate = bearing_runs(seed)
+    coded = central_composite(3, centre_replicates=6).coded / 1.681792830507429
+    eight, zero = np.full(20, 8), np.zeros(3)
+    fine = 0.001 / (np.array([0.005, 0.05, 0.05]) * 1.681792830507429)
+    region = Region(-np.ones(3), np.ones(3), zero, fine, 1.000001 * fine)
+    design = Runs(coded, *evaluate(coded, eight), eight)
+    three = Goals.of(["min"] * 3)
+    return adaptive_front(evaluate, zero, np.ones(3), region, design, three, Plan(budget, seed=seed), zero)
+
+
+def two_kinds(points):
+    """Bowls, which the second of three kinds lowers and the third turns."""
+    kind = np.rint(points[:, 2]).astype(int)
+    costs = bowls(points[:, :2])
+    return np.where((kind == 0)[:, None], costs - 0.3, np.where((kind == 1)[:, None], costs[:, ::-1] + 0.2, costs))
+
+
+def test_the_right_category_is_found_and_no_other_is_asked_often():
+    evaluate = noisy(two_kinds, 1, 0.01)
+    apart = np.array([0.01, 0.01, 0.5])
+    region = Region(-np.ones(3), np.ones(3), np.array([0.0, 0.0, -1.0]), np.array([np.nan, np.nan, 1.0]), apart, (3,))
+    numbers, ones = first_runs(evaluate, 3, 24, 1).points[:, :2], np.ones(24, dtype=np.int64)
+    points = np.column_stack([numbers, np.repeat([-1.0, 0.0, 1.0], 8)])
+    design, zero = Runs(points, *evaluate(points, ones), ones), np.zeros(3)
+    plan = Plan(60, least=1, most=1, usual=1)
+    found = adaptive_front(evaluate, zero, np.ones(3), region, design, TWO, plan, zero)
+    assert set(np.unique(found.front.searched.points[:, 2])) == {-1.0, 0.0, 1.0}
+    assert set(found.front.points[:, 2]) == {0.0}
+    assert (found.front.searched.points[24:, 2] == 0.0).mean() > 0.7
+    line = bowls(found.front.points[:, :2])
+    assert np.sqrt(line).sum(axis=1) == pytest.approx(np.full(len(line), np.sqrt(2.0)), rel=0.03)
+
+
+def test_levels_of_a_category_have_coordinates_of_their_own():
+    """Interpreted: equal levels are as near as the numbers say, others farther, by no order of the levels."""
+    points = np.array([[0.3, -1.0, 1.0], [0.3, 0.0, 1.0], [0.3, 1.0, -1.0]])
+    at = embedded(points, (3, 2))
+    assert at.tolist() == [[0.3, 1, 0, 0, 0, 1], [0.3, 0, 1, 0, 0, 1], [0.3, 0, 0, 1, 1, 0]]
+    assert embedded(points, ()) is points
+
+
+def test_the_best_points_of_a_front_have_its_hypervolume():
+    front = -np.abs(np.random.default_rng(1).standard_normal((3000, 3)))
+    front = front / np.linalg.norm(front, axis=1, keepdims=True)
+    ends = front.min(axis=0), front.max(axis=0)
+    best, even = (hypervolume(front[rows(front, 20)], *ends) for rows in (best_for_hypervolume, spread))
+    assert best > even
+    few = front[:12]
+    ends = few.min(axis=0), few.max(axis=0)
+    every = max(hypervolume(few[list(rows)], *ends) for rows in combinations(range(12), 3))
+    assert hypervolume(few[best_for_hypervolume(few, 3)], *ends) > 0.95 * every

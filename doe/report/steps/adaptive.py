@@ -5,21 +5,22 @@ from typing import Any
 
 import numpy as np
 
-from doe.arrays import or_none
+from doe.arrays import Array, Rows, or_none
 from doe.pareto.surrogate_loss import DRAWS, noisy_hypervolume
 from doe.report.steps.confirmation import point_record
-from doe.study.adaptive import Adaptive
+from doe.study.adaptive import Adaptive, levels_at
 from doe.study.goals import region_of
 from doe.study_file import Study
 
 
 def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
     """``front``: finalists by their fresh runs, with 95 % half widths; ``runs`` of design and search, ``fresh`` ones apart;
-    ``hypervolume`` of the front foretold, on the scale of its own ideal and nadir; ``points``: every run of design and search
-    with its replicates and why it was made."""
-    found, front = adaptive.found, adaptive.front
+    ``hypervolume`` of the front foretold, on the scale of its own ideal and nadir; ``foretold``: the 200 points of that front that have most of its hypervolume; ``points``: every run of design and search with its replicates and why it was made."""
+    found, front = adaptive.found, adaptive.found.front
     rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
-    points = [point_record(study, *row) for row in rows]
+    points = [
+        point_record(study, at[: len(study.factors)], *rest) | {"factors": _factors(study, at)} for at, *rest in rows
+    ]
     costs = front.goals.costs(found.foretold)
     scale = costs.min(axis=0), costs.max(axis=0)
     fresh = noisy_hypervolume(front.costs, front.cost_errors, *scale, DRAWS, front.seed)
@@ -55,10 +56,11 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
         "held": held_sentence(study, adaptive),
         "region": {name: ends for name, ends in zip(study.factors, adaptive.edges.tolist(), strict=True)},
         "points": [
-            {"factors": study.by_factor(point), "replicates": int(count), "why": why}
+            {"factors": _factors(study, point), "replicates": int(count), "why": why}
             for point, count, why in zip(found.searched.points, found.spent, found.why, strict=True)
         ],
         "foretold_points": len(found.archive),
+        "foretold": archive_table(study, adaptive, found.shown),
         "missed": {
             name: {"bias": float(bias), "spread": float(spread)}
             for name, bias, spread in zip(study.responses, found.bias, found.spread, strict=True)
@@ -111,10 +113,18 @@ def _actual(study: Study, factor: int, coded: float) -> float:
     return float(study.centre[factor] + region_of(study)[factor] * study.step[factor] * coded)
 
 
-def archive_table(study: Study, adaptive: Adaptive) -> list[dict[str, float]]:
-    """The whole front that the emulators foretell, with 95 % half widths."""
+def _factors(study: Study, point: Array) -> dict[str, Any]:
+    """Numbers, as they are drawn, and categories of a point (k + c,) of the search, by name."""
+    return study.by_factor(study.rounded(point[: len(study.factors)])) | study.at(levels_at(study, point)).categories
+
+
+def archive_table(study: Study, adaptive: Adaptive, rows: Rows | slice = slice(None)) -> list[dict[str, Any]]:
+    """The front that the emulators foretell, whole or some ``rows``, with 95 % half widths."""
     found = adaptive.found
     errors = [f"{name}_error" for name in study.responses]
-    names = [*study.factors, *study.responses, *errors]
-    table = np.hstack([found.archive, found.foretold, 1.96 * found.deviations])
-    return [dict(zip(names, row, strict=True)) for row in table.tolist()]
+    table = np.hstack([found.foretold, 1.96 * found.deviations])[rows].tolist()
+    names = [*study.responses, *errors]
+    return [
+        _factors(study, at) | dict(zip(names, row, strict=True))
+        for at, row in zip(found.archive[rows], table, strict=True)
+    ]

@@ -80,7 +80,9 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
     if outcome.direct is not None:
         clouds.append(("front on the simulator", outcome.direct.front.values, "tab:green"))
     if outcome.adaptive is not None:
-        clouds.append(("front foretold by emulators", outcome.adaptive.found.foretold, "tab:olive"))
+        clouds.append(
+            ("front foretold by emulators", outcome.adaptive.found.foretold[outcome.adaptive.found.shown], "tab:olive")
+        )
         clouds.append(("its points, simulated afresh", outcome.adaptive.front.values, "tab:green"))
     pairs = list(combinations(range(len(surfaces)), 2))
     figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)

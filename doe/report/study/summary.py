@@ -38,7 +38,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "fit": fit_record(outcome.surfaces),
         "front": front_record(study, outcome.surfaces, outcome.front),
         "pick_on_surfaces": predicted_record(study, outcome.surfaces, outcome.pick.point),
-        "pick": study.by_factor(outcome.pick.point),
+        "pick": study.by_factor(outcome.pick.point) | study.categories,
         "confirmation": confirmation_record(outcome),
         "gains": gains_record(gains),
         "statement": statement(gains),
