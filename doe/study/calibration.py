@@ -21,6 +21,7 @@ from doe.unknown.discrepancy import Measured
 from doe.unknown.posterior import Learnt, contraction, learnt
 from doe.unknown.verdict import ENOUGH, FAR, Foretold, Trial, by_others, held_out, objections, reweighed, trial
 from rbdyn.faults import RunError
+from rbdyn.records.words import quantity
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.unknown import Input
@@ -38,7 +39,7 @@ SAMPLE, BEFORE = 1000, 2000
 class Calibration:
     """Everything a report needs. ``case`` is the scene with its unknowns, ``inputs`` those that were sought, ``screened`` what
     was left at its value; ``cells``: row, output; ``nominal``: cells as the scene says, in logarithms; ``before`` and ``after``:
-    cells over the prior and the posterior (n, c); the rest None where everything is ``refuted``."""
+    cells over the prior and the posterior (n, c); ``after`` and what is judged by it None where nothing is left."""
 
     case: Case
     rig: Rig
@@ -59,8 +60,18 @@ class Calibration:
 
     @property
     def verdict(self) -> str:
-        """calibrated, not calibrated or refuted."""
-        return "refuted" if self.found.refuted else "not calibrated" if self.objections else "calibrated"
+        """calibrated or not calibrated."""
+        return "not calibrated" if self.reasons else "calibrated"
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why inputs may not be called calibrated."""
+        cells = [self.cells[place] for place in self.found.refuted]
+        told = ", ".join(f"{quantity(name)[0]} of row {row}" for row, name in cells)
+        refuted = (
+            f"refuted: no input set within the laws gives what was measured within the allowed discrepancy: {told}"
+        )
+        return [*([refuted] if cells else []), *self.objections]
 
     def sample(self) -> Array:
         """Quantiles (n, d) of the inputs, as likely as the posterior."""

@@ -1,7 +1,7 @@
 """Inputs of a simulation from measurements: waves of history matching, then a sampled posterior that is simulated again."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -44,8 +44,8 @@ class Unknowns:
 @dataclass(frozen=True, eq=False)
 class Matched:
     """What was found. ``volumes``: share of the prior that each wave left; ``refuted``: places of the cells that rule out
-    everything, else none; ``sampled`` and ``quantiles`` (n, d) of the posterior, None where all is refuted; ``tried``: its
-    simulations, and the mean square ``misfit`` of the emulators there."""
+    everything, else none; ``sampled``: the posterior, None where everything is refuted and the simulation is taken as exact;
+    ``tried``: its simulations, and the mean square ``misfit`` of the emulators there."""
 
     measured: Measured
     unknowns: Unknowns
@@ -83,7 +83,7 @@ def matched(
     random = np.random.default_rng(seed)
     count, inputs = max(FEWEST, EACH * unknowns.inputs), unknowns.inputs
     candidates = plan.nested(inputs, CANDIDATES, seed)
-    points, volumes, batch, cells = candidates[:count], list[float](), None, None
+    points, volumes, refuted, batch, cells = candidates[:count], list[float](), list[int](), None, None
     for wave in range(waves):
         new = simulate(_dependent(unknowns, points), wave)
         batch = new if batch is None else batch.joined(new)
@@ -92,34 +92,32 @@ def matched(
         fits = matching.kept(apart, wave)
         volumes.append(float(fits.mean()))
         if not fits.any():
-            worst = measured.learnt[matching.ruling_out(apart)].tolist()
-            return Matched(measured, unknowns, batch, cells, volumes, worst, None, None, 0.0)
+            refuted = measured.learnt[matching.ruling_out(apart)].tolist()
+            break
         steady = wave > 0 and abs(volumes[-1] - volumes[-2]) < matching.STEADY * volumes[-2]
         if steady or float(np.median(share[fits], axis=0).max()) < matching.GOOD or wave == waves - 1:
             break
         points = _spread_over(candidates[fits], unknowns, cells, measured, wave, count, random)
     assert batch is not None and cells is not None
-    return _posterior(simulate, measured, unknowns, batch, cells, volumes, seed, particles, random)
+    found = Matched(measured, unknowns, batch, cells, volumes, refuted, None, None, 0.0)
+    # A larger discrepancy than was allowed may still tell patterns; an exact simulation that is refuted tells nothing.
+    return found if refuted and not measured.scales.any() else _posterior(simulate, found, seed, particles, random)
 
 
-def _posterior(
-    simulate: Simulate, measured: Measured, unknowns: Unknowns, batch: Batch, cells: Cells, volumes: list[float],
-    seed: int, particles: int, random: np.random.Generator,
-) -> Matched:  # fmt: skip
+def _posterior(simulate: Simulate, found: Matched, seed: int, particles: int, random: np.random.Generator) -> Matched:
     """Sample, simulate some of the posterior; where emulators miss it, they learn from that and it is sampled again."""
     for stage in (0, 1):
-        found = Matched(measured, unknowns, batch, cells, volumes, [], None, None, 0.0)
-        density = partial(_density, found)
-        sample = sampled(density, unknowns.inputs + measured.scales.size, seed, particles)
+        size = found.unknowns.inputs + found.measured.scales.size
+        sample = sampled(partial(_density, found), size, seed, particles)
         rows = random.choice(particles, TRIED, replace=False)
         tried = simulate(found.quantiles(sample.points[rows]), 100 + stage)
-        misfit = _misfit(cells, tried)
-        if misfit < MISSED:
+        found = replace(found, sampled=sample, tried=tried, misfit=_misfit(found.cells, tried))
+        if found.misfit < MISSED:
             break
         if stage == 0:
-            batch = batch.joined(tried)
-            cells = _emulated(batch, measured, cells)
-    return Matched(measured, unknowns, batch, found.cells, volumes, [], sample, tried, misfit)
+            batch = found.batch.joined(tried)
+            found = replace(found, batch=batch, cells=_emulated(batch, found.measured, found.cells))
+    return found
 
 
 def _density(found: Matched, points: Array) -> Array:

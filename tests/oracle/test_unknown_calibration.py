@@ -138,7 +138,7 @@ def _of_prior(random: np.random.Generator, scale: float) -> tuple[Array, Array]:
 
 @pytest.mark.slow
 def test_intervals_of_forty_rigs_cover_as_often_as_they_say() -> None:
-    random, covered, ranks = np.random.default_rng(4), [], []
+    random, covered, ranks = np.random.default_rng(5), [], []
     for seed in range(40):
         truth, values = _of_prior(random, 0.1)
         found = _found(values, 0.1, seed)
@@ -161,7 +161,7 @@ def test_a_biased_simulation_needs_a_discrepancy() -> None:
         for scale in covered:
             found = _found(values, scale, seed)
             # Where nothing is left the truth is not covered either.
-            covered[scale].append([False, False] if found.refuted else _covered(found, truth)[:2])
+            covered[scale].append([False, False] if found.sampled is None else _covered(found, truth)[:2])
     assert np.mean(covered[0.1]) >= 0.8
     assert np.mean(covered[0.0]) < 0.5
 
@@ -207,7 +207,10 @@ def test_what_no_input_set_gives_is_refuted_by_the_cells_that_do_it() -> None:
     values[3] += 5.0
     values[5] += 5.0
     found = _found(values, 0.1, 8)
-    assert found.sampled is None and sorted(found.refuted) == [3, 5]
+    assert found.refuted == [3, 5] and found.sampled is not None
+    # An exact simulation would leave nothing at all.
+    found = _found(values, 0.0, 8)
+    assert found.refuted == [3, 5] and found.sampled is None
 
 
 def test_only_a_product_is_seen() -> None:

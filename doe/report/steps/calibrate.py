@@ -39,7 +39,7 @@ def record_of(found: Calibration, made_of: str) -> dict[str, Any]:
         "scene": found.case.source,
         "data": str(found.rig.path),
         "verdict": found.verdict,
-        "reasons": list(found.objections) or [_refuted(found)] * bool(found.found.refuted),
+        "reasons": found.reasons,
         "learned": {} if taught is None else dict(zip(keys, taught.contraction.tolist(), strict=True)),
         "combinations": [
             {
@@ -69,13 +69,6 @@ def record_of(found: Calibration, made_of: str) -> dict[str, Any]:
         "seed": found.case.scene.calibrate.seed,
         "notes": list(found.notes),
     }  # fmt: skip
-
-
-def _refuted(found: Calibration) -> str:
-    told = ", ".join(
-        f"{quantity(name)[0]} of row {row}" for row, name in (found.cells[place] for place in found.found.refuted)
-    )
-    return f"no input set within the laws gives what was measured: {told}"
 
 
 def _inputs(found: Calibration) -> dict[str, Any]:
