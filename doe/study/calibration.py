@@ -24,6 +24,7 @@ from rbdyn.faults import RunError
 from rbdyn.records.words import quantity
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
+from rbdyn.scene.uncertain import Law
 from rbdyn.scene.unknown import Input
 
 # By how much the simulation may err in an output unless the scene says otherwise, as a share.
@@ -218,13 +219,13 @@ def _measured(case: Case, rig: Rig, variances: Array, turns: Array, numerical: A
 
 
 def _unknowns(case: Case, inputs: Sequence[Input]) -> Unknowns:
-    factor = case.copula(inputs)
-    choices = [place for place, each in enumerate(inputs) if each.law.law == "choices"]
+    factor = case.joint(inputs).factor
+    given = [each.law for each in inputs]
+    choices = {place: law for place, law in enumerate(given) if isinstance(law, Law) and law.law == "choices"}
 
     def at(scores: Array) -> Array:
         quantiles = special.ndtr(scores if factor is None else scores @ factor.T)
-        for place in choices:
-            law = inputs[place].law
+        for place, law in choices.items():
             quantiles[:, place] = laws.quantiles_of(law, laws.values_of(law, quantiles[:, place]))
         return quantiles
 

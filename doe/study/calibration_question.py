@@ -7,20 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from doe import clearance
-from doe.study.input_sets import Case, case_of
+from doe.study.input_sets import Case, case_of, impossible
 from doe.study.rig_file import Rig, read_rig
-from doe.unknown import laws
 from rbdyn.faults import InputError, read_toml, refuse, set_key
 from rbdyn.records.kept import code_version, digest_of
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import Uncertain, documented
 from rbdyn.scene.unknown import Input, put
-
-# Quantiles at which a declared law must give a scene.
-LOWEST, HIGHEST = 1e-3, 1.0 - 1e-3
 
 
 class Question(NamedTuple):
@@ -83,6 +77,11 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         for key in free
         if key not in {each.key for each in case.every}
     )
+    refuse(
+        [f'{path}: uncertain.sample = "{given.sample}": calibration starts from laws; leave it out']
+        if given.sample
+        else []
+    )
     refuse([] if sought else [f"{path}: uncertain: nothing is unknown that could be found; name keys with a law"])
     if case.scene.calibrate.discrepancy == "none":
         notes.append(
@@ -94,7 +93,8 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
             for name in case.scene.calibrate.discrepancy
             if name not in rig.outputs
         )
-    _check_ends(case, sought, cases_of(case, rig))
+    # What is wrong at one condition alone is told once.
+    refuse(dict.fromkeys(fault for each in cases_of(case, rig) for fault in impossible(each)))
     return Question(case, sought, rig, tuple(notes))
 
 
@@ -113,20 +113,3 @@ def cases_of(case: Case, rig: Rig) -> list[Case]:
             faults |= dict.fromkeys(error.faults)
     refuse(faults)
     return cases
-
-
-def _check_ends(case: Case, sought: Sequence[Input], cases: Sequence[Case]) -> None:
-    """Raises InputError where a declared law reaches beyond what a scene can be."""
-    faults = []
-    for each in sought:
-        if each.key not in case.uncertain.laws or each.law.law == "choices":
-            continue
-        values = [{each.key: value} for value in laws.values_of(each.law, np.array([LOWEST, HIGHEST]))]
-        for row, value in ((row, value) for row in cases for value in values):
-            (scene,) = row.scenes([each], [value], 0)
-            if isinstance(scene, str):
-                faults.append(
-                    f'uncertain."{each.key}": at {value[each.key]:.4g} there is no scene: {scene}; narrow the law'
-                )
-                break
-    refuse(faults)

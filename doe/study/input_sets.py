@@ -142,7 +142,7 @@ def case_of(
         )
     case = Case(source, data, scene, uncertain, every, tuple(outputs), tuple(overrides), sample)
     case.joint(every)
-    refuse(_impossible(case))
+    refuse(impossible(case))
     return case
 
 
@@ -158,7 +158,7 @@ def read_sample(path: Path) -> dict[str, list[Any]]:
     return columns
 
 
-def _impossible(case: Case) -> Iterator[str]:
+def impossible(case: Case) -> Iterator[str]:
     """What is wrong with the scene at an end of each law that is not documented, one by one."""
     for each in case.every:
         if isinstance(each.law, Law) and each.reason != "declared":
