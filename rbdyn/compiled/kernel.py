@@ -37,7 +37,12 @@ VECTOR = 8 if get_host_cpu_features().get("avx512f") else 4
 # Calls of compiled code return tuples through memory and carry an error status: small functions must vanish.
 WRAPPERS = ("no_cpython_wrapper", "no_cfunc_wrapper")
 # What is not said here would be as in the caller that came first.
-PART: dict[str, Any] = {**OPTIONS, **dict.fromkeys(WRAPPERS, True), "pipeline_class": PartCompiler, "forceinline": False}
+PART: dict[str, Any] = {
+    **OPTIONS,
+    **dict.fromkeys(WRAPPERS, True),
+    "pipeline_class": PartCompiler,
+    "forceinline": False,
+}
 INLINED: dict[str, Any] = {**PART, "forceinline": True}
 
 
@@ -67,7 +72,9 @@ class Inner(CPUDispatcher):
     @functools.cached_property
     def twin(self) -> Any:
         """The same function, callable from Python."""
-        return numba.jit(**{**self.targetoptions, **dict.fromkeys(WRAPPERS, False), "pipeline_class": KernelCompiler})(self.py_func)
+        return numba.jit(**{**self.targetoptions, **dict.fromkeys(WRAPPERS, False), "pipeline_class": KernelCompiler})(
+            self.py_func
+        )
 
 
 class Entry(CPUDispatcher):

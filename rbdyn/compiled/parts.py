@@ -13,9 +13,9 @@ from numba import _dynfunc  # type: ignore[attr-defined]
 from numba.core import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, Flags
+from numba.core.compiler_machinery import PassManager, _pass_registry, register_pass
 from numba.core.datamodel import default_manager, models
 from numba.core.datamodel.manager import DataModelManager
-from numba.core.compiler_machinery import PassManager, _pass_registry, register_pass
 from numba.core.typed_passes import (
     AnnotateTypes,
     IRLegalization,
@@ -196,7 +196,9 @@ class PartCompiler(KernelCompiler):
 
     lowering = PartLowering
 
-    def __init__(self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Flags, *others: Any) -> None:
+    def __init__(
+        self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Flags, *others: Any
+    ) -> None:
         super().__init__(typing, target, library, args, result, PartFlags.of(flags), *others)
 
 
