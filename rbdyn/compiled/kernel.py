@@ -57,7 +57,7 @@ class Inner(CPUDispatcher):
         plain = types.unliteral
         return super().get_call_template([plain(one) for one in args], {name: plain(one) for name, one in kws.items()})
 
-    def compile(self, sig: Any) -> Any:
+    def compile(self: Any, sig: Any) -> Any:
         """Compile without timing it."""
         args, result = normalize_signature(sig)
         if args not in self.overloads:

@@ -147,7 +147,7 @@ class PartFlags(Flags):
     @functools.cache
     def of(flags: Flags) -> "PartFlags":
         """The one instance of these options."""
-        own = PartFlags(flags)
+        own: Any = PartFlags(flags)
         own.no_compile = True
         return own
 
