@@ -210,7 +210,8 @@ def entry(function: Callable[..., Any]) -> Any:
     previous = config.CACHE_DIR
     config.CACHE_DIR = str(cache_folder())
     try:
-        compiled = njit(cache=True, nogil=True, pipeline_class=KernelCompiler, **OPTIONS)(function)
+        make: Any = njit
+        compiled = make(**OPTIONS, cache=True, nogil=True, no_cfunc_wrapper=True, pipeline_class=KernelCompiler)(function)
     finally:
         config.CACHE_DIR = previous
     if isinstance(compiled, CPUDispatcher):

@@ -54,6 +54,14 @@ BEFORE_LOWERING = (
 class Part(JITCodeLibrary):
     """Code of a function and of what it calls, to be linked into its callers; never machine code by itself."""
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Tidy functions up; what takes longer is done once, for the whole."""
+        ll_module.data_layout = self._codegen._data_layout
+        passes, builder = self._codegen._function_pass_manager(opt=1)
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
+
     def finalize(self) -> None:
         """Link what it calls and inline it. Left for the callers to inline, small functions would swell before they shrink."""
         for library in dict.fromkeys(self._linking_libraries):
