@@ -23,8 +23,9 @@ from llvmlite.binding import get_host_cpu_features
 from numba import njit
 from numba.core import types
 from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
 
-from rbdyn.compiled.parts import PartCompiler, SettledCompiler
+from rbdyn.compiled.parts import KernelCompiler, PartCompiler, SettledCompiler
 from rbdyn.compiled.sources import compiled_digest
 
 # No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
@@ -35,7 +36,13 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 VECTOR = 8 if get_host_cpu_features().get("avx512f") else 4
 # Calls of compiled code return tuples through memory and carry an error status: small functions must vanish.
 WRAPPERS = ("no_cpython_wrapper", "no_cfunc_wrapper")
-PART: dict[str, Any] = {**OPTIONS, **dict.fromkeys(WRAPPERS, True), "pipeline_class": PartCompiler}
+# What is not said here would be as in the caller that came first.
+PART: dict[str, Any] = {
+    **OPTIONS,
+    **dict.fromkeys(WRAPPERS, True),
+    "pipeline_class": PartCompiler,
+    "forceinline": False,
+}
 INLINED: dict[str, Any] = {**PART, "forceinline": True}
 
 
@@ -50,6 +57,14 @@ class Inner(CPUDispatcher):
         plain = types.unliteral
         return super().get_call_template([plain(one) for one in args], {name: plain(one) for name, one in kws.items()})
 
+    def compile(self: Any, sig: Any) -> Any:
+        """Compile without timing it."""
+        args, result = normalize_signature(sig)
+        if args not in self.overloads:
+            with self._compiling_counter:
+                self.add_overload(self._compiler.compile(args, result))
+        return self.overloads[args].entry_point
+
     def __call__(self, *arguments: Any) -> Any:
         """Call the twin."""
         return self.twin(*arguments)
@@ -57,7 +72,9 @@ class Inner(CPUDispatcher):
     @functools.cached_property
     def twin(self) -> Any:
         """The same function, callable from Python."""
-        return numba.jit(**{**self.targetoptions, **dict.fromkeys(WRAPPERS, False)})(self.py_func)
+        return numba.jit(**{**self.targetoptions, **dict.fromkeys(WRAPPERS, False), "pipeline_class": KernelCompiler})(
+            self.py_func
+        )
 
 
 class Entry(CPUDispatcher):
@@ -193,7 +210,8 @@ def entry(function: Callable[..., Any]) -> Any:
     previous = config.CACHE_DIR
     config.CACHE_DIR = str(cache_folder())
     try:
-        compiled = njit(cache=True, nogil=True, **OPTIONS)(function)
+        make: Any = njit
+        compiled = make(**OPTIONS, cache=True, nogil=True, no_cfunc_wrapper=True, pipeline_class=KernelCompiler)(function)
     finally:
         config.CACHE_DIR = previous
     if isinstance(compiled, CPUDispatcher):

@@ -6,18 +6,61 @@ counting references, takes two fifths of the time off the first result of a simu
 balls.
 """
 
+import functools
 from typing import Any
 
 from numba import _dynfunc  # type: ignore[attr-defined]
 from numba.core import types
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import PassManager, register_pass
-from numba.core.typed_passes import NativeLowering
+from numba.core.compiler import CompilerBase, Flags
+from numba.core.compiler_machinery import PassManager, _pass_registry, register_pass
+from numba.core.datamodel import default_manager, models
+from numba.core.datamodel.manager import DataModelManager
+from numba.core.typed_passes import (
+    AnnotateTypes,
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.untyped_passes import (
+    DeadBranchPrune,
+    FixupArgs,
+    GenericRewrites,
+    IRProcessing,
+    ReconstructSSA,
+    RewriteSemanticConstants,
+    TranslateByteCode,
+)
+
+# Of numba's passes those that kernels need: they hold no closures, exceptions, unrolled tuples or array expressions.
+BEFORE_LOWERING = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    RewriteSemanticConstants,
+    DeadBranchPrune,
+    GenericRewrites,
+    ReconstructSSA,
+    DeadBranchPrune,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+    IRLegalization,
+    AnnotateTypes,
+)
 
 
 class Part(JITCodeLibrary):
     """Code of a function and of what it calls, to be linked into its callers; never machine code by itself."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Tidy functions up; what takes longer is done once, for the whole."""
+        ll_module.data_layout = self._codegen._data_layout
+        passes, builder = self._codegen._function_pass_manager(opt=1)
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
 
     def finalize(self) -> None:
         """Link what it calls and inline it. Left for the callers to inline, small functions would swell before they shrink."""
@@ -60,7 +103,6 @@ class PartLowering(NativeLowering):
             # It makes no array and returns none: its caller holds them all, and no references need be counted.
             state.targetctx = state.targetctx.subtarget(enable_nrt=False)
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.flags.no_compile = True
         super().run_pass(state)
         code = state["cr"]
         handle = _dynfunc.make_function(code.fndesc.lookup_module(), code.fndesc.qualname, "", 0, code.env, ())
@@ -77,18 +119,95 @@ class SettledLowering(PartLowering):
     library = SettledPart
 
 
-class PartCompiler(CompilerBase):
-    """numba's own but for the lowering."""
+class Whole:
+    """An argument handed on as it is. numba would take a tuple apart and build it anew at every call."""
 
-    lowering: type[PartLowering] = PartLowering
+    def get_argument_type(self: Any) -> Any:
+        """Its own type."""
+        return self.get_value_type()
+
+    def as_argument(self, builder: Any, value: Any) -> Any:
+        """Itself."""
+        return value
+
+    from_argument = as_argument
+
+
+class WholeTuple(Whole, models.TupleModel):
+    """A named tuple."""
+
+
+class WholeUniTuple(Whole, models.UniTupleModel):
+    """A named tuple of one type."""
+
+
+WHOLE = DataModelManager().chain(default_manager)
+WHOLE.register(types.NamedTuple, WholeTuple)
+WHOLE.register(types.NamedUniTuple, WholeUniTuple)
+
+
+class PartFlags(Flags):
+    """Options that stay as they are: numba looks functions up by them, thousands of times."""
+
+    __eq__, __hash__ = object.__eq__, object.__hash__
+
+    @staticmethod
+    @functools.cache
+    def of(flags: Flags) -> "PartFlags":
+        """The one instance of these options."""
+        own: Any = PartFlags(flags)
+        own.no_compile = True
+        return own
+
+    def copy(self) -> "PartFlags":
+        """Itself."""
+        return self
+
+
+class Passes(PassManager):
+    """Passes one after the other, without timings, events and descriptions of types for each of them."""
+
+    def run(self, state: Any) -> None:
+        """Take a function through all passes."""
+        for kind, _ in self.passes:
+            one = _pass_registry.get(kind).pass_inst
+            one.analysis = self._analysis
+            one.run_pass(state)
+
+
+class KernelCompiler(CompilerBase):
+    """numba's own but for passes that look for what no kernel holds, and for how named tuples are handed on."""
+
+    lowering: type[NativeLowering] = NativeLowering
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.state.targetctx = self.state.targetctx.subtarget(data_model_manager=WHOLE)
+
+    @classmethod
+    @functools.cache
+    def passes(cls) -> PassManager:
+        """The one pipeline."""
+        pipeline = Passes("kernel")
+        for kind in (*BEFORE_LOWERING, cls.lowering, NoPythonBackend):
+            pipeline.add_pass(kind)
+        pipeline.finalize()
+        return pipeline
 
     def define_pipelines(self) -> list[PassManager]:
         """The one pipeline."""
-        pipeline = PassManager("part")
-        for kind, what in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
-            pipeline.add_pass(self.lowering if kind is NativeLowering else kind, what)
-        pipeline.finalize()
-        return [pipeline]
+        return [self.passes()]
+
+
+class PartCompiler(KernelCompiler):
+    """Compiler of a ``Part``."""
+
+    lowering = PartLowering
+
+    def __init__(
+        self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Flags, *others: Any
+    ) -> None:
+        super().__init__(typing, target, library, args, result, PartFlags.of(flags), *others)
 
 
 class SettledCompiler(PartCompiler):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import kernel, law, routine
-from rbdyn.dynamics.forces.equations import POWERS, RollerBearing, derivative_once
+from rbdyn.dynamics.forces.equations import POWERS, RollerBearing, derivative, derivative_once
 from rbdyn.dynamics.forces.race_lanes import Scratch
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
 from rbdyn.dynamics.forces.state import PARTS
@@ -86,7 +86,7 @@ def jacobian(bearing, y, stage, k, row, power, loads, scratch, found):
             place = c * z + j
             if c < PARTS:
                 one.y[c] = y[place] + found.increments[place]
-            derivative_once(single, one.y, c // PARTS, one.dy, one.power, one.loads, one.scratch)
+            derivative(single, one.y, c // PARTS, one.dy, one.power, one.loads, one.scratch)
             if c < PARTS:
                 per = 1.0 / (one.y[c] - y[place])
                 one.y[c] = y[place]

@@ -23,7 +23,7 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry
-from rbdyn.quasistatic.rivals.full_system import Stop, System, rival
+from rbdyn.quasistatic.rivals.full_system import Stop, System, move, rival
 from rbdyn.quasistatic.rivals.levenberg_marquardt import CONVERGED, EXHAUSTED, SENTENCES, Damping, levenberg_marquardt
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
@@ -90,8 +90,8 @@ def _search(
             outcome = UNLOADED_BALLS
         if worst < least:
             least = worst
-            best[:] = u
-    u[:] = best
+            move(u, best)
+    move(best, u)
     return outcome, searches, iterations, least
 
 

@@ -53,6 +53,13 @@ def unknowns(system: System, q: Array, balls: Array) -> Array:
 
 
 @routine
+def move(u: Any, to: Any) -> None:
+    """Copy a vector of unknowns, as ``newton.copy`` does a table."""
+    for i in range(u.size):
+        to[i] = u[i]
+
+
+@routine
 def forces(control: Any, system: Any, u: Any, residual: Any, jacobian: Any) -> tuple[float, float]:
     """Fill ``residual`` (n,) [N] and its derivative ``jacobian`` (n, n) [N/m] at ``u``.
 

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.compiled.kernel import routine
-from rbdyn.quasistatic.rivals.full_system import forces
+from rbdyn.quasistatic.rivals.full_system import forces, move
 from rbdyn.quasistatic.row.elimination import eliminate
-from rbdyn.quasistatic.row.newton import ACCEPTED
+from rbdyn.quasistatic.row.newton import ACCEPTED, copy
 
 CONVERGED, STATIONARY, NO_DESCENT, NOT_FINITE, EXHAUSTED = range(5)
 SENTENCES = {
@@ -79,8 +79,8 @@ def levenberg_marquardt(control: Any, system: Any, damping: Any, limit: int, u: 
             scale *= damping.backtrack
         if not better:
             return NO_DESCENT, iteration, worst
-        u[:] = trial
-        residual[:] = ahead
-        jacobian[:, :] = ahead_jacobian
+        move(trial, u)
+        move(ahead, residual)
+        copy(ahead_jacobian, jacobian)
         worst, largest = ahead_worst, ahead_largest
     return (CONVERGED if worst <= ACCEPTED * largest else EXHAUSTED), limit, worst

@@ -11,7 +11,7 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry
-from rbdyn.quasistatic.rivals.full_system import Stop, System, forces, rival, unknowns
+from rbdyn.quasistatic.rivals.full_system import Stop, System, forces, move, rival, unknowns
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.elimination import eliminate
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
@@ -46,20 +46,20 @@ def iterate(control: Any, system: Any, limit: int, u: Any) -> tuple[int, int, fl
         if worst <= ACCEPTED * largest:
             return CONVERGED, step, worst
         if not eliminate(jacobian, residual, size, 0.0):
-            u[:] = best
+            move(best, u)
             return SINGULAR, step, least
         for i in range(size):
             u[i] -= residual[i]
         worst, largest = forces(control, system, u, residual, jacobian)
         if not math.isfinite(worst) or not math.isfinite(largest):
-            u[:] = best
+            move(best, u)
             return NOT_FINITE, step + 1, least
         if worst < least:
             least = worst
-            best[:] = u
+            move(u, best)
     outcome = CONVERGED if worst <= ACCEPTED * largest else EXHAUSTED
     if outcome == EXHAUSTED:
-        u[:] = best
+        move(best, u)
         worst = least
     return outcome, limit, worst
 
