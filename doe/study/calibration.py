@@ -218,7 +218,8 @@ def _measured(case: Case, rig: Rig, variances: Array, turns: Array, numerical: A
 
 
 def _unknowns(case: Case, inputs: Sequence[Input]) -> Unknowns:
-    factor = case.copula(inputs)
+    keys = [each.key for each in inputs]
+    factor = laws.copula(keys, [pair for pair in case.uncertain.correlation if {*pair.keys} <= {*keys}])
     choices = [place for place, each in enumerate(inputs) if each.law.law == "choices"]
 
     def at(scores: Array) -> Array:

@@ -55,30 +55,23 @@ class Case:
         self, inputs: Sequence[Input], values: Sequence[Mapping[str, Any]], seed: int, more: Sequence[str] = ()
     ) -> list[Scene | str]:
         """A scene an input set, or why there is none; ``more`` overrides come last."""
+        by_key = {each.key: each.law for each in self.every}
+        keys = {each.key for each in inputs}
+        # What multiplies an input that varies goes with it, in the ratio that the scene has.
+        tied = {
+            key: value_of(self.scene, key) / value_of(self.scene, law.times)
+            for key, law in by_key.items()
+            if key not in keys and law.times in keys
+        }
         found: list[Scene | str] = []
         for number, row in enumerate(values):
             overrides = [*self.overrides, *self.uncertain.set, f"numerics.seed={seed + number}", *more]
             try:
-                found.append(Scene.from_dict(self.tables(inputs, row), self.source, overrides))
+                tables = with_values(self.data, self.source, by_key, {**row, **tied})
+                found.append(Scene.from_dict(tables, self.source, overrides))
             except InputError as error:
                 found.append(str(error.faults[0]))
         return found
-
-    def tables(self, inputs: Sequence[Input], row: Mapping[str, Any]) -> dict[str, Any]:
-        """Tables of the scene at an input set. Raises InputError where no scene has these values."""
-        by_key = {each.key: each.law for each in self.every}
-        # What multiplies an input that varies goes with it, in the ratio that the scene has.
-        tied = {
-            key: value_of(self.scene, key) / value_of(self.scene, str(by_key[key].times))
-            for key in self.moving(inputs)
-            if key not in row
-        }
-        return with_values(self.data, self.source, by_key, {**row, **tied})
-
-    def moving(self, inputs: Sequence[Input]) -> list[str]:
-        """Keys whose values inputs change: their own, and those that multiply one of them."""
-        keys = [each.key for each in inputs]
-        return keys + [each.key for each in self.every if each.key not in keys and each.law.times in keys]
 
     @property
     def replicates(self) -> int:
