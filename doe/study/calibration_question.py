@@ -50,6 +50,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         set_key(tables, override)
     base = Scene.from_dict(tables, str(path))
     given = getattr(base, "uncertain", None) or Uncertain()
+    refuse([f"{path}: uncertain.sample: is what a calibration gives; leave it out"] if given.sample else [])
     known = {each.key for each in documented()}
     laid = set(given.laws)
     refuse(

@@ -13,7 +13,7 @@ from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.running.failure import Failure, sentence
-from doe.study_file.table import NUMBER, fields_of
+from doe.study_file.table import NUMBER, fields
 from doe.unknown import laws, plan, screening
 from doe.unknown.joint import Joint
 from rbdyn.faults import InputError, RunError, read_toml, refuse, set_key
@@ -67,31 +67,24 @@ class Case:
         own: Sequence[Sequence[str]] = (),
     ) -> list[Scene | str]:
         """A scene an input set, or why there is none; ``more`` overrides come last, then the set's ``own``."""
+        by_key = {each.key: each.law for each in self.every}
+        keys = {each.key for each in inputs}
+        # What multiplies an input that varies goes with it, in the ratio that the scene has.
+        tied = {
+            key: value_of(self.scene, key) / value_of(self.scene, law.times)
+            for key, law in by_key.items()
+            if key not in keys and law.times in keys
+        }
         found: list[Scene | str] = []
         for number, row in enumerate(values):
             overrides = [*self.overrides, *self.uncertain.set, f"numerics.seed={seed + number}", *more]
             overrides += own[number] if own else ()
             try:
-                found.append(Scene.from_dict(self.tables(inputs, row), self.source, overrides))
+                tables = with_values(self.data, self.source, by_key, {**row, **tied})
+                found.append(Scene.from_dict(tables, self.source, overrides))
             except InputError as error:
                 found.append(str(error.faults[0]))
         return found
-
-    def tables(self, inputs: Sequence[Input], row: Mapping[str, Any]) -> dict[str, Any]:
-        """Tables of the scene at an input set. Raises InputError where no scene has these values."""
-        by_key = {each.key: each.law for each in self.every}
-        # What multiplies an input that varies goes with it, in the ratio that the scene has.
-        tied = {
-            key: value_of(self.scene, key) / value_of(self.scene, str(by_key[key].times))
-            for key in self.moving(inputs)
-            if key not in row
-        }
-        return with_values(self.data, self.source, by_key, {**row, **tied})
-
-    def moving(self, inputs: Sequence[Input]) -> list[str]:
-        """Keys whose values inputs change: their own, and those that multiply one of them."""
-        keys = [each.key for each in inputs]
-        return keys + [each.key for each in self.every if each.key not in keys and each.law.times in keys]
 
     @property
     def replicates(self) -> int:
@@ -148,7 +141,7 @@ def case_of(
 
 def read_sample(path: Path) -> dict[str, list[Any]]:
     """Columns of a posterior sample by key: numbers, or choices. Raises InputError, also for fewer than two rows."""
-    header, rows = fields_of(path)
+    header, rows = fields(path)
     if len(rows) < 2:
         raise InputError([f"{path}: has one row; a sample needs two at least"])
     columns: dict[str, list[Any]] = {}

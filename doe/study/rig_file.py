@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from doe.study_file.table import NUMBER, fields_of, listed
+from doe.study_file.table import NUMBER, fields, listed
 from rbdyn.faults import refuse
 
 # What can be measured, by its name in the results of a simulation; the others of these are no positive numbers.
@@ -51,7 +51,7 @@ class Rig:
 
 def read_rig(path: Path) -> Rig:
     """Read a rig's table. Raises InputError with all faults."""
-    header, rows = fields_of(path)
+    header, rows = fields(path)
     header = [name.strip() for name in header]
     keys = tuple(name for name in header if "." in name)
     outputs = tuple(name for name in header if name in OUTPUTS)

@@ -45,7 +45,7 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     Raises InputError, with all faults, when the file, a column or a number is missing, a row has more or fewer fields
     than the header, a column comes twice, a number is not finite or impossible, or replicates have different factors.
     """
-    header, rows = fields_of(path)
+    header, rows = fields(path)
     wanted, errors = [*factors, *responses], [f"{name}_error" for name in responses]
     mend = f"add it, or rename the factor or response in {named_in} to one of {listed(header)}"
     faults = [f"{path}: column {_cut(name)} is missing; {mend}" for name in wanted if name not in header]
@@ -70,7 +70,7 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
 
 def columns_of(path: Path) -> dict[str, bool]:
     """Names of the columns of a table, and whether all in it are numbers. Raises InputError."""
-    header, rows = fields_of(path)
+    header, rows = fields(path)
     return {
         name: all(NUMBER.fullmatch(row[place].strip()) for row in rows) for place, name in enumerate(header) if name
     }
@@ -81,7 +81,7 @@ def listed(names: Iterable[str]) -> str:
     return ", ".join(one_line(name, LONGEST_NAME) for name in names)
 
 
-def fields_of(path: Path) -> tuple[list[str], list[list[str]]]:
+def fields(path: Path) -> tuple[list[str], list[list[str]]]:
     """Names in the header and fields of the rows, as many in each; blank lines are none. Raises InputError."""
     lines = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
     found, start = [], 1

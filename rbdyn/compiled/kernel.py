@@ -211,7 +211,9 @@ def entry(function: Callable[..., Any]) -> Any:
     config.CACHE_DIR = str(cache_folder())
     try:
         make: Any = njit
-        compiled = make(**OPTIONS, cache=True, nogil=True, no_cfunc_wrapper=True, pipeline_class=KernelCompiler)(function)
+        compiled = make(**OPTIONS, cache=True, nogil=True, no_cfunc_wrapper=True, pipeline_class=KernelCompiler)(
+            function
+        )
     finally:
         config.CACHE_DIR = previous
     if isinstance(compiled, CPUDispatcher):

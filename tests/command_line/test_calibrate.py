@@ -63,6 +63,7 @@ def _run(arguments: Sequence[str]) -> Any:
         ({"header": HEADER + ",hold", "rows": [f"{row},perhaps" for row in ROWS]}, "write 1 for a row that is held out"),
         ({"uncertain": UNCERTAIN.replace("low = 40.0", "low = -40.0")}, 'uncertain."cage.mass_g" at -'),
         ({"uncertain": UNCERTAIN.replace("cage.mass_g", "operation.inner_speed_rpm")}, "is sought too"),
+        ({"uncertain": UNCERTAIN.replace("set =", "sample = 'old.csv'\nset =")}, "is what a calibration gives; leave it out"),
         ({"uncertain": UNCERTAIN + "[calibrate.discrepancy]\nwhirl = 0.1\n"}, "discrepancy: whirl is not measured"),
         ({"uncertain": UNCERTAIN + "[calibrate]\ndiscrepancy = 'some'\n"}, "calibrate.discrepancy"),
     ],

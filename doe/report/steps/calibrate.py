@@ -16,7 +16,7 @@ from rbdyn.cli.terminal import print_table
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import quantity, shown
 from rbdyn.result import write_json
-from rbdyn.scene.unknown import Input
+from rbdyn.scene.unknown import Input, value_of
 
 FORMAT, POSTERIOR = "doe.calibration/1", "doe.posterior/1"
 RECORD, SAMPLE, OF_SAMPLE = "calibration.json", "posterior.csv", "posterior.json"
@@ -88,26 +88,21 @@ def _inputs(found: Calibration) -> dict[str, Any]:
 
 
 def _range(found: Calibration, place: int, cut: float) -> tuple[float, float]:
-    """What the scene has at an input's quantiles ``cut`` and 1 - ``cut``, all others at their middle."""
-    quantiles = np.full((2, len(found.inputs)), 0.5)
-    quantiles[:, place] = cut, 1.0 - cut
-    low, high = (row[found.inputs[place].key] for row in _values(found, quantiles))
+    """What the scene has at an input's quantiles ``cut`` and 1 - ``cut``."""
+    law = found.inputs[place].law
+    unit = 1.0 if law.times is None else value_of(found.case.scene, law.times)
+    low, high = (unit * value for value in laws.values_of(law, np.array([cut, 1.0 - cut])))
     return low, high
 
 
 def _values(found: Calibration, quantiles: Array) -> list[dict[str, Any]]:
-    """What the scene has at each input, a dictionary an input set."""
-    rows = []
-    for row in laws.table_of({each.key: each.law for each in found.inputs}, quantiles):
-        tables = found.case.tables(found.inputs, row)
-        rows.append({key: _at(tables, key) for key in found.case.moving(found.inputs)})
-    return rows
-
-
-def _at(tables: Any, key: str) -> Any:
-    for part in key.split("."):
-        tables = tables[part]
-    return tables
+    """What the scene has at each input and at each key that multiplies one, a dictionary an input set."""
+    inputs = [each.key for each in found.inputs]
+    tied = [each.key for each in found.case.every if each.key not in inputs and each.law.times in inputs]
+    rows = laws.table_of({each.key: each.law for each in found.inputs}, quantiles)
+    scenes = found.case.scenes(found.inputs, rows, 0)
+    # A set that is impossible in the scene itself, though not at the rig's conditions, is none.
+    return [{key: value_of(each, key) for key in (*inputs, *tied)} for each in scenes if not isinstance(each, str)]
 
 
 def _cell(found: Calibration, place: int) -> dict[str, Any]:
