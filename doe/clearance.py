@@ -239,6 +239,9 @@ def _in_threads(
     from rbdyn.dynamics.run import prepare
 
     stop, taken = Stop(), list[Point]()
+    threads = workers or os.cpu_count() or 1
+    # Of few points the replicates go side by side too, lest threads wait for the longest point.
+    inside = threads if len(points) < 2 * threads else 1
 
     def runs() -> Iterator[Callable[[], Ran]]:
         for point in points:
@@ -249,7 +252,7 @@ def _in_threads(
                     with suppress(Exception):
                         prepare(scene, roller_bearing(scene))
                 taken.append(point)
-                yield partial(attempt, scene, stop)
+                yield partial(attempt, scene, stop, inside)
 
     run_all(runs(), workers, stop, lambda one: give(taken[one.place], one.result()))
 
@@ -268,15 +271,15 @@ def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point
     run_on_cluster(scheduler, work, tasks, lambda place, ran: give(taken[place], ran))
 
 
-def attempt(scene: Scene, stop: "Stop | None" = None) -> Ran:
-    """Simulate a scene in one thread; whatever is wrong with it is the cause of a failure."""
+def attempt(scene: Scene, stop: "Stop | None" = None, workers: int = 1) -> Ran:
+    """Simulate a scene in one thread, or so many; whatever is wrong with it is the cause of a failure."""
     from rbdyn.dynamics.ensemble import CancelledError
     from rbdyn.dynamics.simulate import simulate
 
     started = time.perf_counter()
     result, cause = None, None
     try:
-        result = simulate(scene, 1, None, stop).as_dict()
+        result = simulate(scene, workers, None, stop).as_dict()
     except (CancelledError, MemoryError, OSError):
         raise
     except (RunError, InputError) as error:

@@ -21,7 +21,8 @@ import numba
 import numba.extending
 from llvmlite.binding import get_host_cpu_features
 from numba import njit
-from numba.core import types
+from numba.core import event, types
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
@@ -58,10 +59,11 @@ class Inner(CPUDispatcher):
         return super().get_call_template([plain(one) for one in args], {name: plain(one) for name, one in kws.items()})
 
     def compile(self: Any, sig: Any) -> Any:
-        """Compile without timing it."""
+        """Compile without timing it for every caller that waits."""
         args, result = normalize_signature(sig)
         if args not in self.overloads:
-            with self._compiling_counter:
+            told = event.trigger_event("numba:compile", data={"dispatcher": self})
+            with global_compiler_lock, self._compiling_counter, told:
                 self.add_overload(self._compiler.compile(args, result))
         return self.overloads[args].entry_point
 

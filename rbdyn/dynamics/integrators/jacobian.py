@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.compiled.kernel import kernel, law, routine
-from rbdyn.dynamics.forces.equations import POWERS, RollerBearing, derivative, derivative_once
+from rbdyn.dynamics.forces.equations import POWERS, RollerBearing, derivative
 from rbdyn.dynamics.forces.race_lanes import Scratch
 from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers
 from rbdyn.dynamics.forces.state import PARTS
@@ -63,7 +63,7 @@ def jacobian(bearing, y, stage, k, row, power, loads, scratch, found):
     for b in range(m):
         stage[body + b] = y[body + b] + found.increments[body + b]
         per = 1.0 / (stage[body + b] - y[body + b])
-        derivative_once(bearing, stage, row, k, power, loads, scratch)
+        derivative(bearing, stage, row, k, power, loads, scratch)
         stage[body + b] = y[body + b]
         for r in range(PARTS):
             for j in range(z):
