@@ -248,9 +248,9 @@ def _judged(given: Calibration) -> Calibration:
     quantiles = found.quantiles(points)
     prior = found.quantiles(np.random.default_rng(1).standard_normal((BEFORE, len(given.inputs))))
     taught = learnt(quantiles, _logarithms(given.inputs, quantiles), _logarithms(given.inputs, prior))
-    taus = dict(
-        zip(given.rig.outputs, zip(np.median(found.taus(points), axis=0), measured.scales, strict=True), strict=True)
-    )
+    medians = np.median(found.taus(points), axis=0).tolist()
+    words = [quantity(name)[0] for name in given.rig.outputs]
+    taus = dict(zip(words, zip(medians, measured.scales.tolist(), strict=True), strict=True))
     against = objections(result, taus, anything=taught.anything, foretells=found.misfit < 2.0)
     rows = np.linspace(0, len(points) - 1, SAMPLE).astype(int)
     after = found.cells.mean(quantiles[rows])

@@ -71,8 +71,8 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     )
     case = case_of(str(path), tables, rig.outputs, declared, frozenset(rig.keys))
     sought = [each for each in case.every if each.law.kind == "unknown" and (not free or each.key in free)]
-    notes = [f"{each.key} varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the key that it multiplies"
-             for each in case.every if each.law.kind == "varies"]  # fmt: skip
+    varies = "varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the key that it multiplies"
+    notes = [*rig.notes, *(f"{each.key} {varies}" for each in case.every if each.law.kind == "varies")]
     refuse(
         f"--free {key}: its documented range does not count in this scene (rbdyn keys {key}); give it a law"
         for key in free

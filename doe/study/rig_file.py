@@ -5,12 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from doe.study.rig_signals import KINDS, cage_speed
 from doe.study_file.table import NUMBER, fields, listed
-from rbdyn.faults import refuse
+from rbdyn.faults import InputError, refuse
 
 # What can be measured, by its name in the results of a simulation; the others of these are no positive numbers.
 OUTPUTS = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
 SD, TURNS, HOLD = "_sd", "turns", "hold"
+FILE, KIND, PULSES, SPEED = "signal_file", "signal_kind", "pulses_per_turn", "cage_speed_rpm"
 YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")
 # Rows that teach.
 FEWEST = 3
@@ -36,12 +38,13 @@ class Row:
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig's table: its rows, the scene keys that are its columns, the outputs that were measured."""
+    """A rig's table: its rows, the scene keys that are its columns, the outputs that were measured, what signals lack."""
 
     path: Path
     rows: list[Row]
     keys: tuple[str, ...]
     outputs: tuple[str, ...]
+    notes: tuple[str, ...]
 
     @property
     def conditions(self) -> list[dict[str, Any]]:
@@ -55,7 +58,9 @@ def read_rig(path: Path) -> Rig:
     header = [name.strip() for name in header]
     keys = tuple(name for name in header if "." in name)
     outputs = tuple(name for name in header if name in OUTPUTS)
-    known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD}
+    if FILE in header:
+        outputs = tuple(dict.fromkeys([*outputs, SPEED]))
+    known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES}
     faults = [f"{path}: {_unknown(name, outputs)}" for name in header if name not in known]
     faults += [
         f"{path}: column {name} comes twice; remove one" for name in dict.fromkeys(header) if header.count(name) > 1
@@ -65,17 +70,16 @@ def read_rig(path: Path) -> Rig:
     if not keys:
         faults.append(f"{path}: no operating condition; add a column of a scene key such as operation.inner_speed_rpm")
     refuse(faults)
+    notes = list[str]()
     found = [
-        _row(
-            dict(zip(header, map(str.strip, row), strict=True)), number, keys, outputs, f"{path}: row {number}", faults
-        )
+        _row(dict(zip(header, map(str.strip, row), strict=True)), number, keys, outputs, path, faults, notes)
         for number, row in enumerate(rows, 1)
     ]
     teaching = sum(not row.held for row in found)
     if teaching < FEWEST:
         faults.append(f"{path}: {teaching} rows to learn from; give {FEWEST} at least that are not on hold")
     refuse(faults)
-    return Rig(path, found, keys, outputs)
+    return Rig(path, found, keys, outputs, tuple(notes))
 
 
 def _unknown(name: str, outputs: Sequence[str]) -> str:
@@ -83,8 +87,6 @@ def _unknown(name: str, outputs: Sequence[str]) -> str:
         return f"column {listed([name])}: no output {listed([name.removesuffix(SD)])} is measured here; add it or remove this"
     if name == "cage_slip":
         return "column cage_slip: may be nothing or less; give cage_speed_rpm, which tells the same"
-    if name.startswith("signal"):
-        return f"column {name}: raw signals are not read; reduce them to {listed(OUTPUTS)} with their {SD} first"
     return (
         f"column {listed([name])}: neither a key of a scene (table.key), an output ({listed(OUTPUTS)}), its {SD}, "
         f"{TURNS} nor {HOLD}; rename or remove it"
@@ -92,8 +94,11 @@ def _unknown(name: str, outputs: Sequence[str]) -> str:
 
 
 def _row(
-    cells: Mapping[str, str], number_of: int, keys: Sequence[str], outputs: Sequence[str], where: str, faults: list[str]
-) -> Row:
+    cells: Mapping[str, str], place: int, keys: Sequence[str], outputs: Sequence[str], path: Path, faults: list[str],
+    notes: list[str],
+) -> Row:  # fmt: skip
+    where = f"{path}: row {place}"
+
     def number(name: str) -> float | None:
         text = cells.get(name, "")
         if text in ("", "nan"):
@@ -105,7 +110,13 @@ def _row(
 
     values = {name: value for name in outputs if (value := number(name)) is not None}
     sds, turns = {name: number(name + SD) for name in values}, number(TURNS)
-    if not values:
+    if cells.get(FILE):
+        try:
+            values[SPEED], sds[SPEED], told = _signal(cells, path, where)
+            notes += [told] if told else []
+        except InputError as error:
+            faults += error.faults
+    elif not values:
         faults.append(f"{where}: nothing measured; remove it")
     faults += [
         f"{where}: {name}{SD} is missing; give it, or {TURNS} for the scatter of a run of so many shaft turns"
@@ -116,7 +127,19 @@ def _row(
     hold = cells.get(HOLD, "").lower()
     if hold not in (*YES, *NO):
         faults.append(f"{where}: {HOLD} = {hold!r}: write 1 for a row that is held out, else 0")
-    return Row(number_of, {key: _value(cells[key]) for key in keys}, values, sds, turns, hold in YES)
+    return Row(place, {key: _value(cells[key]) for key in keys}, values, sds, turns, hold in YES)
+
+
+def _signal(cells: Mapping[str, str], path: Path, where: str) -> tuple[float, float, str | None]:
+    kind, pulses = cells.get(KIND, ""), cells.get(PULSES, "") or "1"
+    if kind == "orbit":
+        why = "orbits are not read, for a run states no whirl filtered alike"
+        raise InputError([f"{where}: {KIND} = 'orbit': {why}; choose {' or '.join(KINDS)}"])
+    if kind not in KINDS:
+        raise InputError([f"{where}: {KIND} = {kind!r}: unknown; choose {' or '.join(KINDS)}"])
+    if not pulses.isdecimal() or int(pulses) < 1:
+        raise InputError([f"{where}: {PULSES} = {pulses!r}: not a whole number of pulses a cage turn; mend it"])
+    return cage_speed(path.parent / cells[FILE], kind, int(pulses))
 
 
 def _value(text: str) -> Any:

@@ -17,7 +17,7 @@ LEARNED, PARTLY, KNOWN = 0.5, 0.2, 0.1
 # A range is too narrow where this share of the posterior lies within so much of one of its ends.
 CROWD, END = 0.2, 0.05
 # Powers below this share of the largest, in standard deviations of their inputs, are none.
-SMALL = 0.15
+SMALL = 0.25
 PRIOR_SD = 12.0**-0.5  # of a quantile
 
 

@@ -284,7 +284,7 @@ def draw_compared(record: dict[str, Any], path: Path) -> None:
             if errors:
                 axis.errorbar([*errors], [0.0] * len(errors), yerr=[*errors.values()], fmt=mark, color=VERMILION,
                               markersize=3.5, label=words)  # fmt: skip
-        axis.set(xlabel="row", ylabel=f"{quantity(name)[0]}, off what was measured [%]", xticks=rows)
+        axis.set(xlabel="row", ylabel=f"{quantity(name)[0]}, off measured [%]", xticks=rows)
     handles, words = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, words, fontsize=7, loc="lower center", ncols=len(words), bbox_to_anchor=(0.5, -0.06))
     save(figure, path)
