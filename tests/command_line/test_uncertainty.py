@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from doe.clearance import read_scene
 from doe.cli import app
 from doe.report.steps.robust import robust_record
+from doe.study.finished import inputs_digest
 from doe.study.robust import check_robust, judge
 from doe.study_file import Study
 from rbdyn.faults import InputError
@@ -312,3 +313,14 @@ def test_a_factor_need_not_stand_in_the_scene(tmp_path: Path) -> None:
     text = study.path.read_text("utf-8")
     study.path.write_text(text.replace('"cage.guide_clearance_mm"', '"lubricant.oil_fraction"'), "utf-8")
     assert "oil_fraction" not in read_scene(Study.load(study.path))["lubricant"]
+
+
+@pytest.mark.parametrize("where", ["study.toml", "cylindrical_roller.toml"])
+def test_a_study_is_not_finished_once_its_sample_changes(tmp_path: Path, where: str) -> None:
+    study, digests = _study(tmp_path, ""), []
+    with (tmp_path / where).open("a", encoding="utf-8") as file:
+        file.write('\n[uncertain]\nsample = "posterior.csv"\n')
+    for rows in ("1\n2\n", "1\n3\n"):
+        (tmp_path / "posterior.csv").write_text(f"cage.mass_g\n{rows}", "utf-8")
+        digests.append(inputs_digest(Study.load(study.path), direct=False))
+    assert digests[0] != digests[1]
