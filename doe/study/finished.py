@@ -11,6 +11,9 @@ from rbdyn.compiled.sources import source_digest
 from rbdyn.faults import InputError, read_toml
 from rbdyn.result import versions
 
+# What simulates, what judges, and what tells it.
+CODE = ("rbdyn.dynamics.simulate", "doe.study.whole", "doe.report.study.files")
+
 
 def inputs_digest(study: Study, direct: bool, adaptive: bool = False, robust: bool = False) -> str:
     """Hash of all that the files of a study depend on: the study, the files it names, the code, what was asked."""
@@ -22,7 +25,7 @@ def inputs_digest(study: Study, direct: bool, adaptive: bool = False, robust: bo
         study.path.name,
         study.file.model_dump_json(),
         json.dumps([direct, adaptive, robust, versions()], sort_keys=True),
-        source_digest("rbdyn.dynamics.simulate", "doe.study"),
+        source_digest(*CODE),
     ):
         digest.update(text.encode())
     for name in named:

@@ -14,9 +14,10 @@ from typer.testing import CliRunner
 from doe.clearance import read_scene
 from doe.cli import app
 from doe.report.steps.robust import robust_record
-from doe.study.finished import inputs_digest
+from doe.study.finished import CODE, inputs_digest
 from doe.study.robust import check_robust, judge
 from doe.study_file import Study
+from rbdyn.compiled.sources import code_behind
 from rbdyn.faults import InputError
 from rbdyn.scene import Scene
 
@@ -313,6 +314,15 @@ def test_a_factor_need_not_stand_in_the_scene(tmp_path: Path) -> None:
     text = study.path.read_text("utf-8")
     study.path.write_text(text.replace('"cage.guide_clearance_mm"', '"lubricant.oil_fraction"'), "utf-8")
     assert "oil_fraction" not in read_scene(Study.load(study.path))["lubricant"]
+
+
+def test_a_study_is_not_finished_once_its_steps_change() -> None:
+    """The packages themselves hold no code: their steps count."""
+    assert set(code_behind(CODE)) > {
+        "doe.unknown.decision",
+        "doe.response_surface.least_squares",
+        "doe.report.steps.robust",
+    }
 
 
 @pytest.mark.parametrize("where", ["study.toml", "cylindrical_roller.toml"])
