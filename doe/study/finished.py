@@ -2,24 +2,30 @@
 
 import hashlib
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from doe.study_file import Study
 from rbdyn.compiled.sources import source_digest
+from rbdyn.faults import InputError, read_toml
 from rbdyn.result import versions
+
+# What simulates, what judges, and what tells it.
+CODE = ("rbdyn.dynamics.simulate", "doe.study.whole", "doe.report.study.files")
 
 
 def inputs_digest(study: Study, direct: bool, adaptive: bool = False, robust: bool = False) -> str:
     """Hash of all that the files of a study depend on: the study, the files it names, the code, what was asked."""
     named = [study.scene.file, *(chain.file for chain in study.file.chain)]
     named += [] if study.file.reference is None else [study.file.reference.file]
+    named += _samples(study)
     digest = hashlib.sha256()
     for text in (
         study.path.name,
         study.file.model_dump_json(),
         json.dumps([direct, adaptive, robust, versions()], sort_keys=True),
-        source_digest("rbdyn.dynamics.simulate", "doe.study"),
+        source_digest(*CODE),
     ):
         digest.update(text.encode())
     for name in named:
@@ -36,6 +42,17 @@ def finished(folder: Path, digest: str) -> dict[str, Any] | None:
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return record if whole else None
+
+
+def _samples(study: Study) -> list[str]:
+    """The posterior sample of unknown inputs that the study or, without such a table there, its scene names."""
+    if study.file.uncertain is not None:
+        return list(filter(None, [study.file.uncertain.sample]))
+    with suppress(InputError):
+        declared = read_toml(study.beside(study.scene.file)).get("uncertain")
+        if isinstance(declared, dict) and isinstance(name := declared.get("sample"), str):
+            return [str(Path(study.scene.file).parent / name)]
+    return []
 
 
 def _content(path: Path) -> bytes:

@@ -8,6 +8,7 @@ import numpy as np
 
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
+from doe.emulator import pooled_variances
 from doe.pareto import Goals
 from doe.running.failure import Failure
 from doe.study.input_sets import Case, run
@@ -17,13 +18,14 @@ from rbdyn.scene.unknown import Input
 @dataclass(frozen=True)
 class Pairs:
     """p designs at the same input sets: ``places`` of these in what was asked for, their quantiles (n, d), outputs, variances
-    and degrees of freedom (p, n, m)."""
+    and degrees of freedom (p, n, m); ``effort`` (n,): how many times the replicates of the first runs."""
 
     places: Whole
     quantiles: Array
     outputs: Array
     variances: Array
     freedom: Whole
+    effort: Whole
 
     def joined(self, rows: Whole, other: "Pairs") -> "Pairs":
         """The same, at some rows joined with as many replicates more."""
@@ -31,17 +33,23 @@ class Pairs:
         outputs[:, rows] = 0.5 * (outputs[:, rows] + other.outputs)
         variances[:, rows] = 0.25 * (variances[:, rows] + other.variances)
         freedom[:, rows] += other.freedom + 1
-        return replace(self, outputs=outputs, variances=variances, freedom=freedom)
+        effort = self.effort.copy()
+        effort[rows] *= 2
+        return replace(self, outputs=outputs, variances=variances, freedom=freedom, effort=effort)
 
-    def gains(self, goals: Goals, design: int = 1) -> tuple[Array, Array, Whole]:
-        """Relative gains (n, q) of a design over the first, their variances, and the degrees of freedom behind these."""
+    def gains(self, goals: Goals, design: int = 1) -> tuple[Array, Array]:
+        """Relative gains (n, q) of a design over the first, and their variances, smoothed over the inputs: of a row's own few
+        replicates they are guesses, whose mean a few large ones make."""
         index, both = goals.objectives, [0, design]
         scale = np.abs(self.outputs[0][:, index])
         before, after = (goals.costs(each) for each in self.outputs[both])
         gains = (before - after) / scale
         noise, other = (each[:, index] for each in self.variances[both])
         # The first stands in the denominator too.
-        return gains, (other + (1.0 - gains) ** 2 * noise) / scale**2, self.freedom[both][:, :, index].sum(axis=0)
+        once = self.effort[:, None] * (other + (1.0 - gains) ** 2 * noise) / scale**2
+        freedom = self.freedom[both][:, :, index].sum(axis=0)
+        smooth = [pooled_variances(self.quantiles, *each) for each in zip(once.T, freedom.T, strict=True)]
+        return gains, np.column_stack(smooth) / self.effort[:, None]
 
 
 def simulated(
@@ -73,4 +81,5 @@ def simulated(
         for arrays in zip(*((sets.outputs, sets.variances, sets.freedom) for sets in every), strict=True)
     )
     lost = tuple(failure for sets in every for failure in sets.failures)
-    return Pairs(places, quantiles[places], outputs, variances, freedom), lost
+    effort = np.ones(len(places), dtype=np.int64)
+    return Pairs(places, quantiles[places], outputs, variances, freedom, effort), lost

@@ -85,7 +85,7 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     pairs, failures = simulated(case, inputs, quantiles, designs, simulations)
     spent, allowed = 2 * len(pairs.quantiles), round(2 * len(pairs.quantiles) * (1.0 + study.file.robust.settle))
     replicates = case.replicates
-    rows = in_doubt(*pairs.gains(goals)[:2])
+    rows = in_doubt(*pairs.gains(goals))
     for again in range(ROUNDS):
         # As many replicates again as there are; a run of twice the replicates counts as two.
         many = 2**again
@@ -98,12 +98,12 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
         )
         rows, spent, failures = rows[new.places], spent + 2 * many * len(rows), (*failures, *lost)
         pairs = pairs.joined(rows, new)
-        still = in_doubt(*pairs.gains(goals)[:2])
+        still = in_doubt(*pairs.gains(goals))
         rows = still[np.isin(still, rows)]
-    gains, variances, freedom = pairs.gains(goals)
+    gains, variances = pairs.gains(goals)
     fresh = joint.sets(FRESH, seed + 1)
     knowable = [place for place, each in enumerate(inputs) if each.law.kind == "unknown"]
-    found = decides(pairs.quantiles, gains, variances, freedom, fresh, seed, _read(case, inputs, fresh, seed), knowable)
+    found = decides(pairs.quantiles, gains, variances, fresh, seed, _read(case, inputs, fresh, seed), knowable)
     front = None
     if study.file.robust.front != "none":
         front, more_runs, lost = find_robust_front(study, case, inputs, joint, pick, simulations)

@@ -93,7 +93,7 @@ def find_robust_front(
     pairs, lost = simulated(case, inputs, joint.sets(CONFIRMED, seed), designs, simulations)
     confirmed = {}
     for number, (name, (point, reason)) in enumerate(chosen.items(), 1):
-        gains, variances, _ = pairs.gains(goals, number)
+        gains, variances = pairs.gains(goals, number)
         held = _over_inputs(shrunk(gains, variances), share)
         confirmed[name] = Held(point, reason, better(gains, variances, seed), held)
     spent += CONFIRMED * (len(chosen) - 1)

@@ -24,7 +24,7 @@ import numpy as np
 from scipy import special, stats
 
 from doe.arrays import Array, Whole
-from doe.emulator import fit_emulator, pooled_variances
+from doe.emulator import fit_emulator
 
 # Draws of a row's true gains, resamplings of rows, and the share of cases an interval should hold.
 DRAWS, RESAMPLES, CONFIDENCE = 64, 200, 0.95
@@ -138,7 +138,6 @@ def decides(
     quantiles: Array,
     gains: Array,
     variances: Array,
-    freedom: Whole,
     fresh: Array,
     seed: int,
     read: Array | None = None,
@@ -146,14 +145,13 @@ def decides(
 ) -> Decides:
     """Which inputs decide, from rows at quantiles (n, d) of them, the last an input that does nothing.
 
-    ``freedom`` (n, m): degrees of freedom behind the variances; ``fresh`` (k, d): quantiles of many input sets, ``read``
+    ``variances`` (n, m) are smooth over the inputs; ``fresh`` (k, d): quantiles of many input sets, ``read``
     (k, d) those of what is read of them, with the errors of measurements; ``knowable``: places of the inputs that have one
     true value, all unless told.
     """
     random = np.random.default_rng(seed)
     emulators, residuals, q2 = [], [], []
-    for gain, variance, free in zip(gains.T, variances.T, freedom.T, strict=True):
-        smooth = pooled_variances(quantiles, variance, free)
+    for gain, smooth in zip(gains.T, variances.T, strict=True):
         emulator = fit_emulator(quantiles, gain, smooth, trend="linear")
         others = emulator.leave_one_out()[0]
         # What the other rows foretell counts by as much as a row's gain follows it: nothing where it follows by chance only.

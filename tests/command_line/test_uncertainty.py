@@ -14,8 +14,10 @@ from typer.testing import CliRunner
 from doe.clearance import read_scene
 from doe.cli import app
 from doe.report.steps.robust import robust_record
+from doe.study.finished import CODE, inputs_digest
 from doe.study.robust import check_robust, judge
 from doe.study_file import Study
+from rbdyn.compiled.sources import code_behind
 from rbdyn.faults import InputError
 from rbdyn.scene import Scene
 
@@ -312,3 +314,23 @@ def test_a_factor_need_not_stand_in_the_scene(tmp_path: Path) -> None:
     text = study.path.read_text("utf-8")
     study.path.write_text(text.replace('"cage.guide_clearance_mm"', '"lubricant.oil_fraction"'), "utf-8")
     assert "oil_fraction" not in read_scene(Study.load(study.path))["lubricant"]
+
+
+def test_a_study_is_not_finished_once_its_steps_change() -> None:
+    """The packages themselves hold no code: their steps count."""
+    assert set(code_behind(CODE)) > {
+        "doe.unknown.decision",
+        "doe.response_surface.least_squares",
+        "doe.report.steps.robust",
+    }
+
+
+@pytest.mark.parametrize("where", ["study.toml", "cylindrical_roller.toml"])
+def test_a_study_is_not_finished_once_its_sample_changes(tmp_path: Path, where: str) -> None:
+    study, digests = _study(tmp_path, ""), []
+    with (tmp_path / where).open("a", encoding="utf-8") as file:
+        file.write('\n[uncertain]\nsample = "posterior.csv"\n')
+    for rows in ("1\n2\n", "1\n3\n"):
+        (tmp_path / "posterior.csv").write_text(f"cage.mass_g\n{rows}", "utf-8")
+        digests.append(inputs_digest(Study.load(study.path), direct=False))
+    assert digests[0] != digests[1]

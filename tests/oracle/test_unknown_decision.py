@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from doe.arrays import Array
+from doe.emulator import pooled_variances
 from doe.unknown.decision import better, decides, in_doubt, wilson
 from doe.unknown.plan import nested
 
@@ -14,6 +15,11 @@ def _noisy(truth: Array, sd: float, seed: int) -> tuple[Array, Array, Array]:
     random = np.random.default_rng(seed)
     variances = sd**2 * random.chisquare(7, truth.shape) / 7.0
     return truth + sd * random.standard_normal(truth.shape), variances, np.full(truth.shape, 7)
+
+
+def _smooth(quantiles: Array, variances: Array, freedom: Array) -> Array:
+    columns = zip(variances.T, freedom.T, strict=True)
+    return np.column_stack([pooled_variances(quantiles, *each) for each in columns])
 
 
 def test_noise_is_taken_off_the_share_of_cases() -> None:
@@ -50,7 +56,7 @@ def test_a_design_that_always_wins_is_sure_within_its_rows() -> None:
     gains, variances, freedom = _noisy(np.full((256, 2), 0.2), 0.02, 3)
     found = better(gains, variances, 1)
     assert found.all.value > 0.98 and found.all.low > 0.97
-    sure = decides(nested(3, 256, 3), gains, variances, freedom, nested(3, 4096, 4), 1)
+    sure = decides(nested(3, 256, 3), gains, _smooth(nested(3, 256, 3), variances, freedom), nested(3, 4096, 4), 1)
     assert all(each.worth < 0.01 for each in sure.inputs)
     assert in_doubt(gains, variances).size == 0
 
@@ -67,7 +73,7 @@ def test_the_input_that_decides_and_where_it_flips() -> None:
     truth = np.column_stack([0.4 - quantiles[:, 1], np.full(256, 1.0) + 0.2 * quantiles[:, 0]])
     gains, variances, freedom = _noisy(truth, 0.05, 5)
     assert better(gains, variances, 1).all.value == pytest.approx(0.4, abs=0.05)
-    found = decides(quantiles, gains, variances, freedom, fresh, 1)
+    found = decides(quantiles, gains, _smooth(quantiles, variances, freedom), fresh, 1)
     first = found.inputs[0]
     assert first.place == 1
     assert first.flip == pytest.approx(0.4, abs=0.03)
@@ -81,7 +87,7 @@ def test_two_inputs_that_decide_only_together() -> None:
     quantiles, fresh = nested(4, 512, 7), nested(4, 8192, 8)
     truth = ((quantiles[:, 0] - 0.5) * (quantiles[:, 2] - 0.5))[:, None]
     gains, variances, freedom = _noisy(truth, 0.005, 7)
-    found = decides(quantiles, gains, variances, freedom, fresh, 1)
+    found = decides(quantiles, gains, _smooth(quantiles, variances, freedom), fresh, 1)
     assert max(each.worth for each in found.inputs) < 0.05
     assert found.pair is not None and found.pair[:2] == (0, 2)
     assert found.pair[2] > 0.4
@@ -91,7 +97,7 @@ def test_what_cannot_be_foretold_is_worth_nothing() -> None:
     """Gains of pure scatter beyond the noise: every share is a half, no input decides."""
     random = np.random.default_rng(9)
     gains, variances, freedom = _noisy(random.standard_normal((256, 1)), 0.1, 9)
-    found = decides(nested(3, 256, 9), gains, variances, freedom, nested(3, 4096, 10), 1)
+    found = decides(nested(3, 256, 9), gains, _smooth(nested(3, 256, 9), variances, freedom), nested(3, 4096, 10), 1)
     assert found.foretold[0] < 0.2
     assert max(each.worth for each in found.inputs) < 0.06
 
@@ -100,7 +106,7 @@ def test_worth_of_knowing_a_normal_input() -> None:
     """D = a + 3 b of normals plus 1: p = Phi(1/sqrt 10), given b Phi(1 + 3 b), whose E max(p, 1 - p) is known by quadrature."""
     quantiles, fresh = nested(3, 512, 11), nested(3, 8192, 12)
     gains, variances, freedom = _noisy(1.0 + stats.norm.ppf(quantiles[:, :2]) @ [[1.0], [3.0]], 0.1, 11)
-    found = decides(quantiles, gains, variances, freedom, fresh, 1)
+    found = decides(quantiles, gains, _smooth(quantiles, variances, freedom), fresh, 1)
     b = stats.norm.ppf((np.arange(20000) + 0.5) / 20000)
     given = stats.norm.cdf(1.0 + 3.0 * b)
     truth = float(np.maximum(given, 1.0 - given).mean() - stats.norm.cdf(1.0 / np.sqrt(10.0)))

@@ -145,7 +145,7 @@ def test_indices_of_the_g_function_under_noise(noise: float) -> None:
     """Kinks at the middle of every input; the dummy is about nothing."""
     truth = [*PARTIAL / G_VARIANCE, 0.0], [*G_TOTAL, 0.0]
     covered, errors = [], []
-    for seed in range(20):
+    for seed in range(10):
         found = sobol(emulated(_noisy(_g_function, 4, 256, np.sqrt(noise * G_VARIANCE), seed)), 4, seed)
         for indices, true in zip(found, truth, strict=True):
             covered += [each.low - 1e-9 <= value <= each.high + 1e-9 for each, value in zip(indices, true, strict=True)]
@@ -155,18 +155,18 @@ def test_indices_of_the_g_function_under_noise(noise: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("noise", "least"), [(0.05, 0.8), (0.3, 0.8)])
-def test_indices_of_ishigami_under_noise(noise: float, least: float) -> None:
+@pytest.mark.parametrize(("noise", "repeats"), [(0.05, 12), (0.3, 40)])
+def test_indices_of_ishigami_under_noise(noise: float, repeats: int) -> None:
     first, total = [0.3139, 0.4424, 0.0, 0.0], [0.5576, 0.4424, 0.2437, 0.0]
     covered, errors = [], []
-    for seed in range(40):
+    for seed in range(repeats):
         found = sobol(emulated(_noisy(_ishigami, 4, 256, np.sqrt(noise * ISHIGAMI), seed)), 4, seed)
         for indices, truth in ((found.first, first), (found.total, total)):
             covered += [
                 each.low - 1e-9 <= value <= each.high + 1e-9 for each, value in zip(indices, truth, strict=True)
             ]
             errors += [each.value - value for each, value in zip(indices, truth, strict=True)]
-    assert np.mean(covered) >= least
+    assert np.mean(covered) >= 0.8
     assert np.sqrt(np.mean(np.square(errors))) <= 0.1
 
 

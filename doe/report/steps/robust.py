@@ -21,7 +21,7 @@ def robust_record(robust: Robust, factors: Sequence[str]) -> dict[str, Any]:
         "decides": [
             {"key": each.key, "flip": each.flip, "worth": each.worth, "pick_above": each.above}
             for each in robust.decides
-            if each.worth > 0.0
+            if each.worth > 1e-3
         ],
         "pair": None if robust.pair is None else {"keys": list(robust.pair[:2]), "worth": robust.pair[2]},
         "halved": _halved(robust),
