@@ -59,9 +59,9 @@ def read_scene(study: Study) -> dict[str, Any]:
     path = study.beside(study.scene.file)
     data = read_toml(path)
     refuse(
-        f"{study.path}: factor.key = {whole!r}: no such key in {path}; write table.key as in that file"
-        for whole in (*(factor.key for factor in study.file.factor), *(each.key for each in study.file.category))
-        for table, _, key in (whole.rpartition("."),)
+        f"{study.path}: factor.key = {factor.key!r}: no such key in {path}; write table.key as in that file"
+        for factor in study.file.factor
+        for table, _, key in (factor.key.rpartition("."),)
         if not isinstance(data.get(table), dict) or key not in data[table]
     )
     return data

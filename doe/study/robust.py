@@ -72,10 +72,7 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     inputs, rest = screened(case, simulations)
     factor, seed = case.copula(inputs), case.uncertain.seed
     quantiles = coordinates(len(inputs), study.file.robust.points, seed, factor)
-    designs = {
-        "baseline": clearance.assignments(study.at(()), study.baseline),
-        "pick": clearance.assignments(study, pick),
-    }
+    designs = {"baseline": _at(study, study.baseline), "pick": _at(study, pick)}
     pairs, failures = _simulated(case, inputs, quantiles, designs, simulations, 0, [])
     spent, allowed = 2 * len(pairs.quantiles), round(2 * len(pairs.quantiles) * (1.0 + study.file.robust.settle))
     replicates = case.replicates
@@ -172,6 +169,11 @@ def _case(study: Study) -> Case:
         set_key(data, override)
     fixed = frozenset(factor.key for factor in study.file.factor)
     return case_of(str(path), data, study.responses, study.file.uncertain, fixed)
+
+
+def _at(study: Study, point: Array) -> list[str]:
+    """Overrides of the scene at factor values (k,)."""
+    return [f"{factor.key}={float(x)!r}" for factor, x in zip(study.file.factor, point, strict=True)]
 
 
 def _gains(goals: Goals, pairs: _Pairs) -> tuple[Array, Array, Whole]:

@@ -51,6 +51,9 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         pictures.append(f"surface_{surface.name}.png")
         plots.response_surface(study, surface, folder / pictures[-1])
     plots.pareto_front(outcome, folder / "pareto_front.png")
+    if outcome.adaptive is not None:
+        pictures.append("adaptive_search.png")
+        plots.adaptive_search(outcome, folder / pictures[-1])
     points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
     motions = clearance.histories(study, points, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]
