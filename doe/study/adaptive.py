@@ -17,6 +17,7 @@ from doe.adaptive.search import check_budget
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.pareto.direct import DirectFront, Samples
+from doe.pareto.indicators import hypervolume
 from doe.pareto.nsga2 import InfeasibleError
 from doe.response_surface import Surface
 from doe.running.failure import Failure, grouped
@@ -128,6 +129,15 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
     return Adaptive(found, front, chosen, each[levels], edges, failures, time.perf_counter() - started)
 
 
+def reached(study: Study, adaptive: Adaptive, points: Array) -> float:
+    """Hypervolume that the emulators foretell of points (n, k) with the pick's categories, on the scale of their own front."""
+    found, goals = adaptive.found, adaptive.front.goals
+    beside = np.tile(_coded_levels(study, adaptive.study.levels), (len(points), 1))
+    means, _ = found.emulators.predict(np.hstack([study.coded(points) / region_of(study), beside]))
+    front = goals.costs(found.foretold)
+    return hypervolume(goals.costs(means), front.min(axis=0), front.max(axis=0))
+
+
 def levels_at(study: Study, point: Array) -> tuple[int, ...]:
     """Places of the categories' values at a point (k + c,) of the search."""
     counts = [len(each.categories) for each in study.file.category]
@@ -187,7 +197,9 @@ def border_of(study: Study) -> Border | None:
         try:
             for corner in corners:
                 numbers = study.centre + reach * corner[: reach.size]
-                clearance.adaptive_scenes(study.at(levels_at(study, corner)), numbers[None], [2], 0)
+                (scene,) = clearance.adaptive_scenes(study.at(levels_at(study, corner)), numbers[None], [2], 0)
+                if 1e3 * scene.mounted_clearance_mm < study.file.adaptive.least_clearance_um:
+                    return False
         except InputError:
             return False
         return True

@@ -18,7 +18,7 @@ from doe.running.store import Store
 from doe.study.adaptive import Adaptive, Searched, advice, find_adaptive
 from doe.study.chains import solve_chains
 from doe.study.checked import check_study
-from doe.study.chosen import choose
+from doe.study.chosen import Chosen, choose
 from doe.study.confirmation import Confirmed, Gain, gains
 from doe.study.design import design_of
 from doe.study.direct import Direct, find_direct
@@ -132,8 +132,7 @@ def run_study(
     clock = _Clock()
     inputs = inputs_digest(study, direct, adaptive, robust)
     check_goals(study)
-    robust = robust or declared(study)
-    if robust:
+    if robust := robust or declared(study):
         check_robust(study)
     reference = check_study(study, adaptive)
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry)
@@ -144,30 +143,20 @@ def run_study(
     clock.lap("front_s")
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress)
-        searched: Searched | None = None
-        if direct or adaptive:
-            searched = find_direct(study, found, simulations) if direct else find_adaptive(study, runs, simulations)
-        if isinstance(searched, Adaptive) and searched.runs is not runs:
-            # From here on with the categories of the front's pick.
-            study, runs = searched.study, searched.runs
-            surfaces = with_rivals(fit_surfaces(study, runs))
-            found = find_front(study, surfaces)
+        searched: Searched | None = find_direct(study, found, simulations) if direct else None
+        if adaptive:
+            searched = find_adaptive(study, runs, simulations)
+            study, runs, surfaces, found = _with_its_categories(searched, runs, surfaces, found)
         clock.lap("adaptive_s" if adaptive else "direct_s")
         chosen = choose(study, surfaces, found, searched, simulations)
-        confirmed, at = chosen.confirmed, None if searched is None else searched.front.points
-        ends, ask = getattr(searched, "edges", None), simulations if searched else None
-        edge = edge_of(study, surfaces, confirmed["pick"], chosen.front.points, at, ask, ends)
+        confirmed, pick = chosen.confirmed, chosen.confirmed["pick"].point
+        edge = _edge(study, surfaces, chosen, searched, simulations)
         clock.lap("confirmation_s")
-        judged = judge(study, confirmed["pick"].point, simulations) if robust else None
+        judged = judge(study, pick, simulations) if robust else None
         clock.lap("robust_s")
-    pick = confirmed["pick"].point
-    local = None if searched is None else local_of(study, surfaces, searched, confirmed["pick"], confirmed["baseline"])
-    wished = study.file.tolerances
-    tolerances = None if wished is None else widest_of(study, surfaces, pick, wished, local)
+    tolerances = _tolerances(study, surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
-    if reference is not None:
-        reference = reference.only(runs.places)
-    others = {name: each for name, each in confirmed.items() if name != "baseline"}
+    reference = reference and reference.only(runs.places)
     lost = (*(() if searched is None else searched.failures), *(() if judged is None else judged.failures))
     return StudyResult(
         study=study,
@@ -183,7 +172,7 @@ def run_study(
         edge=edge,
         tried=chosen.tried,
         confirmed=confirmed,
-        gains={name: gains(study, confirmed["baseline"], each) for name, each in others.items()},
+        gains=_gains(study, confirmed),
         tolerances=tolerances,
         chains=chains,
         beside=[] if reference is None else beside(study, runs, reference),
@@ -192,6 +181,41 @@ def run_study(
         notes=(*runs.notes, *notes, *(() if searched else advice(study, surfaces))),
         cost=clock.total(),
     )
+
+
+def _with_its_categories(
+    searched: Adaptive, runs: Runs, surfaces: list[Surface], found: ParetoFront
+) -> tuple[Study, Runs, list[Surface], ParetoFront]:
+    """Study, runs, surfaces and their front with the categories of a search's pick."""
+    if searched.runs is not runs:
+        surfaces = with_rivals(fit_surfaces(searched.study, searched.runs))
+        found = find_front(searched.study, surfaces)
+    return searched.study, searched.runs, surfaces, found
+
+
+def _edge(
+    study: Study, surfaces: list[Surface], chosen: Chosen, searched: Searched | None, simulations: Simulations
+) -> Edge:
+    """Where the pick lies at the edge of what was searched; the simulator tells what is beyond where it was searched."""
+    pick, front = chosen.confirmed["pick"], chosen.front.points
+    if searched is None:
+        return edge_of(study, surfaces, pick, front, None, None)
+    ends = searched.edges if isinstance(searched, Adaptive) else None
+    return edge_of(study, surfaces, pick, front, searched.front.points, simulations, ends)
+
+
+def _tolerances(
+    study: Study, surfaces: list[Surface], searched: Searched | None, confirmed: Mapping[str, Confirmed]
+) -> WidestTolerances | None:
+    pick, wished = confirmed["pick"], study.file.tolerances
+    if wished is None:
+        return None
+    local = None if searched is None else local_of(study, surfaces, searched, pick, confirmed["baseline"])
+    return widest_of(study, surfaces, pick.point, wished, local)
+
+
+def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:
+    return {name: gains(study, confirmed["baseline"], each) for name, each in confirmed.items() if name != "baseline"}
 
 
 class _Clock:

@@ -108,6 +108,9 @@ class Adaptive(Strict):
     """Runs chosen at once, so that many workers have work; the search knows a little less of each than one by one."""
     extend: bool = True
     """Whether the region grows where the front lies at its edge, as far as the factors' "allowed" permit."""
+    least_clearance_um: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
+    """Diametral clearance that is left to the bearing in operation, mounted, hot and at speed, wherever the region grows: below
+    0 it would be preloaded. What the floor of the land's film needs of the guide clearance the scene itself demands."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the search and its runs."""
     set: list[str] = []

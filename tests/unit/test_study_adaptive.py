@@ -18,7 +18,7 @@ from doe.clearance import Simulations
 from doe.report.steps.adaptive import adaptive_record
 from doe.report.study.files import write
 from doe.running.store import Store
-from doe.study.adaptive import advice, check_adaptive, find_adaptive, region_in_units
+from doe.study.adaptive import advice, border_of, check_adaptive, find_adaptive, reached, region_in_units
 from doe.study.runs import STORE, run_design
 from doe.study.surfaces import fit_surfaces
 from doe.study.whole import run_study
@@ -76,6 +76,10 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
         rows = list(csv.DictReader(file))
     assert len(rows) == found["foretold_points"]
     assert {"radial_clearance_mm", "power_loss_W", "power_loss_W_error"} <= set(rows[0])
+    share = reached(study, outcome.adaptive, outcome.adaptive.front.points)
+    assert 0.5 * found["hypervolume"] < share <= found["hypervolume"] + 1e-9
+    assert reached(study, outcome.adaptive, outcome.front.points) > 0.0
+    assert "adaptive_search.png" in record["files"] and (tmp_path / "adaptive_search.png").stat().st_size > 10_000
     assert "in few runs" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "adaptive front:" in (tmp_path / "answer.txt").read_text(encoding="utf-8")
 
@@ -133,6 +137,15 @@ def test_the_region_grows_within_what_is_allowed(tmp_path, monkeypatch):
     assert 0.15 <= found.edges[2, 0] < 0.2159 or found.edges[2, 1] > 0.3841
     assert found.front.points[:, 2].min() >= 0.15 and found.front.points[:, 2].max() <= 0.40
     assert "The pick foretold" in record["sentence"]
+    corners = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
+    assert border_of(study).possible(corners)
+    kept = written(
+        tmp_path / "kept",
+        (pocket, f"{pocket}allowed = [0.15, 0.40]\n"),
+        ("batch = 6", "batch = 6\nleast_clearance_um = 12"),
+    )
+    assert not border_of(Study.load(kept)).possible(corners), "0.0116 mm at the lower end of the radial clearance"
+    assert border_of(Study.load(kept)).possible(corners[:1])
     narrow = written(tmp_path / "narrow", (pocket, f"{pocket}allowed = [0.25, 0.40]\n"))
     with pytest.raises(
         InputError, match=r"factor.allowed of pocket_clearance_mm = \[0.25, 0.4\]: must reach over the region"

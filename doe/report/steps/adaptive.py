@@ -93,7 +93,7 @@ def held_sentence(study: Study, adaptive: Adaptive) -> str:
     """What holds the pick foretold at the edges of the region that was searched in the end."""
     words = {
         "allowed": "by what is allowed there",
-        "scene": "because no bearing is possible beyond",
+        "scene": "because no bearing that keeps its clearance in operation is possible beyond",
         "moves": "because the region is not moved more often",
         "": "because the responses turn there",
     }

@@ -54,6 +54,9 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     if outcome.robust is not None and outcome.robust.front is not None and outcome.robust.front.confirmed:
         pictures.append("robust_front.png")
         plots.robust_front(outcome.robust.responses, outcome.robust.front, folder / pictures[-1])
+    if outcome.adaptive is not None:
+        pictures.append("adaptive_search.png")
+        plots.adaptive_search(outcome, folder / pictures[-1])
     points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
     motions = clearance.histories(study, points, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]

@@ -11,6 +11,7 @@ from matplotlib import pyplot as plt
 from matplotlib.ticker import MaxNLocator
 
 from doe.response_surface import Surface
+from doe.study.adaptive import reached
 from doe.study.design import design_of
 from doe.study.robust_front import RobustFront
 from doe.study.whole import StudyResult
@@ -69,6 +70,37 @@ def _at_centre(study: Study, place: int) -> str:
 def _bounds(study: Study, name: str) -> list[float]:
     response = next(each for each in study.file.response if each.name == name)
     return [bound for bound in (response.lower, response.upper) if bound is not None]
+
+
+def adaptive_search(outcome: StudyResult, path: Path) -> None:
+    """Hypervolume against runs beside that of the surfaces' front, and where each run was made and why."""
+    study, adaptive = outcome.study, outcome.adaptive
+    assert adaptive is not None
+    found, points = adaptive.found, adaptive.found.searched.points
+    panels = range(1, len(study.factors))
+    figure, axes = plt.subplots(1, 1 + len(panels), figsize=(4.6 * (1 + len(panels)), 4.2), squeeze=False)
+    first, *rest = axes[0]
+    each = [(state.runs, state.reached, state.deviation) for state in found.history]
+    first.errorbar(*np.array(each).T, fmt="o-", color="tab:olive", capsize=3, label="adaptive search ± deviation")
+    words = "front on the surfaces, by the emulators"
+    first.axhline(reached(study, adaptive, outcome.front.points), color="tab:blue", linestyle="--", label=words)
+    first.set_xlabel("runs of design and search")
+    first.set_ylabel("hypervolume foretold")
+    for axis, panel in zip(rest, panels, strict=True):
+        for why in dict.fromkeys(found.why):
+            rows = [row for row, other in enumerate(found.why) if other == why]
+            axis.scatter(points[rows, 0], points[rows, panel], s=6.0 * found.spent[rows], alpha=0.7, label=why)
+        axis.scatter(
+            adaptive.front.points[:, 0], adaptive.front.points[:, panel], s=60, marker="x", c="k", label="fresh"
+        )
+        axis.set_xlabel(label(study.factors[0]))
+        axis.set_ylabel(label(study.factors[panel]))
+    for axis in axes[0]:
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
 
 
 def pareto_front(outcome: StudyResult, path: Path) -> None:
