@@ -140,9 +140,9 @@ G_TOTAL = PARTIAL * np.prod(1.0 + PARTIAL) / (1.0 + PARTIAL) / G_VARIANCE
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise", [0.05, 0.3])
-def test_indices_of_the_g_function_under_noise(noise: float) -> None:
-    """Kinks at the middle of every input; the dummy is about nothing."""
+@pytest.mark.parametrize(("noise", "least"), [(0.05, 0.7), (0.3, 0.8)])
+def test_indices_of_the_g_function_under_noise(noise: float, least: float) -> None:
+    """An emulator rounds the kink at the middle of every input: under little noise errors of 0.01 leave intervals of 0.01."""
     truth = [*PARTIAL / G_VARIANCE, 0.0], [*G_TOTAL, 0.0]
     covered, errors = [], []
     for seed in range(10):
@@ -150,8 +150,8 @@ def test_indices_of_the_g_function_under_noise(noise: float) -> None:
         for indices, true in zip(found, truth, strict=True):
             covered += [each.low - 1e-9 <= value <= each.high + 1e-9 for each, value in zip(indices, true, strict=True)]
             errors += [each.value - value for each, value in zip(indices, true, strict=True)]
-    assert np.mean(covered) >= 0.8
-    assert np.sqrt(np.mean(np.square(errors))) <= 0.1
+    assert np.mean(covered) >= least
+    assert np.sqrt(np.mean(np.square(errors))) <= 0.03
 
 
 @pytest.mark.slow
