@@ -24,6 +24,7 @@ from rbdyn.faults import RunError
 from rbdyn.records.words import quantity
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
+from rbdyn.scene.uncertain import Law
 from rbdyn.scene.unknown import Input
 
 # By how much the simulation may err in an output unless the scene says otherwise, as a share.
@@ -220,12 +221,13 @@ def _measured(case: Case, rig: Rig, variances: Array, turns: Array, numerical: A
 def _unknowns(case: Case, inputs: Sequence[Input]) -> Unknowns:
     keys = [each.key for each in inputs]
     factor = laws.copula(keys, [pair for pair in case.uncertain.correlation if {*pair.keys} <= {*keys}])
-    choices = [place for place, each in enumerate(inputs) if each.law.law == "choices"]
+    choices = {
+        place: each.law for place, each in enumerate(inputs) if isinstance(each.law, Law) and each.law.law == "choices"
+    }
 
     def at(scores: Array) -> Array:
         quantiles = special.ndtr(scores if factor is None else scores @ factor.T)
-        for place in choices:
-            law = inputs[place].law
+        for place, law in choices.items():
             quantiles[:, place] = laws.quantiles_of(law, laws.values_of(law, quantiles[:, place]))
         return quantiles
 
