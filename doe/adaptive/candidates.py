@@ -12,6 +12,7 @@ from doe.arrays import Array, Mask, Rows
 from doe.pareto.archive import non_dominated
 
 EVERYWHERE = 9  # 2^9 points all over the region
+PAST = 1.3  # times the region: what lies beyond is moved to its faces, where fronts like to end
 CHILDREN = 128  # points about a front a round
 ROUNDS = (0.2, 0.1, 0.05, 0.02)  # how far from their parents, in shares of the region
 MOVED = 0.6  # chance of each factor to be moved
@@ -64,7 +65,7 @@ def candidates(
     ``rounds``: how often the children of each distance are made.
     """
     span, goals = region.high - region.low, emulators.goals
-    even = qmc.Sobol(len(span), seed=random).random_base2(EVERYWHERE)
+    even = (0.5 + PAST * (qmc.Sobol(len(span), seed=random).random_base2(EVERYWHERE) - 0.5)).clip(0.0, 1.0)
     draws = emulators.draws(len(ROUNDS), random)
     pool, new = np.empty((0, len(span))), np.vstack([region.low + span * even, emulators.runs.points])
     count = emulators.runs.values.shape[1]

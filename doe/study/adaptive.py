@@ -130,10 +130,12 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
 
 
 def reached(study: Study, adaptive: Adaptive, points: Array) -> float:
-    """Hypervolume that the emulators foretell of points (n, k) with the pick's categories, on the scale of their own front."""
+    """Hypervolume that the emulators foretell of points (n, k), as they are drawn and with the pick's categories, on the scale of their own
+    front."""
     found, goals = adaptive.found, adaptive.front.goals
     beside = np.tile(_coded_levels(study, adaptive.study.levels), (len(points), 1))
-    means, _ = found.emulators.predict(np.hstack([study.coded(points) / region_of(study), beside]))
+    coded = np.hstack([study.coded(points) / region_of(study), beside])
+    means, _ = found.emulators.predict(found.region.snap(coded))
     front = goals.costs(found.foretold)
     return hypervolume(goals.costs(means), front.min(axis=0), front.max(axis=0))
 

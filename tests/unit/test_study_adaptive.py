@@ -215,6 +215,7 @@ def test_categories_and_whole_numbers_end_to_end(tmp_path, monkeypatch):
     record = write(outcome, tmp_path)
     assert record["pick"]["guidance"] == "inner"
     assert {each["factors"]["guidance"] for each in record["adaptive"]["front"]} == {"inner"}
+    assert "The pick has guidance = inner (baseline: outer)." in record["adaptive"]["sentence"]
     assert record["adaptive"]["history"][0]["runs"] == 40, "a design at each of the two"
     assert all(float(each["factors"]["rollers"]).is_integer() for each in record["adaptive"]["points"])
     with (tmp_path / "front.csv").open(encoding="utf-8") as file:

@@ -85,8 +85,15 @@ def adaptive_sentence(study: Study, adaptive: Adaptive) -> str:
     return (
         f"adaptive front: {len(found.spent)} runs of design and search and {found.fresh} fresh ones at its points in "
         f"{adaptive.seconds:.0f} s; it ended because {found.stopped}, with at most {left:.1f} % of its hypervolume to gain. "
-        f"What the fresh runs missed the emulators by, in standard deviations: {off}. {held_sentence(study, adaptive)}"
+        f"What the fresh runs missed the emulators by, in standard deviations: {off}. {held_sentence(study, adaptive)}{_kinds(adaptive.study)}"
     )
+
+
+def _kinds(study: Study) -> str:
+    """The categories of a search's pick; nothing without any."""
+    before = study.at(()).categories
+    pairs = [f"{name} = {kind} (baseline: {before[name]})" for name, kind in study.categories.items()]
+    return f" The pick has {', '.join(pairs)}." if pairs else ""
 
 
 def held_sentence(study: Study, adaptive: Adaptive) -> str:
