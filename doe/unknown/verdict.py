@@ -23,7 +23,8 @@ from doe.unknown.sampler import Level, Sampled, effective
 ENOUGH, INSIDE, REJECTED = 3, 0.9, 0.05
 # A discrepancy above this many scales, and residuals beyond this many standard deviations, are too large.
 GROWN, FAR = 2.0, 3.0
-DRAWS = 800
+# Draws of a cell, and particles of each power that they are drawn from.
+DRAWS, ENOUGH_OF = 800, 2000
 
 JointAt = Callable[[Array], Joint]
 
@@ -81,8 +82,8 @@ def reweighed(found: Sampled, at: JointAt, measured: Measured, known: Whole, see
 
 
 def _levels(found: Sampled, at: JointAt) -> tuple[list[Level], list[Joint]]:
-    # Powers far below serve no row better than a later one.
-    levels = [level for level in found.levels if level.power > 0.02] or found.levels[-1:]
+    """Some particles of every power, which come in no order, and the cells there."""
+    levels = [Level(each.power, each.points[:ENOUGH_OF], each.log_likelihood[:ENOUGH_OF]) for each in found.levels]
     return levels, [at(level.points) for level in levels]
 
 

@@ -14,7 +14,7 @@ from doe.unknown.cells import fit_cells
 from doe.unknown.discrepancy import BY_ROW, Joint, Measured
 from doe.unknown.posterior import contraction, learnt, seen
 from doe.unknown.sampler import sampled
-from doe.unknown.verdict import by_others, held_out, objections, trial
+from doe.unknown.verdict import by_others, held_out, objections, reweighed, trial
 
 ROWS, OUTPUTS, INPUTS = 8, 2, 3
 ACROSS = np.linspace(-1.0, 1.0, ROWS)
@@ -183,6 +183,16 @@ def test_a_sound_rig_is_calibrated_and_held_out_rows_are_foretold() -> None:
     # Without rows to spare each is foretold by the others.
     others = trial(by_others(found.sampled, found.joint, found.measured, 1), found.measured, held=False)
     assert others.cells == 10 and not others.rejected
+    # Particles weighed anew: by all cells the same posterior, by the second output less of the first input, by none the prior.
+    learnt_cells = found.measured.learnt
+    second = learnt_cells[found.measured.output[learnt_cells] == 1]
+    shares = [
+        contraction(found.quantiles(reweighed(found.sampled, found.joint, found.measured, known, 1)))
+        for known in (learnt_cells, second, second[:0])
+    ]
+    assert shares[0] == pytest.approx(taught.contraction, abs=0.1)
+    assert shares[1][0] < shares[0][0] - 0.01
+    assert shares[2] == pytest.approx(np.zeros(3), abs=0.25)
 
 
 def test_missing_physics_is_not_taken_for_inputs() -> None:
