@@ -1,6 +1,7 @@
 """Input sets of a scene whose inputs are not known: which inputs vary, the scenes at values of them, their runs."""
 
 import copy
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,9 +18,10 @@ from doe.study_file.table import NUMBER, fields
 from doe.unknown import laws, plan, screening
 from doe.unknown.joint import Joint
 from rbdyn.faults import InputError, RunError, read_toml, refuse, set_key
+from rbdyn.records.kept import digest_of
 from rbdyn.records.words import shown
 from rbdyn.scene import Scene, rollers_only
-from rbdyn.scene.uncertain import Law, Sampled, Uncertain
+from rbdyn.scene.uncertain import Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, value_of, with_values
 
 # Share of input sets that may be impossible or fail.
@@ -47,7 +49,7 @@ class Sets:
 @dataclass(frozen=True)
 class Case:
     """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, ``overrides`` of all runs,
-    and by key what stands in the rows of a posterior ``sample``."""
+    by key what stands in the rows of a posterior ``sample``, and what is to be doubted of that, in a sentence."""
 
     source: str
     data: dict[str, Any]
@@ -57,6 +59,7 @@ class Case:
     outputs: tuple[str, ...]
     overrides: tuple[str, ...] = ()
     sample: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    doubt: str = ""
 
     def scenes(
         self,
@@ -133,7 +136,8 @@ def case_of(
                 f"{source}: uncertain: nothing is unknown; name keys as \"table.key\" = {{law = ...}} or leave out defaults = 'none'"
             ]
         )
-    case = Case(source, data, scene, uncertain, every, tuple(outputs), tuple(overrides), sample)
+    doubt = "" if uncertain.sample is None else _doubt(folder / uncertain.sample)
+    case = Case(source, data, scene, uncertain, every, tuple(outputs), tuple(overrides), sample, doubt)
     case.joint(every)
     refuse(impossible(case))
     return case
@@ -151,10 +155,27 @@ def read_sample(path: Path) -> dict[str, list[Any]]:
     return columns
 
 
+def _doubt(sample: Path) -> str:
+    """What the record beside a posterior sample says of its calibration, unless that succeeded; empty without a record."""
+    try:
+        record = json.loads(sample.with_suffix(".json").read_text(encoding="utf-8"))
+        verdict, same = record["verdict"], record["sha256"] == digest_of(sample.read_bytes())
+        reason = next(iter(record["reasons"]), "")
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
+    return f"{sample.name} is of a rig that ended {verdict}: {reason}" if same and verdict != "calibrated" else ""
+
+
 def impossible(case: Case) -> Iterator[str]:
-    """What is wrong with the scene at an end of each law that is not documented, one by one."""
+    """What is wrong with the scene at an end of each declared law, one by one, and at rows of a sample with an end of a column."""
+    sampled = [each for each in case.every if each.key in case.sample]
+    ends = {row for each in sampled for row in np.argsort(laws.ranks(case.sample[each.key]))[[0, -1]].tolist()}
+    for row in sorted(ends):
+        (found,) = case.scenes(sampled, [{each.key: case.sample[each.key][row] for each in sampled}], 0)
+        if isinstance(found, str):
+            yield f"{case.source}: uncertain.sample, row {row + 2}: {found.removeprefix(f'{case.source}: ')}; take the row out"
     for each in case.every:
-        if isinstance(each.law, Law) and each.reason != "declared":
+        if each.key in case.sample or each.reason != "declared":
             continue
         for value in dict.fromkeys(laws.values_of(each.law, ENDS)):
             (found,) = case.scenes([each], [{each.key: value}], 0)
@@ -167,21 +188,21 @@ def impossible(case: Case) -> Iterator[str]:
 def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[str, float]]:
     """The inputs that vary, of too many those that matter; and the largest share of each of the others.
 
-    Raises RunError, InputError, KeyboardInterrupt.
+    What a sample or the scene declares stays. Raises RunError, InputError, KeyboardInterrupt.
     """
-    every = case.every
-    if len(every) <= case.uncertain.inputs:
+    every, tried = case.every, [each for each in case.every if each.key not in case.sample]
+    if len(every) <= case.uncertain.inputs or not tried:
         return every, {}
-    quantiles = plan.two_levels(len(every))
-    sets = run(case, every, np.column_stack([quantiles, np.full(len(quantiles), 0.5)]), simulations, SCREENING_SEEDS)
+    quantiles = plan.two_levels(len(tried))
+    sets = run(case, tried, np.column_stack([quantiles, np.full(len(quantiles), 0.5)]), simulations, SCREENING_SEEDS)
     positive = (sets.outputs > 0.0).all(axis=0)
     share = screening.shares(
         sets.quantiles[:, :-1], np.where(positive, np.log(np.where(positive, sets.outputs, 1.0)), sets.outputs)
     )
-    declared = [place for place, each in enumerate(every) if each.key in {*case.uncertain.laws, *case.sample}]
-    stay = screening.kept(share, declared, case.uncertain.inputs)
-    left = [place for place in range(len(every)) if place not in stay]
-    return [every[place] for place in stay], {every[place].key: float(share[place].max()) for place in left}
+    declared = [place for place, each in enumerate(tried) if each.key in case.uncertain.laws]
+    stay = screening.kept(share, declared, case.uncertain.inputs - len(every) + len(tried))
+    left = {tried[place].key: float(share[place].max()) for place in range(len(tried)) if place not in stay}
+    return [each for each in every if each.key not in left], left
 
 
 def run(

@@ -45,7 +45,7 @@ class Robust:
     """The judgement: ``responses`` with a goal, how likely each and all gains are, deciding inputs by worth, the two
     that are worth most together, how well inputs foretell each gain, by how much the chance of all gains changes with ranges
     half as wide, the front of points that hold over the inputs, None where the study wants none, what a screening left out,
-    and the cost in runs."""
+    the cost in runs, and what is to be doubted of a posterior sample."""
 
     responses: list[str]
     better: Better
@@ -60,6 +60,7 @@ class Robust:
     runs: int
     doubtful: int
     failures: tuple[Failure, ...]
+    doubt: str = ""
 
 
 def declared(study: Study) -> bool:
@@ -125,6 +126,7 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
         spent,
         int(in_doubt(gains, variances).size),
         failures,
+        case.doubt,
     )
 
 

@@ -15,10 +15,12 @@ from doe.clearance import read_scene
 from doe.cli import app
 from doe.report.steps.robust import robust_record
 from doe.study.finished import CODE, inputs_digest
+from doe.study.input_sets import read_case
 from doe.study.robust import check_robust, judge
 from doe.study_file import Study
 from rbdyn.compiled.sources import code_behind
 from rbdyn.faults import InputError
+from rbdyn.records.kept import digest_of
 from rbdyn.scene import Scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -141,6 +143,20 @@ def test_inputs_that_go_together_have_shapley_effects(tmp_path: Path, monkeypatc
     assert effects["model.pocket_bar_stiffness_N_m"] > effects["cage.mass_g"] > 0.1
     ran = np.loadtxt(tmp_path / "out" / "input_sets.csv", delimiter=",", skiprows=1)[:, :2]
     assert np.abs(ran[:, None] / rows[None] - 1.0).max(axis=2).min(axis=1).max() < 1e-9
+
+
+def test_a_sample_is_tried_row_by_row_and_says_what_its_rig_could_not(tmp_path: Path) -> None:
+    """Each friction alone would lie beside the other's value in the scene, where no traction curve is."""
+    sample = tmp_path / "posterior.csv"
+    sample.write_text("traction.mu_m,traction.mu_inf\n0.02,0.015\n0.03,0.02\n0.09,0.07\n", "utf-8")
+    record = {"verdict": "not calibrated", "reasons": ["two rows contradict"], "sha256": digest_of(sample.read_bytes())}
+    sample.with_suffix(".json").write_text(json.dumps(record), "utf-8")
+    path = _scene(tmp_path, '[uncertain]\ndefaults = "none"\nsample = "posterior.csv"\n')
+    case = read_case(path, ("impact_force_N",), ())
+    assert case.doubt == "posterior.csv is of a rig that ended not calibrated: two rows contradict"
+    sample.write_text("traction.mu_m,traction.mu_inf\n0.02,0.015\n0.03,0.2\n", "utf-8")
+    with pytest.raises(InputError, match=r"uncertain.sample, row 3: .*; take the row out"):
+        read_case(path, ("impact_force_N",), ())
 
 
 def test_laws_from_the_command_line(tmp_path: Path) -> None:
