@@ -74,7 +74,7 @@ class Edge(Record):
     def _sentence(self) -> str:
         shares = f"{100.0 * self.front_share:.0f} % of the front on the surfaces"
         if self.direct_share is not None:
-            shares += f" and {100.0 * self.direct_share:.0f} % of the direct front"
+            shares += f" and {100.0 * self.direct_share:.0f} % of the simulator's own front"
         shares += f" lies within {100.0 * NEAR:g} % of a bound of the region"
         if not self.outward:
             return f"The pick lies inside the region; {shares}."
