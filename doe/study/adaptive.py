@@ -16,8 +16,8 @@ from doe.adaptive.candidates import Region
 from doe.adaptive.search import check_budget
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
+from doe.pareto.archive import hypervolume
 from doe.pareto.direct import DirectFront, Samples
-from doe.pareto.indicators import hypervolume
 from doe.pareto.nsga2 import InfeasibleError
 from doe.response_surface import Surface
 from doe.running.failure import Failure, grouped
