@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rbdyn.accuracy.judgement import SOUGHT
+from rbdyn.accuracy.judgement import SOUGHT, check_replicates
 from rbdyn.accuracy.report import Progress, Report, Reporter, Table, columns_of, flat, records, reported, tabled
 from rbdyn.accuracy.rollers import method_bias, trajectory
 from rbdyn.accuracy.rollers.methods import METHODS, OURS, Method, NotInstalledError, Stretch, compiled
@@ -64,6 +64,7 @@ def study(
 
     Raises InputError, RunError where the references fail, KeyboardInterrupt.
     """
+    check_replicates(scene)
     motion = trajectories(scene, progress, turns, methods)
     rows = method_bias.bias_rows(scene, progress=progress)
     chosen = method_bias.conclusion(rows, scene, sought)

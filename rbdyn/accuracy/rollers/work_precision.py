@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from rbdyn.accuracy.judgement import SOUGHT
+from rbdyn.accuracy.judgement import SOUGHT, check_replicates
 from rbdyn.accuracy.report import Report, Reporter, flat, record, records
 from rbdyn.accuracy.rollers import comparison, tolerances
 from rbdyn.accuracy.rollers.methods import COMPILED
@@ -25,6 +25,7 @@ def study(
 
     Raises InputError, RunError where a reference fails, KeyboardInterrupt.
     """
+    check_replicates(scene)
     motion = comparison.trajectories(scene, progress, turns, COMPILED)
     biases = tolerances.statistics_bias(scene, rtols, progress)
     chosen = tolerances.conclusion(biases.rows, scene, sought)
