@@ -115,10 +115,11 @@ def _row(
         faults.append(f"{where}: {name} = {text!r}: not a positive number; mend it")
         return 1.0
 
+    before = len(faults)
     values = {name: value for name in outputs if (value := number(name)) is not None}
     sds, turns, cutoff = {name: number(name + SD) for name in values}, number(TURNS), number(CUTOFF)
     scene_keys, notches = {key: _value(cells[key]) for key in keys}, tuple[float, ...]()
-    if cells.get(FILE):
+    if cells.get(FILE) and len(faults) == before:
         try:
             if cells.get(KIND) == ORBIT:
                 notches = _runout(scene_keys, values.get(SPEED))
@@ -128,7 +129,7 @@ def _row(
             notes += [told] if told else []
         except InputError as error:
             faults += error.faults
-    elif not values:
+    elif not values and not cells.get(FILE):
         faults.append(f"{where}: nothing measured; remove it")
     if cutoff is not None and WHIRL in values:
         # The simulated whirl is filtered alike.

@@ -247,7 +247,9 @@ class Scene(SceneFile):
     @property
     def whirl_samples_per_turn(self) -> int:
         """Samples of the cage's centre a shaft turn for the filtered whirl; 0 where it is not filtered."""
-        return math.ceil(SAMPLES_A_PERIOD * (self.numerics.whirl_cutoff_hz or 0.0) * self.turn_s)
+        cutoff = self.numerics.whirl_cutoff_hz
+        # As few as numerics.samples_per_turn may be, so that every batch has some.
+        return 0 if cutoff is None else max(math.ceil(SAMPLES_A_PERIOD * cutoff * self.turn_s), 8)
 
     @property
     def impact_window_turns(self) -> float:

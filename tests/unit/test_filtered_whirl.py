@@ -172,6 +172,10 @@ def test_an_orbit_needs_a_cutoff_and_notches_a_filter(tmp_path: Path, filtered: 
     (tmp_path / "rig.csv").write_text("\n".join([HEADER, *rows]), "utf-8")
     with pytest.raises(InputError, match="row 1: cutoff_hz is missing"):
         read_rig(tmp_path / "rig.csv")
+    (tmp_path / "rig.csv").write_text("\n".join([HEADER, *(f"{row}-5" for row in rows)]), "utf-8")
+    with pytest.raises(InputError) as error:
+        read_rig(tmp_path / "rig.csv")
+    assert len(error.value.faults) == 3 and "cutoff_hz = '-5': not a positive number" in error.value.faults[0]
     with pytest.raises(InputError, match=r"without numerics\.whirl_cutoff_hz nothing is filtered"):
         filtered.changed({"numerics.whirl_cutoff_hz": None, "numerics.whirl_notches_hz": [9.0]})
     with pytest.raises(InputError, match=r"whirl_cutoff_hz = 1e\+08: needs 3\.5e\+08 samples a replicate"):
