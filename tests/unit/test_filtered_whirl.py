@@ -76,6 +76,13 @@ def test_the_sampling_rate_hardly_matters() -> None:
     assert ratios[0] == pytest.approx(ratios[1], rel=2e-3) and ratios[0] == pytest.approx(expected, rel=0.02)
 
 
+def test_nothing_fast_comes_through_at_the_ends() -> None:
+    _, place = _orbit(0.3, [SLOW, FAST])
+    _, noisy = _orbit(0.3, [SLOW, FAST, (1700.0, 0.15)])
+    clean, speed = (filtered_speed(each, RATE, CUTOFF, ()) for each in (place, noisy))
+    assert np.abs(speed - clean).max() < 0.02 * clean.mean()
+
+
 def test_a_still_record_takes_the_noise_out(tmp_path: Path) -> None:
     random = np.random.default_rng(5)
     time, place = _orbit(3.0, [SLOW, FAST])
