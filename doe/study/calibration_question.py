@@ -107,7 +107,7 @@ def cases_of(case: Case, rig: Rig) -> list[Case]:
         tables = copy.deepcopy(case.data)
         try:
             for key, value in keys.items():
-                put(tables, key, value)
+                put(tables, key, list(value) if isinstance(value, tuple) else value)
             scene = Scene.from_dict(tables, f"{rig.path}: row {row}")
             cases.append(replace(case, data=tables, scene=scene, source=f"{rig.path}: row {row}"))
         except InputError as error:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from doe.study.rig_signals import KINDS, cage_speed
+from doe.study.rig_signals import KINDS, cage_speed, whirl
 from doe.study_file.table import NUMBER, fields, listed
 from rbdyn.faults import InputError, refuse
 
@@ -13,6 +13,10 @@ from rbdyn.faults import InputError, refuse
 OUTPUTS = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
 SD, TURNS, HOLD = "_sd", "turns", "hold"
 FILE, KIND, PULSES, SPEED = "signal_file", "signal_kind", "pulses_per_turn", "cage_speed_rpm"
+ORBIT, CUTOFF, STILL, WHIRL = "orbit", "cutoff_hz", "still_file", "whirl_deviation_ratio"
+# Keys of what turns once a shaft turn, and of the filter that the simulated whirl gets.
+SHAFTS = "operation.inner_speed_rpm", "operation.outer_speed_rpm"
+FILTER = "numerics.whirl_cutoff_hz", "numerics.whirl_notches_hz"
 YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")
 # Rows that teach.
 FEWEST = 3
@@ -59,8 +63,11 @@ def read_rig(path: Path) -> Rig:
     keys = tuple(name for name in header if "." in name)
     outputs = tuple(name for name in header if name in OUTPUTS)
     if FILE in header:
-        outputs = tuple(dict.fromkeys([*outputs, SPEED]))
-    known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES}
+        kinds = [
+            row[header.index(KIND)].strip() if KIND in header else "" for row in rows if row[header.index(FILE)].strip()
+        ]
+        outputs = tuple(dict.fromkeys([*outputs, *(WHIRL if kind == ORBIT else SPEED for kind in kinds)]))
+    known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES, CUTOFF, STILL}
     faults = [f"{path}: {_unknown(name, outputs)}" for name in header if name not in known]
     faults += [
         f"{path}: column {name} comes twice; remove one" for name in dict.fromkeys(header) if header.count(name) > 1
@@ -108,16 +115,25 @@ def _row(
         faults.append(f"{where}: {name} = {text!r}: not a positive number; mend it")
         return 1.0
 
+    before = len(faults)
     values = {name: value for name in outputs if (value := number(name)) is not None}
-    sds, turns = {name: number(name + SD) for name in values}, number(TURNS)
-    if cells.get(FILE):
+    sds, turns, cutoff = {name: number(name + SD) for name in values}, number(TURNS), number(CUTOFF)
+    scene_keys, notches = {key: _value(cells[key]) for key in keys}, tuple[float, ...]()
+    if cells.get(FILE) and len(faults) == before:
         try:
-            values[SPEED], sds[SPEED], told = _signal(cells, path, where)
+            if cells.get(KIND) == ORBIT:
+                notches = _runout(scene_keys, values.get(SPEED))
+                values[WHIRL], sds[WHIRL], told = _orbit(cells, path, where, cutoff, notches)
+            else:
+                values[SPEED], sds[SPEED], told = _signal(cells, path, where)
             notes += [told] if told else []
         except InputError as error:
             faults += error.faults
-    elif not values:
+    elif not values and not cells.get(FILE):
         faults.append(f"{where}: nothing measured; remove it")
+    if cutoff is not None and WHIRL in values:
+        # The simulated whirl is filtered alike.
+        scene_keys |= dict(zip(FILTER, (cutoff, notches), strict=True))
     faults += [
         f"{where}: {name}{SD} is missing; give it, or {TURNS} for the scatter of a run of so many shaft turns"
         for name, sd in sds.items()
@@ -127,19 +143,31 @@ def _row(
     hold = cells.get(HOLD, "").lower()
     if hold not in (*YES, *NO):
         faults.append(f"{where}: {HOLD} = {hold!r}: write 1 for a row that is held out, else 0")
-    return Row(place, {key: _value(cells[key]) for key in keys}, values, sds, turns, hold in YES)
+    return Row(place, scene_keys, values, sds, turns, hold in YES)
 
 
 def _signal(cells: Mapping[str, str], path: Path, where: str) -> tuple[float, float, str | None]:
     kind, pulses = cells.get(KIND, ""), cells.get(PULSES, "") or "1"
-    if kind == "orbit":
-        why = "orbits are not read, for a run states no whirl filtered alike"
-        raise InputError([f"{where}: {KIND} = 'orbit': {why}; choose {' or '.join(KINDS)}"])
     if kind not in KINDS:
         raise InputError([f"{where}: {KIND} = {kind!r}: unknown; choose {' or '.join(KINDS)}"])
     if not pulses.isdecimal() or int(pulses) < 1:
         raise InputError([f"{where}: {PULSES} = {pulses!r}: not a whole number of pulses a cage turn; mend it"])
     return cage_speed(path.parent / cells[FILE], kind, int(pulses))
+
+
+def _orbit(
+    cells: Mapping[str, str], path: Path, where: str, cutoff: float | None, notches: tuple[float, ...]
+) -> tuple[float, float, str | None]:
+    if cutoff is None:
+        raise InputError([f"{where}: {CUTOFF} is missing; give the frequency below which the orbit counts"])
+    still = cells.get(STILL)
+    return whirl(path.parent / cells[FILE], cutoff, notches, path.parent / still if still else None)
+
+
+def _runout(keys: Mapping[str, Any], cage: float | None) -> tuple[float, ...]:
+    """Frequencies [Hz] of the row's shaft and cage, as far as it tells them."""
+    speeds = [abs(speed) for key in SHAFTS if isinstance(speed := keys.get(key), int | float)]
+    return tuple(speed / 60.0 for speed in dict.fromkeys([*speeds, cage or 0.0]) if speed > 0.0)
 
 
 def _value(text: str) -> Any:

@@ -1,9 +1,10 @@
-"""Raw signals of a rig as what the simulation states: the mean cage speed with its error by batch means.
+"""Raw signals of a rig as what the simulation states, with its error by batch means: mean cage speed, whirl deviation ratio.
 
 A mean over time needs no filter on either side. Pulses are taken a whole cage turn at a time, which takes out how unevenly
-their marks are spaced.
+their marks are spaced. Whirl needs a velocity: an orbit is filtered as the simulated one is (``filtered_whirl``).
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,22 @@ from doe.arrays import Array
 from doe.study_file.table import NUMBER, fields
 from rbdyn.faults import InputError
 
-# What a signal holds: its columns.
-KINDS = {"cage_pulses": ("t_s",), "cage_speed": ("t_s", "cage_speed_rpm")}
+# What a signal holds: its columns, of which some may have another unit.
+KINDS = {
+    "cage_pulses": ("t_s",),
+    "cage_speed": ("t_s", "cage_speed_rpm"),
+    "orbit": ("t_s", "x_um or x_m", "y_um or y_m"),
+}
 # A turn that takes longer than so many usual ones has lost a pulse.
 LOST = 1.5
 # A mean by fewer turns or samples has no error worth stating.
 FEWEST = 20
+# Batches of an orbit: as many as this, of so many periods of the cutoff at least.
+MOST_PARTS, PERIODS = 400, 10
+# Intervals of an even signal are alike within this share.
+EVEN = 0.1
+# Noise may have this share of the mean square of a speed: its part in the mean is known to first order.
+LOUDEST = 0.25
 
 
 def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> tuple[float, float, str | None]:
@@ -46,15 +57,67 @@ def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> tuple[float, floa
     return found.value, found.half_width / 1.96, told
 
 
+def whirl(path: Path, cutoff: float, notches: Sequence[float], still: Path | None) -> tuple[float, float, str | None]:
+    """Whirl deviation ratio below ``cutoff`` without ``notches`` [Hz], its standard deviation, and what is to be told.
+
+    ``still``: a record of the rig at rest. Noise of variance s^2 in each component adds 2 s^2 to the mean square of the
+    speed v and, to first order, s^2/(2 v) to v. Raises InputError.
+    """
+    from rbdyn.dynamics.statistics.batch_means import estimate
+    from rbdyn.dynamics.statistics.filtered_whirl import sums_until
+    from rbdyn.dynamics.statistics.metrics import WHIRL_DEVIATION_RATIO
+
+    speed, rate = _filtered(path, cutoff, notches)
+    noise = 0.0 if still is None else float((_filtered(still, cutoff, notches)[0] ** 2).mean()) / 2.0
+    if 2.0 * noise > LOUDEST * float((speed**2).mean()):
+        raise InputError(
+            [f"{still}: has more than {100.0 * LOUDEST:g} % of the mean square speed of {path.name}; lower cutoff_hz"]
+        )
+    parts = min(int(len(speed) * cutoff / rate / PERIODS), MOST_PARTS)
+    if parts < FEWEST:
+        raise InputError(
+            [f"{path}: shorter than {FEWEST * PERIODS} periods of cutoff_hz = {cutoff:g}; measure longer or raise it"]
+        )
+    nearly = np.maximum(speed, np.sqrt(noise))
+    mean = speed - noise / (2.0 * nearly) if noise else speed
+    moments = np.stack([np.ones_like(speed), mean, speed**2 - 2.0 * noise])
+    ends = len(speed) * np.arange(1, parts + 1) // parts
+    found = estimate([sums_until(moments, ends)], WHIRL_DEVIATION_RATIO.of_sums)
+    if not found.value > 0.0 or not found.half_width:
+        raise InputError([f"{path}: a speed of the cage's centre that varies no more than noise; check the signal"])
+    told = f"{path}: without a still_file noise below {cutoff:g} Hz counts as whirl" if still is None else None
+    return found.value, found.half_width / 1.96, told
+
+
+def _filtered(path: Path, cutoff: float, notches: Sequence[float]) -> tuple[Array, float]:
+    """Filtered speed [m/s] of an orbit and its sampling rate [Hz]."""
+    from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed
+    from rbdyn.scene.laws import SAMPLES_A_PERIOD
+
+    time, *place = _columns(path, KINDS["orbit"])
+    interval = (time[-1] - time[0]) / max(len(time) - 1, 1)
+    if not (np.abs(np.diff(time) - interval) < EVEN * interval).all() or not interval > 0.0:
+        raise InputError([f"{path}: t_s does not rise evenly; give samples at equal intervals"])
+    rate = 1.0 / interval
+    if rate * (1.0 + 1e-6) < SAMPLES_A_PERIOD * cutoff:
+        raise InputError(
+            [
+                f"{path}: {rate:.4g} samples a second are fewer than {SAMPLES_A_PERIOD} a period of cutoff_hz = {cutoff:g}; "
+                f"sample faster or give {rate / SAMPLES_A_PERIOD:.4g} at most"
+            ]
+        )
+    return filtered_speed(np.stack(place), rate, cutoff, notches), rate
+
+
 def _columns(path: Path, names: tuple[str, ...]) -> list[Array]:
     header, rows = fields(path)
     header = [name.strip() for name in header]
-    if missing := [name for name in names if name not in header]:
+    if missing := [name for name in names if not set(name.split(" or ")).intersection(header)]:
         raise InputError([f"{path}: column {missing[0]} is missing; add it"])
     found = []
-    for name in names:
+    for name in (next(one for one in name.split(" or ") if one in header) for name in names):
         texts = [row[header.index(name)].strip() for row in rows]
         if bad := next((text for text in texts if not NUMBER.fullmatch(text)), None):
             raise InputError([f"{path}: {name} = {bad!r}: not a number; mend it"])
-        found.append(np.array(texts, float))
+        found.append(np.array(texts, float) * (1e-6 if name.endswith("_um") else 1.0))
     return found

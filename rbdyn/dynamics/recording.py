@@ -2,6 +2,7 @@
 
 import math
 import time
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,10 +13,11 @@ from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.forces.state import CAGE_ANGLE
+from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, REJECTED
 from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.run import Run
+from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed, speed_sums
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import MOST_OF_A_RUN
@@ -75,6 +77,8 @@ class Recording:
         self._begin = run.clock_angles()
         self._ends, self._booked = [0.0], list[tuple[Array, ...]]()
         self._looks = [self._look()]
+        # Places of the cage's centre, x and y in turn, and how many samples there were at the end of each batch.
+        self._places, self._sampled = array("d"), list[int]()
         self._cpu_s = 0.0
 
     def to(self, counted: float) -> Replicate:
@@ -86,7 +90,7 @@ class Recording:
         for end in ends[len(self._booked) :]:
             if len(self._booked) == self.batches.first:
                 run.forget()
-            run.to(float(end))
+            self._go(float(end))
             self._booked.append((tally.whirl.copy(), tally.work.copy(), tally.largest.copy()))
             for kept in (tally.whirl, tally.work, tally.largest):
                 kept[:] = 0.0
@@ -105,7 +109,7 @@ class Recording:
             first=self.batches.first,
             per_window=self.batches.per_window,
             durations=np.diff(self._ends) * run.scene.turn_s,
-            whirl=whirl,
+            whirl=self._filtered_whirl() if self._places else whirl,
             work=work,
             largest=largest,
             cage_angle=np.diff(cage),
@@ -119,6 +123,24 @@ class Recording:
             method=run.method,
             stiffness=run.carry.stiffness.copy(),
         )
+
+    def _go(self, end: float) -> None:
+        """Go on to the end of a batch [shaft turns]. Where whirl is filtered steps end at its samples."""
+        run, per_turn = self.run, self.run.scene.whirl_samples_per_turn
+        if per_turn:
+            first = run.layout.first_body + CAGE_X
+            while (sample := len(self._places) // 2 / per_turn) <= end:
+                run.to(sample)
+                self._places.extend(run.carry.y[first : first + 2].tolist())
+            self._sampled.append(len(self._places) // 2)
+        run.to(end)
+
+    def _filtered_whirl(self) -> Array:
+        scene = self.run.scene
+        places, rate = np.array(self._places).reshape(-1, 2).T, scene.whirl_samples_per_turn / scene.turn_s
+        cutoff, notches = scene.numerics.whirl_cutoff_hz, scene.numerics.whirl_notches_hz
+        assert cutoff is not None
+        return speed_sums(filtered_speed(places, rate, cutoff, notches), self._sampled)
 
     def _look(self) -> tuple[float, float, float]:
         """Cage angle, kinematic cage angle [rad] and mechanical energy [J] as they stand."""

@@ -139,6 +139,8 @@ def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:
         loose = f"numerics.rtol = {scene.numerics.rtol:g} is too loose for this scene"
         why = "loose tolerances bias impact and whirl upward, power loss downward; tighten it tenfold"
         notes.append(f"power balance closes only to {100.0 * power_gap:.2g} %: {loose}; {why}")
+    if cutoff := scene.numerics.whirl_cutoff_hz:
+        notes.append(f"whirl deviation ratio: of the motion below {cutoff:g} Hz (numerics.whirl_cutoff_hz)")
     if scene.traction.model == "four_constant":
         what = "traction: one load-independent set of constants"
         notes.append(f"{what}; lightly loaded rollers are driven too hard and skidding is under-predicted")

@@ -15,7 +15,7 @@ from rbdyn.faults import InputError
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
-from rbdyn.scene.laws import Laws, Numerics
+from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics
 from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
 from rbdyn.scene.mounting import Mounting, material_of, misfits
 from rbdyn.scene.operation import Operation, Support
@@ -139,6 +139,12 @@ class Scene(SceneFile):
         numerics = self.numerics
         if numerics.turns * numerics.samples_per_turn < 2:
             yield f"numerics.turns = {numerics.turns:g}: shorter than two samples; lengthen the run"
+        samples = self.whirl_samples_per_turn * (numerics.turns + numerics.warm_up_turns)
+        if samples * (numerics.replicates + numerics.companions) > MOST_SAMPLES:
+            yield (
+                f"numerics.whirl_cutoff_hz = {numerics.whirl_cutoff_hz:g}: needs {samples:.3g} samples a replicate, and there is "
+                f"memory for {MOST_SAMPLES:g} in all; lower it or take fewer turns or replicates"
+            )
 
     def _overload_faults(self) -> Iterator[str]:
         """Whether the most loaded roller, by Stribeck 5 F/Z, would be flattened over more than its diameter."""
@@ -237,6 +243,13 @@ class Scene(SceneFile):
     def turn_s(self) -> float:
         """Duration of one shaft turn [s]."""
         return self.operation.turn_s
+
+    @property
+    def whirl_samples_per_turn(self) -> int:
+        """Samples of the cage's centre a shaft turn for the filtered whirl; 0 where it is not filtered."""
+        cutoff = self.numerics.whirl_cutoff_hz
+        # As few as numerics.samples_per_turn may be, so that every batch has some.
+        return 0 if cutoff is None else max(math.ceil(SAMPLES_A_PERIOD * cutoff * self.turn_s), 8)
 
     @property
     def impact_window_turns(self) -> float:

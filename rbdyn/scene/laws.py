@@ -13,6 +13,10 @@ METAL_ON_METAL_ALPHA = 0.75  # [s/m]
 AUTO_WARM_UP_TURNS = 20.0
 # Batches of a turn that all replicates together may keep, 0.65 kB each; in one run they are longer where there would be more.
 MOST_KEPT, MOST_OF_A_RUN = 4_000_000, 20_000
+# Samples a period of the whirl's cutoff: with fewer the velocity errs and what is faster folds down.
+SAMPLES_A_PERIOD = 10
+# Samples of filtered whirl that all replicates together may take, before they are lengthened.
+MOST_SAMPLES = 1e7
 
 
 class Laws(Consistent):
@@ -138,6 +142,11 @@ class Numerics(Consistent):
     """
     samples_per_turn: Annotated[int, Field(ge=8, le=100000)] = 512
     """Samples of the motion a shaft turn, for whirl and histories."""
+    whirl_cutoff_hz: Positive | None = None
+    """Low pass for the whirl deviation ratio, as a rig's signal has one: the cage's centre is sampled ten times a period
+    of it and filtered, forward and backward. None: the velocities as integrated, as they have no noise."""
+    whirl_notches_hz: list[Positive] = []
+    """Frequencies taken out of the filtered whirl, as a rig's runout at cage and shaft rotation is."""
     companion: bool = True
     """Repeat a share of the replicates at ten times the tolerance to estimate the numerical error."""
     companion_share: Share = 0.25
@@ -161,6 +170,8 @@ class Numerics(Consistent):
         return MOST_KEPT // (self.replicates + self.companions)
 
     def faults(self) -> Iterator[str]:
+        if self.whirl_notches_hz and self.whirl_cutoff_hz is None:
+            yield "numerics.whirl_notches_hz: without numerics.whirl_cutoff_hz nothing is filtered; give that too"
         if min(self.turns, MOST_OF_A_RUN) + min(self.warm_up_turns, MOST_OF_A_RUN) > self.most_batches:
             room = f"memory for {self.most_batches} turns each, warm-up included; take fewer turns or replicates"
             yield f"turns = {self.turns:g}: {self.replicates + self.companions} replicates and companions have {room}"
