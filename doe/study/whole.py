@@ -29,7 +29,7 @@ from doe.study.front import find_front
 from doe.study.goals import check_goals
 from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
 from doe.study.reference import Beside, beside
-from doe.study.robust import Robust, check_robust, declared, judge
+from doe.study.robust import Robust, check_robust, declared, judge, robust_advice
 from doe.study.runs import STORE, Runs, run_design
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
@@ -178,7 +178,12 @@ def run_study(
         beside=[] if reference is None else beside(study, runs, reference),
         reference_values=None if reference is None else reference.values,
         failures=(*runs.failures, *lost, *chosen.failures),
-        notes=(*runs.notes, *notes, *(() if searched else advice(study, surfaces))),
+        notes=(
+            *runs.notes,
+            *notes,
+            *(() if searched else advice(study, surfaces)),
+            *(() if judged else robust_advice(study)),
+        ),
         cost=clock.total(),
     )
 
