@@ -157,7 +157,7 @@ def run_study(
     tolerances = _tolerances(study, surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     reference = reference and reference.only(runs.places)
-    lost = (*(() if searched is None else searched.failures), *(() if judged is None else judged.failures))
+    lost = [failure for each in (searched, judged) if each for failure in each.failures]
     return StudyResult(
         study=study,
         inputs=inputs,
@@ -178,14 +178,14 @@ def run_study(
         beside=[] if reference is None else beside(study, runs, reference),
         reference_values=None if reference is None else reference.values,
         failures=(*runs.failures, *lost, *chosen.failures),
-        notes=(
-            *runs.notes,
-            *notes,
-            *(() if searched else advice(study, surfaces)),
-            *(() if judged else robust_advice(study)),
-        ),
+        notes=(*runs.notes, *notes, *_offers(study, surfaces, searched, judged)),
         cost=clock.total(),
     )
+
+
+def _offers(study: Study, surfaces: list[Surface], searched: Searched | None, judged: Robust | None) -> list[str]:
+    """What further searches would bring that were not made."""
+    return [*([] if searched else advice(study, surfaces)), *([] if judged else robust_advice(study))]
 
 
 def _with_its_categories(
