@@ -124,7 +124,7 @@ def simulated_sets(found: Calibration) -> np.ndarray:
 
 def survival(found: Calibration, simulations: Simulations) -> list[str]:
     """Whether the pick beats the baseline over the posterior: both at the same input sets."""
-    quantiles = found.sample()[:: max(1000 // PAIRS, 1)][:PAIRS]
+    quantiles = found.quantiles[:: max(1000 // PAIRS, 1)][:PAIRS]
     values = laws.table_of({each.key: each.law for each in found.inputs}, quantiles)
     outputs = []
     for design in ((0.02, 0.15, 0.3), PICK):

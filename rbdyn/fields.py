@@ -54,3 +54,8 @@ def or_refuse(table: Any, faults: Iterable[str]) -> Any:
     if lines := "\n".join(faults):
         raise ValueError(lines)
     return table
+
+
+def no_power_of_two(name: str, count: int) -> list[str]:
+    """The fault of a number that is no power of two; none of one that is."""
+    return [f"{name}{count}: no power of two; take {2 ** (count.bit_length() - 1)}"] if count & (count - 1) else []

@@ -1,15 +1,14 @@
 """``doe calibrate``."""
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from doe.commands.options import Quiet, Retry, Scheduler
-from doe.commands.steps import keeping_runs
+from doe.commands.steps import keeping_runs, simulations_in
 from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
-from rbdyn.cli.terminal import guarded, hand_over, output_folder, progress_bar
+from rbdyn.cli.terminal import guarded, hand_over, output_folder
 
 
 def calibrate(
@@ -32,29 +31,18 @@ def calibrate(
 ) -> None:
     """Find what is not known of a scene from measurements on a rig, and tell whether it may be called calibrated."""
     folder = out or Path(f"{path.stem}_calibration")
-    with guarded(as_json), keeping_runs(folder, path), ExitStack() as bars:
-        from doe.clearance import Simulations
+    with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.calibrate import files_of, print_calibration, record_of, stored, write
-        from doe.running.store import Store
         from doe.study.calibration import find_calibration
         from doe.study.calibration_question import question_of, read_question
-        from doe.study.runs import STORE
 
         asked = read_question(path, data, free or (), overrides or ())
         made_of = question_of(asked)
         output_folder(folder, "doe", path)
         record = None if retry else stored(folder, made_of)
         if record is None:
-            with Store(folder / STORE, path.stem) as store:
-                simulations = Simulations(
-                    store,
-                    workers,
-                    scheduler,
-                    retry,
-                    lambda title: bars.enter_context(progress_bar(title, quiet or as_json)),
-                )
+            with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json) as simulations:
                 found = find_calibration(asked, simulations)
-            bars.close()
             record = record_of(found, made_of)
             write(found, record, folder)
         known = record

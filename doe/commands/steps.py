@@ -1,8 +1,8 @@
 """What the commands share: runs and surfaces of a study, and where a record goes."""
 
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,8 +10,10 @@ from rbdyn.cli.terminal import keeping, output_folder, progress_bar
 from rbdyn.faults import RunError
 
 if TYPE_CHECKING:
+    from doe.clearance import Simulations
     from doe.pareto import ParetoFront
     from doe.response_surface import Surface
+    from doe.running.runner import Progress
     from doe.study.direct import Direct
     from doe.study_file import Study
 
@@ -33,6 +35,31 @@ def keeping_runs(out: Path | None, source: Path) -> Iterator[None]:
 
     with keeping(None if out is None else out / STORE), nullcontext() if out is None else at_work(source, out):
         yield
+
+
+@contextmanager
+def stages(quiet: bool) -> "Iterator[Callable[[str], Progress]]":
+    """Progress of one stage after the other, each by its title: a terminal has room for one bar."""
+    with ExitStack() as bars:
+
+        def stage(title: str) -> "Progress":
+            bars.close()
+            return bars.enter_context(progress_bar(title, quiet))
+
+        yield stage
+
+
+@contextmanager
+def simulations_in(
+    folder: Path, source: Path, workers: int | None, scheduler: str | None, retry: bool, quiet: bool
+) -> "Iterator[Simulations]":
+    """Simulations of what the file ``source`` asks for, kept in the store of a folder."""
+    from doe.clearance import Simulations
+    from doe.running.store import Store
+    from doe.study.runs import STORE
+
+    with Store(folder / STORE, source.stem) as store, stages(quiet) as progress:
+        yield Simulations(store, workers, scheduler, retry, progress)
 
 
 class Effort(NamedTuple):
@@ -59,18 +86,14 @@ def fitted(study: "Study", data: Path | None, effort: Effort) -> "list[Surface]"
 
 def searched(study: "Study", found: "ParetoFront", effort: Effort) -> "Direct":
     """The front of the simulator itself beside the one found. Raises InputError, RunError, KeyboardInterrupt."""
-    from doe.clearance import Simulations
-    from doe.running.store import Store
     from doe.study.direct import find_direct
-    from doe.study.runs import STORE
 
     out, workers, scheduler, retry, quiet = effort
     with (
         _store_folder(out, study.path) as folder,
-        Store(folder / STORE, study.path.stem) as store,
-        progress_bar("direct front", quiet) as progress,
+        simulations_in(folder, study.path, workers, scheduler, retry, quiet) as simulations,
     ):
-        return find_direct(study, found, Simulations(store, workers, scheduler, retry, lambda title: progress))
+        return find_direct(study, found, simulations)
 
 
 @contextmanager

@@ -1,16 +1,15 @@
 """``doe study``."""
 
 import sys
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import typer
 
 from doe.commands.options import Adaptive, Direct, Quiet, Retry, Robust, Scheduler, StudyOut, StudyPath, Verbose
-from doe.commands.steps import keeping_runs
+from doe.commands.steps import keeping_runs, stages
 from rbdyn.cli.options import Json, Workers
-from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json, progress_bar
+from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json
 from rbdyn.faults import InputError
 
 
@@ -29,7 +28,7 @@ def study(
 ) -> None:
     """Design, simulate, fit, optimise, confirm and dimension in one go; resumes by itself."""
     folder = out or Path(f"{path.stem}_results")
-    with guarded(as_json), keeping_runs(folder, path), ExitStack() as bars:
+    with guarded(as_json), keeping_runs(folder, path):
         from doe.study_file import Study
 
         if direct and adaptive:
@@ -48,16 +47,10 @@ def study(
         from doe.report.steps.fit import print_fit
         from doe.report.study.answer import print_outcome, print_verdict
         from doe.report.study.files import write
-        from doe.running.runner import Progress
         from doe.study.whole import run_study
 
-        def progress(title: str) -> Progress:
-            # One bar at a time.
-            bars.close()
-            return bars.enter_context(progress_bar(title, quiet or as_json))
-
-        outcome = run_study(loaded, folder, workers, progress, scheduler, retry, direct, adaptive, robust)
-        bars.close()
+        with stages(quiet or as_json) as progress:
+            outcome = run_study(loaded, folder, workers, progress, scheduler, retry, direct, adaptive, robust)
         record = write(outcome, folder)
         if not as_json:
             print_verdict(outcome)

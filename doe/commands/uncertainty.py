@@ -1,15 +1,14 @@
 """``doe uncertainty``."""
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from doe.commands.options import Quiet, Retry, Scheduler
-from doe.commands.steps import keeping_runs
+from doe.commands.steps import keeping_runs, simulations_in
 from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
-from rbdyn.cli.terminal import guarded, hand_over, output_folder, progress_bar
+from rbdyn.cli.terminal import guarded, hand_over, output_folder
 
 
 def uncertainty(
@@ -30,26 +29,15 @@ def uncertainty(
 ) -> None:
     """Tell what is not known of a scene, what that does to every output, and which input decides."""
     folder = out or Path(f"{path.stem}_uncertainty")
-    with guarded(as_json), keeping_runs(folder, path), ExitStack() as bars:
-        from doe.clearance import Simulations
+    with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.uncertainty import print_uncertainty, record_of, write
-        from doe.running.store import Store
-        from doe.study.runs import STORE
         from doe.study.uncertainty import check_points, find_uncertainty
         from rbdyn.dynamics.target import target_of
 
         check_points(points)
         accuracy = target_of(target)
         output_folder(folder, "doe", path)
-        with Store(folder / STORE, path.stem) as store:
-            simulations = Simulations(
-                store,
-                workers,
-                scheduler,
-                retry,
-                lambda title: bars.enter_context(progress_bar(title, quiet or as_json)),
-            )
+        with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json) as simulations:
             found = find_uncertainty(path, overrides or (), simulations, points, accuracy)
-        bars.close()
         files = write(found, folder)
         hand_over(lambda: record_of(found), as_json, lambda: print_uncertainty(found), folder, files)

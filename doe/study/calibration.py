@@ -2,18 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy import special
-from scipy.stats import t as student
 
 from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
-from doe.running.failure import Failure, sentence
+from doe.running.failure import Failure
 from doe.study.calibration_question import Question, cases_of
-from doe.study.input_sets import HOLES, Case, screened
+from doe.study.input_sets import NORMAL, Case, check_holes, outcomes, scattered, screened
 from doe.study.rig_file import Rig
 from doe.unknown import laws
 from doe.unknown.calibration import Batch, Matched, Unknowns, matched
@@ -25,13 +25,12 @@ from rbdyn.records.words import quantity
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import Law
-from rbdyn.scene.unknown import Input
+from rbdyn.scene.unknown import Input, value_of
 
 # By how much the simulation may err in an output unless the scene says otherwise, as a share.
 DISCREPANCY = 0.1
 # Seeds of a stage and of a condition in it.
 STAGE_SEEDS, CONDITION_SEEDS = 200_000, 1_000
-NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
 # Rows of the posterior sample, and input sets that tell what was likely before.
 SAMPLE, BEFORE = 1000, 2000
 
@@ -74,12 +73,23 @@ class Calibration:
         )
         return [*([refuted] if cells else []), *self.objections]
 
-    def sample(self) -> Array:
+    @property
+    def quantiles(self) -> Array:
         """Quantiles (n, d) of the inputs, as likely as the posterior."""
         if self.found.sampled is None:
             raise RunError("calibration: no input set is left to sample")
         points = self.found.sampled.points
         return self.found.quantiles(points[np.linspace(0, len(points) - 1, SAMPLE).astype(int)])
+
+    @cached_property
+    def sample(self) -> list[dict[str, Any]]:
+        """What the scene has at each input, and at each key that multiplies one, in the input sets of ``quantiles``."""
+        inputs = [each.key for each in self.inputs]
+        tied = [each.key for each in self.case.every if each.key not in inputs and each.law.times in inputs]
+        rows = laws.table_of({each.key: each.law for each in self.inputs}, self.quantiles)
+        scenes = self.case.scenes(self.inputs, rows, 0)
+        # A set that is impossible in the scene itself, though not at the rig's conditions, is none.
+        return [{key: value_of(each, key) for key in (*inputs, *tied)} for each in scenes if not isinstance(each, str)]
 
     def outliers(self) -> list[int]:
         """Places of the cells that the others foretell badly."""
@@ -113,45 +123,30 @@ class _Rows:
         ran = self.run(scenes, labels, title)
         table = [ran[place :: len(values)] for place in range(len(values))]
         good = [n for n, row in enumerate(table) if not any(isinstance(each, Failure | str) for each in row)]
-        if len(table) - len(good) > HOLES * len(table):
-            bad = [each for row in table for each in row if isinstance(each, Failure | str)]
-            failures = [each for each in bad if isinstance(each, Failure)]
-            raise RunError(
-                f"{len(table) - len(good)} of {len(table)} input sets gave no result at some condition, more than "
-                f"{100.0 * HOLES:g} %: {sentence(failures) if failures else bad[0]}; narrow the laws of the inputs"
-            )
+        failures = [each for each in ran if isinstance(each, Failure)]
+        impossible = [each for each in ran if isinstance(each, str)]
+        check_holes(len(table) - len(good), len(table), failures, impossible, " at some condition")
         cells, variances, freedom = self.figures([each for n in good for each in table[n]])
         return Batch(quantiles[good], cells, variances, freedom)
 
     def run(self, scenes: Sequence[Scene | str], labels: Sequence[str], title: str) -> list[Any]:
         """Results, failures, or why there is no scene."""
-        places = [place for place, scene in enumerate(scenes) if isinstance(scene, Scene)]
-        self.runs += len(places)
-        ran = self.simulations.run(
-            [scene for scene in scenes if isinstance(scene, Scene)],
-            [labels[place] for place in places],
-            self.simulations.progress(title),
-        )
-        found: list[Any] = list(scenes)
-        for place, result in zip(places, ran, strict=True):
-            found[place] = result
-        return found
+        self.runs += sum(isinstance(scene, Scene) for scene in scenes)
+        return outcomes(scenes, labels, self.simulations, title)
 
     def figures(self, results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
         """Cells (n, c) in logarithms, their variances and the degrees of freedom behind these, of results by condition."""
-        outputs, errors, samples = clearance.figures(self.outputs, results)
+        outputs, variances, freedom = scattered(self.outputs, results)
         if not (outputs > 0.0).all():
             name = self.outputs[int(np.argmin(outputs.min(axis=0)))]
             raise RunError(
                 f"{name}: is nothing in a simulation, so no share of it can be compared; leave its column out"
             )
-        freedom = np.maximum(samples - 1, 1)
-        variances = (np.nan_to_num(errors) / student.ppf(0.975, freedom) / outputs) ** 2
         conditions, names = np.array(self.cells).T
         shape = (-1, len(self.cases), len(self.outputs))
         return (
             np.log(outputs).reshape(shape)[:, conditions, names],
-            variances.reshape(shape)[:, conditions, names],
+            (variances / outputs**2).reshape(shape)[:, conditions, names],
             freedom.reshape(shape)[:, conditions, names],
         )
 

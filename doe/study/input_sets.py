@@ -20,6 +20,7 @@ from doe.unknown.joint import Joint
 from rbdyn.faults import InputError, RunError, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import shown
+from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, value_of, with_values
@@ -27,6 +28,7 @@ from rbdyn.scene.unknown import Input, inputs_of, value_of, with_values
 # Share of input sets that may be impossible or fail.
 HOLES = 0.05
 SCREENING_SEEDS = 500_000
+NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
 # Quantiles of a law at which its scenes must be possible: no plan of as many input sets as we run goes farther out.
 ENDS = np.array([1e-3, 1.0 - 1e-3])
 
@@ -93,6 +95,10 @@ class Case:
     def replicates(self) -> int:
         """Replicates of a run."""
         return Scene.from_dict(self.data, self.source, [*self.overrides, *self.uncertain.set]).numerics.replicates
+
+    def unit(self, each: Input) -> float:
+        """What the numbers of an input's law multiply."""
+        return 1.0 if each.law.times is None else float(value_of(self.scene, each.law.times))
 
     def joint(self, inputs: Sequence[Input]) -> Joint:
         """How the inputs depend on each other. Raises InputError where correlations contradict each other."""
@@ -194,7 +200,14 @@ def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[st
     if len(every) <= case.uncertain.inputs or not tried:
         return every, {}
     quantiles = plan.two_levels(len(tried))
-    sets = run(case, tried, np.column_stack([quantiles, np.full(len(quantiles), 0.5)]), simulations, SCREENING_SEEDS)
+    sets = run(
+        case,
+        tried,
+        np.column_stack([quantiles, np.full(len(quantiles), 0.5)]),
+        simulations,
+        SCREENING_SEEDS,
+        title="screening",
+    )
     positive = (sets.outputs > 0.0).all(axis=0)
     share = screening.shares(
         sets.quantiles[:, :-1], np.where(positive, np.log(np.where(positive, sets.outputs, 1.0)), sets.outputs)
@@ -217,23 +230,13 @@ def run(
 ) -> Sets:
     """Run input sets, with overrides ``more`` for all and its ``own`` for each. Raises RunError where too many are impossible or fail, InputError, KeyboardInterrupt."""
     values = laws.table_of({each.key: each.law for each in inputs}, quantiles)
-    title = "screening" if seeds == SCREENING_SEEDS else title
     scenes = case.scenes(inputs, values, case.scene.numerics.seed + clearance.INPUT_SEEDS + seeds, more, own)
-    possible = [place for place, scene in enumerate(scenes) if isinstance(scene, Scene)]
-    labels = [f"{title} {place + 1}" for place in possible]
-    ran = simulations.run([scene for scene in scenes if isinstance(scene, Scene)], labels, simulations.progress(title))
-    good = [(place, result) for place, result in zip(possible, ran, strict=True) if not isinstance(result, Failure)]
+    ran = outcomes(scenes, [f"{title} {place + 1}" for place in range(len(scenes))], simulations, title)
+    good = [(place, result) for place, result in enumerate(ran) if not isinstance(result, Failure | str)]
     failures = tuple(result for result in ran if isinstance(result, Failure))
-    impossible = tuple(scene for scene in scenes if isinstance(scene, str))
-    if len(scenes) - len(good) > HOLES * len(scenes):
-        why = sentence(failures) if failures else impossible[0]
-        raise RunError(
-            f"{len(scenes) - len(good)} of {len(scenes)} input sets gave no result, more than {100.0 * HOLES:g} %: {why}; "
-            "narrow the laws of the inputs"
-        )
-    outputs, errors, samples = clearance.figures(case.outputs, [result for _, result in good])
-    freedom = np.maximum(samples - 1, 1)
-    variances = (np.nan_to_num(errors) / student.ppf(0.975, freedom)) ** 2
+    impossible = tuple(result for result in ran if isinstance(result, str))
+    check_holes(len(ran) - len(good), len(ran), failures, impossible)
+    outputs, variances, freedom = scattered(case.outputs, [result for _, result in good])
     places = np.array([place for place, _ in good], dtype=np.int64)
     return Sets(
         places,
@@ -245,3 +248,30 @@ def run(
         failures,
         impossible,
     )
+
+
+def outcomes(
+    scenes: Sequence[Scene | str], labels: Sequence[str], simulations: Simulations, title: str
+) -> list[SimulationResult | Failure | str]:
+    """Of each scene its result or failure, of what is no scene why. Raises KeyboardInterrupt."""
+    possible = [(scene, label) for scene, label in zip(scenes, labels, strict=True) if isinstance(scene, Scene)]
+    ran = iter(
+        simulations.run([one for one, _ in possible], [label for _, label in possible], simulations.progress(title))
+    )
+    return [next(ran) if isinstance(scene, Scene) else scene for scene in scenes]
+
+
+def check_holes(lost: int, sets: int, failures: Sequence[Failure], impossible: Sequence[str], where: str = "") -> None:
+    """Raises RunError where too many input sets are lost."""
+    if lost > HOLES * sets:
+        why = sentence(failures) if failures else impossible[0]
+        raise RunError(
+            f"{lost} of {sets} input sets gave no result{where}, more than {100.0 * HOLES:g} %: {why}; narrow the laws of the inputs"
+        )
+
+
+def scattered(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
+    """Outputs (n, m) of results, their variances by what replicates scatter, and the degrees of freedom behind these."""
+    outputs, errors, samples = clearance.figures(names, results)
+    freedom = np.maximum(samples - 1, 1)
+    return outputs, (np.nan_to_num(errors) / student.ppf(0.975, freedom)) ** 2, freedom

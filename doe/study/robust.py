@@ -22,7 +22,7 @@ from doe.study_file import Study
 from doe.unknown import laws
 from doe.unknown.decision import Better, better, decides, in_doubt
 from rbdyn.faults import set_key
-from rbdyn.scene.unknown import Input, value_of
+from rbdyn.scene.unknown import Input
 
 # Rounds of further replicates: each as many again as there are, so that a set gets 2, 4, 8 and 16.
 ROUNDS, ROUND_SEEDS = 3, 10_000
@@ -158,8 +158,7 @@ def _read(case: Case, inputs: Sequence[Input], fresh: Array, seed: int) -> Array
     random, read = np.random.default_rng(seed), fresh.copy()
     for place, each in enumerate(inputs):
         if each.law.measurable is not None:
-            scale = 1.0 if each.law.times is None else abs(value_of(case.scene, each.law.times))
-            values = scale * np.array(laws.values_of(each.law, fresh[:, place]), float)
+            values = abs(case.unit(each)) * np.array(laws.values_of(each.law, fresh[:, place]), float)
             read[:, place] = laws.ranks(values + each.law.measurable * random.standard_normal(len(values)))
     return read
 
@@ -169,4 +168,4 @@ def _value(case: Case, one: Input, quantile: float | None) -> Any:
     if quantile is None:
         return None
     (value,) = laws.values_of(one.law, np.array([quantile]))
-    return value if one.law.times is None else value * value_of(case.scene, one.law.times)
+    return value if one.law.times is None else value * case.unit(one)

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from doe.clearance import Simulations
 from doe.running.failure import Failure
-from doe.study.input_sets import Sets, read_case, run, screened
+from doe.study.input_sets import NORMAL, Sets, read_case, run, screened
 from doe.unknown.joint import Joint
 from doe.unknown.sensitivity import Index, Indices, shapley, sobol
 from doe.unknown.spread import Emulated, Runs, Spread, emulated, spread_of
-from rbdyn.faults import InputError, RunError
+from rbdyn.faults import RunError, refuse
+from rbdyn.fields import no_power_of_two
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
 
@@ -19,7 +20,6 @@ OUTPUTS = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_spee
 FRESH, MOST = 8192, 512
 # An end of the range is known whose standard error is below this share of its width, unless another is asked for.
 TARGET = 0.1
-NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,7 @@ def find_uncertainty(
 
 def check_points(points: int | None) -> None:
     """Raises InputError unless the number of input sets is a power of two."""
-    if points is not None and points & (points - 1):
-        raise InputError([f"--points {points}: no power of two; take {2 ** (points.bit_length() - 1)}"])
+    refuse([] if points is None else no_power_of_two("--points ", points))
 
 
 def _emulated(sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:
@@ -135,7 +134,7 @@ def _notes(doubt: str, sets: Sets, spreads: Sequence[Spread], count: int, target
                 f"{name}: emulators foretell too little of it (Q2 {spread.q2:.2f} of at most {spread.ceiling:.2f}) to say which "
                 "input makes it"
             )
-        if spread.known > target:
+        if spread.known > target and not spread.hidden:
             notes.append(
                 f"{name}: after {count} input sets an end of its range is known to {100.0 * spread.known:.0f} % of its width only"
             )

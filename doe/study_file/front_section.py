@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import or_refuse
+from rbdyn.fields import no_power_of_two, or_refuse
 
 
 class Goal(Strict):
@@ -132,9 +132,7 @@ class Robust(Strict):
 
     @model_validator(mode="after")
     def _power_of_two(self) -> Self:
-        odd = self.points & (self.points - 1)
-        wanted = 2 ** (self.points.bit_length() - 1)
-        return or_refuse(self, [f"points = {self.points}: no power of two; take {wanted}"] if odd else [])
+        return or_refuse(self, no_power_of_two("points = ", self.points))
 
 
 class Tolerances(Strict):

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import ConfigDict, Field, model_validator
 
 from rbdyn.faults import Strict
-from rbdyn.fields import or_refuse
+from rbdyn.fields import no_power_of_two, or_refuse
 
 # What each law needs beside its name, and what it may have.
 NEEDS = {
@@ -150,8 +150,7 @@ class Uncertain(Strict):
     @model_validator(mode="after")
     def _known(self) -> Self:
         found = [f'{key}: no key of a scene; write "table.key"' for key in self.laws if "." not in key]
-        if self.points & (self.points - 1):
-            found.append(f"points = {self.points}: no power of two; take {2 ** (self.points.bit_length() - 1)}")
+        found += no_power_of_two("points = ", self.points)
         found += [
             f"correlation.keys: {key} has no law here; give it one"
             for pair in self.correlation

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from doe.arrays import Array
-from doe.study.calibration import NORMAL, Calibration
+from doe.study.calibration import Calibration
+from doe.study.input_sets import NORMAL
 from doe.unknown import laws
 from doe.unknown.posterior import seen
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import quantity, shown
 from rbdyn.result import write_json
-from rbdyn.scene.unknown import Input, value_of
+from rbdyn.scene.unknown import Input
 
 FORMAT, POSTERIOR = "doe.calibration/1", "doe.posterior/1"
 RECORD, SAMPLE, OF_SAMPLE = "calibration.json", "posterior.csv", "posterior.json"
@@ -72,9 +73,7 @@ def record_of(found: Calibration, made_of: str) -> dict[str, Any]:
 
 
 def _inputs(found: Calibration) -> dict[str, Any]:
-    sample = found.sample()
-    listed = dict[str, dict[str, Any]]()
-    values = _values(found, sample)
+    listed, values = dict[str, dict[str, Any]](), found.sample
     for place, each in enumerate(found.inputs):
         column = [row[each.key] for row in values]
         if each.law.law == "choices":
@@ -89,20 +88,9 @@ def _inputs(found: Calibration) -> dict[str, Any]:
 
 def _range(found: Calibration, place: int, cut: float) -> tuple[float, float]:
     """What the scene has at an input's quantiles ``cut`` and 1 - ``cut``."""
-    law = found.inputs[place].law
-    unit = 1.0 if law.times is None else value_of(found.case.scene, law.times)
-    low, high = (unit * value for value in laws.values_of(law, np.array([cut, 1.0 - cut])))
+    each = found.inputs[place]
+    low, high = (found.case.unit(each) * value for value in laws.values_of(each.law, np.array([cut, 1.0 - cut])))
     return low, high
-
-
-def _values(found: Calibration, quantiles: Array) -> list[dict[str, Any]]:
-    """What the scene has at each input and at each key that multiplies one, a dictionary an input set."""
-    inputs = [each.key for each in found.inputs]
-    tied = [each.key for each in found.case.every if each.key not in inputs and each.law.times in inputs]
-    rows = laws.table_of({each.key: each.law for each in found.inputs}, quantiles)
-    scenes = found.case.scenes(found.inputs, rows, 0)
-    # A set that is impossible in the scene itself, though not at the rig's conditions, is none.
-    return [{key: value_of(each, key) for key in (*inputs, *tied)} for each in scenes if not isinstance(each, str)]
 
 
 def _cell(found: Calibration, place: int) -> dict[str, Any]:
@@ -181,7 +169,7 @@ def write(found: Calibration, record: dict[str, Any], folder: Path) -> None:
     """calibration.json, the posterior sample with its verdict, and the pictures."""
     draw_compared(record, folder / COMPARED)
     if found.found.sampled is not None:
-        rows = _values(found, found.sample())
+        rows = found.sample
         with (folder / SAMPLE).open("w", newline="", encoding="utf-8") as file:
             table = csv.DictWriter(file, list(rows[0]))
             table.writeheader()
@@ -215,8 +203,7 @@ def draw_corner(found: Calibration, record: dict[str, Any], path: Path) -> None:
 
     ranked = sorted(range(len(found.inputs)), key=lambda place: -record["learned"][found.inputs[place].key])
     chosen = [place for place in ranked if found.inputs[place].law.law != "choices"][:SHOWN]
-    values = _values(found, found.sample())
-    columns = [[row[found.inputs[place].key] for row in values] for place in chosen]
+    columns = [[row[found.inputs[place].key] for row in found.sample] for place in chosen]
     ranges = [_range(found, place, END) for place in chosen]
     count = max(len(chosen), 1)
     figure, axes = plt.subplots(count, count, figsize=(1.7 * count + 1.5, 1.7 * count + 0.8), squeeze=False)
