@@ -2,59 +2,199 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
-from typing import Any
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from doe.designs import Design, box_behnken, central_composite, full_factorial, latin_hypercube, sobol
-from doe.designs.model import model_terms
+from doe import designs
+from doe.arrays import Array
+from doe.designs import Design
+from doe.designs.design import replicate_groups
+from doe.designs.model import Model, Terms, model_terms
 from doe.study_file import Study
 from doe.study_file.design_section import KEYS_OF
 from doe.study_file.design_section import Design as DesignSettings
+from doe.study_file.table import read_table
 from rbdyn.faults import InputError, refuse
 
-ALL = (central_composite, box_behnken, full_factorial, latin_hypercube, sobol)
+ALL = (
+    designs.central_composite,
+    designs.box_behnken,
+    designs.full_factorial,
+    designs.latin_hypercube,
+    designs.sobol,
+    designs.definitive_screening,
+)
 MAKERS: dict[str, Callable[..., Design]] = {make.__name__: make for make in ALL}
+OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
+SEEDED = {"latin_hypercube", "sobol", *OPTIMAL}
+# Steps from the centre beyond which no run that is given lies: those of the star points of a rotatable design in 8 factors.
+FARTHEST = 4.0
+# Whole numbers of a factor from which an optimal design chooses, at most; of more, evenly spread ones.
+MOST_LEVELS = 41
+RUNS_TABLE = "design_runs.csv"  # of a study, in its folder
+Values = tuple[float, ...]
+
+
+class Given(NamedTuple):
+    """What an optimal design knows beyond its settings: the terms, of each factor the coded values that it may take (none:
+    any), and the coded points and blocks of runs that were made."""
+
+    terms: Terms
+    levels: tuple[Values | None, ...]
+    made: tuple[Values, ...] = ()
+    block: tuple[int, ...] = ()
+
+
+def terms_of(study: Study, model: Model) -> Terms:
+    """Terms of a model in the factors that mean something at the study's categories."""
+    return model_terms(len(study.factors), model, study.inactive)
 
 
 def design_of(study: Study) -> Design:
-    """The design in the order of its runs. Raises InputError when its settings are impossible."""
+    """The design in the order of its runs; whole numbers and factors that mean nothing rounded.
+
+    Raises InputError when its settings are impossible.
+    """
+    settings = study.file.design
+    given = _given(study) if settings.kind in OPTIMAL else None
     try:
-        design = _design(study.file.design.model_dump_json(exclude_unset=True), len(study.factors))
+        design = _design(settings.model_dump_json(exclude_unset=True), len(study.factors), given)
     except ValueError as error:
         raise InputError([f"{study.path}: design.{error}"]) from None
     whole = np.array([factor.whole for factor in study.file.factor])
-    return replace(design, coded=np.where(whole, study.coded(np.rint(study.actual(design.coded))), design.coded))
+    reach = design.reach * study.step
+    rounded = _whole(study.actual(design.coded), study.centre, study.centre - reach, study.centre + reach)
+    design = replace(design, coded=np.where(whole, study.coded(rounded), design.coded))
+    return _without(design, list(study.inactive)) if study.inactive else design
+
+
+def _whole(actual: Array, centre: Array, low: Array, high: Array) -> Array:
+    """The nearest whole numbers, halves outward, that do not lie beyond the ends of the region."""
+    nearest = np.where(actual < centre, np.ceil(actual - 0.5), np.floor(actual + 0.5))
+    slack = 1e-9 * (high - low)
+    return nearest.clip(np.ceil(low - slack), np.floor(high + slack))
+
+
+def _without(design: Design, inactive: list[int]) -> Design:
+    """Runs with the inactive factors at their centre; of those that only these told apart the first."""
+    settled = design.coded.copy()
+    settled[:, inactive] = 0.0
+    first, before = (replicate_groups(each, design.block) for each in (settled, design.coded))
+    return replace(design, coded=settled).rows(np.flatnonzero(before == before[first]))
 
 
 @cache
-def _design(text: str, factors: int) -> Design:
+def _design(text: str, factors: int, given: Given | None) -> Design:
     """The design of settings in JSON; several steps of a study ask for it, and some designs take a while."""
     settings = DesignSettings.model_validate_json(text)
-    make, seed = MAKERS[settings.kind], {"seed"} if settings.kind in ("latin_hypercube", "sobol") else set()
-    keys = settings.model_dump(include=KEYS_OF[settings.kind] | seed)
-    design = make(factors, centre_replicates=settings.centres, **keys)
+    known: dict[str, Any] = {}
+    if given is not None:
+        known = {"terms": given.terms, "levels": [None if each is None else np.array(each) for each in given.levels]}
+        known |= {"made": np.array(given.made).reshape(-1, factors), "block": np.array(given.block, np.int64)}
+    seed = {"seed"} if settings.kind in SEEDED else set()
+    keys = settings.model_dump(include=(KEYS_OF[settings.kind] | seed) - {"augment"})
+    design = (MAKERS | OPTIMAL)[settings.kind](factors, centre_replicates=settings.centres, **keys, **known)
     return design.by_blocks(settings.seed if settings.order == "random" else None)
+
+
+def _given(study: Study) -> Given:
+    """What an optimal design is to know. Raises InputError for a table of runs that are impossible."""
+    terms = tuple(dict.fromkeys(term for each in study.file.response for term in terms_of(study, each.model)))
+    made, block = np.empty((0, len(study.factors))), np.empty(0, np.int64)
+    if study.file.design.augment is not None:
+        made, block = _made(study, study.file.design.augment)
+    reach = np.abs(made).max(initial=1.0)
+    levels: list[Values | None] = []
+    for place, factor in enumerate(study.file.factor):
+        if place in study.inactive:
+            levels.append((0.0,))
+        elif factor.whole:
+            ends = factor.centre + reach * factor.step * np.array([-1.0, 1.0])
+            low, high = np.ceil(ends[0] - 1e-9), np.floor(ends[1] + 1e-9)
+            some = np.unique(np.rint(np.linspace(low, high, min(int(high - low) + 1, MOST_LEVELS))))
+            levels.append(tuple(((some - factor.centre) / factor.step).tolist()))
+        else:
+            levels.append(None)
+    return Given(terms, tuple(levels), tuple(map(tuple, made.tolist())), tuple(block.tolist()))
+
+
+def _made(study: Study, name: str) -> tuple[Array, Any]:
+    """Coded points (n, k) of a table's runs, and their blocks (n,) from 0. Raises InputError."""
+    where = f"{study.path}: design.augment = {name!r}"
+    try:
+        table = read_table(study.beside(name), study.factors, [], study.path)
+    except InputError as error:
+        raise InputError([f"{where}: {fault}" for fault in error.faults]) from None
+    coded = _exactly(study, table.actual)
+    refuse(
+        f"{where}: {study.factors[column]} in row {row + 1} = {table.actual[row, column]:g}: lies {abs(coded[row, column]):.4g} "
+        f"steps from the centre, outside any region of a design (at most {FARTHEST:g}); check its unit, or widen step"
+        for row, column in np.argwhere(np.abs(coded) > FARTHEST).tolist()
+    )
+    refuse(
+        f"{where}: {factor.name} in row {row + 1} = {table.actual[row, column]:g}: whole = true has no such value; mend the row"
+        for column, factor in enumerate(study.file.factor)
+        for row in np.flatnonzero(factor.whole & (table.actual[:, column] % 1.0 != 0.0)).tolist()
+    )
+    return coded, np.unique(table.block, return_inverse=True)[1]
+
+
+def _exactly(study: Study, actual: Array) -> Array:
+    """Coded points whose actual values are these to the last bit, wherever a number has such."""
+    coded = study.coded(actual)
+    for side in (-np.inf, np.inf):
+        beside = study.coded(actual)
+        for _ in range(4):
+            beside = np.nextafter(beside, side)
+            coded = np.where(
+                study.actual(coded) == actual, coded, np.where(study.actual(beside) == actual, beside, coded)
+            )
+    return coded
+
+
+def check_given(study: Study, folder: Path) -> None:
+    """Raises InputError where the runs that are given stand in the table that the study writes into its folder."""
+    name = study.file.design.augment
+    if name is not None and study.beside(name).resolve() == (folder / RUNS_TABLE).resolve():
+        why = "the study writes its own runs there"
+        raise InputError(
+            [f"{study.path}: design.augment = {name!r}: {why}; copy it beside the study and name the copy"]
+        )
 
 
 def check_runs(study: Study, design: Design) -> None:
     """Raises InputError with every response whose model the runs do not suffice for."""
     from doe.designs.evaluation import lost_terms
 
-    runs, factors = design.coded.shape
+    runs = len(design.coded)
+
+    def lost(model: Model) -> list[str]:
+        return lost_terms(design.coded, terms_of(study, model), design.block)
+
+    def needed(model: Model) -> int:
+        return len(terms_of(study, model)) + design.blocks
+
     faults = []
     for number, response in enumerate(study.file.response, 1):
-        terms = model_terms(factors, response.model)
+        terms = terms_of(study, response.model)
         where = f"{study.path}: response[{number}].model = {response.model!r}"
-        needed = len(terms) + design.blocks
         what = f"{len(terms)} terms" + (f", {design.blocks - 1} block effects" if design.blocks > 1 else "")
-        if runs < needed:
-            few = f"the {runs} runs of the design are too few; it needs {needed} ({what} and one to judge the fit)"
-            faults.append(f"{where}: {few}: enlarge the design or choose a simpler model")
-        elif lost := lost_terms(design.coded, terms, design.block):
-            mend = "add levels or centre points, or choose a simpler model"
-            faults.append(f"{where}: the runs of the design cannot tell {', '.join(lost)} from the other terms; {mend}")
+        simpler: list[Model] = ["pure_quadratic", "interaction", "linear"]
+        told = [
+            each
+            for each in simpler
+            if set(terms_of(study, each)) < set(terms) and runs >= needed(each) and not lost(each)
+        ]
+        model = f"choose a simpler model{' (' + ' or '.join(told) + ')' if told else ''}"
+        if runs < needed(response.model):
+            few = f"the {runs} runs of the design are too few; it needs {needed(response.model)} ({what} and one to judge the fit)"
+            faults.append(f"{where}: {few}: enlarge the design or {model}")
+        elif gone := lost(response.model):
+            mend = f"add levels or centre points, or {model}"
+            faults.append(f"{where}: the runs of the design cannot tell {', '.join(gone)} from the other terms; {mend}")
     refuse(faults)
 
 
@@ -66,8 +206,6 @@ def evaluation(study: Study, design: Design) -> dict[str, Any]:
     from doe.designs.evaluation import evaluate
 
     check_runs(study, design)
-    factors = len(study.factors)
-    model = max((response.model for response in study.file.response), key=lambda each: len(model_terms(factors, each)))
-    terms = model_terms(factors, model)
-    judged = evaluate(design.coded, terms, design.block, region=design.region, reach=design.extent)
+    model = max((response.model for response in study.file.response), key=lambda each: len(terms_of(study, each)))
+    judged = evaluate(design.coded, terms_of(study, model), design.block, region=design.region, reach=design.extent)
     return {"model": model, **judged}

@@ -10,11 +10,10 @@ import numpy as np
 from doe import clearance
 from doe.arrays import Array, Whole
 from doe.designs import Design
-from doe.designs.model import model_terms
 from doe.running.failure import Failure, alike, sentence
 from doe.running.runner import Progress
 from doe.running.store import Store
-from doe.study.design import check_runs, design_of
+from doe.study.design import check_runs, design_of, terms_of
 from doe.study_file import Study
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
@@ -126,8 +125,7 @@ def _each_once(notes: Iterable[str]) -> list[str]:
 
 def fewest_runs(study: Study, design: Design) -> int:
     """Runs that the largest response model needs: one a term, one a block beyond the first, one to judge the fit."""
-    factors = len(study.factors)
-    return design.blocks + max(len(model_terms(factors, response.model)) for response in study.file.response)
+    return design.blocks + max(len(terms_of(study, response.model)) for response in study.file.response)
 
 
 def read_runs(study: Study, path: Path) -> Runs:

@@ -20,7 +20,7 @@ from doe.study.chains import solve_chains
 from doe.study.checked import check_study
 from doe.study.chosen import Chosen, choose
 from doe.study.confirmation import Confirmed, Gain, gains
-from doe.study.design import design_of
+from doe.study.design import check_given, design_of
 from doe.study.direct import Direct, find_direct
 from doe.study.direct_pick import DirectPick, local_of
 from doe.study.edge import Edge, edge_of
@@ -132,6 +132,7 @@ def run_study(
     clock = _Clock()
     inputs = inputs_digest(study, direct, adaptive, robust)
     check_goals(study)
+    check_given(study, folder)
     if robust := robust or declared(study):
         check_robust(study)
     reference = check_study(study, adaptive)

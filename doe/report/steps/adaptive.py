@@ -93,7 +93,9 @@ def _kinds(study: Study) -> str:
     """The categories of a search's pick; nothing without any."""
     before = study.at(()).categories
     pairs = [f"{name} = {kind} (baseline: {before[name]})" for name, kind in study.categories.items()]
-    return f" The pick has {', '.join(pairs)}." if pairs else ""
+    idle = " and ".join(study.factors[place] for place in study.inactive)
+    nothing = f", where {idle} means nothing" if idle else ""
+    return f" The pick has {', '.join(pairs)}{nothing}." if pairs else ""
 
 
 def held_sentence(study: Study, adaptive: Adaptive) -> str:
