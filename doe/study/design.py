@@ -79,11 +79,13 @@ def _whole(actual: Array, centre: Array, low: Array, high: Array) -> Array:
 
 
 def _without(design: Design, inactive: list[int]) -> Design:
-    """Runs with the inactive factors at their centre; of those that only these told apart the first."""
+    """Runs with the inactive factors at their centre; of those that only these told apart the ones that were there, or the
+    first."""
     settled = design.coded.copy()
     settled[:, inactive] = 0.0
-    first, before = (replicate_groups(each, design.block) for each in (settled, design.coded))
-    return replace(design, coded=settled).rows(np.flatnonzero(before == before[first]))
+    rows = np.argsort((settled != design.coded).any(axis=1), kind="stable")
+    first, before = (replicate_groups(each[rows], design.block[rows]) for each in (settled, design.coded))
+    return replace(design, coded=settled).rows(np.sort(rows[before == before[first]]))
 
 
 @cache
