@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from doe.arrays import Array, Whole
 from doe.designs.design import Design, assembled
-from doe.designs.evaluation import block_contrasts, moment_matrix
 from doe.designs.model import Terms, model_matrix, model_terms
 
 Criterion = Literal["d", "i"]
@@ -55,6 +54,8 @@ def optimal(
 
     The same seed gives the same design. Raises ValueError when the runs are too few for the terms, or too many.
     """
+    from doe.designs.evaluation import block_contrasts, moment_matrix
+
     terms = model_terms(factors, "quadratic") if terms is None else terms
     old = np.empty((0, factors)) if made is None else made
     groups = np.zeros(len(old), np.int64) if block is None else block

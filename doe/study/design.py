@@ -19,16 +19,11 @@ from doe.study_file.design_section import Design as DesignSettings
 from doe.study_file.table import read_table
 from rbdyn.faults import InputError, refuse
 
-ALL = (
-    designs.central_composite,
-    designs.box_behnken,
-    designs.full_factorial,
-    designs.latin_hypercube,
-    designs.sobol,
-    designs.definitive_screening,
-)
-MAKERS: dict[str, Callable[..., Design]] = {make.__name__: make for make in ALL}
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
+MAKERS: dict[str, Callable[..., Design]] = {
+    **OPTIMAL,
+    **{kind: getattr(designs, kind) for kind in KEYS_OF if kind not in OPTIMAL},
+}
 SEEDED = {"latin_hypercube", "sobol", *OPTIMAL}
 # Steps from the centre beyond which no run that is given lies: those of the star points of a rotatable design in 8 factors.
 FARTHEST = 4.0
@@ -98,7 +93,7 @@ def _design(text: str, factors: int, given: Given | None) -> Design:
         known |= {"made": np.array(given.made).reshape(-1, factors), "block": np.array(given.block, np.int64)}
     seed = {"seed"} if settings.kind in SEEDED else set()
     keys = settings.model_dump(include=(KEYS_OF[settings.kind] | seed) - {"augment"})
-    design = (MAKERS | OPTIMAL)[settings.kind](factors, centre_replicates=settings.centres, **keys, **known)
+    design = MAKERS[settings.kind](factors, centre_replicates=settings.centres, **keys, **known)
     return design.by_blocks(settings.seed if settings.order == "random" else None)
 
 
@@ -193,7 +188,9 @@ def check_runs(study: Study, design: Design) -> None:
         model = f"choose a simpler model{' (' + ' or '.join(told) + ')' if told else ''}"
         if runs < needed(response.model):
             few = f"the {runs} runs of the design are too few; it needs {needed(response.model)} ({what} and one to judge the fit)"
-            faults.append(f"{where}: {few}: enlarge the design or {model}")
+            key = "runs" if "runs" in KEYS_OF[study.file.design.kind] else "centre_replicates"
+            more = "enlarge the design" if key != "runs" and lost(response.model) else f"raise design.{key}"
+            faults.append(f"{where}: {few}: {more} or {model}")
         elif gone := lost(response.model):
             mend = f"add levels or centre points, or {model}"
             faults.append(f"{where}: the runs of the design cannot tell {', '.join(gone)} from the other terms; {mend}")

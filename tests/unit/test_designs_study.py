@@ -121,7 +121,7 @@ def test_impossible_settings_are_named(tmp_path, lines, factors, words):
         (
             'kind = "d_optimal"\nruns = 10',
             "quadratic",
-            "or choose a simpler model (pure_quadratic or interaction or linear)",
+            "raise design.runs or choose a simpler model (pure_quadratic or interaction or linear)",
         ),
         (
             'kind = "definitive_screening"',

@@ -97,6 +97,7 @@ def test_the_study_follows_a_pick_at_which_a_factor_means_nothing(tmp_path, monk
     outcome = run_study(study, tmp_path, 1, lambda title: silent, adaptive=True)
     assert outcome.study.categories == {"guidance": "roller"}
     assert outcome.pick.point[1] == 0.15
+    assert (outcome.front.points[:, 1] == 0.15).all()
     assert all("B" not in term for surface in outcome.surfaces for term in surface.terms)
     said = adaptive_record(study, outcome.adaptive)["sentence"]
     assert "The pick has guidance = roller (baseline: outer), where guide_clearance_mm means nothing." in said
