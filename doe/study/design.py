@@ -174,25 +174,26 @@ def check_runs(study: Study, design: Design) -> None:
     def needed(model: Model) -> int:
         return len(terms_of(study, model)) + design.blocks
 
+    def simpler(model: Model) -> str:
+        others: tuple[Model, ...] = "pure_quadratic", "interaction", "linear"
+        less = [each for each in others if set(terms_of(study, each)) < set(terms_of(study, model))]
+        told = [each for each in less if runs >= needed(each) and not lost(each)]
+        return f"choose a simpler model{' (' + ' or '.join(told) + ')' if told else ''}"
+
     faults = []
     for number, response in enumerate(study.file.response, 1):
-        terms = terms_of(study, response.model)
-        where = f"{study.path}: response[{number}].model = {response.model!r}"
-        what = f"{len(terms)} terms" + (f", {design.blocks - 1} block effects" if design.blocks > 1 else "")
-        simpler: list[Model] = ["pure_quadratic", "interaction", "linear"]
-        told = [
-            each
-            for each in simpler
-            if set(terms_of(study, each)) < set(terms) and runs >= needed(each) and not lost(each)
-        ]
-        model = f"choose a simpler model{' (' + ' or '.join(told) + ')' if told else ''}"
-        if runs < needed(response.model):
-            few = f"the {runs} runs of the design are too few; it needs {needed(response.model)} ({what} and one to judge the fit)"
+        model, least = response.model, needed(response.model)
+        where = f"{study.path}: response[{number}].model = {model!r}"
+        if runs < least:
+            what = f"{least - design.blocks} terms" + (
+                f", {design.blocks - 1} block effects" if design.blocks > 1 else ""
+            )
+            few = f"the {runs} runs of the design are too few; it needs {least} ({what} and one to judge the fit)"
             key = "runs" if "runs" in KEYS_OF[study.file.design.kind] else "centre_replicates"
-            more = "enlarge the design" if key != "runs" and lost(response.model) else f"raise design.{key}"
-            faults.append(f"{where}: {few}: {more} or {model}")
-        elif gone := lost(response.model):
-            mend = f"add levels or centre points, or {model}"
+            more = "enlarge the design" if key != "runs" and lost(model) else f"raise design.{key}"
+            faults.append(f"{where}: {few}: {more} or {simpler(model)}")
+        elif gone := lost(model):
+            mend = f"add levels or centre points, or {simpler(model)}"
             faults.append(f"{where}: the runs of the design cannot tell {', '.join(gone)} from the other terms; {mend}")
     refuse(faults)
 
