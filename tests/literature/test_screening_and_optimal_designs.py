@@ -12,6 +12,7 @@ from doe.designs import central_composite, definitive_screening, full_factorial,
 from doe.designs.definitive_screening import conference_matrix
 from doe.designs.evaluation import evaluate, lost_terms, moment_matrix
 from doe.designs.model import model_matrix, model_terms
+from doe.response_surface import fit
 
 QUADRATIC = model_terms(2, "quadratic")
 
@@ -64,6 +65,17 @@ def test_literature_definitive_screening_of_six_factors():
     assert np.sqrt(np.diag(covariance)[1:]) == pytest.approx(10.0**-0.5)
     for three in combinations(range(6), 3):
         assert lost_terms(points[:, three], model_terms(3, "quadratic")) == []
+
+
+def test_main_effects_are_told_in_spite_of_products():
+    """The same: a product that the model lacks shifts squares and the mean, and no main effect."""
+    points = definitive_screening(6, centre_replicates=2).coded
+    slopes = np.array([2.0, -1.0, 0.5, 0.0, 3.0, -4.0])
+    values = 7.0 + points @ slopes + 1.5 * points[:, 2] ** 2 + 5.0 * points[:, 0] * points[:, 1]
+    fitted = fit(points, values, name="y", model="pure_quadratic", centre=np.zeros(6), step=np.ones(6))
+    assert [fitted.by_term[letter] for letter in "ABCDEF"] == pytest.approx(slopes, abs=1e-12)
+    without = fit(points, values, name="y", model="pure_quadratic", centre=np.zeros(6), step=np.ones(6), without=(3,))
+    assert set(fitted.terms) - set(without.terms) == {"D", "D^2"}
 
 
 def test_closed_form_factorial_is_d_optimal():
