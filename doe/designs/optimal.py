@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from doe.arrays import Array, Whole
+from doe.arrays import Array
 from doe.designs.design import Design, assembled
 from doe.designs.model import Terms, model_matrix, model_terms
 
@@ -36,9 +36,9 @@ def optimal(
     runs: int,
     seed: int = 1,
     terms: Terms | None = None,
-    levels: Sequence[Array | None] | None = None,
-    made: Array | None = None,
-    block: Whole | None = None,
+    levels: Sequence[ArrayLike | None] | None = None,
+    made: ArrayLike = (),
+    block: ArrayLike | None = None,
     centre_replicates: int = 0,
 ) -> Design:
     """Add ``runs`` runs to those made such that all together tell a model as well as they can.
@@ -57,8 +57,8 @@ def optimal(
     from doe.designs.evaluation import block_contrasts, moment_matrix
 
     terms = model_terms(factors, "quadratic") if terms is None else terms
-    old = np.empty((0, factors)) if made is None else made
-    groups = np.zeros(len(old), np.int64) if block is None else block
+    old = np.asarray(made, float).reshape(-1, factors)
+    groups = np.zeros(len(old), np.int64) if block is None else np.asarray(block, np.int64)
     new = int(groups.max(initial=0)) + 1 if len(np.unique(groups)) > 1 else 0
     fixed = np.vstack([old, np.zeros((centre_replicates, factors))])
     needed = len(terms) + len(np.unique([*groups, new])) - 1
@@ -82,7 +82,7 @@ def optimal(
         contrasts[-1],
         rows.T @ rows + RIDGE * np.eye(rows.shape[1]),
         weights if criterion == "i" else None,
-        [None if each is None else each / reach for each in levels or [None] * factors],
+        [None if each is None else np.asarray(each, float) / reach for each in levels or [None] * factors],
     )
     points = exchange.best(exchange.starts(runs, np.random.default_rng(seed)))
     kinds = [("given", old), ("centre", fixed[len(old) :]), ("optimal", reach * points[np.lexsort(points.T)])]

@@ -39,8 +39,8 @@ class Given(NamedTuple):
 
     terms: Terms
     levels: tuple[Values | None, ...]
-    made: tuple[Values, ...] = ()
-    block: tuple[int, ...] = ()
+    made: tuple[Values, ...]
+    block: tuple[int, ...]
 
 
 def terms_of(study: Study, model: Model) -> Terms:
@@ -87,11 +87,7 @@ def _without(design: Design, inactive: list[int]) -> Design:
 def _design(text: str, factors: int, given: Given | None) -> Design:
     """The design of settings in JSON; several steps of a study ask for it, and some designs take a while."""
     settings = DesignSettings.model_validate_json(text)
-    known: dict[str, Any] = {}
-    if given is not None:
-        known = {"terms": given.terms, "levels": [None if each is None else np.array(each) for each in given.levels]}
-        known |= {"made": np.array(given.made).reshape(-1, factors), "block": np.array(given.block, np.int64)}
-    seed = {"seed"} if settings.kind in SEEDED else set()
+    seed, known = {"seed"} if settings.kind in SEEDED else set(), {} if given is None else given._asdict()
     keys = settings.model_dump(include=(KEYS_OF[settings.kind] | seed) - {"augment"})
     design = MAKERS[settings.kind](factors, centre_replicates=settings.centres, **keys, **known)
     return design.by_blocks(settings.seed if settings.order == "random" else None)
@@ -100,9 +96,8 @@ def _design(text: str, factors: int, given: Given | None) -> Design:
 def _given(study: Study) -> Given:
     """What an optimal design is to know. Raises InputError for a table of runs that are impossible."""
     terms = tuple(dict.fromkeys(term for each in study.file.response for term in terms_of(study, each.model)))
-    made, block = np.empty((0, len(study.factors))), np.empty(0, np.int64)
-    if study.file.design.augment is not None:
-        made, block = _made(study, study.file.design.augment)
+    table = study.file.design.augment
+    made, block = (np.empty((0, 1)), np.empty(0, np.int64)) if table is None else _made(study, table)
     reach = np.abs(made).max(initial=1.0)
     levels: list[Values | None] = []
     for place, factor in enumerate(study.file.factor):
