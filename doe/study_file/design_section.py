@@ -128,7 +128,7 @@ class Design(Consistent):
     given or at the centre."""
     augment: str | None = None
     """Table of runs that were made, beside the study: an optimal design keeps them as they are and adds its own, so that all
-    together tell most; made in standard order with the same seed, they are not simulated again in the same folder."""
+    together tell most. Runs that this study made in standard order with this seed are not simulated again in its folder."""
     order: Literal["standard", "random"] = "standard"
     """Order of the runs. A run's seed is seed plus its place in the standard order, whatever this is."""
     seed: Annotated[int, Field(ge=0)] = 1
