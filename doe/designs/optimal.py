@@ -77,7 +77,7 @@ def optimal(
     size = len(terms)
     weights = np.zeros((rows.shape[1],) * 2)
     weights[:size, :size] = moment_matrix(terms, factors, "box", 1.0)
-    exchange = _Exchange(
+    exchange = Exchange(
         terms,
         contrasts[-1],
         rows.T @ rows + RIDGE * np.eye(rows.shape[1]),
@@ -95,7 +95,7 @@ def _on_parts(number: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Exchange:
+class Exchange:
     """Exchanges of coordinates in many designs (s, n, k) of new runs side by side, in the box from -1 to 1.
 
     ``beside`` (b,) stands in the row of every new run for the blocks, ``made`` (p, p) is X'X of the runs that stay;
@@ -159,7 +159,7 @@ class _Exchange:
         trial = np.repeat(points[:, run, None], given.shape[-1], axis=1)
         trial[..., factor] = given
         old, new = self._rows(points[:, run]), self._rows(trial)
-        gain = self._gain(inverse, old, new)
+        gain = self.gain(inverse, old, new)
         every = np.arange(len(points))
         best = np.round(gain, 9).argmax(axis=1)
         better = np.flatnonzero(gain[every, best] > LEAST)
@@ -170,7 +170,7 @@ class _Exchange:
         points[better, run] = trial[better, best[better]]
         return better.size > 0
 
-    def _gain(self, inverse: Array, old: Array, new: Array) -> Array:
+    def gain(self, inverse: Array, old: Array, new: Array) -> Array:
         """By what share each of the ``new`` rows (s, c, p) in place of the ``old`` (s, p) raises the determinant, or lowers the
         mean variance, of the designs; -1 where it leaves a term untold."""
         ahead = new @ inverse

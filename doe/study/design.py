@@ -16,7 +16,7 @@ from doe.designs.model import Model, Terms, model_terms
 from doe.study_file import Study
 from doe.study_file.design_section import KEYS_OF
 from doe.study_file.design_section import Design as DesignSettings
-from doe.study_file.table import read_table
+from doe.study_file.table import Table, read_table
 from rbdyn.faults import InputError, refuse
 
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
@@ -96,8 +96,10 @@ def _design(text: str, factors: int, given: Given | None) -> Design:
 def _given(study: Study) -> Given:
     """What an optimal design is to know. Raises InputError for a table of runs that are impossible."""
     terms = tuple(dict.fromkeys(term for each in study.file.response for term in terms_of(study, each.model)))
-    table = study.file.design.augment
-    made, block = (np.empty((0, 1)), np.empty(0, np.int64)) if table is None else _made(study, table)
+    made, block = np.empty((0, 1)), np.empty(0, np.int64)
+    if (name := study.file.design.augment) is not None:
+        table = _table(study, name)
+        made, block = study.coded(table.actual), np.unique(table.block, return_inverse=True)[1]
     reach = np.abs(made).max(initial=1.0)
     levels: list[Values | None] = []
     for place, factor in enumerate(study.file.factor):
@@ -113,38 +115,34 @@ def _given(study: Study) -> Given:
     return Given(terms, tuple(levels), tuple(map(tuple, made.tolist())), tuple(block.tolist()))
 
 
-def _made(study: Study, name: str) -> tuple[Array, Any]:
-    """Coded points (n, k) of a table's runs, and their blocks (n,) from 0. Raises InputError."""
+def _table(study: Study, name: str) -> Table:
+    """The runs that are given. Raises InputError for a table that cannot be read or has impossible ones."""
     where = f"{study.path}: design.augment = {name!r}"
     try:
         table = read_table(study.beside(name), study.factors, [], study.path)
     except InputError as error:
         raise InputError([f"{where}: {fault}" for fault in error.faults]) from None
-    coded = _exactly(study, table.actual)
+    away = np.abs(study.coded(table.actual))
     refuse(
-        f"{where}: {study.factors[column]} in row {row + 1} = {table.actual[row, column]:g}: lies {abs(coded[row, column]):.4g} "
+        f"{where}: {study.factors[column]} in row {row + 1} = {table.actual[row, column]:g}: lies {away[row, column]:.4g} "
         f"steps from the centre, outside any region of a design (at most {FARTHEST:g}); check its unit, or widen step"
-        for row, column in np.argwhere(np.abs(coded) > FARTHEST).tolist()
+        for row, column in np.argwhere(away > FARTHEST).tolist()
     )
     refuse(
         f"{where}: {factor.name} in row {row + 1} = {table.actual[row, column]:g}: whole = true has no such value; mend the row"
         for column, factor in enumerate(study.file.factor)
         for row in np.flatnonzero(factor.whole & (table.actual[:, column] % 1.0 != 0.0)).tolist()
     )
-    return coded, np.unique(table.block, return_inverse=True)[1]
+    return table
 
 
-def _exactly(study: Study, actual: Array) -> Array:
-    """Coded points whose actual values are these to the last bit, wherever a number has such."""
-    coded = study.coded(actual)
-    for side in (-np.inf, np.inf):
-        beside = study.coded(actual)
-        for _ in range(4):
-            beside = np.nextafter(beside, side)
-            coded = np.where(
-                study.actual(coded) == actual, coded, np.where(study.actual(beside) == actual, beside, coded)
-            )
-    return coded
+def actual_of(study: Study, design: Design) -> Array:
+    """Factor values (n, k) of the runs; of those that are given to the last bit, which coding them may change."""
+    actual, name = study.actual(design.coded), study.file.design.augment
+    if name is not None and not study.inactive:
+        given = [row for row, kind in enumerate(design.kind) if kind == "given"]
+        actual[given] = _table(study, name).actual[design.order[given]]
+    return actual
 
 
 def check_given(study: Study, folder: Path) -> None:

@@ -13,7 +13,7 @@ from doe.designs import Design
 from doe.running.failure import Failure, alike, sentence
 from doe.running.runner import Progress
 from doe.running.store import Store
-from doe.study.design import check_runs, design_of, terms_of
+from doe.study.design import actual_of, check_runs, design_of, terms_of
 from doe.study_file import Study
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
@@ -74,7 +74,7 @@ def ordered_runs(study: Study) -> Ordered:
     """Every run of the study's design. Raises InputError when the design, a scene or a response is impossible."""
     clearance.check_responses(study)
     design = design_of(study)
-    actual = study.actual(design.coded)
+    actual = actual_of(study, design)
     scenes = clearance.design_scenes(study, actual, design.order.tolist())
     labels = [f"design run {run}" for run in range(1, len(actual) + 1)]
     return Ordered(design, actual, scenes, labels, [study.by_factor(point) for point in actual])

@@ -12,6 +12,7 @@ from doe.designs import central_composite, definitive_screening, full_factorial,
 from doe.designs.definitive_screening import conference_matrix
 from doe.designs.evaluation import evaluate, lost_terms, moment_matrix
 from doe.designs.model import model_matrix, model_terms
+from doe.designs.optimal import Exchange
 from doe.response_surface import fit
 
 QUADRATIC = model_terms(2, "quadratic")
@@ -148,6 +149,25 @@ def test_invariant_no_exchange_improves_the_design(criterion):
                 moved = points.copy()
                 moved[run, factor] = np.clip(moved[run, factor] + step, -1.0, 1.0)
                 assert loss(moved) > loss(points) - 3e-5
+
+
+@pytest.mark.parametrize("criterion", ["d", "i"])
+def test_closed_form_gain_of_an_exchange(criterion):
+    """Closed form of Fedorov against both designs worked out from scratch."""
+    random, terms = np.random.default_rng(4), model_terms(3, "quadratic")
+    points, others = random.uniform(-1.0, 1.0, (16, 3)), random.uniform(-1.0, 1.0, (30, 3))
+    moments = moment_matrix(terms, 3, "box", 1.0) if criterion == "i" else None
+    exchange = Exchange(terms, np.empty(0), np.zeros((10, 10)), moments, [None] * 3)
+    old, new = (model_matrix(each, terms)[None] for each in (points[5], others))
+    found = exchange.gain(np.linalg.inv(information(points, terms))[None], old, new)[0]
+    for other, gain in zip(others, found, strict=True):
+        after = points.copy()
+        after[5] = other
+        if criterion == "d":
+            expected = (determinant(after, terms) / determinant(points, terms)) ** 10 - 1.0
+        else:
+            expected = 1.0 - mean_variance(after, terms) / mean_variance(points, terms)
+        assert gain == pytest.approx(expected, rel=1e-8, abs=1e-10)
 
 
 def test_more_runs_never_tell_less():

@@ -11,7 +11,7 @@ from short_studies import SHORT, short_study, silent
 
 from doe import clearance
 from doe.report.study.files import write
-from doe.study.design import check_given, design_of, evaluation
+from doe.study.design import actual_of, check_given, design_of, evaluation
 from doe.study.runs import ordered_runs, run_design
 from doe.study.whole import run_study
 from doe.study_file import Study
@@ -66,6 +66,16 @@ def test_runs_of_a_study_are_kept_and_not_simulated_again(tmp_path, monkeypatch)
     judged = evaluation(study, ordered.design)
     assert judged["region"]["shape"] == "box" and judged["region"]["reach"] == pytest.approx(8**0.25)
     assert judged["degrees_of_freedom"]["residual"] == 14
+
+
+def test_given_runs_are_kept_to_the_last_bit_where_coding_changes_it(tmp_path):
+    points = np.random.default_rng(2).uniform(0.0, 0.1, (40, 3)).round(3)
+    study = augmented(tmp_path, table_of(points.tolist()))
+    study.file.factor[:] = [each.model_copy(update={"centre": 0.0, "step": 0.07}) for each in study.file.factor]
+    design = design_of(study)
+    assert (study.actual(design.coded)[:40] != points).any()
+    assert np.array_equal(actual_of(study, design)[:40], points)
+    assert design.order[:40].tolist() == list(range(40)), "a random order is one of the new runs"
 
 
 def test_blocks_of_the_table_stay_and_the_new_runs_make_another(tmp_path):

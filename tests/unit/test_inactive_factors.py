@@ -126,6 +126,7 @@ def test_unknown_names_of_inactive_factors(tmp_path, old, new, words):
     [
         (10, 1, [9.0, 10.0, 11.0]),  # the star points at 8.3 and 11.7 would be rounded out of the region
         (10, 1.5, [8.0, 10.0, 12.0]),  # 8.5 and 11.5 go outward, 7.5 and 12.5 inward
+        (10, 1.4, [8.0, 9.0, 10.0, 11.0, 12.0]),
         (12, 2, [9.0, 10.0, 12.0, 14.0, 15.0]),
     ],
 )
