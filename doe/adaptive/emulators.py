@@ -35,20 +35,19 @@ class Emulators:
     levels: tuple[int, ...] = ()
     inactive: Inactive = ()
 
-    def embedded(self, points: Array) -> Array:
-        """Points (n, k) as the emulators know them."""
+    def _embedded(self, points: Array) -> Array:
         return embedded(settled(points, self.levels, self.inactive), self.levels)
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations (n, m) of the responses without scatter at points (n, k)."""
-        means, deviations = zip(*(one.predict(self.embedded(points)) for one in self.each), strict=True)
+        means, deviations = zip(*(one.predict(self._embedded(points)) for one in self.each), strict=True)
         stretched = np.column_stack(deviations) * self.stretch
         floor = LEAST_DEVIATION * np.maximum(np.abs(self.runs.values).max(axis=0), 1e-300)
         return np.column_stack(means), np.maximum(stretched, floor)
 
     def covariance(self, points: Array, point: Array) -> Array:
         """Covariances (n, m) of what is not known of each response at points (n, k) and at one point (k,)."""
-        at, other = (self.embedded(each) for each in (points, point[None]))
+        at, other = (self._embedded(each) for each in (points, point[None]))
         columns = [one.covariance(at, other)[:, 0] for one in self.each]
         return np.column_stack(columns) * self.stretch**2
 
@@ -63,7 +62,7 @@ class Emulators:
     def draws(self, count: int, random: np.random.Generator) -> Callable[[Array], Array]:
         """Functions of points (n, k) drawn from the emulators, with responses (s, n, m)."""
         drawn = [one.draw(count, random) for one in self.each]
-        return lambda points: np.stack([function(self.embedded(points)) for function in drawn], axis=-1)
+        return lambda points: np.stack([function(self._embedded(points)) for function in drawn], axis=-1)
 
     def kept(self, means: Array, deviations: Array) -> Array:
         """Probability (n,) that a point keeps all limits, the responses as independent."""
