@@ -8,6 +8,7 @@ import numpy as np
 from doe.arrays import Array, Rows, or_none
 from doe.pareto.surrogate_loss import DRAWS, noisy_hypervolume
 from doe.report.steps.confirmation import point_record
+from doe.report.steps.emulators import emulators_record
 from doe.study.adaptive import Adaptive, levels_at
 from doe.study.goals import region_of
 from doe.study_file import Study
@@ -65,6 +66,7 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
             name: {"bias": float(bias), "spread": float(spread)}
             for name, bias, spread in zip(study.responses, found.bias, found.spread, strict=True)
         },
+        "emulators": emulators_record(study, adaptive),
         "failed": len(adaptive.failures),
         "seed": front.seed,
         "seconds": adaptive.seconds,
