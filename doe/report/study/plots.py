@@ -2,21 +2,35 @@
 
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from doe.report.sections.record import Record
+from doe.report.sections.searches import reached_lines, reached_text, spent_runs
 from doe.response_surface import Surface
-from doe.study.adaptive import reached
 from doe.study.design import design_of
 from doe.study.robust_front import RobustFront
 from doe.study.whole import StudyResult
 from doe.study_file import Study
-from rbdyn.records.words import label, quantity
+from rbdyn.records.words import label, quantity, with_error
+
+# Marker and colour of the runs made for each reason; a legend where no point lies; pictures beside each other.
+MARKERS = {
+    "design": ("s", "tab:blue"),
+    "improvement": ("h", "tab:orange"),
+    "check": ("D", "tab:green"),
+    "extension": ("^", "tab:purple"),
+    "fresh": ("P", "black"),
+}
+BENEATH: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13)}
+WIDEST = 3
 
 
 def response_surface(study: Study, surface: Surface, path: Path) -> None:
@@ -72,35 +86,47 @@ def _bounds(study: Study, name: str) -> list[float]:
     return [bound for bound in (response.lower, response.upper) if bound is not None]
 
 
-def adaptive_search(outcome: StudyResult, path: Path) -> None:
-    """Hypervolume against runs beside that of the surfaces' front, and where each run was made and why."""
-    study, adaptive = outcome.study, outcome.adaptive
-    assert adaptive is not None
-    found, points = adaptive.found, adaptive.found.searched.points
-    panels = range(1, len(study.factors))
-    figure, axes = plt.subplots(1, 1 + len(panels), figsize=(4.6 * (1 + len(panels)), 4.2), squeeze=False)
-    first, *rest = axes[0]
-    each = [(state.runs, state.reached, state.deviation) for state in found.history]
-    first.errorbar(*np.array(each).T, fmt="o-", color="tab:olive", capsize=3, label="adaptive search ± deviation")
-    words = "front on the surfaces, by the emulators"
-    first.axhline(reached(study, adaptive, outcome.front.points), color="tab:blue", linestyle="--", label=words)
-    first.set_xlabel("runs of design and search")
-    first.set_ylabel("hypervolume foretold")
-    for axis, panel in zip(rest, panels, strict=True):
-        for why in dict.fromkeys(found.why):
-            rows = [row for row, other in enumerate(found.why) if other == why]
-            axis.scatter(points[rows, 0], points[rows, panel], s=6.0 * found.spent[rows], alpha=0.7, label=why)
-        axis.scatter(
-            adaptive.front.points[:, 0], adaptive.front.points[:, panel], s=60, marker="x", c="k", label="fresh"
+def adaptive_search(record: Record, path: Path) -> None:
+    """Hypervolume against runs beside other fronts, and where each run was spent and why, of the record of a study."""
+    names = record["design"]["factors"]
+    columns = min(len(names), WIDEST)
+    rows = -(-len(names) // columns)
+    figure = plt.figure(figsize=(5.2 * columns, 5.0 * rows), layout="constrained")
+    _hypervolumes(figure.add_subplot(rows, columns, 1), record["adaptive"])
+    for panel, name in enumerate(names[1:], 2):
+        axis = figure.add_subplot(rows, columns, panel)
+        for why, runs in spent_runs(record).items():
+            x, y = ([point[each] for point, _ in runs] for each in (names[0], name))
+            marker, color = MARKERS[why]
+            sizes = [7.0 * count for _, count in runs]
+            axis.scatter(x, y, sizes, color, marker=marker, alpha=0.8, edgecolors="white", linewidths=0.5, label=why)
+        axis.plot(
+            *(record["pick"][each] for each in (names[0], name)), "*", c="tab:red", mec="white", ms=15, label="pick"
         )
-        axis.set_xlabel(label(study.factors[0]))
-        axis.set_ylabel(label(study.factors[panel]))
-    for axis in axes[0]:
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=7)
-    figure.tight_layout()
+        axis.set_xlabel(label(names[0]))
+        axis.set_ylabel(label(name))
+        axis.xaxis.set_major_locator(MaxNLocator(5))
+        axis.set_title("where each run was spent, and why; size: replicates", fontsize=10)
+        axis.legend(fontsize=8, ncol=4, **BENEATH)
     figure.savefig(path, dpi=130)
     plt.close(figure)
+
+
+def _hypervolumes(axis: Axes, adaptive: Record) -> None:
+    search, fresh = adaptive["compared"]["search"], adaptive["compared"]["fresh"]
+    runs, doubt = ([each[key] for each in adaptive["history"]] for key in ("runs", "deviation"))
+    words = f"search, foretold by its last emulators: {search[-1]:.3f}; bars: what they doubted then"
+    axis.errorbar(runs, search, doubt, fmt="o-", color="tab:blue", capsize=3, label=words)
+    words = f"its points by fresh runs: {with_error(fresh['hypervolume'], fresh['error'])}"
+    place = runs[-1] + adaptive["fresh"], fresh["hypervolume"], fresh["error"]
+    axis.errorbar(*place, fmt="P", color="black", markersize=8, capsize=3, label=words)
+    for (_, words, reached, error), color in zip(reached_lines(adaptive), ("tab:gray", "tab:green"), strict=False):
+        axis.axhline(reached, color=color, linestyle="--", label=f"{words}: {reached_text(reached, error)}")
+        axis.axhspan(reached - error, reached + error, color=color, alpha=0.15, linewidth=0)
+    axis.set_xlabel("runs")
+    axis.set_ylabel("hypervolume (larger is better)")
+    axis.set_title("how far each front gets, on one scale", fontsize=10)
+    axis.legend(fontsize=8, **BENEATH)
 
 
 def pareto_front(outcome: StudyResult, path: Path) -> None:
