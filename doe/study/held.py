@@ -43,18 +43,21 @@ def pulls(study: Study, adaptive: Adaptive, pick: Array) -> list[Pull]:
         less = (here - below > LITTLE) & (below <= above)
         turn = ~more & ~less & (np.maximum(above, below) - here > LITTLE)
         ways = [[name for name, one in zip(names, each, strict=True) if one] for each in (more, less, turn)]
-        at_face = _face(adaptive, index, float(pick[index]))
+        at_face = _face(study, adaptive, index, float(pick[index]))
         found.append(Pull(study.factors[index], float(pick[index]), ways[0], ways[1], ways[2], at_face))
     return found
 
 
-def _face(adaptive: Adaptive, index: int, at: float) -> Face | None:
-    """The face that a factor lies at, as the search left it; held by "end" where its own pick lay elsewhere."""
+def _face(study: Study, adaptive: Adaptive, index: int, at: float) -> Face | None:
+    """The face that a factor lies at, as the search left it; where its own pick lay elsewhere, the "end" of the region that was
+    searched, if that might have grown."""
     low, high = adaptive.edges[index].tolist()
+    allowed = study.file.factor[index].allowed if study.file.adaptive.extend else None
     for side, end in ((-1, low), (1, high)):
         if abs(at - end) <= NEAR * (high - low):
             known = (face for face in adaptive.found.faces if (face.factor, face.side) == (index, side))
-            return next(known, Face(index, side, float("nan"), float("nan"), "end"))
+            open_end = allowed is not None and abs(allowed[int(side > 0)] - end) > NEAR * (high - low)
+            return next(known, Face(index, side, float("nan"), float("nan"), "end" if open_end else "allowed"))
     return None
 
 

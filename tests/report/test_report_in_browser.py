@@ -387,7 +387,7 @@ def test_the_widget_switches_between_polynomial_and_emulator(browser):
         assert f"guidance {name}" in told[name]
     polynomial = predicted(RESPONSES[0], [(x - c) / s for x, c, s in zip(chosen, CENTRE, STEP, strict=True)])
     assert f"; {polynomial:.2f} ± " in told["inner"] and " N by the polynomial; at radial" in told["inner"]
-    assert "out of reach of the polynomial" in told["outer"], "it was fitted to runs with the categories of the pick"
+    assert "not known to the polynomial" in told["outer"], "it was fitted to runs with the categories of the pick"
     page.find_element("id", "surface_pick").click()
     maps = []
     for by in ("polynomial", "emulator"):
@@ -397,7 +397,7 @@ def test_the_widget_switches_between_polynomial_and_emulator(browser):
     # The axis goes as far as the search went, the polynomial does not.
     keys(page, "surface_y", "pocket")
     keys(page, "surface_map", *["\ue013"] * 41)
-    assert "out of reach of the polynomial" in text_of(page, "surface_read")
+    assert "not known to the polynomial" in text_of(page, "surface_read")
     assert "pocket clearance 0.48409 mm" in text_of(page, "surface_read")
     assert driver.get_log("browser") == []
     plain = opened(browser)

@@ -199,4 +199,7 @@ def test_what_pulls_at_a_factor_and_what_turns_there():
     assert "limit impact_force_N <= 0.02" in told and "power_loss_W <=" not in told
     assert "dimension chain pocket cannot" in told and "guide cannot" not in told
     outcome.pick.point = centre - half
-    assert "where the region searched ends" in held_sentence(outcome), "its own pick lay elsewhere"
+    assert "where the region of the design ends and no allowed" in held_sentence(outcome), "its own pick lay elsewhere"
+    factors = [each.model_copy(update={"allowed": (0.01, 0.5)}) for each in study.file.factor]
+    outcome.study = replace(study, file=study.file.model_copy(update={"factor": factors}))
+    assert "where the region searched ends" in held_sentence(outcome), "it might have grown"

@@ -80,10 +80,9 @@
     });
     let height = `${page.with_error(polynomial(one, place), model.half_width(one, c))}${unit}`;
     if (searched) {
-      const known = Number.isFinite(polynomial(one, place)) ? `${height} by the polynomial` : "out of reach of the polynomial";
-      const deviation = by_emulator(one, place, emulator.deviation);
-      const value = page.with_error(by_emulator(one, place), deviation).split(" ± ")[0];
-      height = `${value}${unit} by the emulator, standard deviation ${page.shown(deviation, 2)}${unit}; ${known};`;
+      const known = Number.isFinite(polynomial(one, place)) ? `${height} by the polynomial` : "not known to the polynomial";
+      const [value, deviation] = page.with_error(by_emulator(one, place), by_emulator(one, place, emulator.deviation)).split(" ± ");
+      height = `${value}${unit} by the emulator, standard deviation ${deviation}${unit}; ${known};`;
       searched.categories.forEach((each, c) => where.push(`${each.name} ${each.levels[kinds[c]]}`));
     }
     by("surface_read").textContent = `${one.words} ${height} at ${where.join(", ")}`;

@@ -1,6 +1,6 @@
 """The search in few runs: how far its front came, run by run, beside other fronts, and where each run was spent and why."""
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
 from doe.report.sections.blocks import Block, Figures, Heading, Table
 from doe.report.sections.plot import Plot, legend, span
@@ -23,7 +23,8 @@ def in_few_runs(summary: Record) -> list[Block]:
     history, known = adaptive.get("history") or [], part(adaptive, "compared", "search") or []
     blocks: list[Block] = [Heading("The search in few runs")] if history else []
     if history and len(known) == len(history):
-        blocks.append(Figures([_progress(adaptive, known), _lines(adaptive, known)], SCALE))
+        entries = [(SHAPES.get(each.role, "line"), each.role, each.words) for each in curves(adaptive)]
+        blocks.append(Figures([_progress(adaptive), legend(entries)], SCALE))
     if spent := spent_runs(summary):
         given = factors(summary)
         pairs = [_where(summary, spent, given[0].name, other.name) for other in given[1:]]
@@ -49,62 +50,52 @@ def spent_runs(summary: Record) -> dict[str, list[tuple[Record, int]]]:
     return found
 
 
-def reached_lines(adaptive: Record) -> list[tuple[str, str, float, float]]:
-    """Fronts beside that of the search: role, what they are, hypervolume and its 95 % half width (0: not known)."""
-    compared = adaptive["compared"]
-    found = [("surrogate", "front on the surfaces, by the same emulators", compared["surfaces"], 0.0)]
+class Curve(NamedTuple):
+    """Hypervolumes of a front after ``runs``, all along without any, with what they are in doubt by (0: not known)."""
+
+    role: str
+    words: str
+    runs: list[float]
+    reached: list[float]
+    doubt: list[float]
+
+
+def curves(adaptive: Record) -> list[Curve]:
+    """The search, its points by their fresh runs, the front on the surfaces, and the direct one where it is known."""
+    compared, history = adaptive["compared"], adaptive["history"]
+    runs, doubt = ([float(each[key]) for each in history] for key in ("runs", "deviation"))
+    search, fresh = compared["search"], compared["fresh"]
+    told = f"search, foretold by its last emulators: {search[-1]:.3f} in the end; bars: what they doubted then"
+    words = f"its points by their fresh runs: {with_error(fresh['hypervolume'], fresh['error'])}"
+    beside = f"front on the surfaces, by the same emulators: {compared['surfaces']:.3f}"
+    found = [
+        Curve("front", told, runs, search, doubt),
+        Curve("fresh", words, [runs[-1] + adaptive["fresh"]], [fresh["hypervolume"]], [fresh["error"]]),
+        Curve("surrogate", beside, [], [compared["surfaces"]], [0.0]),
+    ]
     if direct := compared.get("direct"):
-        words = f"direct front of {direct['evaluations']} evaluations, by its own fresh runs"
-        found.append(("direct", words, direct["hypervolume"], direct["error"]))
+        reached = with_error(direct["hypervolume"], direct["error"])
+        words = f"direct front of {direct['evaluations']} evaluations, by its own fresh runs: {reached}"
+        found.append(Curve("direct", words, [], [direct["hypervolume"]], [direct["error"]]))
     return found
 
 
-def reached_text(hypervolume: float, error: float) -> str:
-    """A hypervolume with its error, if that is known."""
-    return with_error(hypervolume, error) if error else f"{hypervolume:.3f}"
-
-
-def _progress(adaptive: Record, search: Sequence[float]) -> str:
+def _progress(adaptive: Record) -> str:
     """Hypervolume against runs."""
-    history, fresh = adaptive["history"], adaptive["compared"]["fresh"]
-    end = history[-1]["runs"] + adaptive["fresh"]
-    lines = reached_lines(adaptive)
-    heights = [y + side * e for _, _, y, e in lines for side in (-1, 1)] + [fresh["hypervolume"] - fresh["error"]]
-    known = [
-        *search,
-        *heights,
-        *(y + side * each["deviation"] for y, each in zip(search, history, strict=True) for side in (-1, 1)),
-    ]
-    plot = Plot((history[0]["runs"] - 4.0, end + 4.0), span(known), ("runs", "hypervolume"))
-    for role, _, height, error in lines:
-        plot.line([(plot.x[0], height), (plot.x[1], height)], role)
-        plot.cross((plot.x[1] - 2.0, height), (None, error), "error")
-    points = [(float(each["runs"]), y) for each, y in zip(history, search, strict=True)]
-    for point, each in zip(points, history, strict=True):
-        plot.cross(point, (None, each["deviation"]), "error")
-    plot.line(points, "front")
-    plot.dots(points, "front", radius=3.4, titles=[f"{x:.0f} runs: {y:.3f}" for x, y in points])
-    plot.cross((end, fresh["hypervolume"]), (None, fresh["error"]), "error")
-    plot.symbol((end, fresh["hypervolume"]), SHAPES["fresh"], "fresh", "its points, simulated afresh")
-    return plot.svg(
-        f"Hypervolume of the search rises from {search[0]:.3f} to {search[-1]:.3f} in {history[-1]['runs']} runs"
-    )
-
-
-def _lines(adaptive: Record, search: Sequence[float]) -> str:
-    """What the lines are, with their numbers."""
-    fresh = adaptive["compared"]["fresh"]
-    entries = [
-        (
-            "line",
-            "front",
-            f"search, foretold by its last emulators: {search[-1]:.3f} in the end; bars: what they doubted then",
-        ),
-        (SHAPES["fresh"], "fresh", f"its points by fresh runs: {with_error(fresh['hypervolume'], fresh['error'])}"),
-    ]
-    lines = reached_lines(adaptive)
-    entries += [("line", role, f"{words}: {reached_text(y, error)}") for role, words, y, error in lines]
-    return legend(entries)
+    drawn = curves(adaptive)
+    ends = [y + side * e for each in drawn for y, e in zip(each.reached, each.doubt, strict=True) for side in (-1, 1)]
+    plot = Plot(span(x for each in drawn for x in each.runs), span(ends), ("runs", "hypervolume"))
+    for role, words, runs, reached, doubt in drawn:
+        points = list(zip(runs or plot.x, reached if runs else 2 * reached, strict=True))
+        plot.line(points, role)
+        for point, error in zip(points, doubt, strict=False):
+            plot.cross(point, (None, error), "error")
+        if role in SHAPES:
+            plot.symbol(points[0], SHAPES[role], role, words)
+        elif runs:
+            plot.dots(points, role, radius=3.4, titles=[f"{x:.0f} runs: {y:.3f}" for x, y in points])
+    first, last = drawn[0].reached[0], drawn[0].reached[-1]
+    return plot.svg(f"Hypervolume of the search rises from {first:.3f} to {last:.3f} in {drawn[0].runs[-1]:.0f} runs")
 
 
 def _where(summary: Record, spent: dict[str, list[tuple[Record, int]]], one: str, two: str) -> str:

@@ -1,5 +1,6 @@
 """Pictures of a study: response surfaces and the Pareto front."""
 
+from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -13,15 +14,15 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from doe.report.sections.record import Record
-from doe.report.sections.searches import reached_lines, reached_text, spent_runs
+from doe.report.sections.searches import curves, spent_runs
 from doe.response_surface import Surface
 from doe.study.design import design_of
 from doe.study.robust_front import RobustFront
 from doe.study.whole import StudyResult
 from doe.study_file import Study
-from rbdyn.records.words import label, quantity, with_error
+from rbdyn.records.words import label, quantity
 
-# Marker and colour of the runs made for each reason; a legend where no point lies; pictures beside each other.
+# Marker and colour of the runs made for each reason and of the fronts; a legend where no point lies; pictures in a row.
 MARKERS = {
     "design": ("s", "tab:blue"),
     "improvement": ("h", "tab:orange"),
@@ -29,6 +30,7 @@ MARKERS = {
     "extension": ("^", "tab:purple"),
     "fresh": ("P", "black"),
 }
+CURVES = (("o-", "tab:blue"), ("P", "black"), ("--", "tab:gray"), ("--", "tab:green"))
 BENEATH: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13)}
 WIDEST = 3
 
@@ -113,16 +115,13 @@ def adaptive_search(record: Record, path: Path) -> None:
 
 
 def _hypervolumes(axis: Axes, adaptive: Record) -> None:
-    search, fresh = adaptive["compared"]["search"], adaptive["compared"]["fresh"]
-    runs, doubt = ([each[key] for each in adaptive["history"]] for key in ("runs", "deviation"))
-    words = f"search, foretold by its last emulators: {search[-1]:.3f}; bars: what they doubted then"
-    axis.errorbar(runs, search, doubt, fmt="o-", color="tab:blue", capsize=3, label=words)
-    words = f"its points by fresh runs: {with_error(fresh['hypervolume'], fresh['error'])}"
-    place = runs[-1] + adaptive["fresh"], fresh["hypervolume"], fresh["error"]
-    axis.errorbar(*place, fmt="P", color="black", markersize=8, capsize=3, label=words)
-    for (_, words, reached, error), color in zip(reached_lines(adaptive), ("tab:gray", "tab:green"), strict=False):
-        axis.axhline(reached, color=color, linestyle="--", label=f"{words}: {reached_text(reached, error)}")
-        axis.axhspan(reached - error, reached + error, color=color, alpha=0.15, linewidth=0)
+    for each, (marker, color) in zip(curves(adaptive), CURVES, strict=False):
+        if each.runs:
+            axis.errorbar(each.runs, each.reached, each.doubt, fmt=marker, c=color, ms=7, capsize=3, label=each.words)
+        else:
+            (y,), (error,) = each.reached, each.doubt
+            axis.axhline(y, color=color, linestyle=marker, label=each.words)
+            axis.axhspan(y - error, y + error, color=color, alpha=0.15, linewidth=0)
     axis.set_xlabel("runs")
     axis.set_ylabel("hypervolume (larger is better)")
     axis.set_title("how far each front gets, on one scale", fontsize=10)
@@ -142,9 +141,7 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
             ("front foretold by emulators", outcome.adaptive.found.foretold[outcome.adaptive.found.shown], "tab:olive")
         )
         clouds.append(("its points, simulated afresh", outcome.adaptive.front.values, "tab:green"))
-    pairs = list(combinations(range(len(surfaces)), 2))
-    figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
-    for axis, (i, j) in zip(axes[0], pairs, strict=True):
+    for axis, (i, j) in _pairs(len(surfaces), path, 6):
         for words, values, color in clouds:
             axis.plot(values[:, i], values[:, j], ".", color=color, markersize=4, label=words)
         for words, each, marker, color in (
@@ -162,21 +159,11 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
                 draw(bound, color="tab:red", linestyle="--", linewidth=1.2, label=words or "_")
         axis.set_xlabel(label(surfaces[i].name))
         axis.set_ylabel(label(surfaces[j].name))
-        axis.grid(alpha=0.3)
-    figure.tight_layout()
-    # Below the figure, where no point lies.
-    figure.legend(
-        *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=6, fontsize=8
-    )
-    figure.savefig(path, dpi=130, bbox_inches="tight")
-    plt.close(figure)
 
 
 def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
     """Every pair of gains that are kept over what is not known: foretold of the front, and simulated."""
-    pairs = list(combinations(range(len(responses)), 2))
-    figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
-    for axis, (i, j) in zip(axes[0], pairs, strict=True):
+    for axis, (i, j) in _pairs(len(responses), path, 2):
         gains = 100.0 * front.gains
         axis.plot(gains[:, i], gains[:, j], ".", color="tab:blue", markersize=4, label="foretold by emulators")
         for (name, each), marker in zip(front.confirmed.items(), "*o^v", strict=False):
@@ -189,10 +176,18 @@ def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
         axis.axvline(0.0, color="tab:gray", linewidth=1.0)
         axis.set_xlabel(f"gain in {quantity(responses[i])[0]} [%]")
         axis.set_ylabel(f"gain in {quantity(responses[j])[0]} [%]")
+
+
+def _pairs(count: int, path: Path, columns: int) -> Iterator[tuple[Axes, tuple[int, int]]]:
+    """Axes for every pair of so many responses to draw on, saved with one legend of so many ``columns`` in the end."""
+    pairs = list(combinations(range(count), 2))
+    figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
+    yield from zip(axes[0], pairs, strict=True)
+    for axis in axes[0]:
         axis.grid(alpha=0.3)
     figure.tight_layout()
-    figure.legend(
-        *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=2, fontsize=8
-    )
+    # Below the figure, where no point lies.
+    first = axes[0][0].get_legend_handles_labels()
+    figure.legend(*first, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=columns, fontsize=8)
     figure.savefig(path, dpi=130, bbox_inches="tight")
     plt.close(figure)
