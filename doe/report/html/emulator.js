@@ -1,12 +1,19 @@
 "use strict";
 // An emulator of the simulator, a trend and a process with the runs of a search behind it: mean and standard deviation of a
-// response without its scatter. A point has a coordinate a factor, -1 to 1 in the region of the design, and one a level.
+// response without its scatter, at factors that are -1 to 1 in the region of the design and levels of the categories.
 const emulator = (() => {
-  const solved = new Map();
+  const solved = new Map(), known = new Map();
 
-  function point(all, factors, kinds) {
-    const levels = all.categories.flatMap((each, c) => each.levels.map((_, level) => level === kinds[c] ? 1 : 0));
-    return [...factors.map((value, k) => (value - all.centre[k]) / all.half_range[k]), ...levels];
+  // A point as the emulators know it: a coordinate a factor, and one a level.
+  const embedded = (all, coded, kinds) =>
+    [...coded, ...all.categories.flatMap((each, c) => each.levels.map((_, level) => level === kinds[c] ? 1 : 0))];
+
+  const point = (all, factors, kinds) =>
+    embedded(all, factors.map((value, k) => (value - all.centre[k]) / all.half_range[k]), kinds);
+
+  function runs(all) {
+    if (!known.has(all)) known.set(all, all.points.map((run, i) => embedded(all, run, all.kinds[i])));
+    return known.get(all);
   }
 
   // Covariance of two points: Matern of smoothness 5/2 with a length a coordinate.
@@ -20,7 +27,7 @@ const emulator = (() => {
   const product = (a, b) => a.reduce((sum, each, k) => sum + each * b[k], 0);
 
   function mean(all, one, at) {
-    const process = all.points.reduce((sum, run, i) => sum + covariance(one, at, run) * one.weights[i], 0);
+    const process = runs(all).reduce((sum, run, i) => sum + covariance(one, at, run) * one.weights[i], 0);
     return product(model.row(one, at), one.coefficients) + process;
   }
 
@@ -50,8 +57,8 @@ const emulator = (() => {
   // What of a response stays the same for all points: roots of the covariance of the runs and of the trend's information.
   function prepared(all, one) {
     if (!solved.has(one)) {
-      const lower = root(all.points.map((a, i) => all.points.map((b, j) => covariance(one, a, b) + (i === j ? one.noise[i] : 0))));
-      const rows = all.points.map(run => model.row(one, run));
+      const lower = root(runs(all).map((a, i) => runs(all).map((b, j) => covariance(one, a, b) + (i === j ? one.noise[i] : 0))));
+      const rows = runs(all).map(run => model.row(one, run));
       const trend = one.terms.map((_, term) => forward(lower, rows.map(row => row[term])));
       solved.set(one, {lower, trend, information: root(trend.map(a => trend.map(b => product(a, b))))});
     }
@@ -60,7 +67,7 @@ const emulator = (() => {
 
   function deviation(all, one, at) {
     const {lower, trend, information} = prepared(all, one);
-    const inside = forward(lower, all.points.map(run => covariance(one, at, run)));
+    const inside = forward(lower, runs(all).map(run => covariance(one, at, run)));
     const left = forward(information, model.row(one, at).map((column, term) => column - product(trend[term], inside)));
     const variance = one.variance - product(inside, inside) + product(left, left);
     return Math.max(one.stretch * Math.sqrt(Math.max(variance, 0)), one.least);

@@ -30,10 +30,9 @@
   // Runs behind the surface that is shown: those of the design, or all of the search too.
   function runs(one) {
     if (!emulated) return data.runs.map(run => ({factors: run.factors, value: run.values[one.name], alike: true}));
-    const levels = emulator.point(searched, searched.centre, kinds).slice(data.factors.length);
     return searched.points.map((point, i) => ({
       factors: searched.centre.map((centre, k) => centre + searched.half_range[k] * point[k]),
-      value: searched.responses[one.name].values[i], alike: levels.every((level, k) => level === point[data.factors.length + k])}));
+      value: searched.responses[one.name].values[i], alike: searched.kinds[i].every((kind, c) => kind === kinds[c])}));
   }
 
   function scene() {

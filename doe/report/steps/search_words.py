@@ -7,7 +7,6 @@ import numpy as np
 
 from doe.study.adaptive import Adaptive
 from doe.study.compared import Compared
-from doe.study.goals import region_of
 from doe.study.held import Pull, near_limits, pulls
 from doe.study.whole import StudyResult
 from doe.study_file import Study
@@ -95,22 +94,19 @@ def _end(study: Study, name: str) -> str:
 
 def trust_sentence(study: Study, adaptive: Adaptive) -> str:
     """How well the emulators foretold the fresh runs at their front."""
-    found, categories = adaptive.found, len(study.file.category)
-    front = found.front
-    half = np.append(region_of(study) * study.step, np.ones(categories))
-    means, _ = found.emulators.predict((front.points - np.append(study.centre, np.zeros(categories))) / half)
-    off = 100.0 * np.sqrt(((front.values - means) ** 2).mean(axis=0)) / np.abs(front.values).mean(axis=0)
-    claimed = np.hypot(found.bias, found.spread)
-    told = [f"{share:.2g} % of {name}" for name, share in zip(study.responses, off.tolist(), strict=True)]
-    times = [f"{each:.1f}" for each in claimed.tolist()]
-    sure = [name for name, each in zip(study.responses, claimed.tolist(), strict=True) if each > SURE]
+    found, front = adaptive.found, adaptive.found.front
+    wanted = [study.responses[index] for index in front.goals.objectives]
+    flattered = [f"{name} by {100.0 * x:.1f} %" for name, x in zip(wanted, front.optimism.tolist(), strict=True)]
+    missed = np.hypot(found.bias, found.spread).tolist()
+    told = [f"{name} by {times:.1f}" for name, times in zip(study.responses, missed, strict=True)]
+    sure = [name for name, times in zip(study.responses, missed, strict=True) if times > SURE]
     claim = (
-        f"They claimed to know {_listed(sure)} better than they did" if sure else "They claimed no more than they knew"
+        f"they claimed to know {_listed(sure)} better than they did" if sure else "they claimed no more than they knew"
     )
     return (
-        f"Fresh runs at {len(front.points)} points of the front missed what the emulators foretold by {_listed(told)}, root mean "
-        f"square: {_listed(times)} times the standard deviations that they claimed. {claim}; what is reported of the front are "
-        "these fresh runs alone."
+        f"The emulators foretold the fresh runs at {len(front.points)} points of the front better than these came, on average "
+        f"{_listed(flattered)} of the range on the front (below 0: worse), and missed {_listed(told)} standard deviations in root "
+        f"mean square: {claim}. What is reported of the front are these fresh runs alone."
     )
 
 
