@@ -88,7 +88,7 @@ def _progress(adaptive: Record) -> str:
     for role, words, runs, reached, doubt in drawn:
         points = list(zip(runs or plot.x, reached if runs else 2 * reached, strict=True))
         plot.line(points, role)
-        for point, error in zip(points, doubt, strict=False):
+        for point, error in zip(points, doubt if runs else (), strict=False):
             plot.cross(point, (None, error), "error")
         if role in SHAPES:
             plot.symbol(points[0], SHAPES[role], role, words)
