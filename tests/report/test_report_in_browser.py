@@ -21,6 +21,7 @@ from doe.pareto.goals import Goals
 from doe.report.html import html_report
 from doe.report.steps.emulators import emulators_record
 from doe.study_file import Study
+from doe.study_file.design_section import Category
 
 PICTURE = "return document.getElementById(arguments[0]).toDataURL()"
 
@@ -322,7 +323,7 @@ def with_emulators(record: dict[str, Any], levels: tuple[str, ...]) -> tuple[dic
     whole, errors = np.full((24, 3), 7), 0.02 * np.abs(values) * random.uniform(0.5, 1.0, (24, 3))
     runs = Runs(points, values, errors, whole, np.full(24, 8))
     emulators = fit_emulators(Goals.of(["min"] * 3), runs, levels=(len(levels),) if levels else ())
-    category = [SimpleNamespace(name="guidance", categories=list(levels))] if levels else []
+    category = [Category(name="guidance", key="cage.guidance", categories=list(levels))] if levels else []
     study = Study.load(EXAMPLES / "clearance_study.toml")
     study = replace(study, file=study.file.model_copy(update={"category": category}))
     found = SimpleNamespace(
