@@ -47,8 +47,8 @@ def spent_sentence(study: Study, adaptive: Adaptive) -> str:
     """What the search spent, why it ended, how far its region grew."""
     found, last = adaptive.found, adaptive.found.history[-1]
     left = 100.0 * last.left / last.hypervolume if last.hypervolume > 0.0 else math.nan
-    moved = {face.factor: float(adaptive.edges[face.factor, int(face.side > 0)]) for face, _ in found.moves}
-    grown = [_place(study.factors[factor], end, " to") for factor, end in moved.items()]
+    moved = dict.fromkeys((face.factor, int(face.side > 0)) for face, _ in found.moves)
+    grown = [_place(study.factors[place[0]], float(adaptive.edges[place]), " to") for place in moved]
     return (
         f"The search ended because {found.stopped}: {len(found.spent)} runs of design and search and {found.fresh} fresh ones at "
         f"its points and the baseline in {adaptive.seconds:.0f} s, with at most {left:.1f} % of the hypervolume of its front still "
@@ -114,17 +114,21 @@ def beside_sentence(adaptive: Adaptive, compared: Compared) -> str:
     """The hypervolumes of the front and of those beside it."""
     foretold, (fresh, error) = float(compared.search[-1]), compared.fresh
     points = len(adaptive.found.front.points)
+    share = f" ({100.0 * compared.surfaces / foretold:.0f} % of the first)" if foretold > 0.0 else ""
     told = [
         f"front foretold {foretold:.3f}",
         f"its {points} points by their fresh runs {with_error(fresh, 1.96 * error)}",
-        f"front on the surfaces, by the same emulators, {compared.surfaces:.3f} ({100.0 * compared.surfaces / foretold:.0f} % of the first)",
+        f"front on the surfaces, by the same emulators, {compared.surfaces:.3f}{share}",
     ]
     if compared.direct is not None and compared.direct_reached is not None:
         reached, doubt = compared.direct_reached
-        share, off = 100.0 * fresh / reached, math.hypot(error / fresh, doubt / reached)
+        part = ""
+        if reached > 0.0:
+            off = 196.0 * math.hypot(error, fresh / reached * doubt) / reached
+            part = f", of which the search has {with_error(100.0 * fresh / reached, off)} %"
         told.append(
             f"direct front of {compared.direct['evaluations']} evaluations, its {len(compared.direct['front'])} points by their fresh "
-            f"runs {with_error(reached, 1.96 * doubt)}, of which the search has {with_error(share, 1.96 * share * off)} %"
+            f"runs {with_error(reached, 1.96 * doubt)}{part}"
         )
     return f"Hypervolumes on one scale: {'; '.join(told)}."
 
