@@ -36,7 +36,7 @@ class AdaptiveFront:
 
     ``front``: its finalists in factor units with their fresh runs alone, and all runs of the search. ``archive`` (a, k) is the
     whole front that the emulators foretell, of which the rows ``shown`` have the largest hypervolume, with its ``foretold`` responses (a, m) and their ``deviations`` (a, m).
-    ``region`` that was searched in the end. ``history``: state after every batch; ``searched`` (n,) are all runs of design and search, in factor units,
+    ``region`` that was searched in the end. ``history``: state after every batch; ``fronts``: points (s, k), in coded units, that stand for the front foretold at each; ``searched`` (n,) are all runs of design and search, in factor units,
     ``why`` each was made ("design", "improvement", "check", "extension") and the replicates ``spent`` on it (n,); ``moves``: faces moved
     and where to (coded); ``faces`` that the pick lies at in the end.
     ``bias`` and ``spread`` (m,): mean, and root mean square about it, of what the fresh runs at the finalists missed the
@@ -52,6 +52,7 @@ class AdaptiveFront:
     emulators: Emulators
     region: Region
     history: tuple[Batch, ...]
+    fronts: tuple[Array, ...]
     moves: tuple[tuple[Face, float], ...]
     faces: tuple[Face, ...]
     searched: Samples

@@ -241,6 +241,7 @@ class _Search:
             emulators=emulators,
             region=self.region,
             history=tuple(self._on_one_scale(emulators, costs[rows])),
+            fronts=tuple(self.fronts),
             moves=tuple(self.moves),
             faces=tuple(self._faces(emulators, points, random)),
             searched=Samples(self.centre + self.step * self.runs.points, self.runs.values, self.runs.errors),

@@ -16,7 +16,6 @@ from doe.adaptive.candidates import Region
 from doe.adaptive.search import check_budget
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
-from doe.pareto.archive import hypervolume
 from doe.pareto.direct import DirectFront, Samples
 from doe.pareto.nsga2 import InfeasibleError
 from doe.response_surface import Surface
@@ -129,15 +128,13 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
     return Adaptive(found, front, chosen, each[levels], edges, failures, time.perf_counter() - started)
 
 
-def reached(study: Study, adaptive: Adaptive, points: Array) -> float:
-    """Hypervolume that the emulators foretell of points (n, k), as they are drawn and with the pick's categories, on the scale of their own
-    front."""
-    found, goals = adaptive.found, adaptive.front.goals
+def costs_foretold(study: Study, adaptive: Adaptive, points: Array) -> Array:
+    """Costs (n, q) that the emulators foretell of points (n, k), as they are drawn and with the pick's categories."""
+    found = adaptive.found
     beside = np.tile(_coded_levels(study, adaptive.study.levels), (len(points), 1))
     coded = np.hstack([study.coded(points) / region_of(study), beside])
     means, _ = found.emulators.predict(found.region.snap(coded))
-    front = goals.costs(found.foretold)
-    return hypervolume(goals.costs(means), front.min(axis=0), front.max(axis=0))
+    return adaptive.front.goals.costs(means)
 
 
 def levels_at(study: Study, point: Array) -> tuple[int, ...]:

@@ -19,6 +19,7 @@ from doe.study.adaptive import Adaptive, Searched, advice, find_adaptive
 from doe.study.chains import solve_chains
 from doe.study.checked import check_study
 from doe.study.chosen import Chosen, choose
+from doe.study.compared import Compared, compared, kept_direct
 from doe.study.confirmation import Confirmed, Gain, gains
 from doe.study.design import check_given, design_of
 from doe.study.direct import Direct, find_direct
@@ -43,7 +44,7 @@ class StudyResult:
 
     ``inputs`` is the hash of all it follows from. ``confirmed`` and ``gains`` by name of the point, "baseline" (without
     gains) and "pick" first; ``tried`` counts the points simulated as the pick until one kept its limits. ``tolerances`` is
-    None where the study asks for none, ``direct``, ``adaptive`` and ``direct_pick``, of either, unless it was run, ``robust``
+    None where the study asks for none, ``direct``, ``adaptive``, what it is ``compared`` with and ``direct_pick``, of either, unless it was run, ``robust``
     where nothing is declared as unknown and it was not wanted.
     """
 
@@ -56,6 +57,7 @@ class StudyResult:
     direct: Direct | None
     adaptive: Adaptive | None
     direct_pick: DirectPick | None
+    compared: Compared | None
     robust: Robust | None
     edge: Edge
     tried: int
@@ -169,6 +171,7 @@ def run_study(
         direct=searched if isinstance(searched, Direct) else None,
         adaptive=searched if isinstance(searched, Adaptive) else None,
         direct_pick=chosen.direct,
+        compared=_compared(study, searched, found, folder),
         robust=judged,
         edge=edge,
         tried=chosen.tried,
@@ -187,6 +190,13 @@ def run_study(
 def _offers(study: Study, surfaces: list[Surface], searched: Searched | None, judged: Robust | None) -> list[str]:
     """What further searches would bring that were not made."""
     return [*([] if searched else advice(study, surfaces)), *([] if judged else robust_advice(study))]
+
+
+def _compared(study: Study, searched: Searched | None, found: ParetoFront, folder: Path) -> Compared | None:
+    """An adaptive search beside the surfaces and beside a direct search that was finished in the folder."""
+    if not isinstance(searched, Adaptive):
+        return None
+    return compared(study, searched, found.points, kept_direct(folder, study))
 
 
 def _with_its_categories(

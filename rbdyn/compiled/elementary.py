@@ -111,6 +111,20 @@ def _(x):
     return fma(_exponential_series(r, r), scale, scale - 1.0)
 
 
+def fast_tanh(x: float) -> float:
+    """Hyperbolic tangent, to a few 1e-16 of itself."""
+    return math.tanh(x)
+
+
+@compiled_as(fast_tanh)
+def _(x):
+    # By e^2x - 1, which keeps its figures near zero; from 20 on it is one.
+    doubled = 2.0 * abs(x)
+    doubled = 40.0 if doubled > 40.0 else doubled
+    grown = fast_expm1(doubled)
+    return math.copysign(grown / (grown + 2.0), x)
+
+
 @kernel
 def _reduced(x):
     """Rest r of x after whole halvings of e^x, |r| < 0.35, and the power of two that they make."""
@@ -167,9 +181,13 @@ def _(x):
     return fma(power, LN2_HIGH, f - rest) + (x - x)
 
 
-@kernel
-def _rough_power(x, exponent):
-    """x^exponent of a positive normal number to a few parts in 1e5, for small exponents."""
+def rough_power(x: float, exponent: float) -> float:
+    """x^exponent of a positive normal number to a few parts in 1e4 times the exponent, to start from."""
+    return float(x**exponent)
+
+
+@compiled_as(rough_power)
+def _(x, exponent):
     power, f = _split(x)
     # Minimax: log2(1 + f) within 6.4e-4 over a factor of two, then 2^t within 2.6e-6 over [-1/2, 1/2].
     high = fma(f, fma(f, 4.47594888e-1, -7.60965453e-1), 1.44564380)
@@ -209,7 +227,7 @@ def tenth_root(x: float) -> float:
 
 @compiled_as(tenth_root)
 def _(x):
-    guess = _rough_power(x, -1.0 / 10.0)
+    guess = rough_power(x, -1.0 / 10.0)
     return _root_from(x, guess, _fourth_power(guess), 10)
 
 
@@ -220,7 +238,7 @@ def eighteenth_root(x: float) -> float:
 
 @compiled_as(eighteenth_root)
 def _(x):
-    guess = _rough_power(x, -1.0 / 18.0)
+    guess = rough_power(x, -1.0 / 18.0)
     return _root_from(x, guess, _fourth_power(guess * guess), 18)
 
 

@@ -19,6 +19,7 @@ from numba.core.compiler_machinery import PassManager, _pass_registry, register_
 from numba.core.datamodel import default_manager, models
 from numba.core.datamodel.manager import DataModelManager
 from numba.core.typed_passes import NativeLowering
+from numba.np import arrayobj
 
 # Of numba's passes those that kernels need: they hold no closures, exceptions, unrolled tuples or array expressions.
 BEFORE_LOWERING = (
@@ -122,6 +123,20 @@ class Whole:
 WHOLE = DataModelManager().chain(default_manager)
 for _kind, _model in ((types.NamedTuple, models.TupleModel), (types.NamedUniTuple, models.UniTupleModel)):
     WHOLE.register(_kind, type("WholeTuple", (Whole, _model), {}))
+
+
+wrapped_index = arrayobj.fix_integer_index
+
+
+def index_from_start(context: Any, builder: Any, kind: types.Integer, index: Any, size: Any) -> Any:
+    """An index of a kernel as it is: it counts from the start. Where it might count from the end, vector code must look first,
+    and reads and writes one by one."""
+    if context.data_model_manager is not WHOLE:
+        return wrapped_index(context, builder, kind, index, size)
+    return context.cast(builder, index, kind, types.intp)
+
+
+arrayobj.fix_integer_index = index_from_start
 
 
 class PartFlags(Flags):

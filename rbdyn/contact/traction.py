@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rbdyn.arrays import Array
-from rbdyn.compiled.elementary import fast_exp, fast_expm1, fast_log, fma
+from rbdyn.compiled.elementary import fast_exp, fast_log, fast_tanh, fma
 from rbdyn.compiled.kernel import kernel, law
 
 SMALLEST_LOAD = 1e-30  # [N], keeps the logarithm finite
@@ -136,7 +136,7 @@ def _(model, slip, load):
 
 @traction.body(CoulombTraction)
 def _(model, slip, load):
-    return model.coefficient * math.tanh(slip / model.blend_speed)
+    return model.coefficient * fast_tanh(slip / model.blend_speed)
 
 
 @traction.body(TractionSurface)
@@ -168,12 +168,7 @@ def bicubic(c, x, y):
 @traction.body(MixedTraction)
 def _(model, slip, load):
     share = asperity_load_share(model.share_scale, model.share_exponent, load)
-    # tanh, written without a call so that neighbouring contacts share vector instructions; by e^x - 1, which keeps its
-    # figures at a slip far below the blend speed.
-    doubled = 2.0 * abs(slip) / model.blend_speed
-    doubled = 40.0 if doubled > 40.0 else doubled
-    grown = fast_expm1(doubled)
-    rubbing = math.copysign(model.boundary * (grown / (grown + 2.0)), slip)
+    rubbing = model.boundary * fast_tanh(slip / model.blend_speed)
     return share * rubbing + (1.0 - share) * traction(model.fluid, slip, load)
 
 

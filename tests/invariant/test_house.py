@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 SOURCES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.py")]
 LONGEST_FILE, LONGEST_FUNCTION, MOST_AT_THE_ROOT = 360, 70, 6
 NOT_SI = re.compile(r"_(mm|mm2|um|mm_um|g|g_mm|rpm|deg|mrad|MPa|GPa)$")
+KERNEL = re.compile(r"kernel|routine|settled_kernel|entry|.*\.body\(|compiled_as\(")
 # Where a drawing's own units may be read: what speaks to people, what makes scenes of scenes, and saved records.
 EDGES = {
     "rbdyn/scene/": "where they leave as SI",
@@ -75,3 +76,21 @@ def test_invariant_units_end_at_the_scene():
                 found += [f"{name}:{node.lineno} {node.attr}"] if edge is None else []
     assert not found
     assert needed == set(EDGES), "an edge that reads none is none"
+
+
+def test_invariant_kernels_index_from_the_start():
+    """Invariant: no index of a kernel is written as one that counts from the end, which compiled code would not follow."""
+    seen, found = 0, []
+    for path in SOURCES:
+        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(function, ast.FunctionDef) or not any(
+                map(KERNEL.match, map(ast.unparse, function.decorator_list))
+            ):
+                continue
+            for node in ast.walk(function):
+                if isinstance(node, ast.Subscript):
+                    indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+                    seen += len(indices)
+                    counted = [ast.unparse(index) for index in indices if isinstance(index, ast.UnaryOp)]
+                    found += [f"{path.name}:{node.lineno} {index}" for index in counted]
+    assert seen > 500 and not found

@@ -13,7 +13,6 @@ from test_study_adaptive import ROLLERS, with_kinds, written
 
 from doe import clearance
 from doe.adaptive.emulators import embedded, settled
-from doe.report.steps.adaptive import adaptive_record
 from doe.report.study.files import write
 from doe.study.adaptive import check_adaptive, region_in_units
 from doe.study.design import check_runs, design_of
@@ -103,9 +102,10 @@ def test_the_study_follows_a_pick_at_which_a_factor_means_nothing(tmp_path, monk
     assert outcome.pick.point[1] == 0.15
     assert (outcome.front.points[:, 1] == 0.15).all()
     assert all("B" not in term for surface in outcome.surfaces for term in surface.terms)
-    said = adaptive_record(study, outcome.adaptive)["sentence"]
-    assert "The pick has guidance = roller (baseline: outer), where guide_clearance_mm means nothing." in said
     record = write(outcome, tmp_path)
+    words = "guidance = roller (baseline: outer) and no guide_clearance_mm, which means nothing there"
+    assert words in record["adaptive"]["sentence"]
+    assert record["adaptive"]["emulators"]["categories"][0]["inactive"] == [[], [1]]
     there = [each for each in record["adaptive"]["points"] if each["factors"]["guidance"] == "roller"]
     assert {each["factors"]["guide_clearance_mm"] for each in there} == {0.15}
     assert "guide_clearance_mm" not in record["tolerances"]

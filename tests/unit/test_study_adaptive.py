@@ -16,9 +16,10 @@ from short_studies import SHORT, short_study, silent
 from doe import clearance
 from doe.clearance import Simulations
 from doe.report.steps.adaptive import adaptive_record
+from doe.report.steps.search_words import spent_sentence
 from doe.report.study.files import write
 from doe.running.store import Store
-from doe.study.adaptive import advice, border_of, check_adaptive, find_adaptive, reached, region_in_units
+from doe.study.adaptive import advice, border_of, check_adaptive, find_adaptive, region_in_units
 from doe.study.runs import STORE, run_design
 from doe.study.surfaces import fit_surfaces
 from doe.study.whole import run_study
@@ -76,12 +77,10 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
         rows = list(csv.DictReader(file))
     assert len(rows) == found["foretold_points"]
     assert {"radial_clearance_mm", "power_loss_W", "power_loss_W_error"} <= set(rows[0])
-    share = reached(study, outcome.adaptive, outcome.adaptive.front.points)
-    assert 0.5 * found["hypervolume"] < share <= found["hypervolume"] + 1e-9
-    assert reached(study, outcome.adaptive, outcome.front.points) > 0.0
     assert "adaptive_search.png" in record["files"] and (tmp_path / "adaptive_search.png").stat().st_size > 10_000
     assert "in few runs" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "adaptive front:" in (tmp_path / "answer.txt").read_text(encoding="utf-8")
+    text = (tmp_path / "answer.txt").read_text(encoding="utf-8")
+    assert text.startswith("The pick has radial clearance ") and "The search ended because" in text
 
 
 def test_invariant_same_bits_for_any_number_of_workers_and_after_an_interruption(tmp_path, monkeypatch):
@@ -136,7 +135,7 @@ def test_the_region_grows_within_what_is_allowed(tmp_path, monkeypatch):
     assert {move["factor"] for move in record["extended"]} == {"pocket_clearance_mm"}
     assert 0.15 <= found.edges[2, 0] < 0.2159 or found.edges[2, 1] > 0.3841
     assert found.front.points[:, 2].min() >= 0.15 and found.front.points[:, 2].max() <= 0.40
-    assert "The pick foretold" in record["sentence"]
+    assert "Its region grew: pocket clearance to 0." in spent_sentence(study, found)
     corners = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
     assert border_of(study).possible(corners)
     kept = written(
@@ -215,7 +214,7 @@ def test_categories_and_whole_numbers_end_to_end(tmp_path, monkeypatch):
     record = write(outcome, tmp_path)
     assert record["pick"]["guidance"] == "inner"
     assert {each["factors"]["guidance"] for each in record["adaptive"]["front"]} == {"inner"}
-    assert "The pick has guidance = inner (baseline: outer)." in record["adaptive"]["sentence"]
+    assert "guidance = inner (baseline: outer): by simulation" in record["adaptive"]["sentence"]
     assert record["adaptive"]["history"][0]["runs"] == 40, "a design at each of the two"
     assert all(float(each["factors"]["rollers"]).is_integer() for each in record["adaptive"]["points"])
     with (tmp_path / "front.csv").open(encoding="utf-8") as file:

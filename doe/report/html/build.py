@@ -17,7 +17,7 @@ from rbdyn.records.words import filled_page
 # In the order in which they need each other; the moving bearing is drawn by the script of ``rbdyn show``.
 SCRIPTS = {
     "page": ("page.js", "tables.js"),
-    "surface": ("model.js", "viridis.js", "contours.js", "surface.js", "surface_view.js"),
+    "surface": ("model.js", "emulator.js", "viridis.js", "contours.js", "surface.js", "surface_view.js"),
     "front": ("front.js",),
     "bearing": ("motion.js",),
 }

@@ -14,6 +14,8 @@ def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
     """Factors, surfaces, runs, fronts and motion, ready for JSON."""
     given = factors(summary)
     names = [each["name"] for each in responses(summary)]
+    emulators = part(summary, "adaptive", "emulators")
+    searched = emulators and emulators | {"region": [part(summary, "adaptive", "region", each.name) for each in given]}
     return {
         "factors": [
             {key: getattr(each, key) for key in ("name", "words", "unit", "letter", "centre", "step", "low", "high", "decimals")}
@@ -41,6 +43,7 @@ def page_data(summary: Record, motion: Mapping[str, Any]) -> dict[str, Any]:
         ],
         "beside": {name: _point(point, given, names) for name, point in picks(summary).items()},
         "motion": {name: each["moving"] for name, each in motion.items() if part(each, "moving")},
+        **({"emulators": searched} if searched else {}),
     }  # fmt: skip
 
 

@@ -42,5 +42,5 @@ const model = (() => {
     return Math.abs(back(surface, middle + half) - back(surface, middle - half)) / 2;
   }
 
-  return {value, half_width};
+  return {row, value, half_width};
 })();

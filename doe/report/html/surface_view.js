@@ -1,7 +1,11 @@
 "use strict";
-// Which surface is shown: response, two factors, the others at their sliders; rotation, marker, values read out.
+// Which surface is shown: response, two factors, the others at their sliders; rotation, marker, values read out. Where a search
+// has left its emulators, their surface is shown in place of the polynomial on demand, in the same colours.
 (() => {
-  const {data, by} = page, STEPS = 41, TURN = 0.08;
+  const {data, by} = page, STEPS = 41, TURN = 0.08, searched = data.emulators;
+  const ends = data.factors.map((each, k) => searched ? searched.region[k] : [each.low, each.high]);
+  const kinds = searched ? searched.categories.map(each => each.pick) : [], choices = [];
+  let emulated = Boolean(searched);
   const view = {azimuth: 0.9, elevation: 0.5};
   const at = data.factors.map(each => each.centre);
   const marker = data.factors.map(each => each.centre);
@@ -12,27 +16,48 @@
   const shown_pair = () => [Number(by("surface_x").value), Number(by("surface_y").value)];
   const near = (a, b, k) => Math.abs(a - b) < 1e-6 * data.factors[k].step;
   const shapes = {baseline: "square", pick: "star"};
+  const along = (k, share) => ends[k][0] + (ends[k][1] - ends[k][0]) * share;
+
+  // The polynomial is known in the region of the design and with the categories of the pick, the emulator all over.
+  function polynomial(one, place) {
+    const out = searched && (searched.categories.some((each, c) => each.pick !== kinds[c])
+      || data.factors.some((each, k) => place[k] < each.low - 1e-6 * each.step || place[k] > each.high + 1e-6 * each.step));
+    return out ? NaN : model.value(one, coded(place));
+  }
+  const by_emulator = (one, place, what = emulator.mean) =>
+    what(searched, searched.responses[one.name], emulator.point(searched, place, kinds));
+
+  // Runs behind the surface that is shown: those of the design, or all of the search too.
+  function runs(one) {
+    if (!emulated) return data.runs.map(run => ({factors: run.factors, value: run.values[one.name], alike: true}));
+    return searched.points.map((point, i) => ({
+      factors: searched.centre.map((centre, k) => centre + searched.half_range[k] * point[k]),
+      value: searched.responses[one.name].values[i], alike: searched.kinds[i].every((kind, c) => kind === kinds[c])}));
+  }
 
   function scene() {
     const [x, y] = shown_pair(), one = surface(), fx = data.factors[x], fy = data.factors[y];
-    const point = at.slice(), z = [];
-    for (let i = 0; i < STEPS; i++) {
-      point[x] = fx.low + (fx.high - fx.low) * i / (STEPS - 1);
-      z.push(Array.from({length: STEPS}, (_, j) => {
-        point[y] = fy.low + (fy.high - fy.low) * j / (STEPS - 1);
-        return model.value(one, coded(point));
+    const grid = height => {
+      const point = at.slice();
+      return Array.from({length: STEPS}, (_, i) => Array.from({length: STEPS}, (_, j) => {
+        point[x] = along(x, i / (STEPS - 1));
+        point[y] = along(y, j / (STEPS - 1));
+        return height(one, point);
       }));
-    }
+    };
+    const heights_of = searched ? [polynomial, by_emulator].map(grid) : [grid(polynomial)], z = heights_of[Number(emulated)];
+    const height = emulated ? by_emulator : polynomial;
     const here = factors => factors.every((value, k) => k === x || k === y || near(value, at[k], k));
-    const on = factors => model.value(one, coded(at.map((value, k) => k === x || k === y ? factors[k] : value)));
-    const points = data.runs.filter(run => run.values[one.name] !== null && !run.factors.includes(null)).map(run => (
-      {x: run.factors[x], y: run.factors[y], z: run.values[one.name], here: here(run.factors), surface: on(run.factors)}));
+    const on = factors => height(one, at.map((value, k) => k === x || k === y ? factors[k] : value));
+    const points = runs(one).filter(run => run.value !== null && !run.factors.includes(null)).map(run => (
+      {x: run.factors[x], y: run.factors[y], z: run.value, here: run.alike && here(run.factors), surface: on(run.factors)}));
     const marks = Object.entries(data.marks).map(([name, factors]) => (
       {x: factors[x], y: factors[y], shape: shapes[name], here: here(factors), surface: on(factors)}));
-    const heights = [...z.flat(), ...points.map(each => each.z)].filter(Number.isFinite);
+    const told = searched ? searched.responses[one.name].values : points.map(each => each.z);
+    const heights = [...heights_of.flat(2), ...told].filter(Number.isFinite);
     const low = Math.min(...heights), high = Math.max(...heights);
     return {
-      bounds: one.bounds || [], x: [fx.low, fx.high], y: [fy.low, fy.high], z, points, marks, low, high: high > low ? high : low + 1,
+      bounds: one.bounds || [], x: ends[x], y: ends[y], z, points, marks, low, high: high > low ? high : low + 1,
       labels: [page.named(fx), page.named(fy), page.named(one)],
       marker: [marker[x], marker[y]], height: on(marker),
     };
@@ -46,20 +71,25 @@
   }
 
   function read() {
-    const pair = shown_pair(), one = surface();
+    const pair = shown_pair(), one = surface(), unit = one.unit && ` ${one.unit}`;
     const place = at.map((value, k) => pair.includes(k) ? marker[k] : value), c = coded(place);
     const where = place.map((value, k) => {
       const each = data.factors[k];
       return `${each.words} ${value.toFixed(each.decimals + 1)}${each.unit && ` ${each.unit}`}`;
     });
-    const height = page.with_error(model.value(one, c), model.half_width(one, c));
-    by("surface_read").textContent = `${one.words} ${height}${one.unit && ` ${one.unit}`} at ${where.join(", ")}`;
+    let height = `${page.with_error(polynomial(one, place), model.half_width(one, c))}${unit}`;
+    if (searched) {
+      const known = Number.isFinite(polynomial(one, place)) ? `${height} by the polynomial` : "not known to the polynomial";
+      const [value, deviation] = page.with_error(by_emulator(one, place), by_emulator(one, place, emulator.deviation)).split(" ± ");
+      height = `${value}${unit} by the emulator, standard deviation ${deviation}${unit}; ${known};`;
+      searched.categories.forEach((each, c) => where.push(`${each.name} ${each.levels[kinds[c]]}`));
+    }
+    by("surface_read").textContent = `${one.words} ${height} at ${where.join(", ")}`;
   }
 
   function move_marker(shares) {
     shown_pair().forEach((k, which) => {
-      const each = data.factors[k], share = Math.min(Math.max(shares[which], 0), 1);
-      marker[k] = each.low + (each.high - each.low) * share;
+      marker[k] = along(k, Math.min(Math.max(shares[which], 0), 1));
     });
     draw();
   }
@@ -71,7 +101,7 @@
       if (pair.includes(k)) return [];
       const label = page.element("label", `${page.named(each)} `);
       const step = 10 ** -(each.decimals + 1);
-      const input = page.element("input", "", {type: "range", min: each.low, max: each.high, step});
+      const input = page.element("input", "", {type: "range", min: ends[k][0], max: ends[k][1], step});
       const shown = page.element("output", at[k].toFixed(each.decimals + 1));
       input.value = at[k];
       input.addEventListener("input", () => {
@@ -94,6 +124,8 @@
 
   function go_to(name) {
     data.marks[name].forEach((value, k) => { at[k] = value; marker[k] = value; });
+    // The first level of a category is the baseline's.
+    choices.forEach((select, c) => { select.value = kinds[c] = name === "pick" ? searched.categories[c].pick : 0; });
     sliders();
     draw();
   }
@@ -115,10 +147,8 @@
   keys(space, (across, up) => rotate(across * TURN, up * TURN));
   keys(map, (across, up) => {
     const step = 1 / (STEPS - 1);
-    move_marker(shown_pair().map((k, which) => {
-      const each = data.factors[k];
-      return (marker[k] - each.low) / (each.high - each.low) + step * [across, up][which];
-    }));
+    move_marker(shown_pair().map((k, which) =>
+      (marker[k] - ends[k][0]) / (ends[k][1] - ends[k][0]) + step * [across, up][which]));
   });
   space.addEventListener("pointerdown", event => {
     dragging = [event.clientX, event.clientY];
@@ -139,6 +169,16 @@
     if (shares && shares.every(share => share >= 0 && share <= 1)) move_marker(shares);
   });
 
+  function choice(words, names, chosen, act) {
+    const label = page.element("label", `${words} `), select = page.element("select", "");
+    select.append(...names.map((name, k) => page.element("option", name, {value: k})));
+    select.value = chosen;
+    select.addEventListener("change", () => { act(Number(select.value)); draw(); });
+    label.append(select);
+    by("surface_others").before(label);
+    return select;
+  }
+
   data.surfaces.forEach((each, k) => by("surface_response").append(page.element("option", page.named(each), {value: k})));
   for (const name of ["surface_x", "surface_y"])
     data.factors.forEach((each, k) => by(name).append(page.element("option", page.named(each), {value: k})));
@@ -149,6 +189,11 @@
   for (const name of ["baseline", "pick"]) {
     by(`surface_${name}`).hidden = !data.marks[name];
     by(`surface_${name}`).addEventListener("click", () => go_to(name));
+  }
+  if (searched) {
+    choice("Surface by", ["polynomial", "emulator"], 1, chosen => { emulated = chosen === 1; }).id = "surface_by";
+    searched.categories.forEach((each, c) => choices.push(choice(each.name, each.levels, each.pick, level => { kinds[c] = level; })));
+    by("surface_help").textContent += " The polynomial knows the runs of the design, the emulator those of the search too; one scale colours both.";
   }
   sliders();
   page.draws(draw);

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from doe.report.sections.blocks import Block, Section, Table, Tile, Tiles, Words
+from doe.report.sections.blocks import Block, Bullets, Section, Table, Tile, Tiles, Words
 from doe.report.sections.record import Factor, Record, factors, nearest, part, responses, scalars
 from doe.report.words import change, dimension, half_width, moved, rounded_down
 from rbdyn.records.words import label, quantity, shown, with_error
@@ -26,13 +26,15 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     robust = part(summary, "robust") or {"sentences": []}
     blocks: list[Block] = [Words(each, "statement") for each in robust["sentences"]]
     blocks.append(Words(part(summary, "limits_sentence") or "", "statement"))
+    searched = part(summary, "adaptive", "sentences") or [""]
+    blocks.append(Words(searched[0], "statement"))
     if pick := part(summary, "pick"):
         blocks.append(Tiles([_tile(summary, each, pick) for each in factors(summary) if each.name in pick]))
         if plays := [CLEARANCES[each.key] for each in factors(summary) if each.key in CLEARANCES]:
             blocks.append(Words(f"Clearances: {', '.join(plays)}.", "note"))
     blocks += [Words(statement(summary), "statement"), _gains(summary), limits(summary, ("baseline", "pick"))]
     blocks.append(_held(summary))
-    blocks += [Words(part(summary, "edge", "sentence") or ""), part_dimensions(summary)]
+    blocks += [Words(part(summary, "edge", "sentence") or ""), Bullets(searched[1:]), part_dimensions(summary)]
     reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")
     if reason:
         blocks.append(Words(f"Why this point: {reason}.", "note"))

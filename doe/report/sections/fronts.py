@@ -8,6 +8,7 @@ from doe.report.sections.answer import record_table, tolerances
 from doe.report.sections.blocks import Block, Figures, Section, Table, Widget, Words
 from doe.report.sections.plots_of_fronts import Front
 from doe.report.sections.record import Record, factors, nearest, part, responses
+from doe.report.sections.searches import in_few_runs
 from doe.report.words import change
 from rbdyn.records.words import label, shown, with_error
 
@@ -161,9 +162,7 @@ def _beside(summary: Record) -> list[Block]:
         blocks += _with_tolerances(aware, [each["name"] for each in responses(summary)])
     if direct := part(summary, "direct"):
         blocks += _on_the_simulator(direct)
-    if adaptive := part(summary, "adaptive"):
-        blocks += _in_few_runs(adaptive)
-    return blocks
+    return [*blocks, *in_few_runs(summary)]
 
 
 def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
@@ -180,19 +179,6 @@ def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
     blocks.append(Table("What manufacture leaves of the responses", ["point", *map(label, names)], rows))
     costs = {key: aware.get(key) for key in ("survival", "nominal_loss_percent", "robust_gain_percent")}
     blocks.append(record_table("What the tolerances cost", costs))
-    return blocks
-
-
-def _in_few_runs(adaptive: Record) -> list[Block]:
-    blocks: list[Block] = [Words(str(adaptive["sentence"]))] if adaptive.get("sentence") else []
-    history = adaptive.get("history") or []
-    rows = [
-        (shown(each["runs"]), shown(each["hypervolume"]), with_error(each["left"], each["deviation"]), each["why"])
-        for each in history
-        if {"runs", "hypervolume", "left", "deviation", "why"} <= set(each)
-    ]
-    header = ("runs", "hypervolume", "still to gain", "next runs for")
-    blocks.append(Table("Adaptive search, batch by batch", header, rows, text_columns=(3,)))
     return blocks
 
 

@@ -1,6 +1,5 @@
 """The front found in few runs, as plain numbers and in words."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -8,7 +7,9 @@ import numpy as np
 from doe.arrays import Array, Rows, or_none
 from doe.pareto.surrogate_loss import DRAWS, noisy_hypervolume
 from doe.report.steps.confirmation import point_record
+from doe.report.steps.emulators import emulators_record
 from doe.study.adaptive import Adaptive, levels_at
+from doe.study.compared import Compared
 from doe.study.goals import region_of
 from doe.study_file import Study
 
@@ -53,10 +54,9 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
             }
             for face, to in found.moves
         ],
-        "held": held_sentence(study, adaptive),
         "region": {name: ends for name, ends in zip(study.factors, adaptive.edges.tolist(), strict=True)},
         "points": [
-            {"factors": _factors(study, point), "replicates": int(count), "why": why}
+            {"factors": _factors(study, point, drawn=why != "design"), "replicates": int(count), "why": why}
             for point, count, why in zip(found.searched.points, found.spent, found.why, strict=True)
         ],
         "foretold_points": len(found.archive),
@@ -65,66 +65,39 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
             name: {"bias": float(bias), "spread": float(spread)}
             for name, bias, spread in zip(study.responses, found.bias, found.spread, strict=True)
         },
+        "emulators": emulators_record(study, adaptive),
         "failed": len(adaptive.failures),
         "seed": front.seed,
         "seconds": adaptive.seconds,
         "emulator_seconds": found.seconds,
-        "sentence": adaptive_sentence(study, adaptive),
     }
 
 
-def adaptive_sentence(study: Study, adaptive: Adaptive) -> str:
-    """What the search spent, why it ended, and whether its emulators were right."""
-    found = adaptive.found
-    last = found.history[-1]
-    left = 100.0 * last.left / last.hypervolume if last.hypervolume > 0.0 else math.nan
-    off = ", ".join(
-        f"{name} {bias:+.1f} (scatter {spread:.1f})"
-        for name, bias, spread in zip(study.responses, found.bias, found.spread, strict=True)
-    )
-    return (
-        f"adaptive front: {len(found.spent)} runs of design and search and {found.fresh} fresh ones at its points in "
-        f"{adaptive.seconds:.0f} s; it ended because {found.stopped}, with at most {left:.1f} % of its hypervolume to gain. "
-        f"What the fresh runs missed the emulators by, in standard deviations: {off}. {held_sentence(study, adaptive)}{_kinds(adaptive.study)}"
-    )
-
-
-def _kinds(study: Study) -> str:
-    """The categories of a search's pick; nothing without any."""
-    before = study.at(()).categories
-    pairs = [f"{name} = {kind} (baseline: {before[name]})" for name, kind in study.categories.items()]
-    idle = " and ".join(study.factors[place] for place in study.inactive)
-    nothing = f", where {idle} means nothing" if idle else ""
-    return f" The pick has {', '.join(pairs)}{nothing}." if pairs else ""
-
-
-def held_sentence(study: Study, adaptive: Adaptive) -> str:
-    """What holds the pick foretold at the edges of the region that was searched in the end."""
-    words = {
-        "allowed": "by what is allowed there",
-        "scene": "because no bearing that keeps its clearance in operation is possible beyond",
-        "moves": "because the region is not moved more often",
-        "": "because the responses turn there",
+def compared_record(study: Study, adaptive: Adaptive, compared: Compared) -> dict[str, Any]:
+    """Hypervolumes between one ``ideal`` and ``nadir``, in costs: of the fronts foretold in the course of the ``search`` and of
+    the ``surfaces``' front by the last emulators; of the search's points, ``fresh``, and of the direct front's, ``direct``, by
+    their own fresh runs, with 95 % half widths."""
+    names = [study.responses[index] for index in adaptive.front.goals.objectives]
+    record = {
+        **{key: dict(zip(names, getattr(compared, key).tolist(), strict=True)) for key in ("ideal", "nadir")},
+        "search": compared.search.tolist(),
+        "surfaces": compared.surfaces,
+        "fresh": {"hypervolume": compared.fresh[0], "error": 1.96 * compared.fresh[1]},
     }
-    held = [
-        f"{study.factors[face.factor]} at {_actual(study, face.factor, face.at):.4g} {words[face.held]} (the front goes on beyond "
-        f"with a probability of {face.better:.2f})"
-        for face in adaptive.found.faces
-    ]
-    return (
-        f"The pick foretold is held in {'; '.join(held)}."
-        if held
-        else "The pick foretold lies inside the region searched."
-    )
+    if compared.direct is not None and compared.direct_reached is not None:
+        reached, error = compared.direct_reached
+        record["direct"] = {"hypervolume": reached, "error": 1.96 * error, **compared.direct}
+    return record
 
 
 def _actual(study: Study, factor: int, coded: float) -> float:
     return float(study.centre[factor] + region_of(study)[factor] * study.step[factor] * coded)
 
 
-def _factors(study: Study, point: Array) -> dict[str, Any]:
-    """Numbers, as they are drawn, and categories of a point (k + c,) of the search, by name."""
-    return study.by_factor(study.rounded(point[: len(study.factors)])) | study.at(levels_at(study, point)).categories
+def _factors(study: Study, point: Array, drawn: bool = True) -> dict[str, Any]:
+    """Numbers, as they are drawn where they are, and categories of a point (k + c,) of the search, by name."""
+    numbers = point[: len(study.factors)]
+    return study.by_factor(study.rounded(numbers) if drawn else numbers) | study.at(levels_at(study, point)).categories
 
 
 def archive_table(study: Study, adaptive: Adaptive, rows: Rows | slice = slice(None)) -> list[dict[str, Any]]:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from doe.clearance import direct_run
-from doe.report.steps.adaptive import adaptive_sentence
 from doe.report.steps.chain import print_chain
 from doe.report.steps.robust import print_robust_front, robust_sentences
+from doe.report.steps.search_words import search_sentences
 from doe.report.words import rounded_down
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
@@ -57,8 +57,8 @@ def _print_answer(outcome: StudyResult) -> None:
             f"{direct.loss.sentence}"
         )
         print(f"a run of the direct search: {direct_run(study)}")
-    if outcome.adaptive is not None:
-        print(adaptive_sentence(study, outcome.adaptive))
+    for sentence in search_sentences(outcome):
+        print(sentence)
     _print_clearances(outcome)
     rows = []
     for gain in outcome.gains["pick"]:

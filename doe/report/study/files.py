@@ -57,7 +57,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
         plots.robust_front(outcome.robust.responses, outcome.robust.front, folder / pictures[-1])
     if outcome.adaptive is not None:
         pictures.append("adaptive_search.png")
-        plots.adaptive_search(outcome, folder / pictures[-1])
+        plots.adaptive_search(record, folder / pictures[-1])
     points = {"baseline": outcome.baseline.point, "pick": outcome.pick.point}
     motions = clearance.histories(study, points, DRAWN_TURNS)
     pictures += ["pareto_front.png", *clearance.draw_motion(motions, folder)]

@@ -1,22 +1,38 @@
 """Pictures of a study: response surfaces and the Pareto front."""
 
+from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from doe.report.sections.record import Record
+from doe.report.sections.searches import curves, spent_runs
 from doe.response_surface import Surface
-from doe.study.adaptive import reached
 from doe.study.design import design_of
 from doe.study.robust_front import RobustFront
 from doe.study.whole import StudyResult
 from doe.study_file import Study
 from rbdyn.records.words import label, quantity
+
+# Marker and colour of the runs made for each reason and of the fronts; a legend where no point lies; pictures in a row.
+MARKERS = {
+    "design": ("s", "tab:blue"),
+    "improvement": ("h", "tab:orange"),
+    "check": ("D", "tab:green"),
+    "extension": ("^", "tab:purple"),
+    "fresh": ("P", "black"),
+}
+CURVES = (("o-", "tab:blue"), ("P", "black"), ("--", "tab:gray"), ("--", "tab:green"))
+BENEATH: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13)}
+WIDEST = 3
 
 
 def response_surface(study: Study, surface: Surface, path: Path) -> None:
@@ -72,35 +88,44 @@ def _bounds(study: Study, name: str) -> list[float]:
     return [bound for bound in (response.lower, response.upper) if bound is not None]
 
 
-def adaptive_search(outcome: StudyResult, path: Path) -> None:
-    """Hypervolume against runs beside that of the surfaces' front, and where each run was made and why."""
-    study, adaptive = outcome.study, outcome.adaptive
-    assert adaptive is not None
-    found, points = adaptive.found, adaptive.found.searched.points
-    panels = range(1, len(study.factors))
-    figure, axes = plt.subplots(1, 1 + len(panels), figsize=(4.6 * (1 + len(panels)), 4.2), squeeze=False)
-    first, *rest = axes[0]
-    each = [(state.runs, state.reached, state.deviation) for state in found.history]
-    first.errorbar(*np.array(each).T, fmt="o-", color="tab:olive", capsize=3, label="adaptive search ± deviation")
-    words = "front on the surfaces, by the emulators"
-    first.axhline(reached(study, adaptive, outcome.front.points), color="tab:blue", linestyle="--", label=words)
-    first.set_xlabel("runs of design and search")
-    first.set_ylabel("hypervolume foretold")
-    for axis, panel in zip(rest, panels, strict=True):
-        for why in dict.fromkeys(found.why):
-            rows = [row for row, other in enumerate(found.why) if other == why]
-            axis.scatter(points[rows, 0], points[rows, panel], s=6.0 * found.spent[rows], alpha=0.7, label=why)
-        axis.scatter(
-            adaptive.front.points[:, 0], adaptive.front.points[:, panel], s=60, marker="x", c="k", label="fresh"
+def adaptive_search(record: Record, path: Path) -> None:
+    """Hypervolume against runs beside other fronts, and where each run was spent and why, of the record of a study."""
+    names = record["design"]["factors"]
+    columns = min(len(names), WIDEST)
+    rows = -(-len(names) // columns)
+    figure = plt.figure(figsize=(5.2 * columns, 5.0 * rows), layout="constrained")
+    _hypervolumes(figure.add_subplot(rows, columns, 1), record["adaptive"])
+    for panel, name in enumerate(names[1:], 2):
+        axis = figure.add_subplot(rows, columns, panel)
+        for why, runs in spent_runs(record).items():
+            x, y = ([point[each] for point, _ in runs] for each in (names[0], name))
+            marker, color = MARKERS[why]
+            sizes = [7.0 * count for _, count in runs]
+            axis.scatter(x, y, sizes, color, marker=marker, alpha=0.8, edgecolors="white", linewidths=0.5, label=why)
+        axis.plot(
+            *(record["pick"][each] for each in (names[0], name)), "*", c="tab:red", mec="white", ms=15, label="pick"
         )
-        axis.set_xlabel(label(study.factors[0]))
-        axis.set_ylabel(label(study.factors[panel]))
-    for axis in axes[0]:
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=7)
-    figure.tight_layout()
+        axis.set_xlabel(label(names[0]))
+        axis.set_ylabel(label(name))
+        axis.xaxis.set_major_locator(MaxNLocator(5))
+        axis.set_title("where each run was spent, and why; size: replicates", fontsize=10)
+        axis.legend(fontsize=8, ncol=4, **BENEATH)
     figure.savefig(path, dpi=130)
     plt.close(figure)
+
+
+def _hypervolumes(axis: Axes, adaptive: Record) -> None:
+    for each, (marker, color) in zip(curves(adaptive), CURVES, strict=False):
+        if each.runs:
+            axis.errorbar(each.runs, each.reached, each.doubt, fmt=marker, c=color, ms=7, capsize=3, label=each.words)
+        else:
+            (y,), (error,) = each.reached, each.doubt
+            axis.axhline(y, color=color, linestyle=marker, label=each.words)
+            axis.axhspan(y - error, y + error, color=color, alpha=0.15, linewidth=0)
+    axis.set_xlabel("runs")
+    axis.set_ylabel("hypervolume (larger is better)")
+    axis.set_title("how far each front gets, on one scale", fontsize=10)
+    axis.legend(fontsize=8, **BENEATH)
 
 
 def pareto_front(outcome: StudyResult, path: Path) -> None:
@@ -116,9 +141,7 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
             ("front foretold by emulators", outcome.adaptive.found.foretold[outcome.adaptive.found.shown], "tab:olive")
         )
         clouds.append(("its points, simulated afresh", outcome.adaptive.front.values, "tab:green"))
-    pairs = list(combinations(range(len(surfaces)), 2))
-    figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
-    for axis, (i, j) in zip(axes[0], pairs, strict=True):
+    for axis, (i, j) in _pairs(len(surfaces), path, 6):
         for words, values, color in clouds:
             axis.plot(values[:, i], values[:, j], ".", color=color, markersize=4, label=words)
         for words, each, marker, color in (
@@ -136,21 +159,11 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
                 draw(bound, color="tab:red", linestyle="--", linewidth=1.2, label=words or "_")
         axis.set_xlabel(label(surfaces[i].name))
         axis.set_ylabel(label(surfaces[j].name))
-        axis.grid(alpha=0.3)
-    figure.tight_layout()
-    # Below the figure, where no point lies.
-    figure.legend(
-        *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=6, fontsize=8
-    )
-    figure.savefig(path, dpi=130, bbox_inches="tight")
-    plt.close(figure)
 
 
 def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
     """Every pair of gains that are kept over what is not known: foretold of the front, and simulated."""
-    pairs = list(combinations(range(len(responses)), 2))
-    figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
-    for axis, (i, j) in zip(axes[0], pairs, strict=True):
+    for axis, (i, j) in _pairs(len(responses), path, 2):
         gains = 100.0 * front.gains
         axis.plot(gains[:, i], gains[:, j], ".", color="tab:blue", markersize=4, label="foretold by emulators")
         for (name, each), marker in zip(front.confirmed.items(), "*o^v", strict=False):
@@ -163,10 +176,18 @@ def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
         axis.axvline(0.0, color="tab:gray", linewidth=1.0)
         axis.set_xlabel(f"gain in {quantity(responses[i])[0]} [%]")
         axis.set_ylabel(f"gain in {quantity(responses[j])[0]} [%]")
+
+
+def _pairs(count: int, path: Path, columns: int) -> Iterator[tuple[Axes, tuple[int, int]]]:
+    """Axes for every pair of so many responses to draw on, saved with one legend of so many ``columns`` in the end."""
+    pairs = list(combinations(range(count), 2))
+    figure, axes = plt.subplots(1, len(pairs), figsize=(5.0 * len(pairs), 4.4), squeeze=False)
+    yield from zip(axes[0], pairs, strict=True)
+    for axis in axes[0]:
         axis.grid(alpha=0.3)
     figure.tight_layout()
-    figure.legend(
-        *axes[0][0].get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=2, fontsize=8
-    )
+    # Below the figure, where no point lies.
+    first = axes[0][0].get_legend_handles_labels()
+    figure.legend(*first, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=columns, fontsize=8)
     figure.savefig(path, dpi=130, bbox_inches="tight")
     plt.close(figure)

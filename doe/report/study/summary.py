@@ -5,13 +5,15 @@ from typing import Any
 
 from doe import clearance
 from doe.arrays import or_none
-from doe.report.steps.adaptive import adaptive_record
+from doe.report.steps.adaptive import adaptive_record, compared_record
 from doe.report.steps.confirmation import confirmation_record, direct_record, gains_record, limits_record
 from doe.report.steps.design import runs_record
 from doe.report.steps.fit import fit_record
 from doe.report.steps.front import front_record, predicted_record
 from doe.report.steps.robust import robust_record
+from doe.report.steps.search_words import held_sentence, search_sentences
 from doe.running.failure import grouped
+from doe.study.adaptive import Adaptive
 from doe.study.confirmation import statement
 from doe.study.design import evaluation
 from doe.study.direct_pick import DirectPick
@@ -59,7 +61,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
     if outcome.direct is not None:
         record["direct"] = direct_record(study, outcome.direct)
     if outcome.adaptive is not None:
-        record["adaptive"] = adaptive_record(study, outcome.adaptive)
+        record["adaptive"] = _adaptive_record(outcome, outcome.adaptive)
     if outcome.direct_pick is not None:
         record["direct" if outcome.adaptive is None else "adaptive"]["chosen"] = _chosen_record(outcome.direct_pick)
     if outcome.robust is not None:
@@ -68,6 +70,14 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         record["tolerances"] = outcome.tolerances.as_dict(study.factors)
         record["tolerances_sentence"] = outcome.tolerances.sentence
     return record
+
+
+def _adaptive_record(outcome: StudyResult, adaptive: Adaptive) -> dict[str, Any]:
+    """The search, its fronts beside others, and all in ``sentences``, of which ``held`` is one."""
+    sentences = search_sentences(outcome)
+    told = {"held": held_sentence(outcome), "sentences": sentences, "sentence": " ".join(sentences)}
+    beside = {} if outcome.compared is None else compared_record(outcome.study, adaptive, outcome.compared)
+    return adaptive_record(outcome.study, adaptive) | {"compared": beside} | told
 
 
 def _chosen_record(pick: DirectPick) -> dict[str, Any]:

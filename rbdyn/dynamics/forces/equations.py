@@ -153,16 +153,27 @@ class OnCage(NamedTuple):
 
 
 @kernel
-def pocket_forces(bearing, cage, y, row, dy, scratch):
+def touching_rollers(bearing, cage, y, scratch):
+    """Number of rollers that their pockets act on; which they are stands in ``scratch.touching``."""
+    z = roller_count(bearing)
+    for j in range(z):
+        scratch.gap[j] = roller_gap(bearing, y, cage, j)
+    # Counted without a branch, which could not be foretold.
+    touching = 0
+    for j in range(z):
+        scratch.touching[touching] = j
+        touching += 0 if scratch.gap[j] > 0.0 else 1
+    return touching
+
+
+@kernel
+def pocket_forces(bearing, cage, touching, y, row, dy, scratch):
     """Add the forces of the pocket walls to row ``row`` of ``dy``, as yet forces and moments on the rollers."""
     z = roller_count(bearing)
     fx = fy = moment = friction = damping = film = 0.0
     load = contact_load = 0.0
-    for j in range(z):
-        scratch.gap[j] = roller_gap(bearing, y, cage, j)
-    for j in range(z):
-        if scratch.gap[j] > 0.0:
-            continue
+    for i in range(touching):
+        j = scratch.touching[i]
         wall = roller_pocket(bearing, y, cage, j)
         dy[row, 2 * z + j] += wall.x
         dy[row, 3 * z + j] += wall.y
@@ -183,10 +194,10 @@ def accelerate_rollers(bearing, row, dy):
     """Turn forces and moments on the rollers, which stand in row ``row`` of ``dy``, into accelerations."""
     z = roller_count(bearing)
     per_mass, per_inertia = 1.0 / bearing.roller_mass, 1.0 / bearing.roller_inertia
-    for i in range(2 * z, 4 * z):
-        dy[row, i] *= per_mass
-    for i in range(4 * z, 5 * z):
-        dy[row, i] *= per_inertia
+    for j in range(z):
+        dy[row, 2 * z + j] *= per_mass
+        dy[row, 3 * z + j] *= per_mass
+        dy[row, 4 * z + j] *= per_inertia
     add_weight(bearing.gravity, 2 * z, z, row, dy)
 
 
@@ -221,15 +232,14 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     """Fill row ``row`` of ``dy``, of the powers [W] and of the largest loads [N], for the state ``y``."""
     z = roller_count(bearing)
     acting, cage, inner, outer = motions(bearing, y)
-    # A long chain of roots and quotients: begun first, it runs beside what follows.
-    land = guide_forces(bearing.guide, cage, inner, outer)
     tick(bearing.drive, acting, row, dy)
     drag_loss = drag_forces(bearing.drag, z, y, row, dy)
-    for i in range(2 * z):
-        dy[row, i] = y[2 * z + i]
-    for i in range(4 * z, 5 * z):
-        dy[row, i] = 0.0
-    pockets = pocket_forces(bearing, cage, y, row, dy, scratch)
+    for j in range(z):
+        dy[row, j], dy[row, z + j], dy[row, 4 * z + j] = y[2 * z + j], y[3 * z + j], 0.0
+    touching = touching_rollers(bearing, cage, y, scratch)
+    # Two long chains of roots and quotients: side by side they take little more than one.
+    land = guide_forces(bearing.guide, cage, inner, outer)
+    pockets = pocket_forces(bearing, cage, touching, y, row, dy, scratch)
     on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
     accelerate_rollers(bearing, row, dy)
     accelerate_cage(bearing, cage, pockets, land, row, dy)

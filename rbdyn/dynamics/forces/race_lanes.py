@@ -57,12 +57,17 @@ class Scratch(NamedTuple):
     lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
     gap: NDArray[np.float64]  # (rollers,) way that each has left in its pocket [m]
+    touching: NDArray[np.int64]  # (rollers,) numbers of those that touch theirs
 
 
 def scratch(rollers: int) -> Scratch:
     """Work space for the contacts of so many rollers."""
     return Scratch(
-        np.ones((PARTS + 2) * LANES), np.empty(OUTPUTS * LANES), np.zeros(LANES, np.int64), np.empty(rollers)
+        np.ones((PARTS + 2) * LANES),
+        np.empty(OUTPUTS * LANES),
+        np.zeros(LANES, np.int64),
+        np.empty(rollers),
+        np.zeros(rollers, np.int64),
     )
 
 
@@ -203,21 +208,25 @@ def pack(sizes, rollers, y, j, side, scratch, lane):
 
 
 @kernel
-def add_block(lanes, i, j, rollers, row, dy, sums):
-    """Add contact ``i`` of a block to roller ``j`` and to the sums of its race."""
-    force_x, force_y = lanes[FORCE_X + i], lanes[FORCE_Y + i]
-    dy[row, 2 * rollers + j] += force_x
-    dy[row, 3 * rollers + j] += force_y
-    dy[row, 4 * rollers + j] += lanes[ROLLER_MOMENT + i]
+def add_to_ring(lanes, i, sums):
+    """Add contact ``i`` of a block to the sums of its race."""
     return OnRing(
-        sums.x - force_x,
-        sums.y - force_y,
+        sums.x - lanes[FORCE_X + i],
+        sums.y - lanes[FORCE_Y + i],
         sums.moment + lanes[RING_MOMENT + i],
         max(sums.load, lanes[LOAD + i]),
         sums.traction + lanes[TRACTION + i],
         sums.rolling + lanes[ROLLING + i],
         sums.damping + lanes[DAMPING + i],
     )
+
+
+@kernel
+def add_to_roller(lanes, i, j, rollers, row, dy):
+    """Add contact ``i`` of a block to what acts on roller ``j``."""
+    dy[row, 2 * rollers + j] += lanes[FORCE_X + i]
+    dy[row, 3 * rollers + j] += lanes[FORCE_Y + i]
+    dy[row, 4 * rollers + j] += lanes[ROLLER_MOMENT + i]
 
 
 @kernel
@@ -235,7 +244,9 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
         count = min(LANES, in_order - start)
         outer_block(outer, sizes, outer_ring, y, start, rollers, lanes, count)
         for i in range(count):
-            on_outer = add_block(lanes, i, start + i, rollers, row, dy, on_outer)
+            add_to_roller(lanes, i, start + i, rollers, row, dy)
+        for i in range(count):
+            on_outer = add_to_ring(lanes, i, on_outer)
         start += LANES
 
     left, reach2 = 0, inner.reach * inner.reach
@@ -255,8 +266,10 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
             left += 1
         if count > 0:
             picked_block(outer, inner, sizes, outer_ring, inner_ring, scratch.packed, lanes, count)
+        for i in range(count):
+            add_to_roller(lanes, i, index[i], rollers, row, dy)
         for i in range(outer_count):
-            on_outer = add_block(lanes, i, index[i], rollers, row, dy, on_outer)
+            on_outer = add_to_ring(lanes, i, on_outer)
         for i in range(outer_count, count):
-            on_inner = add_block(lanes, i, index[i], rollers, row, dy, on_inner)
+            on_inner = add_to_ring(lanes, i, on_inner)
     return on_outer, on_inner

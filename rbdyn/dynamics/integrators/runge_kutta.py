@@ -62,28 +62,22 @@ def _(pair, refused, bearing, y, k, stage, power, loads, scratch, clock, counts,
     counts[DERIVATIVES] += pair.last
 
 
-@kernel
-def scaled_error(pair, k, i, inverse_tolerance):
-    """Embedded error of component ``i`` per step size, over its tolerance."""
-    return rate_error(pair, k, i) * inverse_tolerance[i]
-
-
 @laws.error_norm.body(*PAIRS)
 def _(pair, k, h, inverse_tolerance):
-    # Four sums side by side, in an order that does not depend on how the compiler vectorises.
-    n = inverse_tolerance.size
+    # Squares in vectors, into a row that is free; then four sums side by side, in an order that no compiler chooses.
+    n, squares = inverse_tolerance.size, pair.free
+    for i in range(n):
+        e = rate_error(pair, k, i) * inverse_tolerance[i]
+        k[squares, i] = e * e
     whole = n // 4 * 4
     sum_0 = sum_1 = sum_2 = sum_3 = 0.0
     for i in range(0, whole, 4):
-        e_0, e_1 = (scaled_error(pair, k, i, inverse_tolerance), scaled_error(pair, k, i + 1, inverse_tolerance))
-        e_2, e_3 = (scaled_error(pair, k, i + 2, inverse_tolerance), scaled_error(pair, k, i + 3, inverse_tolerance))
-        sum_0 += e_0 * e_0
-        sum_1 += e_1 * e_1
-        sum_2 += e_2 * e_2
-        sum_3 += e_3 * e_3
+        sum_0 += k[squares, i]
+        sum_1 += k[squares, i + 1]
+        sum_2 += k[squares, i + 2]
+        sum_3 += k[squares, i + 3]
     for i in range(whole, n):
-        e = scaled_error(pair, k, i, inverse_tolerance)
-        sum_0 += e * e
+        sum_0 += k[squares, i]
     return h * math.sqrt((sum_0 + sum_1) + (sum_2 + sum_3))
 
 
@@ -134,16 +128,18 @@ def compare_last_stages(pair, k, stiffness, h, inverse_tolerance):
     """Book whether stability holds the step: |eigenvalue| = |difference of rates|/|difference of states| over the
     tolerances, of the last two stages, both at the end of the step (Hairer and Wanner, Solving ODEs II, IV.2).
     """
-    last, (weights, _) = pair.last, tableau(pair)
+    last, (weights, _), way = pair.last, tableau(pair), pair.free
+    for i in range(inverse_tolerance.size):
+        k[way, i] = 0.0
+    for s in range(last):
+        weight = weights[last, s] - weights[last - 1, s]
+        if weight != 0.0:
+            for i in range(inverse_tolerance.size):
+                k[way, i] += weight * k[s, i]
     rates = places = 0.0
     for i in range(inverse_tolerance.size):
         rate = (k[last, i] - k[last - 1, i]) * inverse_tolerance[i]
-        place = 0.0
-        for s in range(last):
-            weight = weights[last, s] - weights[last - 1, s]
-            if weight != 0.0:
-                place += weight * k[s, i]
-        place *= h * inverse_tolerance[i]
+        place = k[way, i] * (h * inverse_tolerance[i])
         rates += rate * rate
         places += place * place
     stiffness[LOOKED_AT] += 1.0

@@ -7,6 +7,7 @@ over them: it is never smaller than that of the worst component, however many ro
 
 import math
 
+from rbdyn.compiled.elementary import rough_power
 from rbdyn.compiled.kernel import kernel, routine
 from rbdyn.dynamics.integrators import method_laws as laws
 from rbdyn.dynamics.integrators.records import ERROR, STEP
@@ -20,7 +21,7 @@ def after_accepted(method, clock, h, cut, error, refused, largest_step):
     was cut from; ``refused``: the one before was refused, so that this is no time to grow.
     """
     error = max(error, 1e-4)
-    factor = SAFETY * error**-method.exponent * clock[ERROR] ** method.beta
+    factor = SAFETY * rough_power(error, -method.exponent) * rough_power(clock[ERROR], method.beta)
     proposal = min(h * min(max(factor, SHRINK), 1.0 if refused else GROW), largest_step)
     clock[STEP] = max(proposal, clock[STEP]) if cut else proposal
     clock[ERROR] = error
@@ -29,7 +30,7 @@ def after_accepted(method, clock, h, cut, error, refused, largest_step):
 @kernel
 def shortened(method, h, error):
     """Step [s] in place of one of ``h`` that was refused."""
-    return h * (max(SAFETY * error**-method.rejected, SHRINK) if math.isfinite(error) else SHRINK)
+    return h * (max(SAFETY * rough_power(error, -method.rejected), SHRINK) if math.isfinite(error) else SHRINK)
 
 
 @routine

@@ -47,6 +47,10 @@ def layout_of(scene: Scene) -> Layout:
 
 def scales(scene: Scene) -> Scales:
     """Size of a race contact: the mean load share, or the centrifugal force, or the roller's weight."""
+    return scene.once("scales", lambda: _scales(scene))
+
+
+def _scales(scene: Scene) -> Scales:
     geometry, mass = scene.geometry, scene.geometry.roller_mass
     load = max(scene.operation.largest_load_N / scene.bearing.rollers, geometry.centrifugal_force, 9.81 * mass)
     modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))

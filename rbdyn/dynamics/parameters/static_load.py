@@ -7,8 +7,10 @@ from rbdyn.contact.hertz_line import line_load
 from rbdyn.dynamics.forces.race_form import form_at
 from rbdyn.dynamics.forces.races import roller_radius
 
-BISECTIONS = 60
-BALANCED = 1e-12  # of the forces at the ends of the bracket
+TRIES = 60
+BALANCED = 1e-11  # of the forces at the ends of the bracket
+ROUND_OFF = 1e-15  # of a radius
+FIRST_APPROACH = 1e-6  # [m], from which a bracket of approaches is widened
 
 
 @kernel
@@ -27,18 +29,45 @@ def race_loads(bearing, j, radius, angle, ring_x):
     return outer, line_load(bearing.inner.contact, overlap, nx, ny)[0]
 
 
+@kernel
+def narrowed(low, below, high, above, moved, middle, force):
+    """Bracket with the forces at its ends after a try, and which end moved: +1 the high one, -1 the low one, 0 none yet.
+
+    False position: an end that stays for a second time counts half (Illinois), so that both close in.
+    """
+    if force > 0.0:
+        return low, 0.5 * below if moved > 0 else below, middle, force, 1
+    return middle, force, high, 0.5 * above if moved < 0 else above, -1
+
+
+@kernel
+def seat_force(bearing, j, radius, angle, ring_x, orbit_speed):
+    """Outer load less inner load and centrifugal force [N]."""
+    outer, inner = race_loads(bearing, j, radius, angle, ring_x)
+    return outer - inner - bearing.roller_mass * radius * orbit_speed**2
+
+
 @routine
 def seated_radius(bearing, j, angle, ring_x, orbit_speed):
     """Orbit radius [m] at which outer load balances inner load and centrifugal force."""
-    low = bearing.inner.radius
-    high = 2.0 * bearing.outer.radius
-    for _ in range(BISECTIONS):
-        radius = 0.5 * (low + high)
-        outer, inner = race_loads(bearing, j, radius, angle, ring_x)
-        if outer > inner + bearing.roller_mass * radius * orbit_speed**2:
-            high = radius
-        else:
-            low = radius
+    low = bearing.outer.radius - roller_radius(bearing.sizes, j)
+    width, below = FIRST_APPROACH, seat_force(bearing, j, low, angle, ring_x, orbit_speed)
+    high, above = low, below
+    while above <= 0.0 and high < 2.0 * bearing.outer.radius:
+        low, below, high, width = high, above, high + width, 2.0 * width
+        above = seat_force(bearing, j, high, angle, ring_x, orbit_speed)
+    while below > 0.0 and low > bearing.inner.radius:
+        low, high, above, width = low - width, low, below, 2.0 * width
+        below = seat_force(bearing, j, low, angle, ring_x, orbit_speed)
+    # A light roller is balanced only as well as the bits of its radius allow.
+    enough = BALANCED * max(abs(below), abs(above)) + ROUND_OFF * high * (above - below) / (high - low)
+    moved = 0
+    for _ in range(TRIES):
+        middle = (low * above - high * below) / (above - below)
+        force = seat_force(bearing, j, middle, angle, ring_x, orbit_speed)
+        if abs(force) <= enough:
+            return middle
+        low, below, high, above, moved = narrowed(low, below, high, above, moved, middle, force)
     return high
 
 
@@ -66,19 +95,16 @@ def static_share(bearing, angles, orbit_speed, load, radii):
         low, high = 2.0 * low, low
     below = static_force(bearing, angles, orbit_speed, low, radii) - load
     above = static_force(bearing, angles, orbit_speed, high, radii) - load
-    # False position that halves the stale end (Illinois): a tenth of the forces that bisection takes.
     enough = BALANCED * max(abs(below), abs(above))
     if below >= 0.0 or above <= 0.0:
         # No load within the play, or more than the bracket holds.
         return 0.5 * (low + high) if below == above else low if below >= 0.0 else high
     middle = high
-    for _ in range(BISECTIONS):
+    moved = 0
+    for _ in range(TRIES):
         middle = (low * above - high * below) / (above - below)
         force = static_force(bearing, angles, orbit_speed, middle, radii) - load
         if abs(force) <= enough:
             break
-        if force > 0.0:
-            high, above, below = middle, force, 0.5 * below
-        else:
-            low, below, above = middle, force, 0.5 * above
+        low, below, high, above, moved = narrowed(low, below, high, above, moved, middle, force)
     return middle

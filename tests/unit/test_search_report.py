@@ -1,0 +1,205 @@
+"""What a report tells of a search in few runs: fronts on one scale, where runs were spent, what holds the pick."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from instant_runs import instantly
+from scipy.stats import qmc
+from short_studies import EXAMPLES, SHORT, short_study, silent
+
+from doe import clearance
+from doe.adaptive.candidates import Region
+from doe.adaptive.runs import Face
+from doe.pareto.archive import REFERENCE
+from doe.report.sections.blocks import Figures
+from doe.report.sections.searches import in_few_runs
+from doe.report.steps.search_words import SURE, held_sentence
+from doe.report.study.files import write
+from doe.study.compared import kept_direct
+from doe.study.goals import goals_of
+from doe.study.held import pulls
+from doe.study.limits import Limit
+from doe.study.whole import run_study
+from doe.study_file import Study
+
+GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '
+
+
+@pytest.fixture(scope="module")
+def studied(tmp_path_factory):
+    """A search in a folder of its own, and one in the folder of a direct search of the same study."""
+    patch = pytest.MonkeyPatch()
+    instantly(patch.setattr)
+    patch.setattr(clearance, "histories", lambda *rest: {})
+    patch.setattr(clearance, "draw_motion", lambda *rest: [])
+    source = tmp_path_factory.mktemp("study")
+    path = short_study(source, SHORT, (f'{GOAL}"min"', f'{GOAL}"max"'))
+    text = path.read_text(encoding="utf-8").replace("population = 100", "population = 24")
+    text = text.replace("evaluations = 2000", "evaluations = 130").replace("population = 50", "population = 20")
+    path.write_text(f"{text}\n[adaptive]\nbudget = 44\nbatch = 6\n", encoding="utf-8")
+    study, found = Study.load(path), {}
+    for name, searches in (("alone", ("adaptive",)), ("beside", ("direct", "adaptive", "adaptive"))):
+        folder = tmp_path_factory.mktemp(name)
+        for search in searches:
+            outcome = run_study(study, folder, 1, lambda title: silent, **{search: True})
+            found[name, search] = outcome, write(outcome, folder)
+        found[name] = folder
+    patch.undo()
+    return study, found
+
+
+def dominated(costs: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> float:
+    """Hypervolume by counting levels below which a point lies."""
+    scaled = (costs - ideal) / (nadir - ideal)
+    levels = REFERENCE * qmc.Sobol(scaled.shape[1], seed=1).random_base2(14)
+    below = (scaled[None] <= levels[:, None]).all(axis=2).any(axis=1)
+    return float(below.mean()) * REFERENCE ** scaled.shape[1]
+
+
+def test_oracle_hypervolumes_of_all_fronts_are_on_one_scale(studied):
+    """Oracle: levels counted; of the front foretold, of the surfaces' front as it is drawn, of the direct front by its runs."""
+    study, found = studied
+    outcome, record = found["beside", "adaptive"]
+    _, direct = found["beside", "direct"]
+    goals, emulators = goals_of(study), outcome.adaptive.found.emulators
+    told = record["adaptive"]["compared"]
+    values = np.array([list(point["responses"].values()) for point in direct["direct"]["front"]])
+    both = np.vstack([goals.costs(values), goals.costs(outcome.adaptive.found.foretold)])
+    front = [row for row in both if not ((both <= row).all(axis=1) & (both < row).any(axis=1)).any()]
+    scale = np.min(front, axis=0), np.max(front, axis=0)
+    assert list(told["ideal"].values()) == pytest.approx(scale[0])
+    assert list(told["nadir"].values()) == pytest.approx(scale[1])
+    drawn = np.array([study.rounded(point) for point in outcome.front.points])
+    on_surfaces, _ = emulators.predict((drawn - study.centre) / record["adaptive"]["emulators"]["half_range"])
+    for mine, costs in (
+        (told["search"][-1], goals.costs(outcome.adaptive.found.foretold)),
+        (told["surfaces"], goals.costs(on_surfaces)),
+        (told["direct"]["hypervolume"], goals.costs(values)),
+        (told["fresh"]["hypervolume"], outcome.adaptive.found.front.costs),
+    ):
+        assert mine == pytest.approx(dominated(costs, *scale), rel=0.03)
+    assert len(told["search"]) == len(record["adaptive"]["history"])
+
+
+def test_the_direct_front_stands_beside_where_the_folder_holds_it(studied):
+    _, found = studied
+    for name, there in (("alone", False), ("beside", True)):
+        outcome, record = found[name, "adaptive"]
+        compared = record["adaptive"]["compared"]
+        assert ("direct" in compared) == there and "direct" not in record
+        page = (found[name] / "report.html").read_text(encoding="utf-8")
+        (picture,) = re.findall(r'<svg[^>]*aria-label="Hypervolume of the search.*?</svg>', page, re.DOTALL)
+        assert ("direct front of" in page) == there == ('class="line direct"' in picture)
+        assert picture.count('class="line surrogate"') == 1
+        assert (outcome.compared.direct_reached is not None) == there
+    # On its own the scale is that of the front foretold, as in the history.
+    _, record = found["alone", "adaptive"]
+    history = [each["hypervolume"] for each in record["adaptive"]["history"]]
+    assert record["adaptive"]["compared"]["search"] == pytest.approx(history, rel=1e-12)
+    _, direct = found["beside", "direct"]
+    _, record = found["beside", "adaptive"]
+    assert record["adaptive"]["compared"]["direct"]["front"] == json.loads(json.dumps(direct["direct"]["front"]))
+    assert record["adaptive"]["compared"]["direct"]["evaluations"] == direct["direct"]["evaluations"]
+
+
+def test_a_direct_front_of_another_study_is_none(studied, tmp_path):
+    study, found = studied
+    assert kept_direct(found["beside"], study) is not None, "a second search in the folder hands it on"
+    assert kept_direct(found["alone"], study) is None
+    other = study.file.front.model_copy(update={"seed": 7})
+    assert kept_direct(found["beside"], replace(study, file=study.file.model_copy(update={"front": other}))) is None
+    assert kept_direct(tmp_path, study) is None
+    for text in ("no json", "[1]", '{"adaptive": 3}', '{"direct": {"front": []}}'):
+        (tmp_path / "summary.json").write_text(text, encoding="utf-8")
+        assert kept_direct(tmp_path, study) is None
+
+
+def test_the_picture_has_every_run_by_its_reason(studied):
+    _, found = studied
+    _, record = found["alone", "adaptive"]
+    drawn = [block for block in in_few_runs(record) if isinstance(block, Figures)]
+    assert len(drawn) == 2
+    adaptive = record["adaptive"]
+    reasons = [each["why"] for each in adaptive["points"]]
+    for picture in drawn[1].pictures[:2]:
+        for why in {*reasons, "fresh"}:
+            count = len(adaptive["front"]) if why == "fresh" else reasons.count(why)
+            assert picture.count(f'class="symbol {why}"') == count, why
+        assert picture.count('class="symbol pick"') == 1
+    dots = re.findall(r"<title>(\d+) runs: ([\d.]+)</title>", drawn[0].pictures[0])
+    assert [int(runs) for runs, _ in dots] == [each["runs"] for each in adaptive["history"]]
+    assert [float(y) for _, y in dots] == pytest.approx(adaptive["compared"]["search"], abs=6e-4)
+
+
+def test_sentences_say_pick_end_hold_trust_and_hypervolumes(studied):
+    _, found = studied
+    outcome, record = found["beside", "adaptive"]
+    answer, spent, held, trust, beside = record["adaptive"]["sentences"]
+    for name, value in record["pick"].items():
+        assert f"{name[:-3].replace('_', ' ')} {value:.4g} mm" in answer
+    for name, gain in record["gains"].items():
+        assert f"{name} {abs(gain['percent']):.2f} %" in answer
+    assert f"because {record['adaptive']['stopped']}: {record['adaptive']['runs']} runs" in spent
+    assert held == record["adaptive"]["held"] and held.startswith("What holds the pick: ")
+    fresh = outcome.adaptive.found
+    claimed = np.hypot(fresh.bias, fresh.spread)
+    assert all(f"{times:.1f}" in trust for times in claimed)
+    assert ("no more than they knew" in trust) == bool((claimed <= SURE).all())
+    compared = record["adaptive"]["compared"]
+    assert f"({100.0 * compared['surfaces'] / compared['search'][-1]:.0f} % of the first)" in beside
+    assert f"direct front of {compared['direct']['evaluations']} evaluations" in beside
+    page = (found["beside"] / "report.html").read_text(encoding="utf-8")
+    assert page.index("The pick has") < page.index('class="tiles"') < page.index("The search ended because")
+
+
+def foretelling(predict, faces=()):
+    """The example with a search that foretells responses so over coded factors, its pick foretold at faces of the region."""
+    study = Study.load(EXAMPLES / "clearance_study.toml")
+    one = np.ones(3)
+    goals = goals_of(study)
+    corners = np.random.default_rng(1).uniform(-1.0, 1.0, (64, 3))
+    emulators = SimpleNamespace(predict=lambda at: (predict(at), None), runs=SimpleNamespace(values=predict(corners)))
+    found = SimpleNamespace(
+        emulators=emulators, region=Region(-one, one, 0.0 * one, np.nan * one, 0.01 * one), faces=faces,
+        foretold=predict(corners), front=SimpleNamespace(goals=goals),
+    )  # fmt: skip
+    half = 1.681792830507429 * study.step
+    edges = np.column_stack([study.centre - half, study.centre + half])
+    return study, SimpleNamespace(found=found, study=study, front=found.front, edges=edges), study.centre, half
+
+
+def test_what_pulls_at_a_factor_and_what_turns_there():
+    """A parabola turns where it is least; planes pull to their lower side; what is flat does neither."""
+
+    def predict(at):
+        a, b, _ = at.T
+        return np.column_stack([(a - 0.2) ** 2 + b, -b + 3.0, 5.0 + 0.0 * a])
+
+    face = Face(2, 1, 1.0, 0.97, "scene")
+    study, adaptive, centre, half = foretelling(predict, (face,))
+    first, second, third = pulls(study, adaptive, centre + half * np.array([0.2, 0.0, 0.98]))
+    assert (first.more, first.less, first.turn, first.face) == ([], [], ["impact_force_N"], None)
+    assert (second.more, second.less, second.turn) == (["whirl_deviation_ratio"], ["impact_force_N"], [])
+    assert third.face == face and third.more == third.less == third.turn == []
+    outcome = SimpleNamespace(
+        study=study, adaptive=adaptive, pick=SimpleNamespace(point=centre + half * np.array([0.2, 0.0, 0.98])),
+        limits=[Limit("power_loss_W", "<=", 6.0, 5.0, 0.1, 0.8), Limit("impact_force_N", "<=", 0.02, 0.0, 0.01, 0.8)],
+        chains={"guide": SimpleNamespace(refused=False), "pocket": SimpleNamespace(refused=True)},
+    )  # fmt: skip
+    told = held_sentence(outcome)
+    assert "where impact_force_N turns" in told
+    assert "whirl_deviation_ratio would gain with more and impact_force_N would gain with less" in told
+    assert "(the front goes on beyond with a probability of 0.97), beyond which no bearing that keeps" in told
+    assert "limit impact_force_N <= 0.02" in told and "power_loss_W <=" not in told
+    assert "dimension chain pocket cannot" in told and "guide cannot" not in told
+    outcome.pick.point = centre - half
+    assert "where the region of the design ends and no allowed" in held_sentence(outcome), "its own pick lay elsewhere"
+    factors = [each.model_copy(update={"allowed": (0.01, 0.5)}) for each in study.file.factor]
+    outcome.study = replace(study, file=study.file.model_copy(update={"factor": factors}))
+    assert "where the region searched ends" in held_sentence(outcome), "it might have grown"
