@@ -131,8 +131,7 @@ def run_study(
     few runs. ``robust``: judge the pick over what is not known, which is also done where something is declared so. Raises
     InputError, RunError, KeyboardInterrupt.
     """
-    clock = _Clock()
-    inputs = inputs_digest(study, direct, adaptive, robust)
+    clock, inputs = _Clock(), inputs_digest(study, direct, adaptive, robust)
     check_goals(study)
     check_given(study, folder)
     if robust := robust or declared(study):
