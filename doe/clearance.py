@@ -86,11 +86,11 @@ def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, over
 
 
 def assignments(study: Study, factors: Array) -> list[str]:
-    """Keys of the scene at factor values (k,) and at the study's categories, as "key=value"."""
+    """Keys of the scene at factor values (k,) and at the study's categories, as "key=value"; of factors that mean something."""
     numbers = zip(study.file.factor, map(float, factors), strict=True)
-    values = study.categories
+    values, idle = study.categories, [study.factors[place] for place in study.inactive]
     return [
-        *(f"{factor.key}={round(x) if factor.whole else x!r}" for factor, x in numbers),
+        *(f"{factor.key}={round(x) if factor.whole else x!r}" for factor, x in numbers if factor.name not in idle),
         *(f"{each.key}={values[each.name]}" for each in study.file.category),
     ]
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import qmc
 
-from doe.adaptive.emulators import Emulators
+from doe.adaptive.emulators import Emulators, Inactive, settled
 from doe.arrays import Array, Mask, Rows
 from doe.pareto.archive import non_dominated
 
@@ -24,7 +24,7 @@ LIKELY = 0.5  # chance of keeping all limits at which a point counts as allowed
 class Region(NamedTuple):
     """The box from ``low`` to ``high`` (k,) in coded units. A drawing has the values ``origin`` and whole numbers of ``finest``
     (k,) from it (NaN: any); points are twins unless they are more than ``apart`` (k,) from each other in some factor. The last
-    coordinates are of categories of so many ``levels``, spread evenly from -1 to 1."""
+    coordinates are of categories of so many ``levels``, spread evenly from -1 to 1; ``inactive`` factors are drawn at 0."""
 
     low: Array
     high: Array
@@ -32,13 +32,15 @@ class Region(NamedTuple):
     finest: Array
     apart: Array
     levels: tuple[int, ...] = ()
+    inactive: Inactive = ()
 
     def snap(self, points: Array) -> Array:
         """Points (n, k) as they can be drawn within the box."""
         ends = (self.low - self.origin) / self.finest, (self.high - self.origin) / self.finest
         steps = np.round((points - self.origin) / self.finest).clip(np.ceil(ends[0] - 1e-6), np.floor(ends[1] + 1e-6))
         free = points.clip(self.low, self.high)
-        return np.where(np.isnan(self.finest), free, self.origin + steps * self.finest)
+        drawn = np.where(np.isnan(self.finest), free, self.origin + steps * self.finest)
+        return settled(drawn, self.levels, self.inactive)
 
     def twins(self, points: Array, others: Array) -> Mask:
         """Whether each of points (n, k) is a twin of any of the others (o, k)."""

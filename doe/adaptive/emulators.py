@@ -16,6 +16,8 @@ from doe.pareto.goals import Goals
 # Prior of the logarithm of a length in half ranges. On the bearing's whirl, which turns several times between two levels of a
 # design, the emulators' own prior believed in 5 of 5 searches in lengths that no run had told, and lost 1.5 % of the front.
 PRIOR = (0.0, 1.0)
+# Factors that mean nothing at a level of a category: places of the category, of its level, and of the factors.
+Inactive = tuple[tuple[int, int, tuple[int, ...]], ...]
 LEAST_DEVIATION = 1e-12  # of a response's scale: what is known exactly still has a side of a level
 
 
@@ -23,7 +25,7 @@ LEAST_DEVIATION = 1e-12  # of a response's scale: what is known exactly still ha
 class Emulators:
     """Emulators of m responses from runs that went well.
 
-    The last coordinates of points are of categories of so many ``levels``. Their deviations are stretched by ``stretch`` (m,), at least 1, so that runs left out one at a time lie within them.
+    The last coordinates of points are of categories of so many ``levels``, at which ``inactive`` factors mean nothing. Their deviations are stretched by ``stretch`` (m,), at least 1, so that runs left out one at a time lie within them.
     """
 
     goals: Goals
@@ -31,17 +33,21 @@ class Emulators:
     each: Sequence[Emulator]
     stretch: Array
     levels: tuple[int, ...] = ()
+    inactive: Inactive = ()
+
+    def _embedded(self, points: Array) -> Array:
+        return embedded(settled(points, self.levels, self.inactive), self.levels)
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations (n, m) of the responses without scatter at points (n, k)."""
-        means, deviations = zip(*(one.predict(embedded(points, self.levels)) for one in self.each), strict=True)
+        means, deviations = zip(*(one.predict(self._embedded(points)) for one in self.each), strict=True)
         stretched = np.column_stack(deviations) * self.stretch
         floor = LEAST_DEVIATION * np.maximum(np.abs(self.runs.values).max(axis=0), 1e-300)
         return np.column_stack(means), np.maximum(stretched, floor)
 
     def covariance(self, points: Array, point: Array) -> Array:
         """Covariances (n, m) of what is not known of each response at points (n, k) and at one point (k,)."""
-        at, other = (embedded(each, self.levels) for each in (points, point[None]))
+        at, other = (self._embedded(each) for each in (points, point[None]))
         columns = [one.covariance(at, other)[:, 0] for one in self.each]
         return np.column_stack(columns) * self.stretch**2
 
@@ -56,7 +62,7 @@ class Emulators:
     def draws(self, count: int, random: np.random.Generator) -> Callable[[Array], Array]:
         """Functions of points (n, k) drawn from the emulators, with responses (s, n, m)."""
         drawn = [one.draw(count, random) for one in self.each]
-        return lambda points: np.stack([function(embedded(points, self.levels)) for function in drawn], axis=-1)
+        return lambda points: np.stack([function(self._embedded(points)) for function in drawn], axis=-1)
 
     def kept(self, means: Array, deviations: Array) -> Array:
         """Probability (n,) that a point keeps all limits, the responses as independent."""
@@ -82,6 +88,15 @@ class Emulators:
         return chance
 
 
+def settled(points: Array, levels: tuple[int, ...], inactive: Inactive) -> Array:
+    """Points (n, k) with the factors at 0 that mean nothing at their levels: all values of these are the same point."""
+    found, numbers = points.copy() if inactive else points, points.shape[1] - len(levels)
+    for category, place, factors in inactive:
+        there = np.rint(0.5 * (points[:, numbers + category] + 1.0) * (levels[category] - 1)) == place
+        found[np.ix_(there, factors)] = 0.0
+    return found
+
+
 def embedded(points: Array, levels: tuple[int, ...]) -> Array:
     """Points (n, k) whose last coordinates are of categories, with a coordinate for every level in the place of each of these.
 
@@ -96,18 +111,20 @@ def embedded(points: Array, levels: tuple[int, ...]) -> Array:
     return np.hstack(parts) if levels else points
 
 
-def fit_emulators(goals: Goals, runs: Runs, known: Emulators | None = None, levels: tuple[int, ...] = ()) -> Emulators:
+def fit_emulators(
+    goals: Goals, runs: Runs, known: Emulators | None = None, levels: tuple[int, ...] = (), inactive: Inactive = ()
+) -> Emulators:
     """Emulators of all responses; ``known`` of nearly the same runs shorten the search for their hyperparameters."""
     good = runs.rows(runs.good)
     variances = _pooled(good, good.points) / good.replicates[:, None]
     starts = [None] * good.values.shape[1] if known is None else [one.hyperparameters for one in known.each]
     columns = zip(good.values.T, variances.T, starts, strict=True)
-    at, numbers = embedded(good.points, levels), good.points.shape[1] - len(levels)
+    at, numbers = embedded(settled(good.points, levels, inactive), levels), good.points.shape[1] - len(levels)
     each = [
         fit_emulator(at, value, variance, start=start, prior=PRIOR, trended=numbers)
         for value, variance, start in columns
     ]
-    return Emulators(goals, good, each, np.array([_stretch(one) for one in each]), levels)
+    return Emulators(goals, good, each, np.array([_stretch(one) for one in each]), levels, inactive)
 
 
 def _stretch(emulator: Emulator) -> float:

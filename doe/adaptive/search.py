@@ -151,7 +151,7 @@ class _Search:
         good = int(self.runs.good.sum())
         if good < 2 + len(self.centre):
             raise ValueError(f"only {good} runs went well; emulators need {2 + len(self.centre)}")
-        self.emulators = fit_emulators(self.goals, self.runs, self.emulators, self.region.levels)
+        self.emulators = fit_emulators(self.goals, self.runs, self.emulators, self.region.levels, self.region.inactive)
         return self.emulators
 
     def _state(self, emulators: Emulators, points: Array, random: np.random.Generator) -> tuple[Levels, Array, Batch]:

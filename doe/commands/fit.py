@@ -31,7 +31,8 @@ def fit(
         valued("NAME", "Column of --data to be fitted, without STUDY; repeatable.", "all numbers but --factor"),
     ] = None,
     model: Annotated[
-        str | None, valued("NAME", "linear, interaction, quadratic or reduced, without STUDY.", "quadratic")
+        str | None,
+        valued("NAME", "linear, interaction, pure_quadratic, quadratic or reduced, without STUDY.", "quadratic"),
     ] = None,
     out: Out = None,
     workers: Workers = None,

@@ -19,7 +19,7 @@ class Design:
     """Runs of a design in the order in which they are made.
 
     ``coded`` (n, k): points in coded units. ``block`` (n,): number of the block of each run, from 0. ``kind``
-    (n,): what each point is ("cube", "axial", "edge", "grid", "sample" or "centre"). ``order`` (n,): place of
+    (n,): what each point is ("cube", "axial", "edge", "grid", "sample", "screening", "optimal", "given" or "centre"). ``order`` (n,): place of
     each run in the standard order, which names a run whatever the order of the runs. ``region``: where the
     design is meant to predict, a ball through its outermost points or the box of ``reach``, the half-range
     of every factor in coded units.
@@ -48,11 +48,16 @@ class Design:
         return int(self.block.max()) + 1
 
     def by_blocks(self, seed: int | None = None) -> Self:
-        """Blocks one after the other, within each the standard order or, with a ``seed``, a random one."""
+        """Blocks one after the other, within each the standard order or, with a ``seed``, a random one after runs that are
+        given."""
         ties = np.arange(len(self.coded))
         if seed is not None:
-            ties = np.random.default_rng(seed).permutation(len(self.coded))
-        rows = np.lexsort((ties, self.block))
+            given = self.kind.count("given")
+            ties[given:] = given + np.random.default_rng(seed).permutation(len(self.coded) - given)
+        return self.rows(np.lexsort((ties, self.block)))
+
+    def rows(self, rows: Rows) -> Self:
+        """Some runs, or all in another order."""
         kind = tuple(self.kind[row] for row in rows)
         return replace(self, coded=self.coded[rows], block=self.block[rows], kind=kind, order=self.order[rows])
 

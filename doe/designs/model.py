@@ -4,7 +4,7 @@ Which a model has, their columns, hierarchy, and the polynomial that they and th
 in the innermost loop of every search, so no columns of powers are built here.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cache
 from itertools import combinations
 from string import ascii_uppercase
@@ -15,18 +15,19 @@ from numpy.typing import ArrayLike
 
 from doe.arrays import Array, Rows
 
-Model = Literal["linear", "interaction", "quadratic", "reduced"]
+Model = Literal["linear", "interaction", "pure_quadratic", "quadratic", "reduced"]
 MODELS: tuple[str, ...] = get_args(Model)
 Terms = tuple[str, ...]
 
 
-def model_terms(factors: int, model: str) -> Terms:
-    """Terms of a model: "linear", "interaction" (with products of two factors), else the full second order.
+def model_terms(factors: int, model: str, without: Collection[int] = ()) -> Terms:
+    """Terms of a model: "linear", "interaction" (with products of two factors), "pure_quadratic" (with squares), else the
+    full second order; none of the factors in the places ``without``.
 
     A model that is reduced by the data needs runs for all terms that it starts from.
     """
-    letters = ascii_uppercase[:factors]
-    products = [a + b for a, b in combinations(letters, 2)] if model != "linear" else []
+    letters = [letter for place, letter in enumerate(ascii_uppercase[:factors]) if place not in without]
+    products = [a + b for a, b in combinations(letters, 2)] if model not in ("linear", "pure_quadratic") else []
     squares = [f"{letter}^2" for letter in letters] if model not in ("linear", "interaction") else []
     return ("1", *letters, *products, *squares)
 

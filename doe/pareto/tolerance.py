@@ -1,14 +1,14 @@
 """Backwards from a pick: the widest tolerances of its factors within which parts keep what the pick promises."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 
-from doe.arrays import Array, Mask
+from doe.arrays import Array, Mask, Rows
 from doe.pareto.manufacture import Distribution, error_of_share, random_offsets
 
 Costs = Callable[[Array], Array]
@@ -21,7 +21,7 @@ RIM = "the rim of the region"
 
 @dataclass(frozen=True, eq=False)
 class WidestTolerances:
-    """Half widths (k,) of the widest tolerances and what they keep.
+    """Half widths (k,) of the widest tolerances, NaN of what has none, and what they keep.
 
     ``probability`` is the share of the parts that keep every limit, ``standard_error`` its Monte Carlo error.
     ``limited_by`` names the limit that parts break first beyond, or the rim of the region; ``at_rim`` (k,) the
@@ -41,7 +41,14 @@ class WidestTolerances:
         return {
             name: {"half_width": float(width), **sure, "limited_by": RIM if rim else self.limited_by}
             for name, width, rim in zip(factors, self.half_widths, self.at_rim, strict=True)
+            if not np.isnan(width)
         }
+
+    def among(self, factors: Rows, count: int) -> Self:
+        """The same as those of some of ``count`` factors, of which the others have none."""
+        half, rim = np.full(count, np.nan), np.zeros(count, dtype=bool)
+        half[factors], rim[factors] = self.half_widths, self.at_rim
+        return replace(self, half_widths=half, at_rim=rim)
 
 
 def widest_tolerances(

@@ -1,5 +1,6 @@
 """The runs that a surface is fitted to, and whether they can be."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,8 @@ class Data:
 
     ``points`` (n, k) coded, ``values`` (n,); ``standard_errors`` (n,) of the values or None where they are not
     all known; ``replicates`` (n,) behind each standard error (0: unknown); ``block`` (n,) label of each run;
-    ``centre`` and ``step`` (k,) actual value at coded 0 and per coded unit.
+    ``centre`` and ``step`` (k,) actual value at coded 0 and per coded unit; ``without``: places of factors that no term is
+    made of.
     """
 
     points: Array
@@ -27,12 +29,13 @@ class Data:
     block: Whole
     centre: Array
     step: Array
+    without: Collection[int] = ()
 
     def rows(self, rows: Rows) -> "Data":
         """The runs of these rows alone."""
         errors = None if self.standard_errors is None else self.standard_errors[rows]
         per_run = self.points[rows], self.values[rows], errors, self.replicates[rows], self.block[rows]
-        return Data(*per_run, self.centre, self.step)
+        return Data(*per_run, self.centre, self.step, self.without)
 
     @property
     def block_columns(self) -> Array:
@@ -52,6 +55,7 @@ def checked(
     standard_errors: ArrayLike | None,
     replicates: ArrayLike | None,
     block: ArrayLike | None,
+    without: Collection[int] = (),
 ) -> Data:
     """Runs as arrays. Raises ValueError when shapes differ, a number is not finite, or all values are equal."""
     points, response = points_and_values(name, coded, values)
@@ -71,6 +75,7 @@ def checked(
         block=_whole(block, len(points)),
         centre=np.array(np.broadcast_to(centre, points.shape[1]), float),
         step=np.array(np.broadcast_to(step, points.shape[1]), float),
+        without=without,
     )
 
 

@@ -7,7 +7,7 @@ as the pure error of a design without replicates, is None and never NaN.
 Source: Myers, Montgomery and Anderson-Cook, Response Surface Methodology, 4th ed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Any, Literal
 
@@ -170,14 +170,15 @@ def fit(
     weighting: Weighting = "equal",
     block: ArrayLike | None = None,
     transform: Transform | None = None,
+    without: Collection[int] = (),
 ) -> Surface:
     """Fit one response by least squares.
 
     coded : runs in coded units, shape (n, k).
     values : response of each run, shape (n,).
     name : name of the response, for messages.
-    model : "linear"; "interaction" (linear and products of two factors); "quadratic" (full second order); or
-        "reduced", which starts from the quadratic and drops the term of largest p until every p is at most
+    model : "linear"; "interaction" (linear and products of two factors); "pure_quadratic" (linear and squares);
+        "quadratic" (full second order); or "reduced", which starts from the quadratic and drops the term of largest p until every p is at most
         0.05, keeping each term that a remaining interaction or square is built on (hierarchy).
     centre, step : actual value of each factor at coded 0 and its change over one coded unit, shape (k,).
     standard_errors : of each value, from the replicates of the simulation, shape (n,). They are set beside
@@ -186,6 +187,7 @@ def fit(
     weighting : "equal", or "replicates" for weights 1 / standard_error^2.
     block : label of the block of each run, whole numbers, shape (n,).
     transform : "none", "box_cox" for the recommended exponent, or an exponent: (y^lambda - 1)/lambda, ln y for 0.
+    without : places of factors that the surface does not depend on.
 
     Raises ValueError when a value is not finite, all are equal, shapes differ, the model is unknown, runs are too few
     for it, the runs cannot tell its terms apart, a transform meets a value that is not positive, or weights are
@@ -193,7 +195,7 @@ def fit(
     """
     if model not in MODELS:
         raise ValueError(f"{name}: model = {model!r}: choose {', '.join(MODELS[:-1])} or {MODELS[-1]}")
-    data = checked(name, coded, values, centre, step, standard_errors, replicates, block)
+    data = checked(name, coded, values, centre, step, standard_errors, replicates, block, without)
     if weighting == "replicates":
         check_errors(name, standard_errors)
     return _fit(name, data, model, weighting, "none" if transform is None else transform, advised=True)
@@ -205,7 +207,7 @@ def _figures(surface: Surface, source: str, *keys: str) -> dict[str, Any]:
 
 
 def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: Transform, advised: bool) -> Surface:
-    terms = model_terms(data.points.shape[1], model)
+    terms = model_terms(data.points.shape[1], model, data.without)
     check_matrix(name, model, terms, _columns(data, terms))
     if not np.ptp(data.values):
         alike = f"all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit"

@@ -69,7 +69,7 @@ def check_adaptive(study: Study, wanted: bool) -> None:
     every = study.every_level
     check_all([partial(clearance.adaptive_scenes, study.at(at), study.baseline[None], [2], 0) for at in every])
     try:
-        check_budget(plan_of(study), len(every) * len(design_of(study).coded))
+        check_budget(plan_of(study), sum(len(design_of(study.at(at)).coded) for at in every))
     except ValueError as error:
         raise InputError([f"{study.path}: adaptive.{error}"]) from None
 
@@ -174,7 +174,13 @@ def region_in_units(study: Study) -> Region:
     levels = tuple(len(each.categories) for each in study.file.category)
     one, between = np.ones(half.size + len(levels)), np.array([2.0 / (count - 1) for count in levels])
     origin = np.append(-study.centre / half, -np.ones(len(levels)))
-    return Region(-one, one, origin, np.append(finest, between), np.append(apart, 0.5 * between), levels)
+    inactive = tuple(
+        (category, place, tuple(map(study.factors.index, names)))
+        for category, each in enumerate(study.file.category)
+        for place in range(len(each.categories))
+        if (names := each.inactive_at(place))
+    )
+    return Region(-one, one, origin, np.append(finest, between), np.append(apart, 0.5 * between), levels, inactive)
 
 
 def border_of(study: Study) -> Border | None:

@@ -31,7 +31,10 @@ def solve_chains(
     half_widths = np.full(pick.size, np.nan) if tolerances is None else tolerances.half_widths
     solved, notes = {}, []
     for number, chain in enumerate(study.file.chain):
-        widest, given = half_widths[study.factors.index(chain.factor)], chain.half_width_mm
+        if (place := study.factors.index(chain.factor)) in study.inactive:
+            notes.append(f"chain {chain.name}: not solved, since {chain.factor} means nothing at the pick's categories")
+            continue
+        widest, given = half_widths[place], chain.half_width_mm
         if given is not None and given > widest:
             why = f"wider than the {widest:.3g} within which the gains are kept as [tolerances] asks"
             where = f"{study.path}: chain {chain.name}: half_width_mm = {given:g}"

@@ -2,59 +2,192 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
-from typing import Any
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from doe.designs import Design, box_behnken, central_composite, full_factorial, latin_hypercube, sobol
-from doe.designs.model import model_terms
+from doe import designs
+from doe.arrays import Array
+from doe.designs import Design
+from doe.designs.design import replicate_groups
+from doe.designs.model import Model, Terms, model_terms
 from doe.study_file import Study
 from doe.study_file.design_section import KEYS_OF
 from doe.study_file.design_section import Design as DesignSettings
+from doe.study_file.table import Table, read_table
 from rbdyn.faults import InputError, refuse
 
-ALL = (central_composite, box_behnken, full_factorial, latin_hypercube, sobol)
-MAKERS: dict[str, Callable[..., Design]] = {make.__name__: make for make in ALL}
+OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
+MAKERS: dict[str, Callable[..., Design]] = {
+    **OPTIMAL,
+    **{kind: getattr(designs, kind) for kind in KEYS_OF if kind not in OPTIMAL},
+}
+SEEDED = {"latin_hypercube", "sobol", *OPTIMAL}
+# Steps from the centre beyond which no run that is given lies: those of the star points of a rotatable design in 8 factors.
+FARTHEST = 4.0
+# Whole numbers of a factor from which an optimal design chooses, at most; of more, evenly spread ones.
+MOST_LEVELS = 41
+RUNS_TABLE = "design_runs.csv"  # of a study, in its folder
+Values = tuple[float, ...]
+
+
+class Given(NamedTuple):
+    """What an optimal design knows beyond its settings: the terms, of each factor the coded values that it may take (none:
+    any), and the coded points and blocks of runs that were made."""
+
+    terms: Terms
+    levels: tuple[Values | None, ...]
+    made: tuple[Values, ...]
+    block: tuple[int, ...]
+
+
+def terms_of(study: Study, model: Model) -> Terms:
+    """Terms of a model in the factors that mean something at the study's categories."""
+    return model_terms(len(study.factors), model, study.inactive)
 
 
 def design_of(study: Study) -> Design:
-    """The design in the order of its runs. Raises InputError when its settings are impossible."""
+    """The design in the order of its runs; whole numbers and factors that mean nothing rounded.
+
+    Raises InputError when its settings are impossible.
+    """
+    settings = study.file.design
+    given = _given(study) if settings.kind in OPTIMAL else None
     try:
-        design = _design(study.file.design.model_dump_json(exclude_unset=True), len(study.factors))
+        design = _design(settings.model_dump_json(exclude_unset=True), len(study.factors), given)
     except ValueError as error:
         raise InputError([f"{study.path}: design.{error}"]) from None
     whole = np.array([factor.whole for factor in study.file.factor])
-    return replace(design, coded=np.where(whole, study.coded(np.rint(study.actual(design.coded))), design.coded))
+    reach = design.reach * study.step
+    rounded = _whole(study.actual(design.coded), study.centre, study.centre - reach, study.centre + reach)
+    design = replace(design, coded=np.where(whole, study.coded(rounded), design.coded))
+    return _without(design, list(study.inactive)) if study.inactive else design
+
+
+def _whole(actual: Array, centre: Array, low: Array, high: Array) -> Array:
+    """The nearest whole numbers, halves outward, that do not lie beyond the ends of the region."""
+    nearest = np.where(actual < centre, np.ceil(actual - 0.5), np.floor(actual + 0.5))
+    slack = 1e-9 * (high - low)
+    return nearest.clip(np.ceil(low - slack), np.floor(high + slack))
+
+
+def _without(design: Design, inactive: list[int]) -> Design:
+    """Runs with the inactive factors at their centre; of those that only these told apart the ones that were there, or the
+    first."""
+    settled = design.coded.copy()
+    settled[:, inactive] = 0.0
+    rows = np.argsort((settled != design.coded).any(axis=1), kind="stable")
+    first, before = (replicate_groups(each[rows], design.block[rows]) for each in (settled, design.coded))
+    return replace(design, coded=settled).rows(np.sort(rows[before == before[first]]))
 
 
 @cache
-def _design(text: str, factors: int) -> Design:
+def _design(text: str, factors: int, given: Given | None) -> Design:
     """The design of settings in JSON; several steps of a study ask for it, and some designs take a while."""
     settings = DesignSettings.model_validate_json(text)
-    make, seed = MAKERS[settings.kind], {"seed"} if settings.kind in ("latin_hypercube", "sobol") else set()
-    keys = settings.model_dump(include=KEYS_OF[settings.kind] | seed)
-    design = make(factors, centre_replicates=settings.centres, **keys)
+    seed, known = {"seed"} if settings.kind in SEEDED else set(), {} if given is None else given._asdict()
+    keys = settings.model_dump(include=(KEYS_OF[settings.kind] | seed) - {"augment"})
+    design = MAKERS[settings.kind](factors, centre_replicates=settings.centres, **keys, **known)
     return design.by_blocks(settings.seed if settings.order == "random" else None)
+
+
+def _given(study: Study) -> Given:
+    """What an optimal design is to know. Raises InputError for a table of runs that are impossible."""
+    terms = tuple(dict.fromkeys(term for each in study.file.response for term in terms_of(study, each.model)))
+    made, block = np.empty((0, 1)), np.empty(0, np.int64)
+    if (name := study.file.design.augment) is not None:
+        table = _table(study, name)
+        made, block = study.coded(table.actual), np.unique(table.block, return_inverse=True)[1]
+    reach = np.abs(made).max(initial=1.0)
+    levels: list[Values | None] = []
+    for place, factor in enumerate(study.file.factor):
+        if place in study.inactive:
+            levels.append((0.0,))
+        elif factor.whole:
+            ends = factor.centre + reach * factor.step * np.array([-1.0, 1.0])
+            low, high = np.ceil(ends[0] - 1e-9), np.floor(ends[1] + 1e-9)
+            some = np.unique(np.rint(np.linspace(low, high, min(int(high - low) + 1, MOST_LEVELS))))
+            levels.append(tuple(((some - factor.centre) / factor.step).tolist()))
+        else:
+            levels.append(None)
+    return Given(terms, tuple(levels), tuple(map(tuple, made.tolist())), tuple(block.tolist()))
+
+
+def _table(study: Study, name: str) -> Table:
+    """The runs that are given. Raises InputError for a table that cannot be read or has impossible ones."""
+    where = f"{study.path}: design.augment = {name!r}"
+    try:
+        table = read_table(study.beside(name), study.factors, [], study.path)
+    except InputError as error:
+        raise InputError([f"{where}: {fault}" for fault in error.faults]) from None
+    away = np.abs(study.coded(table.actual))
+    refuse(
+        f"{where}: {study.factors[column]} in row {row + 1} = {table.actual[row, column]:g}: lies {away[row, column]:.4g} "
+        f"steps from the centre, outside any region of a design (at most {FARTHEST:g}); check its unit, or widen step"
+        for row, column in np.argwhere(away > FARTHEST).tolist()
+    )
+    refuse(
+        f"{where}: {factor.name} in row {row + 1} = {table.actual[row, column]:g}: whole = true has no such value; mend the row"
+        for column, factor in enumerate(study.file.factor)
+        for row in np.flatnonzero(factor.whole & (table.actual[:, column] % 1.0 != 0.0)).tolist()
+    )
+    return table
+
+
+def actual_of(study: Study, design: Design) -> Array:
+    """Factor values (n, k) of the runs; of those that are given to the last bit, which coding them may change."""
+    actual, name = study.actual(design.coded), study.file.design.augment
+    if name is not None and not study.inactive:
+        given = [row for row, kind in enumerate(design.kind) if kind == "given"]
+        actual[given] = _table(study, name).actual[design.order[given]]
+    return actual
+
+
+def check_given(study: Study, folder: Path) -> None:
+    """Raises InputError where the runs that are given stand in the table that the study writes into its folder."""
+    name = study.file.design.augment
+    if name is not None and study.beside(name).resolve() == (folder / RUNS_TABLE).resolve():
+        why = "the study writes its own runs there"
+        raise InputError(
+            [f"{study.path}: design.augment = {name!r}: {why}; copy it beside the study and name the copy"]
+        )
 
 
 def check_runs(study: Study, design: Design) -> None:
     """Raises InputError with every response whose model the runs do not suffice for."""
     from doe.designs.evaluation import lost_terms
 
-    runs, factors = design.coded.shape
+    runs = len(design.coded)
+
+    def lost(model: Model) -> list[str]:
+        return lost_terms(design.coded, terms_of(study, model), design.block)
+
+    def needed(model: Model) -> int:
+        return len(terms_of(study, model)) + design.blocks
+
+    def simpler(model: Model) -> str:
+        others: tuple[Model, ...] = "pure_quadratic", "interaction", "linear"
+        less = [each for each in others if set(terms_of(study, each)) < set(terms_of(study, model))]
+        told = [each for each in less if runs >= needed(each) and not lost(each)]
+        return f"choose a simpler model{' (' + ' or '.join(told) + ')' if told else ''}"
+
     faults = []
     for number, response in enumerate(study.file.response, 1):
-        terms = model_terms(factors, response.model)
-        where = f"{study.path}: response[{number}].model = {response.model!r}"
-        needed = len(terms) + design.blocks
-        what = f"{len(terms)} terms" + (f", {design.blocks - 1} block effects" if design.blocks > 1 else "")
-        if runs < needed:
-            few = f"the {runs} runs of the design are too few; it needs {needed} ({what} and one to judge the fit)"
-            faults.append(f"{where}: {few}: enlarge the design or choose a simpler model")
-        elif lost := lost_terms(design.coded, terms, design.block):
-            mend = "add levels or centre points, or choose a simpler model"
-            faults.append(f"{where}: the runs of the design cannot tell {', '.join(lost)} from the other terms; {mend}")
+        model, least = response.model, needed(response.model)
+        where = f"{study.path}: response[{number}].model = {model!r}"
+        if runs < least:
+            what = f"{least - design.blocks} terms" + (
+                f", {design.blocks - 1} block effects" if design.blocks > 1 else ""
+            )
+            few = f"the {runs} runs of the design are too few; it needs {least} ({what} and one to judge the fit)"
+            key = "runs" if "runs" in KEYS_OF[study.file.design.kind] else "centre_replicates"
+            more = "enlarge the design" if key != "runs" and lost(model) else f"raise design.{key}"
+            faults.append(f"{where}: {few}: {more} or {simpler(model)}")
+        elif gone := lost(model):
+            mend = f"add levels or centre points, or {simpler(model)}"
+            faults.append(f"{where}: the runs of the design cannot tell {', '.join(gone)} from the other terms; {mend}")
     refuse(faults)
 
 
@@ -66,8 +199,6 @@ def evaluation(study: Study, design: Design) -> dict[str, Any]:
     from doe.designs.evaluation import evaluate
 
     check_runs(study, design)
-    factors = len(study.factors)
-    model = max((response.model for response in study.file.response), key=lambda each: len(model_terms(factors, each)))
-    terms = model_terms(factors, model)
-    judged = evaluate(design.coded, terms, design.block, region=design.region, reach=design.extent)
+    model = max((response.model for response in study.file.response), key=lambda each: len(terms_of(study, each)))
+    judged = evaluate(design.coded, terms_of(study, model), design.block, region=design.region, reach=design.extent)
     return {"model": model, **judged}

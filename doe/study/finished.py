@@ -19,7 +19,7 @@ def inputs_digest(study: Study, direct: bool, adaptive: bool = False, robust: bo
     """Hash of all that the files of a study depend on: the study, the files it names, the code, what was asked."""
     named = [study.scene.file, *(chain.file for chain in study.file.chain)]
     named += [] if study.file.reference is None else [study.file.reference.file]
-    named += _samples(study)
+    named += [study.file.design.augment, *_samples(study)]
     digest = hashlib.sha256()
     for text in (
         study.path.name,

@@ -62,13 +62,19 @@ def find_front(
         )
 
     with named_faults(study, goals, lambda point: point, ""):
-        found = _backed_off(study, plain, failed)
+        found = _idle_at(study, study.centre, _backed_off(study, plain, failed))
     found = replace(found, uncertainty=_uncertainty(study, surfaces, found))
     if box is None:
         return found
     with named_faults(study, goals, study.actual, " after manufacture"):
         aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt(share)), failed)
-    return replace(found, tolerance_aware=aware)
+    return replace(found, tolerance_aware=_idle_at(study, np.zeros_like(study.centre), aware))
+
+
+def _idle_at(study: Study, centre: Array, found: Found) -> Found:
+    """The same points with the factors that mean nothing, for which the search takes anything, at a centre (k,)."""
+    idle = np.isin(np.arange(centre.size), study.inactive)
+    return replace(found, points=np.where(idle, centre, found.points)) if idle.any() else found
 
 
 def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> Found:

@@ -1,8 +1,10 @@
 """Goals, tolerances and the region of a study as the methods want them."""
 
+from itertools import compress
+
 import numpy as np
 
-from doe.arrays import Array
+from doe.arrays import Array, Mask
 from doe.pareto.goals import BLANK, Goals
 from doe.pareto.tolerance_aware import ToleranceBox
 from doe.study.design import design_of
@@ -46,10 +48,16 @@ def beyond_runs(study: Study, coded: Array) -> bool:
     return bool(distance > design.extent * (1.0 + 1e-4))
 
 
+def rigid(study: Study) -> Mask:
+    """Which factors (k,) have no tolerance: whole numbers, and those that mean nothing at the study's categories."""
+    return np.array([one.whole or place in study.inactive for place, one in enumerate(study.file.factor)])
+
+
 def known_tolerances(study: Study) -> dict[str, float]:
-    """Half widths of the factors in their units: their own, else the narrowest of the chains that close on them."""
+    """Half widths of the factors that have any, in their units: their own, else the narrowest of the chains that close on
+    them."""
     known = {}
-    for factor in study.file.factor:
+    for factor in compress(study.file.factor, ~rigid(study)):
         closing = [chain.half_width_mm for chain in study.file.chain if chain.factor == factor.name]
         widths = [width for width in closing if width is not None]
         if factor.tolerance is not None or widths:
@@ -67,8 +75,9 @@ def tolerance_box(study: Study) -> ToleranceBox | None:
 
 
 def tolerances_of(study: Study) -> Array:
-    """Half widths (k,) of all factors in coded units. Raises InputError for each that has none or too wide a one."""
-    known = known_tolerances(study)
+    """Half widths (k,) of all factors in coded units, 0 of those that have no tolerance. Raises InputError for each other
+    one that is missing or too wide."""
+    known = dict.fromkeys(compress(study.factors, rigid(study)), 0.0) | known_tolerances(study)
     where = f"{study.path}: factor.tolerance of"
     needs = "the tolerance-aware front needs the half width that manufacture keeps"
     mend = "here or as half_width_mm of a chain that closes on this factor"

@@ -10,11 +10,10 @@ import numpy as np
 from doe import clearance
 from doe.arrays import Array, Whole
 from doe.designs import Design
-from doe.designs.model import model_terms
 from doe.running.failure import Failure, alike, sentence
 from doe.running.runner import Progress
 from doe.running.store import Store
-from doe.study.design import check_runs, design_of
+from doe.study.design import actual_of, check_runs, design_of, terms_of
 from doe.study_file import Study
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
@@ -75,7 +74,7 @@ def ordered_runs(study: Study) -> Ordered:
     """Every run of the study's design. Raises InputError when the design, a scene or a response is impossible."""
     clearance.check_responses(study)
     design = design_of(study)
-    actual = study.actual(design.coded)
+    actual = actual_of(study, design)
     scenes = clearance.design_scenes(study, actual, design.order.tolist())
     labels = [f"design run {run}" for run in range(1, len(actual) + 1)]
     return Ordered(design, actual, scenes, labels, [study.by_factor(point) for point in actual])
@@ -126,8 +125,7 @@ def _each_once(notes: Iterable[str]) -> list[str]:
 
 def fewest_runs(study: Study, design: Design) -> int:
     """Runs that the largest response model needs: one a term, one a block beyond the first, one to judge the fit."""
-    factors = len(study.factors)
-    return design.blocks + max(len(model_terms(factors, response.model)) for response in study.file.response)
+    return design.blocks + max(len(terms_of(study, response.model)) for response in study.file.response)
 
 
 def read_runs(study: Study, path: Path) -> Runs:

@@ -21,6 +21,7 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
     number = independent_values(runs)
     errors = standard_errors(runs.errors, number)
     units: dict[str, Any] = {"centre": study.centre, "step": study.step, "block": runs.block}
+    units["without"] = study.inactive
     columns = zip(study.file.response, runs.values.T, errors.T, number.T, strict=True)
     for response, values, error, behind in columns:
         asked = response.model_dump(include={"name", *Fitted.model_fields}) | units

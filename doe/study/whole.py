@@ -21,7 +21,7 @@ from doe.study.checked import check_study
 from doe.study.chosen import Chosen, choose
 from doe.study.compared import Compared, compared, kept_direct
 from doe.study.confirmation import Confirmed, Gain, gains
-from doe.study.design import design_of
+from doe.study.design import check_given, design_of
 from doe.study.direct import Direct, find_direct
 from doe.study.direct_pick import DirectPick, local_of
 from doe.study.edge import Edge, edge_of
@@ -131,9 +131,9 @@ def run_study(
     few runs. ``robust``: judge the pick over what is not known, which is also done where something is declared so. Raises
     InputError, RunError, KeyboardInterrupt.
     """
-    clock = _Clock()
-    inputs = inputs_digest(study, direct, adaptive, robust)
+    clock, inputs = _Clock(), inputs_digest(study, direct, adaptive, robust)
     check_goals(study)
+    check_given(study, folder)
     if robust := robust or declared(study):
         check_robust(study)
     reference = check_study(study, adaptive)

@@ -9,15 +9,15 @@ from doe.pareto.tolerance import WidestTolerances, widest_tolerances
 from doe.response_surface import Surface
 from doe.study.direct_pick import Local
 from doe.study.drawn import draw_all, predict_all, predict_paired
-from doe.study.goals import goals_of, known_tolerances, region_of
+from doe.study.goals import goals_of, known_tolerances, region_of, rigid
 from doe.study_file import Study
 from doe.study_file.front_section import Tolerances
 
 
 def widest_of(
     study: Study, surfaces: Sequence[Surface], point: Array, settings: Tolerances, local: Local | None = None
-) -> WidestTolerances:
-    """Widest half widths, in factor units, about a point (k,) in factor units.
+) -> WidestTolerances | None:
+    """Widest half widths, in factor units, about a point (k,) in factor units; None where no factor has a tolerance.
 
     ``local``, of a pick of the direct front, stands for the level of the surfaces there; then parts may lie beyond the
     region by the factors' own tolerances, which the runs of the search bear out by their slopes.
@@ -25,6 +25,9 @@ def widest_of(
     A part keeps its promise when every response with a goal has at least the share ``keep`` of the gain that the
     surfaces predict at the point (or, where they predict a loss, loses no more), and when all limits hold.
     """
+    free = np.flatnonzero(~rigid(study))
+    if not free.size:
+        return None
     goals = goals_of(study)
     base, nominal = (study.coded(each)[None] for each in (study.baseline, point))
     ends = [predict_all(surfaces, each) for each in (base, nominal)]
@@ -39,7 +42,9 @@ def widest_of(
             return predict_all(surfaces, coded)
         return predict_paired(surfaces, drawn, coded)
 
-    def objectives(points: Array) -> Array:
+    def objectives(parts: Array) -> Array:
+        points = np.tile(point, (len(parts), 1))
+        points[:, free] = parts
         coded = study.coded(points)
         values = responses(coded)
         if local is not None:
@@ -53,22 +58,23 @@ def widest_of(
     reference = goals.costs(reference_values)
     held = np.zeros((settings.samples, len(goals.limited)))
     known = known_tolerances(study)
-    ratios = [known.get(name, np.nan) for name in study.factors]
+    ratios = np.array([known.get(name, np.nan) for name in study.factors])
     reach = region_of(study) * study.step
     low, high = study.centre - reach, study.centre + reach
     if local is not None:
         beyond = np.nan_to_num(ratios)
         low, high = np.minimum(low, point - beyond), np.maximum(high, point + beyond)
-    return widest_tolerances(
+    found = widest_tolerances(
         objectives,
-        point,
+        point[free],
         np.hstack([reference - keep, held]) + 1e-9 * np.abs(gain).max(),
-        study.step if np.isnan(ratios).any() else ratios,
-        lower=low,
-        upper=high,
+        (study.step if np.isnan(ratios[free]).any() else ratios)[free],
+        lower=low[free],
+        upper=high[free],
         names=[
             *(f"the gain of {study.responses[index]}" for index in goals.objectives),
             *(f"{study.responses[index]} {sense} {limit:g}" for index, sense, limit in goals.limited),
         ],
         **settings.model_dump(include={"probability", "distribution", "samples", "seed", "aim"}),
     )
+    return found.among(free, point.size)

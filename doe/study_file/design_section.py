@@ -42,6 +42,8 @@ class Factor(Consistent):
             yield f"resolution = {self.resolution:g}: {steps}; coarsen it"
         if self.whole and self.resolution is not None:
             yield f"resolution = {self.resolution:g}: whole = true has none but 1; leave it out"
+        if self.whole and self.tolerance is not None:
+            yield f"tolerance = {self.tolerance:g}: whole = true has none; leave it out"
         if self.whole and self.step < 1.0:
             yield f"step = {self.step:g}: is less than a whole number; widen it"
 
@@ -60,13 +62,32 @@ class Category(Consistent):
     """Its key in the scene, such as cage.guidance."""
     categories: Annotated[list[str | bool], Field(min_length=2, max_length=8)]
     """Values of the key; the first is the baseline's."""
+    inactive: dict[str, list[str]] = {}
+    """By value, the names of factors that mean nothing there, such as {roller = ["guide_clearance_mm"]}: their keys stay as
+    the scene has them."""
+
+    def inactive_at(self, place: int) -> list[str]:
+        """Names of the factors that mean nothing at the value in this place."""
+        return self.inactive.get(_in_toml(self.categories[place]), [])
 
     def faults(self) -> Iterator[str]:
+        values = [_in_toml(each) for each in self.categories]
+        mend = f"write one of {', '.join(values)}"
+        yield from (
+            f"inactive.{name}: is none of the categories; {mend}" for name in self.inactive if name not in values
+        )
         if len(self.categories) > len({*map(str, self.categories)}):
             yield f"categories = {self.categories}: name each value once"
 
 
-Kind = Literal["central_composite", "box_behnken", "full_factorial", "latin_hypercube", "sobol"]
+def _in_toml(value: str | bool) -> str:
+    return value if isinstance(value, str) else str(value).lower()
+
+
+Kind = Literal[
+    "central_composite", "box_behnken", "full_factorial", "latin_hypercube", "sobol", "definitive_screening",
+    "d_optimal", "i_optimal",
+]  # fmt: skip
 Alpha = Literal["rotatable", "spherical", "orthogonal_blocks", "orthogonal_columns", "face_centred", "inscribed"]
 
 # Keys that only some kinds of design know.
@@ -76,11 +97,16 @@ KEYS_OF = {
     "full_factorial": {"levels"},
     "latin_hypercube": {"runs"},
     "sobol": {"runs"},
+    "definitive_screening": set[str](),
+    "d_optimal": {"runs", "augment"},
+    "i_optimal": {"runs", "augment"},
 }
+# Runs at the centre unless told.
+CENTRES = {"central_composite": 6, "box_behnken": 6, "definitive_screening": 1}
 
 
 class Design(Consistent):
-    """Which runs are made, and in which order."""
+    """Which runs are made, and in which order. Optimal ones are so for the terms of all response models."""
 
     kind: Kind = "central_composite"
     """Kind of design."""
@@ -89,7 +115,8 @@ class Design(Consistent):
     cube: Literal["full", "resolution_v"] = "full"
     """Cube of a central composite design: all corners, or a fraction of resolution V."""
     centre_replicates: Annotated[int, Field(ge=0, le=100)] | None = None
-    """Runs at the centre: 6 for central composite and Box-Behnken designs where left out, else none."""
+    """Runs at the centre: 6 for central composite and Box-Behnken designs where left out, 1 for definitive screening, else
+    none."""
     blocks: bool = False
     """Whether the runs are made in orthogonal blocks."""
     cube_blocks: Literal[1, 2, 4] = 1
@@ -97,7 +124,11 @@ class Design(Consistent):
     levels: Annotated[int, Field(ge=2, le=100)] = 3
     """Levels a factor of a full factorial."""
     runs: Annotated[int, Field(ge=2, le=10000)] = 60
-    """Runs of a Latin hypercube or Sobol sequence."""
+    """Runs of a Latin hypercube or Sobol sequence; of an optimal design, which has no default, those beside runs that are
+    given or at the centre."""
+    augment: str | None = None
+    """Table of runs that were made, beside the study: an optimal design keeps them as they are and adds its own, so that all
+    together tell most. Runs that this study made in standard order with this seed are not simulated again in its folder."""
     order: Literal["standard", "random"] = "standard"
     """Order of the runs. A run's seed is seed plus its place in the standard order, whatever this is."""
     seed: Annotated[int, Field(ge=0)] = 1
@@ -106,13 +137,13 @@ class Design(Consistent):
     @property
     def centres(self) -> int:
         """Number of centre points."""
-        if self.centre_replicates is not None:
-            return self.centre_replicates
-        return 6 if self.kind in ("central_composite", "box_behnken") else 0
+        return CENTRES.get(self.kind, 0) if self.centre_replicates is None else self.centre_replicates
 
     def faults(self) -> Iterator[str]:
         alien = self.model_fields_set & set().union(*KEYS_OF.values()) - KEYS_OF[self.kind]
         mend = f"kind = {self.kind!r} has no such key; remove it or choose another kind"
         yield from (f"{key}: {mend}" for key in type(self).model_fields if key in alien)
+        if self.kind in ("d_optimal", "i_optimal") and "runs" not in self.model_fields_set:
+            yield f"runs: missing; kind = {self.kind!r} needs the number of runs to make"
         if self.cube_blocks > 1 and not self.blocks:
             yield f"cube_blocks = {self.cube_blocks}: needs blocks; write blocks = true beside it"

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from doe.arrays import Array
 from doe.designs.design import to_actual, to_coded
+from doe.designs.model import Model
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Category, Design, Factor, Name
 from doe.study_file.front_section import Adaptive, Direct, Front, Goal, Robust, Tolerances
@@ -32,8 +33,8 @@ class SceneFile(Strict):
 class Fitted(Strict):
     """How a surface is fitted to a response."""
 
-    model: Literal["linear", "interaction", "quadratic", "reduced"] = "quadratic"
-    """Terms of the surface; "reduced" keeps those of the quadratic that are significant, with their hierarchy."""
+    model: Model = "quadratic"
+    """Terms of the surface: "interaction" has products of two factors, "pure_quadratic" squares, "quadratic" both; "reduced" keeps those of the quadratic that are significant, with their hierarchy."""
     weighting: Literal["equal", "replicates"] = "equal"
     """"replicates" weighs each run by the inverse of its variance, known from the replicates of the simulation."""
     transform: Literal["none", "box_cox"] | Annotated[float, Field(ge=-5.0, le=5.0)] = "none"
@@ -140,6 +141,12 @@ class StudyFile(Strict):
             alike = [name for name in given if name in others]
             faults += [f"{kind}.name = {name!r}: is another column of a table of runs; rename it" for name in alike]
         known = ", ".join(names)
+        faults += [
+            f"factor.inactive of {each.name} = {name!r}: no such factor; name one of {known}"
+            for each in self.category
+            for name in dict.fromkeys(name for group in each.inactive.values() for name in group)
+            if name not in names
+        ]
         faults += [f"baseline.{key}: no such factor; name one of {known}" for key in self.baseline if key not in names]
         faults += [
             f"chain.factor = {chain.factor!r}: no such factor; name one of {known}"
@@ -222,6 +229,13 @@ class Study:
         """Values of the categories by name."""
         places = self.levels or self.every_level[0]
         return {each.name: str(each.categories[at]) for each, at in zip(self.file.category, places, strict=True)}
+
+    @property
+    def inactive(self) -> tuple[int, ...]:
+        """Places of the factors that mean nothing at the values of its categories."""
+        places = self.levels or self.every_level[0]
+        named = {name for each, at in zip(self.file.category, places, strict=True) for name in each.inactive_at(at)}
+        return tuple(place for place, name in enumerate(self.factors) if name in named)
 
     def by_factor(self, point: Array) -> dict[str, float]:
         """Values (k,) by name of the factor."""

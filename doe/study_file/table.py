@@ -36,7 +36,7 @@ class Table:
 
 
 def read_table(path: Path, factors: list[str], responses: list[str], named_in: Path) -> Table:
-    """Read a CSV table in UTF-8 with a column for each factor and response, commas between fields, points in numbers.
+    """Read a CSV table in UTF-8 with a column for each factor and response, if any, commas between fields, points in numbers.
 
     A column "<response>_error" holds 95 % half widths (empty or "nan" where unknown), "replicates" and "block" whole
     numbers; all three kinds may be missing. ``named_in`` is the file that names the columns. Rows of one number in a
@@ -61,8 +61,8 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     size = len(columns[factors[0]])
     return Table(
         actual=np.column_stack([columns[name] for name in factors]),
-        values=np.column_stack([columns[name] for name in responses]),
-        errors=np.column_stack([columns.get(name, np.full(size, np.nan)) for name in errors]),
+        values=np.column_stack([np.empty((size, 0)), *(columns[name] for name in responses)]),
+        errors=np.column_stack([np.empty((size, 0)), *(columns.get(name, np.full(size, np.nan)) for name in errors)]),
         replicates=np.asarray(columns.get(COUNT, np.zeros(size)), np.int64),
         block=np.asarray(columns.get("block", np.zeros(size)), np.int64),
     )

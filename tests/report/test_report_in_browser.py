@@ -308,7 +308,8 @@ def test_wide_pictures_stay_legible(browser, width):
 
 
 def with_emulators(record: dict[str, Any], levels: tuple[str, ...]) -> tuple[dict[str, Any], Emulators]:
-    """The record as after a search whose region has grown at the end of the last factor, and its emulators."""
+    """The record as after a search whose region has grown at the end of the last factor, and its emulators; the second factor
+    means nothing at the second of the levels."""
     random = np.random.default_rng(3)
     numbers = random.uniform(-1.0, 1.0, (24, 3))
     kinds = np.where(random.uniform(size=24) < 0.5, -1.0, 1.0)
@@ -322,8 +323,11 @@ def with_emulators(record: dict[str, Any], levels: tuple[str, ...]) -> tuple[dic
     points = np.column_stack([numbers, kinds]) if levels else numbers
     whole, errors = np.full((24, 3), 7), 0.02 * np.abs(values) * random.uniform(0.5, 1.0, (24, 3))
     runs = Runs(points, values, errors, whole, np.full(24, 8))
-    emulators = fit_emulators(Goals.of(["min"] * 3), runs, levels=(len(levels),) if levels else ())
-    category = [Category(name="guidance", key="cage.guidance", categories=list(levels))] if levels else []
+    category, idle = [], ()
+    if levels:
+        named = {"categories": list(levels), "inactive": {levels[1]: [FACTORS[1]]}}
+        category, idle = [Category(name="guidance", key="cage.guidance", **named)], ((0, 1, (1,)),)
+    emulators = fit_emulators(Goals.of(["min"] * 3), runs, levels=(len(levels),) if levels else (), inactive=idle)
     study = Study.load(EXAMPLES / "clearance_study.toml")
     study = replace(study, file=study.file.model_copy(update={"category": category}))
     found = SimpleNamespace(

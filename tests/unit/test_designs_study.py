@@ -72,6 +72,8 @@ def test_random_order_gives_every_point_its_own_seed(tmp_path):
         ('kind = "full_factorial"', 3, 27, 1.0),
         ('kind = "latin_hypercube"\nruns = 25\ncentre_replicates = 3', 3, 28, 1.0),
         ('kind = "sobol"\nruns = 40\nseed = 9', 3, 40, 1.0),
+        ('kind = "d_optimal"\nruns = 12', 3, 12, 1.0),
+        ('kind = "i_optimal"\nruns = 10\ncentre_replicates = 3\norder = "random"', 3, 13, 1.0),
     ],
 )
 def test_every_kind_is_built_and_evaluated(tmp_path, lines, factors, runs, reach):
@@ -94,6 +96,11 @@ def test_every_kind_is_built_and_evaluated(tmp_path, lines, factors, runs, reach
         ("blocks = true\ncube_blocks = 4", 3, ["design.cube_blocks = 4: 8 corners of 3 factors"]),
         ("cube_blocks = 2\nlevels = 4", 3, ["design.levels: kind = 'central_composite' has no", "design.cube_blocks = 2: needs"]),
         ('kind = "sobol"\nalpha = 1.5', 3, ["design.alpha: kind = 'sobol' has no such key"]),
+        ('kind = "definitive_screening"\nruns = 5', 3, ["design.runs: kind = 'definitive_screening' has no such key"]),
+        ('kind = "sobol"\naugment = "a.csv"', 3, ["design.augment: kind = 'sobol' has no such key"]),
+        ('kind = "d_optimal"', 3, ["design.runs: missing; kind = 'd_optimal' needs the number of runs to make"]),
+        ('kind = "i_optimal"\nruns = 9', 3, ["design.runs = 9: too few for a model of 10 terms; give at least 11"]),
+        ('kind = "d_optimal"\nruns = 9\naugment = "a.csv"', 3, ["design.augment = 'a.csv'", "a.csv: no such file; check"]),
         ('kind = "full_factorial"\nlevels = 30', 4, ["design.levels = 30: 4 factors give 810000 runs"]),
     ],
 )  # fmt: skip
@@ -111,6 +118,16 @@ def test_impossible_settings_are_named(tmp_path, lines, factors, words):
         ('kind = "sobol"\nruns = 10', "quadratic", "the 10 runs of the design are too few; it needs 11 (10 terms and"),
         ('kind = "sobol"\nruns = 4', "linear", "it needs 5 (4 terms and one to judge the fit)"),
         ('kind = "full_factorial"\nlevels = 2\ncentre_replicates = 4', "reduced", "cannot tell B^2, C^2 from"),
+        (
+            'kind = "d_optimal"\nruns = 10',
+            "quadratic",
+            "raise design.runs or choose a simpler model (pure_quadratic or interaction or linear)",
+        ),
+        (
+            'kind = "definitive_screening"',
+            "quadratic",
+            "it needs 11 (10 terms and one to judge the fit): enlarge the design or",
+        ),
         ('alpha = "spherical"\ncentre_replicates = 0', "quadratic", "cannot tell C^2 from the other terms"),
     ],
 )

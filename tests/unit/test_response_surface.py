@@ -293,7 +293,7 @@ def test_reduction_takes_terms_from_the_quadratic_in_order(printed):
         (lambda x, y: (x, np.where(np.arange(20) == 4, np.nan, y), "linear"), "value of run 5 is nan"),
         (lambda x, y: (np.where(x == 0, np.inf, x), y, "linear"), "coded factor is not a finite"),
         (lambda x, y: (x, y[:3], "linear"), "do not match"),
-        (lambda x, y: (x, y, "cubic"), "choose linear, interaction, quadratic or reduced"),
+        (lambda x, y: (x, y, "cubic"), "choose linear, interaction, pure_quadratic, quadratic or reduced"),
         (lambda x, y: (x, np.full(20, 0.1), "linear"), "all 20 values are 0.1, so there is nothing to fit"),
     ],
 )

@@ -4,9 +4,10 @@
 const emulator = (() => {
   const solved = new Map(), known = new Map();
 
-  // A point as the emulators know it: a coordinate a factor, and one a level.
+  // A point as the emulators know it: a coordinate a factor, 0 where that means nothing, and one a level.
+  const idle = (all, k, kinds) => all.categories.some((each, c) => each.inactive[kinds[c]].includes(k));
   const embedded = (all, coded, kinds) =>
-    [...coded, ...all.categories.flatMap((each, c) => each.levels.map((_, level) => level === kinds[c] ? 1 : 0))];
+    [...coded.map((x, k) => idle(all, k, kinds) ? 0 : x), ...all.categories.flatMap((each, c) => each.levels.map((_, level) => level === kinds[c] ? 1 : 0))];
 
   const point = (all, factors, kinds) =>
     embedded(all, factors.map((value, k) => (value - all.centre[k]) / all.half_range[k]), kinds);

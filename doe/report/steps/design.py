@@ -3,13 +3,14 @@
 from typing import Any
 
 from doe.designs import Design
+from doe.study.design import actual_of
 from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
 
 
 def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:
     """Runs in their order, from 1."""
-    actual = study.actual(design.coded)
+    actual = actual_of(study, design)
     return [
         {
             "run": number,

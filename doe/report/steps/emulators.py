@@ -13,7 +13,8 @@ def emulators_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
     """Mean and standard deviation of every response without its scatter, anywhere.
 
     The coordinates of a point are (factor - ``centre``) / ``half_range``, and of each of the ``categories`` 1 for the level
-    that it has and 0 for each other one; ``pick``: that of the pick. ``points`` (n, k) are the runs' factors, ``kinds`` (n, c)
+    that it has and 0 for each other one; ``pick``: that of the pick. Factors in the places that ``inactive`` lists by level are
+    at 0 there. ``points`` (n, k) are the runs' factors, ``kinds`` (n, c)
     the places of their levels. A response is a trend of ``terms`` with ``coefficients``, A the first factor, and a process: the
     covariances of the point with the runs, Matern of smoothness 5/2 with ``lengths`` a coordinate and ``variance``, times
     ``weights`` (n,). The runs' ``values`` (n,) have the variances ``noise`` (n,). The deviation is that of universal kriging
@@ -40,7 +41,13 @@ def emulators_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
         "centre": study.centre.tolist(),
         "half_range": (region_of(study) * study.step).tolist(),
         "categories": [
-            {"name": each.name, "levels": list(each.categories), "pick": place} for each, place in categories
+            {
+                "name": each.name,
+                "levels": list(each.categories),
+                "pick": place,
+                "inactive": [[*map(study.factors.index, each.inactive_at(at))] for at in range(len(each.categories))],
+            }
+            for each, place in categories
         ],
         "points": runs[:, :numbers].tolist(),
         "kinds": [levels_at(study, point) for point in runs],

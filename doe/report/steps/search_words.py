@@ -37,8 +37,10 @@ def search_sentences(outcome: StudyResult) -> list[str]:
 
 def _answer(outcome: StudyResult) -> str:
     study, before = outcome.study, outcome.study.at(()).categories
-    places = [_place(name, x) for name, x in zip(study.factors, outcome.pick.point.tolist(), strict=True)]
+    point = zip(study.factors, outcome.pick.point.tolist(), strict=True)
+    places = [_place(*each) for at, each in enumerate(point) if at not in study.inactive]
     places += [f"{name} = {kind} (baseline: {before[name]})" for name, kind in study.categories.items()]
+    places += [f"no {study.factors[at]}, which means nothing there" for at in study.inactive]
     gained = [f"{each.response} {improvement(each.percent, None, each.goal)}" for each in outcome.gains["pick"]]
     return f"The pick has {_listed(places)}: by simulation {_listed(gained)} than the baseline."
 

@@ -96,7 +96,12 @@ def _print_clearances(outcome: StudyResult) -> None:
     found = outcome.tolerances
     half_widths = [None] * len(outcome.study.factors) if found is None else found.half_widths.tolist()
     rows = [
-        (name, f"{base:.4g}", f"{pick:.4g}", *([] if half is None else [f"± {rounded_down(half)}"]))
+        (
+            name,
+            f"{base:.4g}",
+            f"{pick:.4g}",
+            *([] if half is None else ["" if half != half else f"± {rounded_down(half)}"]),
+        )
         for name, base, pick, half in zip(
             outcome.study.factors, outcome.baseline.point, outcome.pick.point, half_widths, strict=True
         )

@@ -11,6 +11,7 @@ from doe.report.steps.adaptive import archive_table
 from doe.report.steps.fit import fit_tables
 from doe.report.study.answer import answer_text
 from doe.report.study.summary import summary
+from doe.study.design import RUNS_TABLE
 from doe.study.whole import StudyResult
 from rbdyn.result import write_json
 
@@ -30,7 +31,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     study, record = outcome.study, summary(outcome)
     (folder / "summary.json").unlink(missing_ok=True)
     tables = {
-        "design_runs.csv": _runs_table(record),
+        RUNS_TABLE: _runs_table(record),
         **fit_tables(outcome.surfaces),
         "front.csv": [{**point["factors"], **point["responses"]} for point in record["front"]["front"]]
         if outcome.adaptive is None
