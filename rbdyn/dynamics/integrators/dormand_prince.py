@@ -39,7 +39,7 @@ class DormandPrince(NamedTuple):
     """The pair of order 5(4), six right-hand sides a step; fields as in ``method_laws``."""
 
     last: int = 6
-    free: int = 1  # b_2 = e_2 = d_2 = 0
+    free: int = 7
     exponent: float = 0.2 - 0.75 * 0.04
     beta: float = 0.04
     rejected: float = 0.2

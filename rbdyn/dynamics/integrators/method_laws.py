@@ -1,7 +1,7 @@
 """What the loop of ``advance`` asks of a method. Each is a law, so that stages and weights are compiled in.
 
 A method is a NamedTuple: ``last``, the row of ``Carry.k`` at the end of the step, which is the first of the next one;
-``free``, a row in which nothing is kept once the step is taken; the ``exponent`` of the error of this step and ``beta`` of
+``free``, a row of no stage that is needed once a step was tried; the ``exponent`` of the error of this step and ``beta`` of
 the one before in the control of the step, ``rejected`` that of the error of a step that is refused.
 """
 

@@ -18,8 +18,8 @@ ACCEPTED, REJECTED, DERIVATIVES, WORST, COUNTS = range(5)
 LOOKED_AT, HELD, EIGENVALUES, STIFFNESS = range(4)
 # In ``Tally.whirl``: samples, sum and sum of squares of the speed of the cage's centre.
 SAMPLES, SPEEDS, SQUARES, WHIRL = range(4)
-# Rows of stages: of the longest method, its end of the step included.
-ROWS = 7
+# Rows of stages: of the longest method, its end of the step and a free one included.
+ROWS = 8
 PI_START_ERROR = 1e-4
 
 
