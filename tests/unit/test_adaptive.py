@@ -210,12 +210,14 @@ def test_replicates_are_made_where_they_matter():
 
     design = first_runs(evaluate, 2, 12, 1)
     plan = Plan(60, least=2, most=16, usual=5)
-    adaptive_front(evaluate, np.zeros(2), np.ones(2), box(2), design, TWO, plan, np.zeros(2))
-    spent = np.concatenate(asked[1:-1])
+    found = adaptive_front(evaluate, np.zeros(2), np.ones(2), box(2), design, TWO, plan, np.zeros(2))
+    searched, fresh = asked[1 : len(found.history)], asked[len(found.history) :]
+    spent = np.concatenate(searched)
     assert spent.min() >= 2
     assert spent.max() == 16
-    assert np.mean(asked[1]) < np.mean(asked[-2])
-    assert set(asked[-1]) == {5}
+    assert np.mean(searched[0]) < np.mean(searched[-1])
+    assert set(np.concatenate(fresh)) == {5}
+    assert sum(map(len, fresh)) == plan.fresh and max(map(len, fresh)) <= plan.batch, "learnt a batch at a time"
 
 
 def shifted(points):
