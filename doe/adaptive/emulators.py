@@ -16,6 +16,9 @@ from doe.pareto.goals import Goals
 # Prior of the logarithm of a length in half ranges. On the bearing's whirl, which turns several times between two levels of a
 # design, the emulators' own prior believed in 5 of 5 searches in lengths that no run had told, and lost 1.5 % of the front.
 PRIOR = (0.0, 1.0)
+# Ends of a factor whose logarithm is told: farther apart, one may lie at a zero that means nothing. A clearance acts by its
+# shares: with logarithms, searches of 100 runs on a table of the bearing found 1.2 % more of its front.
+WIDEST = 10.0
 LEAST_DEVIATION = 1e-12  # of a response's scale: what is known exactly still has a side of a level
 
 
@@ -23,7 +26,8 @@ LEAST_DEVIATION = 1e-12  # of a response's scale: what is known exactly still ha
 class Emulators:
     """Emulators of m responses from runs that went well.
 
-    The last coordinates of points are of categories of so many ``levels``. Their deviations are stretched by ``stretch`` (m,), at least 1, so that runs left out one at a time lie within them.
+    The last coordinates of points are of categories of so many ``levels``; factors with a share in ``shares`` are known by
+    their logarithms. Their deviations are stretched by ``stretch`` (m,), at least 1, so that runs left out one at a time lie within them.
     """
 
     goals: Goals
@@ -31,17 +35,21 @@ class Emulators:
     each: Sequence[Emulator]
     stretch: Array
     levels: tuple[int, ...] = ()
+    shares: tuple[float, ...] = ()
+
+    def _embedded(self, points: Array) -> Array:
+        return embedded(points, self.levels, self.shares)
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations (n, m) of the responses without scatter at points (n, k)."""
-        means, deviations = zip(*(one.predict(embedded(points, self.levels)) for one in self.each), strict=True)
+        means, deviations = zip(*(one.predict(self._embedded(points)) for one in self.each), strict=True)
         stretched = np.column_stack(deviations) * self.stretch
         floor = LEAST_DEVIATION * np.maximum(np.abs(self.runs.values).max(axis=0), 1e-300)
         return np.column_stack(means), np.maximum(stretched, floor)
 
     def covariance(self, points: Array, point: Array) -> Array:
         """Covariances (n, m) of what is not known of each response at points (n, k) and at one point (k,)."""
-        at, other = (embedded(each, self.levels) for each in (points, point[None]))
+        at, other = (self._embedded(each) for each in (points, point[None]))
         columns = [one.covariance(at, other)[:, 0] for one in self.each]
         return np.column_stack(columns) * self.stretch**2
 
@@ -56,7 +64,7 @@ class Emulators:
     def draws(self, count: int, random: np.random.Generator) -> Callable[[Array], Array]:
         """Functions of points (n, k) drawn from the emulators, with responses (s, n, m)."""
         drawn = [one.draw(count, random) for one in self.each]
-        return lambda points: np.stack([function(embedded(points, self.levels)) for function in drawn], axis=-1)
+        return lambda points: np.stack([function(self._embedded(points)) for function in drawn], axis=-1)
 
     def kept(self, means: Array, deviations: Array) -> Array:
         """Probability (n,) that a point keeps all limits, the responses as independent."""
@@ -82,32 +90,52 @@ class Emulators:
         return chance
 
 
-def embedded(points: Array, levels: tuple[int, ...]) -> Array:
-    """Points (n, k) whose last coordinates are of categories, with a coordinate for every level in the place of each of these.
+def shares_of(centre: Array, step: Array, low: Array, high: Array) -> tuple[float, ...]:
+    """What ``step`` is of ``centre`` (k,) for factors that have the same sign from ``low`` to ``high`` (k,), in steps from the
+    centre, and whose ends are not too far apart; 0 for others."""
+    ends = np.sort(np.abs([centre + step * low, centre + step * high]), axis=0)
+    told = (ends[0] * WIDEST > ends[1]) & ((centre + step * low) * (centre + step * high) > 0.0)
+    return tuple(np.divide(step, centre, out=np.zeros(len(step)), where=told).tolist())
+
+
+def embedded(points: Array, levels: tuple[int, ...], shares: tuple[float, ...] = ()) -> Array:
+    """Points (n, k) whose last coordinates are of categories, with a coordinate for every level in the place of each of these,
+    and the logarithms of the factors that have ``shares``, which have the slope of the points where these are 0.
 
     Any two levels of a category are so as unlike as the lengths of their coordinates say. Source: Garrido-Merchan and
     Hernandez-Lobato, Dealing with categorical and integer-valued variables in Bayesian optimization with Gaussian processes,
-    Neurocomputing 380 (2020).
+    Neurocomputing 380 (2020). Logarithms: Snoek, Swersky, Zemel and Adams, Input warping for Bayesian optimization of
+    non-stationary functions, ICML (2014).
     """
-    numbers = points.shape[1] - len(levels)
+    share, numbers = np.array(shares), points.shape[1] - len(levels)
+    told = np.flatnonzero(share)
+    if told.size:
+        points = points.copy()
+        points[:, told] = np.log1p(share[told] * points[:, told]) / share[told]
     parts = [points[:, :numbers]]
     for count, column in zip(levels, points[:, numbers:].T, strict=True):
         parts.append(np.eye(count)[np.rint(0.5 * (column + 1.0) * (count - 1)).astype(np.int64)])
     return np.hstack(parts) if levels else points
 
 
-def fit_emulators(goals: Goals, runs: Runs, known: Emulators | None = None, levels: tuple[int, ...] = ()) -> Emulators:
+def fit_emulators(
+    goals: Goals,
+    runs: Runs,
+    known: Emulators | None = None,
+    levels: tuple[int, ...] = (),
+    shares: tuple[float, ...] = (),
+) -> Emulators:
     """Emulators of all responses; ``known`` of nearly the same runs shorten the search for their hyperparameters."""
     good = runs.rows(runs.good)
     variances = _pooled(good, good.points) / good.replicates[:, None]
     starts = [None] * good.values.shape[1] if known is None else [one.hyperparameters for one in known.each]
     columns = zip(good.values.T, variances.T, starts, strict=True)
-    at, numbers = embedded(good.points, levels), good.points.shape[1] - len(levels)
+    at, numbers = embedded(good.points, levels, shares), good.points.shape[1] - len(levels)
     each = [
         fit_emulator(at, value, variance, start=start, prior=PRIOR, trended=numbers)
         for value, variance, start in columns
     ]
-    return Emulators(goals, good, each, np.array([_stretch(one) for one in each]), levels)
+    return Emulators(goals, good, each, np.array([_stretch(one) for one in each]), levels, shares)
 
 
 def _stretch(emulator: Emulator) -> float:

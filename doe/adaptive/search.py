@@ -1,7 +1,8 @@
 """The search: design, batches where most is to be gained, a check of what is foretold, fresh runs at the finalists.
 
 What a search believes of the points that it chose is flattered by the errors that made it choose them. So the last runs are
-made afresh at the finalists and alone are reported, as at the end of `doe.pareto.direct`.
+made afresh at the finalists and alone are reported, as at the end of `doe.pareto.direct`; what they tell helps to choose
+the finalists that are left, but has no say in what was chosen.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from scipy.stats import qmc
 
 from doe.adaptive.border import Place, faces, grown, outermost
 from doe.adaptive.candidates import Region, candidates, front_rows
-from doe.adaptive.emulators import Emulators, fit_emulators
+from doe.adaptive.emulators import Emulators, fit_emulators, shares_of
 from doe.adaptive.improvement import DRAWS, WORTH, Levels, batch, known_of, levels_of
 from doe.adaptive.result import AdaptiveFront, Batch
 from doe.adaptive.runs import Border, Evaluate, Face, Runs
@@ -29,7 +30,7 @@ from doe.pareto.goals import Goals
 from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import NAMES, Rule, pick_all
 
-FRESH = 0.3  # of the budget: fresh runs at the finalists, as in a direct search
+FRESH = 0.2  # of the budget: fresh runs at the finalists
 ROUNDS = 3  # of candidates for a front that is reported
 SHOWN, FEW = 200, 2048  # points of a front foretold that are shown, and levels, by which its hypervolume is told
 
@@ -38,13 +39,14 @@ SHOWN, FEW = 200, 2048  # points of a front foretold that are shown, and levels,
 class Plan:
     """How a search goes: ``budget`` of runs, those of the design and the fresh ones included; runs a ``batch``; ``seed``.
 
-    A run has from ``least`` to ``most`` replicates, a fresh one ``usual``, and the ``pick`` is made by that rule.
+    A run has from ``least`` to ``most`` replicates, a fresh one ``usual``, and the ``pick`` is made by that rule. Two replicates
+    of the bearing may both miss what it does at a point in half of the time, and then agree.
     """
 
     budget: int
     batch: int = 8
     seed: int = 1
-    least: int = 2
+    least: int = 4
     most: int = 16
     usual: int = 8
     pick: Rule = "knee"
@@ -80,10 +82,11 @@ def adaptive_front(
     InfeasibleError where no run comes near to keeping the limits.
     """
     check_budget(plan, len(design.points))
+    widest = border or region
+    shares = shares_of(centre, step, widest.low, widest.high)
     with THREADS.limit(limits=1):
-        search = _Search(
-            evaluate, centre, step, region, goals, plan, design, tell, border, why=["design"] * len(design.points)
-        )
+        why = ["design"] * len(design.points)
+        search = _Search(evaluate, centre, step, region, goals, plan, design, tell, border, shares, why=why)
         stopped = search.spend()
         return search.finish(baseline, stopped)
 
@@ -122,6 +125,7 @@ class _Search:
     runs: Runs
     tell: Tell
     border: Border | None
+    shares: tuple[float, ...]
     history: list[Batch] = field(default_factory=list)
     fronts: list[Array] = field(default_factory=list)
     why: list[str] = field(default_factory=list)
@@ -163,7 +167,7 @@ class _Search:
         good = int(runs.good.sum())
         if good < 2 + len(self.centre):
             raise ValueError(f"only {good} runs went well; emulators need {2 + len(self.centre)}")
-        self.emulators = fit_emulators(self.goals, runs, self.emulators, self.region.levels)
+        self.emulators = fit_emulators(self.goals, runs, self.emulators, self.region.levels, shares=self.shares)
         return self.emulators
 
     def _state(self, emulators: Emulators, points: Array, random: np.random.Generator) -> tuple[Levels, Array, Batch]:
