@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from known_fronts import bearing_runs, bearing_share, box, dtlz2, first_runs, noisy, search, share, zdt1
+from known_fronts import box, first_runs, noisy, search
 from scipy import special
 
 from doe.adaptive import Batch, Border, Plan, adaptive_front
@@ -16,7 +16,6 @@ from doe.adaptive.emulators import embedded, fit_emulators, shares_of
 from doe.adaptive.improvement import Known, batch, dominated, levels_of
 from doe.adaptive.runs import Runs
 from doe.adaptive.settling import as_foretold, missed, nothing_gained
-from doe.designs import central_composite
 from doe.pareto.archive import best_for_hypervolume, hypervolume, spread
 from doe.pareto.goals import Goals
 from doe.pareto.nsga2 import InfeasibleError
@@ -255,43 +254,6 @@ def test_what_holds_the_pick_is_told(border, held):
     assert not found.moves and found.region.high.tolist() == [1.0, 1.0]
     face = next(face for face in found.faces if face.factor == 0)
     assert (face.side, face.held) == (1, held) and face.better > 0.9
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("problem", [zdt1, dtlz2])
-def test_literature_80_runs_find_the_front_under_noise(problem):
-    """ZDT1 and DTLZ2, 2 % noise: the finalists of 80 runs, 24 of them fresh, against as many points of the true front."""
-    ours = [share(problem, search(problem, seed).front.points) for seed in range(1, 6)]
-    # As many runs of a Sobol sequence, the same emulators.
-    even = [share(problem, search(problem, seed, first=55, batch=1).front.points) for seed in range(1, 6)]
-    assert np.median(ours) >= 0.97
-    assert np.median(ours) > np.median(even)
-
-
-@pytest.mark.slow
-def test_a_tabulated_bearing_100_runs():
-    """Whirl turns several times there, and its least lies in a narrow valley on a face of the region. Measured: 0.88 to 0.98
-    of the front, in the mean of 6 seeds 0.94; 2000 runs of the direct search find 0.99."""
-    shares = [bearing_share(bearing_search(seed)) for seed in (1, 2, 3)]
-    assert np.mean(shares) > 0.92
-    assert min(shares) > 0.86
-
-
-def bearing_search(seed, budget=100):
-    """From a central composite design as in the example, on a drawing of micrometres; the finalists in coded units."""
-    centre, half = np.array([0.02, 0.15, 0.30]), np.array([0.005, 0.05, 0.05]) * 1.681792830507429
-    evaluate = bearing_runs(seed)
-    coded = central_composite(3, centre_replicates=6).coded / 1.681792830507429
-    eight, fine = np.full(20, 8), 0.001 / half
-    region = Region(-np.ones(3), np.ones(3), -centre / half, fine, 1.000001 * fine)
-    design = Runs(coded, *evaluate(coded, eight), eight)
-    three = Goals.of(["min"] * 3)
-
-    def at(points, replicates):
-        return evaluate((points - centre) / half, replicates)
-
-    found = adaptive_front(at, centre, half, region, design, three, Plan(budget, seed=seed), centre)
-    return (found.front.points - centre) / half
 
 
 def two_kinds(points):
