@@ -17,7 +17,7 @@ from doe.pareto.goals import Goals
 # design, the emulators' own prior believed in 5 of 5 searches in lengths that no run had told, and lost 1.5 % of the front.
 PRIOR = (0.0, 1.0)
 # Ends of a factor whose logarithm is told: farther apart, one may lie at a zero that means nothing. A clearance acts by its
-# shares: with logarithms, searches of 100 runs on a table of the bearing found 1.2 % more of its front.
+# shares: where the runs say so, logarithms found 1 % more of the front of a table of the bearing in 100 runs.
 WIDEST = 10.0
 LEAST_DEVIATION = 1e-12  # of a response's scale: what is known exactly still has a side of a level
 
@@ -26,8 +26,8 @@ LEAST_DEVIATION = 1e-12  # of a response's scale: what is known exactly still ha
 class Emulators:
     """Emulators of m responses from runs that went well.
 
-    The last coordinates of points are of categories of so many ``levels``; factors with a share in ``shares`` are known by
-    their logarithms. Their deviations are stretched by ``stretch`` (m,), at least 1, so that runs left out one at a time lie within them.
+    The last coordinates of points are of categories of so many ``levels``; ``shares`` (m) of factors are those that each
+    emulator knows by their logarithms. Their deviations are stretched by ``stretch`` (m,), at least 1, so that runs left out one at a time lie within them.
     """
 
     goals: Goals
@@ -35,22 +35,23 @@ class Emulators:
     each: Sequence[Emulator]
     stretch: Array
     levels: tuple[int, ...] = ()
-    shares: tuple[float, ...] = ()
+    shares: tuple[tuple[float, ...], ...] = ()
 
-    def _embedded(self, points: Array) -> Array:
-        return embedded(points, self.levels, self.shares)
+    def _told(self, points: Array) -> list[Array]:
+        return [embedded(points, self.levels, each) for each in self.shares]
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Means and standard deviations (n, m) of the responses without scatter at points (n, k)."""
-        means, deviations = zip(*(one.predict(self._embedded(points)) for one in self.each), strict=True)
+        told = zip(self.each, self._told(points), strict=True)
+        means, deviations = zip(*(one.predict(at) for one, at in told), strict=True)
         stretched = np.column_stack(deviations) * self.stretch
         floor = LEAST_DEVIATION * np.maximum(np.abs(self.runs.values).max(axis=0), 1e-300)
         return np.column_stack(means), np.maximum(stretched, floor)
 
     def covariance(self, points: Array, point: Array) -> Array:
         """Covariances (n, m) of what is not known of each response at points (n, k) and at one point (k,)."""
-        at, other = (self._embedded(each) for each in (points, point[None]))
-        columns = [one.covariance(at, other)[:, 0] for one in self.each]
+        told = zip(self.each, self._told(points), self._told(point[None]), strict=True)
+        columns = [one.covariance(at, other)[:, 0] for one, at, other in told]
         return np.column_stack(columns) * self.stretch**2
 
     def scatter(self, points: Array) -> Array:
@@ -64,7 +65,11 @@ class Emulators:
     def draws(self, count: int, random: np.random.Generator) -> Callable[[Array], Array]:
         """Functions of points (n, k) drawn from the emulators, with responses (s, n, m)."""
         drawn = [one.draw(count, random) for one in self.each]
-        return lambda points: np.stack([function(self._embedded(points)) for function in drawn], axis=-1)
+
+        def functions(points: Array) -> Array:
+            return np.stack([each(at) for each, at in zip(drawn, self._told(points), strict=True)], axis=-1)
+
+        return functions
 
     def kept(self, means: Array, deviations: Array) -> Array:
         """Probability (n,) that a point keeps all limits, the responses as independent."""
@@ -125,17 +130,24 @@ def fit_emulators(
     levels: tuple[int, ...] = (),
     shares: tuple[float, ...] = (),
 ) -> Emulators:
-    """Emulators of all responses; ``known`` of nearly the same runs shorten the search for their hyperparameters."""
+    """Emulators of all responses; ``known`` of nearly the same runs shorten the search for their hyperparameters.
+
+    Each knows the factors that have ``shares`` by their logarithms where that makes its runs likelier.
+    """
     good = runs.rows(runs.good)
     variances = _pooled(good, good.points) / good.replicates[:, None]
     starts = [None] * good.values.shape[1] if known is None else [one.hyperparameters for one in known.each]
-    columns = zip(good.values.T, variances.T, starts, strict=True)
-    at, numbers = embedded(good.points, levels, shares), good.points.shape[1] - len(levels)
-    each = [
-        fit_emulator(at, value, variance, start=start, prior=PRIOR, trended=numbers)
-        for value, variance, start in columns
-    ]
-    return Emulators(goals, good, each, np.array([_stretch(one) for one in each]), levels, shares)
+    numbers, ways = good.points.shape[1] - len(levels), [(), shares] if any(shares) else [()]
+    each, told = [], []
+    for value, variance, start in zip(good.values.T, variances.T, starts, strict=True):
+        found = [
+            fit_emulator(embedded(good.points, levels, way), value, variance, start=start, prior=PRIOR, trended=numbers)
+            for way in ways
+        ]
+        best = max(range(len(ways)), key=lambda way: found[way].restricted_likelihood)
+        each.append(found[best])
+        told.append(ways[best])
+    return Emulators(goals, good, each, np.array([_stretch(one) for one in each]), levels, tuple(told))
 
 
 def _stretch(emulator: Emulator) -> float:

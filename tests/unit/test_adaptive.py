@@ -300,13 +300,19 @@ def test_factors_that_are_never_near_zero_are_told_by_their_logarithms():
 
 
 def test_what_acts_by_its_logarithm_is_foretold_better_by_it():
-    """Waves that are as long everywhere by the logarithm of a factor from 1 to 9, and shorter and shorter toward 1 by itself."""
-    runs = first_runs(noisy(lambda points: np.sin(3.0 * np.log(5.0 + 4.0 * points)), 1, 0.01), 1, 20, 1)
-    points = np.linspace(-1.0, 1.0, 101)[:, None]
-    one = Goals.of(["min"])
-    plain, told = (fit_emulators(one, runs, shares=shares).predict(points)[0] for shares in ((), (0.8,)))
-    off = [np.std(each - np.sin(3.0 * np.log(5.0 + 4.0 * points))) for each in (plain, told)]
+    """Waves that are as long everywhere by the logarithm of a factor from 1 to 9, and others that are so by itself."""
+    one, points = Goals.of(["min"]), np.linspace(-1.0, 1.0, 101)[:, None]
+
+    def waves(at):
+        return np.sin(3.0 * np.log(5.0 + 4.0 * at))
+
+    runs = first_runs(noisy(waves, 1, 0.01), 1, 20, 1)
+    plain, told = (fit_emulators(one, runs, shares=shares) for shares in ((), (0.8,)))
+    assert (plain.shares, told.shares) == (((),), ((0.8,),))
+    off = [np.std(each.predict(points)[0] - waves(points)) for each in (plain, told)]
     assert off[1] < 0.5 * off[0]
+    even = first_runs(noisy(lambda at: np.sin(4.0 * at), 1, 0.01), 1, 20, 1)
+    assert fit_emulators(one, even, shares=(0.8,)).shares == ((),)
 
 
 def test_the_best_points_of_a_front_have_its_hypervolume():
