@@ -31,6 +31,7 @@ from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import NAMES, Rule, pick_all
 
 FRESH = 0.2  # of the budget: fresh runs at the finalists
+TESTED = 4  # last batches that tell how right the emulators' deviations are
 ROUNDS = 3  # of candidates for a front that is reported
 SHOWN, FEW = 200, 2048  # points of a front foretold that are shown, and levels, by which its hypervolume is told
 
@@ -130,6 +131,7 @@ class _Search:
     fronts: list[Array] = field(default_factory=list)
     why: list[str] = field(default_factory=list)
     moves: list[tuple[Face, float]] = field(default_factory=list)
+    off: list[Array] = field(default_factory=list)
     emulators: Emulators | None = None
     seconds: float = 0.0
 
@@ -157,6 +159,7 @@ class _Search:
             if not rows:
                 return "the budget is spent" if count <= 0 else "no point is left that may gain"
             fresh = self._run(chosen, replicates)
+            self.off.append(missed(emulators, fresh.rows(fresh.good)))
             self.runs, self.why = self.runs.plus(fresh), [*self.why, *[why] * len(chosen)]
             if check:
                 if as_foretold(emulators, fresh):
@@ -233,7 +236,7 @@ class _Search:
         if not finals.runs.good.any():
             raise ValueError("every run at the finalists failed; see the failures of the runs")
         started = time.perf_counter()
-        emulators = self._fit(self.runs.plus(finals.runs))
+        emulators = self._tested(self._fit(self.runs.plus(finals.runs)))
         points = candidates(emulators, self.region, random, self.runs.points[~self.runs.good], ROUNDS)
         rows, costs = front_rows(emulators, points)
         archive, self.fronts[-1] = points[rows], points[rows[spread(costs[rows], SHOWN)]]
@@ -280,8 +283,16 @@ class _Search:
                 base, more = more.rows(slice(-1, None)), more.rows(slice(-1))
             runs = runs.plus(more)
             believed.append(emulators.predict(chosen)[0])
-            off.append(missed(emulators, more.rows(more.good)))
+            off.append(missed(self._tested(emulators), more.rows(more.good)))
+            self.off.append(missed(emulators, more.rows(more.good)))
         return _Finals(runs, base, np.vstack(believed), np.vstack(off))
+
+    def _tested(self, emulators: Emulators) -> Emulators:
+        """Emulators with deviations by which the last batches lay within what had been foretold of them; runs left out one at
+        a time have neighbours that a point yet to be run has not. Source: Dawid, Statistical theory: the prequential approach
+        (1984)."""
+        last = np.vstack([np.ones((1, len(emulators.stretch))), *self.off[-TESTED:]])
+        return replace(emulators, stretch=emulators.stretch * np.sqrt((last**2).mean(axis=0)).clip(1.0))
 
     def _finalists(self, emulators: Emulators, before: Array, count: int, random: np.random.Generator) -> Array:
         """Points of the front foretold that are expected to gain most beside those ``before`` (f, k)."""
