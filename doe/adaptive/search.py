@@ -1,7 +1,8 @@
 """The search: design, batches where most is to be gained, a check of what is foretold, fresh runs at the finalists.
 
 What a search believes of the points that it chose is flattered by the errors that made it choose them. So the last runs are
-made afresh at the finalists and alone are reported, as at the end of `doe.pareto.direct`.
+made afresh at the finalists and alone are reported, as at the end of `doe.pareto.direct`; what they tell helps to choose
+the finalists that are left, but has no say in what was chosen.
 """
 
 from __future__ import annotations
@@ -9,13 +10,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import qmc
 
 from doe.adaptive.border import Place, faces, grown, outermost
 from doe.adaptive.candidates import Region, candidates, front_rows
-from doe.adaptive.emulators import Emulators, fit_emulators
+from doe.adaptive.emulators import Emulators, fit_emulators, shares_of
 from doe.adaptive.improvement import DRAWS, WORTH, Levels, batch, known_of, levels_of
 from doe.adaptive.result import AdaptiveFront, Batch
 from doe.adaptive.runs import Border, Evaluate, Face, Runs
@@ -28,7 +30,9 @@ from doe.pareto.goals import Goals
 from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import NAMES, Rule, pick_all
 
-FRESH = 0.3  # of the budget: fresh runs at the finalists, as in a direct search
+FRESH = 0.2  # of the budget: fresh runs at the finalists
+TESTED = 4  # last batches that tell how right the emulators' deviations are
+ROUNDS = 3  # of candidates for a front that is reported
 SHOWN, FEW = 200, 2048  # points of a front foretold that are shown, and levels, by which its hypervolume is told
 
 
@@ -36,13 +40,14 @@ SHOWN, FEW = 200, 2048  # points of a front foretold that are shown, and levels,
 class Plan:
     """How a search goes: ``budget`` of runs, those of the design and the fresh ones included; runs a ``batch``; ``seed``.
 
-    A run has from ``least`` to ``most`` replicates, a fresh one ``usual``, and the ``pick`` is made by that rule.
+    A run has from ``least`` to ``most`` replicates, a fresh one ``usual``, and the ``pick`` is made by that rule. Two replicates
+    of the bearing may both miss what it does at a point in half of the time, and then agree.
     """
 
     budget: int
     batch: int = 8
     seed: int = 1
-    least: int = 2
+    least: int = 4
     most: int = 16
     usual: int = 8
     pick: Rule = "knee"
@@ -78,10 +83,11 @@ def adaptive_front(
     InfeasibleError where no run comes near to keeping the limits.
     """
     check_budget(plan, len(design.points))
+    widest = border or region
+    shares = shares_of(centre, step, widest.low, widest.high)
     with THREADS.limit(limits=1):
-        search = _Search(
-            evaluate, centre, step, region, goals, plan, design, tell, border, why=["design"] * len(design.points)
-        )
+        why = ["design"] * len(design.points)
+        search = _Search(evaluate, centre, step, region, goals, plan, design, tell, border, shares, why=why)
         stopped = search.spend()
         return search.finish(baseline, stopped)
 
@@ -97,6 +103,16 @@ def check_budget(plan: Plan, design: int) -> None:
         )
 
 
+class _Finals(NamedTuple):
+    """Fresh ``runs`` at the finalists, the one at the ``base``, what was ``believed`` (f, m) of the finalists when they were
+    chosen, and what good runs ``missed`` (g, m) that by, in standard deviations."""
+
+    runs: Runs
+    base: Runs
+    believed: Array
+    missed: Array
+
+
 @dataclass(eq=False)
 class _Search:
     """A search under way; ``runs`` are all so far, failed ones too."""
@@ -110,10 +126,12 @@ class _Search:
     runs: Runs
     tell: Tell
     border: Border | None
+    shares: tuple[float, ...]
     history: list[Batch] = field(default_factory=list)
     fronts: list[Array] = field(default_factory=list)
     why: list[str] = field(default_factory=list)
     moves: list[tuple[Face, float]] = field(default_factory=list)
+    off: list[Array] = field(default_factory=list)
     emulators: Emulators | None = None
     seconds: float = 0.0
 
@@ -122,7 +140,7 @@ class _Search:
         room, since = self.plan.budget - self.plan.fresh, -1
         while True:
             started = time.perf_counter()
-            emulators = self._fit()
+            emulators = self._fit(self.runs)
             random = np.random.default_rng([self.plan.seed, len(self.history)])
             points = candidates(emulators, self.region, random, self.runs.points)
             levels, left, state = self._state(emulators, points, random)
@@ -141,17 +159,19 @@ class _Search:
             if not rows:
                 return "the budget is spent" if count <= 0 else "no point is left that may gain"
             fresh = self._run(chosen, replicates)
+            self.off.append(missed(emulators, fresh.rows(fresh.good)))
             self.runs, self.why = self.runs.plus(fresh), [*self.why, *[why] * len(chosen)]
             if check:
                 if as_foretold(emulators, fresh):
                     return "batches gained nothing more and fresh runs on the front were as foretold"
                 since = len(self.history) - 1
 
-    def _fit(self) -> Emulators:
-        good = int(self.runs.good.sum())
+    def _fit(self, runs: Runs) -> Emulators:
+        good = int(runs.good.sum())
         if good < 2 + len(self.centre):
             raise ValueError(f"only {good} runs went well; emulators need {2 + len(self.centre)}")
-        self.emulators = fit_emulators(self.goals, self.runs, self.emulators, self.region.levels, self.region.inactive)
+        region = self.region
+        self.emulators = fit_emulators(self.goals, runs, self.emulators, region.levels, region.inactive, self.shares)
         return self.emulators
 
     def _state(self, emulators: Emulators, points: Array, random: np.random.Generator) -> tuple[Levels, Array, Batch]:
@@ -211,29 +231,20 @@ class _Search:
         return Runs(points, values, errors, freedom, replicates)
 
     def finish(self, baseline: Array, stopped: str) -> AdaptiveFront:
-        """Fresh runs at the finalists."""
-        started = time.perf_counter()
-        emulators = self._fit()
+        """Fresh runs at the finalists, and what all runs together tell."""
         random = np.random.default_rng([self.plan.seed, len(self.history), 1])
-        failed = self.runs.points[~self.runs.good]
-        points = candidates(emulators, self.region, random, failed, 3)
+        finals = self._finals((baseline - self.centre) / self.step, random)
+        if not finals.runs.good.any():
+            raise ValueError("every run at the finalists failed; see the failures of the runs")
+        started = time.perf_counter()
+        emulators = self._tested(self._fit(self.runs.plus(finals.runs)))
+        points = candidates(emulators, self.region, random, self.runs.points[~self.runs.good], ROUNDS)
         rows, costs = front_rows(emulators, points)
-        self._check_limits(emulators, points)
-        archive = points[rows]
-        levels = levels_of(costs[rows], costs[rows].min(axis=0), random)
-        chosen, _ = batch(emulators, archive, levels, np.ones(len(levels.at)), self.plan.fresh - 1, self.region.apart)
-        finalists = archive[sorted(chosen, key=lambda row: costs[rows][row, 0])]
+        archive, self.fronts[-1] = points[rows], points[rows[spread(costs[rows], SHOWN)]]
         foretold, deviations = emulators.predict(archive)
         self.seconds += time.perf_counter() - started
-        original = (baseline - self.centre) / self.step
-        usual = np.full(len(finalists) + 1, self.plan.usual)
-        fresh = self._run(np.vstack([finalists, original]), usual)
-        ours, base = fresh.rows(slice(-1)), fresh.rows(slice(-1, None))
-        if not ours.good.any():
-            raise ValueError("every run at the finalists failed; see the failures of the runs")
-        off = missed(emulators, ours.rows(ours.good))
         return AdaptiveFront(
-            front=self._front(emulators, ours, base, fresh),
+            front=self._front(finals),
             archive=self.centre + self.step * archive,
             shown=best_for_hypervolume(costs[rows], SHOWN),
             foretold=foretold,
@@ -247,12 +258,55 @@ class _Search:
             searched=Samples(self.centre + self.step * self.runs.points, self.runs.values, self.runs.errors),
             why=tuple(self.why),
             spent=self.runs.replicates,
-            bias=off.mean(axis=0),
-            spread=off.std(axis=0, ddof=1 if len(off) > 1 else 0),
-            fresh=len(usual),
+            bias=finals.missed.mean(axis=0),
+            spread=finals.missed.std(axis=0, ddof=1 if len(finals.missed) > 1 else 0),
+            fresh=len(finals.runs.points) + 1,
             stopped=stopped,
             seconds=self.seconds,
         )
+
+    def _finals(self, original: Array, random: np.random.Generator) -> _Finals:
+        """Fresh runs at the finalists and at the original point (k,), a batch at a time: each tells where the next gains most.
+
+        None has a say in whether it is reported.
+        """
+        runs = self.runs.rows(slice(0))
+        believed: list[Array] = []
+        off: list[Array] = []
+        sizes = np.diff(np.linspace(0, self.plan.fresh - 1, -(-self.plan.fresh // self.plan.batch) + 1).round())
+        for size in sizes.astype(int).tolist():
+            started = time.perf_counter()
+            emulators = self._fit(self.runs.plus(runs))
+            chosen = self._finalists(emulators, runs.points, size, random)
+            self.seconds += time.perf_counter() - started
+            asked = chosen if believed else np.vstack([chosen, original])
+            more = self._run(asked, np.full(len(asked), self.plan.usual))
+            if not believed:
+                base, more = more.rows(slice(-1, None)), more.rows(slice(-1))
+            runs = runs.plus(more)
+            believed.append(emulators.predict(chosen)[0])
+            off.append(missed(self._tested(emulators), more.rows(more.good)))
+            self.off.append(missed(emulators, more.rows(more.good)))
+        return _Finals(runs, base, np.vstack(believed), np.vstack(off))
+
+    def _tested(self, emulators: Emulators) -> Emulators:
+        """Emulators with deviations by which the last batches lay within what had been foretold of them; runs left out one at
+        a time have neighbours that a point yet to be run has not. Source: Dawid, Statistical theory: the prequential approach
+        (1984)."""
+        last = np.vstack([np.ones((1, len(emulators.stretch))), *self.off[-TESTED:]])
+        return replace(emulators, stretch=emulators.stretch * np.sqrt((last**2).mean(axis=0)).clip(1.0))
+
+    def _finalists(self, emulators: Emulators, before: Array, count: int, random: np.random.Generator) -> Array:
+        """Points of the front foretold that are expected to gain most beside those ``before`` (f, k)."""
+        points = candidates(
+            emulators, self.region, random, np.vstack([self.runs.points[~self.runs.good], before]), ROUNDS
+        )
+        self._check_limits(emulators, points)
+        rows, costs = front_rows(emulators, np.vstack([points, before]))
+        levels = levels_of(costs[rows], costs[rows].min(axis=0), random)
+        left = known_of(levels, emulators, emulators.draws(DRAWS, random)(before)).left
+        archive = points[rows[rows < len(points)]]
+        return archive[batch(emulators, archive, levels, left, count, self.region.apart)[0]]
 
     def _on_one_scale(self, emulators: Emulators, front: Array) -> list[Batch]:
         """The history with the hypervolumes of all fronts foretold, by the last emulators, on the scale of the last front
@@ -270,17 +324,21 @@ class _Search:
             if violations[row].any():
                 raise InfeasibleError(self.centre + self.step * points[row], violations[row])
 
-    def _front(self, emulators: Emulators, ours: Runs, base: Runs, fresh: Runs) -> DirectFront:
-        """The finalists as their fresh runs found them, picked by what was believed before."""
-        goals, kept = self.goals, ours.good
-        believed = goals.costs(emulators.predict(ours.points[kept])[0])
-        values, errors = ours.values[kept], np.nan_to_num(ours.errors[kept])
+    def _front(self, finals: _Finals) -> DirectFront:
+        """The finalists as their fresh runs found them, in ascending order of the first cost believed, picked by what was
+        believed before."""
+        goals = self.goals
+        believed = goals.costs(finals.believed)
+        kept = np.array([row for row in believed[:, 0].argsort(kind="stable") if finals.runs.good[row]])
+        ours, believed = finals.runs.rows(kept), believed[kept]
+        values, errors = ours.values, np.nan_to_num(ours.errors)
         costs = goals.costs(values)
-        base_values = base.values[0] if base.good.all() else None
+        base_values = finals.base.values[0] if finals.base.good.all() else None
         picks, among = pick_all(believed, goals, None if base_values is None else goals.costs(base_values))
         span = np.ptp(costs, axis=0)
-        actual = [self.centre + self.step * part.points for part in (ours.rows(kept), self.runs, self.runs.plus(fresh))]
-        failed = actual[2][~self.runs.plus(fresh).good]
+        every = self.runs.plus(finals.runs).plus(finals.base)
+        actual = [self.centre + self.step * part.points for part in (ours, self.runs, every)]
+        failed = actual[2][~every.good]
         return DirectFront(
             points=actual[0],
             values=values,
@@ -293,7 +351,7 @@ class _Search:
             baseline_values=base_values,
             repeats=1,
             failures=np.unique(failed, axis=0),
-            evaluations=len(self.runs.points) + len(fresh.points),
+            evaluations=len(every.points),
             generations=len(self.history),
             seed=self.plan.seed,
             goals=goals,

@@ -16,8 +16,10 @@ from scipy.stats import qmc
 from doe.adaptive import Plan, Runs, adaptive_front
 from doe.adaptive.candidates import Region
 from doe.pareto.archive import best_for_hypervolume, hypervolume, non_dominated, spread
+from doe.pareto.direct import direct_front
 from doe.pareto.goals import Goals
 
+THREE = Goals.of(["min"] * 3)
 FACTORS, NOISE = 4, 0.02  # of the ranges of the fronts, which are 0 to 1
 
 
@@ -34,6 +36,15 @@ def dtlz2(points):
     radius = 1.0 + ((x[:, 2:] - 0.5) ** 2).sum(axis=1)
     a, b = 0.5 * np.pi * x[:, 0], 0.5 * np.pi * x[:, 1]
     return radius[:, None] * np.column_stack([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
+
+
+def two_spheres(points):
+    """Three costs of five numbers and a category of two levels, -1 and 1, each with an eighth of a sphere as DTLZ2 has it: the
+    second is flatter, and lies where the last three numbers are lower."""
+    other = points[:, -1] > 0.0
+    x = (points[:, :-1] + 1.0) / 2.0
+    at = np.hstack([points[:, :2], 2.0 * x[:, 2:] - np.where(other, 0.6, 1.2)[:, None]])
+    return dtlz2(at) * np.where(other[:, None], [0.8, 1.1, 1.1], [1.0, 1.0, 1.0])
 
 
 def true_front(problem, count):
@@ -134,8 +145,23 @@ def bearing_front():
     return costs[non_dominated(costs)]
 
 
+def share_of_best(costs, front, ends):
+    """Hypervolume of costs over that of the best as many of a front."""
+    best = front[best_for_hypervolume(front, len(costs))]
+    return hypervolume(costs, *ends) / hypervolume(best, *ends)
+
+
 def bearing_share(points):
     """Hypervolume of the true costs of points over that of the best as many of the front."""
     front = bearing_front()
-    ends, best = (front.min(axis=0), front.max(axis=0)), front[best_for_hypervolume(front, len(points))]
-    return hypervolume(bearing(points), *ends) / hypervolume(best, *ends)
+    return share_of_best(bearing(points), front, (front.min(axis=0), front.max(axis=0)))
+
+
+@cache
+def bearing_direct(seed):
+    """True costs of the front that 2000 runs of three replicates find by the direct search."""
+    evaluate = bearing_runs(1000 + seed)
+    found = direct_front(
+        lambda points: evaluate(points, np.full(len(points), 3))[:2], -np.ones(3), np.ones(3), goals=THREE, seed=seed
+    )
+    return bearing(found.points)

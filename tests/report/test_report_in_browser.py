@@ -327,7 +327,9 @@ def with_emulators(record: dict[str, Any], levels: tuple[str, ...]) -> tuple[dic
     if levels:
         named = {"categories": list(levels), "inactive": {levels[1]: [FACTORS[1]]}}
         category, idle = [Category(name="guidance", key="cage.guidance", **named)], ((0, 1, (1,)),)
-    emulators = fit_emulators(Goals.of(["min"] * 3), runs, levels=(len(levels),) if levels else (), inactive=idle)
+    shares = (0.42, 0.0, 0.28)
+    emulators = fit_emulators(Goals.of(["min"] * 3), runs, None, (len(levels),) if levels else (), idle, shares)
+    assert shares in emulators.shares and () in emulators.shares
     study = Study.load(EXAMPLES / "clearance_study.toml")
     study = replace(study, file=study.file.model_copy(update={"category": category}))
     found = SimpleNamespace(

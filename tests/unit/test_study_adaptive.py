@@ -245,7 +245,7 @@ def test_faults_are_one_sentence_each(tmp_path, monkeypatch):
         (
             "small",
             [],
-            "adaptive.budget = 30: 20 runs of the design, a batch of 6 and 9 fresh runs at the end do not fit; give at",
+            "adaptive.budget = 30: 20 runs of the design, a batch of 6 and 6 fresh runs at the end do not fit; give at",
         ),
         ("both", ["--direct"], "--direct, --adaptive: the pick can follow one front only; give one of them"),
     ):

@@ -12,9 +12,12 @@ const emulator = (() => {
   const point = (all, factors, kinds) =>
     embedded(all, factors.map((value, k) => (value - all.centre[k]) / all.half_range[k]), kinds);
 
-  function runs(all) {
-    if (!known.has(all)) known.set(all, all.points.map((run, i) => embedded(all, run, all.kinds[i])));
-    return known.get(all);
+  // A point as one emulator knows it: factors that have a share by their logarithms.
+  const told = (one, at) => at.map((x, k) => one.shares[k] ? Math.log1p(one.shares[k] * x) / one.shares[k] : x);
+
+  function runs(all, one) {
+    if (!known.has(one)) known.set(one, all.points.map((run, i) => told(one, embedded(all, run, all.kinds[i]))));
+    return known.get(one);
   }
 
   // Covariance of two points: Matern of smoothness 5/2 with a length a coordinate.
@@ -27,8 +30,8 @@ const emulator = (() => {
 
   const product = (a, b) => a.reduce((sum, each, k) => sum + each * b[k], 0);
 
-  function mean(all, one, at) {
-    const process = runs(all).reduce((sum, run, i) => sum + covariance(one, at, run) * one.weights[i], 0);
+  function mean(all, one, place) {
+    const at = told(one, place), process = runs(all, one).reduce((sum, run, i) => sum + covariance(one, at, run) * one.weights[i], 0);
     return product(model.row(one, at), one.coefficients) + process;
   }
 
@@ -58,17 +61,17 @@ const emulator = (() => {
   // What of a response stays the same for all points: roots of the covariance of the runs and of the trend's information.
   function prepared(all, one) {
     if (!solved.has(one)) {
-      const lower = root(runs(all).map((a, i) => runs(all).map((b, j) => covariance(one, a, b) + (i === j ? one.noise[i] : 0))));
-      const rows = runs(all).map(run => model.row(one, run));
+      const lower = root(runs(all, one).map((a, i) => runs(all, one).map((b, j) => covariance(one, a, b) + (i === j ? one.noise[i] : 0))));
+      const rows = runs(all, one).map(run => model.row(one, run));
       const trend = one.terms.map((_, term) => forward(lower, rows.map(row => row[term])));
       solved.set(one, {lower, trend, information: root(trend.map(a => trend.map(b => product(a, b))))});
     }
     return solved.get(one);
   }
 
-  function deviation(all, one, at) {
-    const {lower, trend, information} = prepared(all, one);
-    const inside = forward(lower, runs(all).map(run => covariance(one, at, run)));
+  function deviation(all, one, place) {
+    const at = told(one, place), {lower, trend, information} = prepared(all, one);
+    const inside = forward(lower, runs(all, one).map(run => covariance(one, at, run)));
     const left = forward(information, model.row(one, at).map((column, term) => column - product(trend[term], inside)));
     const variance = one.variance - product(inside, inside) + product(left, left);
     return Math.max(one.stretch * Math.sqrt(Math.max(variance, 0)), one.least);

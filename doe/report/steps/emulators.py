@@ -12,10 +12,10 @@ from doe.study_file import Study
 def emulators_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
     """Mean and standard deviation of every response without its scatter, anywhere.
 
-    The coordinates of a point are (factor - ``centre``) / ``half_range``, and of each of the ``categories`` 1 for the level
+    The coordinates of a point are x = (factor - ``centre``) / ``half_range``, and of each of the ``categories`` 1 for the level
     that it has and 0 for each other one; ``pick``: that of the pick. Factors in the places that ``inactive`` lists by level are
-    at 0 there. ``points`` (n, k) are the runs' factors, ``kinds`` (n, c)
-    the places of their levels. A response is a trend of ``terms`` with ``coefficients``, A the first factor, and a process: the
+    at 0 there. A response that has ``shares`` s of factors knows these by ln(1 + s x)/s. ``points`` (n, k) are the runs'
+    factors, ``kinds`` (n, c) the places of their levels. A response is a trend of ``terms`` with ``coefficients``, A the first factor, and a process: the
     covariances of the point with the runs, Matern of smoothness 5/2 with ``lengths`` a coordinate and ``variance``, times
     ``weights`` (n,). The runs' ``values`` (n,) have the variances ``noise`` (n,). The deviation is that of universal kriging
     times ``stretch``, ``least`` at least.
@@ -24,7 +24,8 @@ def emulators_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
     runs = emulators.runs.points
     categories = zip(study.file.category, adaptive.study.levels, strict=True)
     responses = {}
-    for name, one, stretch in zip(study.responses, emulators.each, emulators.stretch.tolist(), strict=True):
+    each_one = zip(study.responses, emulators.each, emulators.stretch.tolist(), emulators.shares, strict=True)
+    for name, one, stretch, shares in each_one:
         given = one.hyperparameters
         responses[name] = {
             "terms": list(one.terms),
@@ -35,6 +36,7 @@ def emulators_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
             "values": one.values.tolist(),
             "noise": (one.variances + given.nugget + JITTER * given.variance).tolist(),
             "stretch": stretch,
+            "shares": list(shares),
             "least": LEAST_DEVIATION * float(abs(one.values).max()),
         }
     return {

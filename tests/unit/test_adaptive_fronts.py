@@ -1,0 +1,98 @@
+"""Adaptive searches on fronts that are known, beside even runs and the direct search; sources in ``known_fronts``."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from known_fronts import (
+    THREE,
+    bearing,
+    bearing_direct,
+    bearing_front,
+    bearing_runs,
+    bearing_share,
+    dtlz2,
+    noisy,
+    search,
+    share,
+    share_of_best,
+    two_spheres,
+    zdt1,
+)
+from scipy.stats import qmc
+
+from doe.adaptive import Plan, adaptive_front
+from doe.adaptive.candidates import Region
+from doe.adaptive.runs import Runs
+from doe.designs import central_composite
+from doe.pareto.direct import direct_front
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("problem", [zdt1, dtlz2])
+def test_literature_80_runs_find_the_front_under_noise(problem):
+    """ZDT1 and DTLZ2, 2 % noise: the finalists of 80 runs, 24 of them fresh, against as many points of the true front."""
+    ours = [share(problem, search(problem, seed).front.points) for seed in range(1, 6)]
+    # As many runs of a Sobol sequence, the same emulators.
+    even = [share(problem, search(problem, seed, first=55, batch=1).front.points) for seed in range(1, 6)]
+    assert np.median(ours) >= 0.97
+    assert np.median(ours) > np.median(even)
+
+
+@pytest.mark.slow
+def test_a_tabulated_bearing_100_runs():
+    """Whirl turns several times there, and its least lies in a narrow valley on a face of the region. Measured: in the mean of
+    5 seeds 0.978 of the front, and 0.993 (0.979 to 1.003) of what 2000 runs of the direct search find of it; before the last
+    changes, of 12 seeds 0.965 and 0.980 (0.934 to 0.999). With 60 runs 0.92 and 0.93."""
+    found = [bearing_search(seed) for seed in (1, 2, 3)]
+    shares = [bearing_share(points) for points in found]
+    assert np.mean(shares) > 0.95
+    assert min(shares) > 0.92
+    front = bearing_front()
+    ends, direct = (front.min(axis=0), front.max(axis=0)), [bearing_direct(seed) for seed in (1, 2)]
+    beside = [share_of_best(bearing(points), each, ends) for points in found for each in direct]
+    assert np.mean(beside) > 0.965
+
+
+@pytest.mark.slow
+def test_six_factors_with_a_category_150_runs():
+    """Against 2000 runs of the direct search, 1000 a level. Measured over 3 seeds: 1.07 to 1.11 of its hypervolume."""
+    spread_evenly = qmc.Sobol(6, seed=1).random_base2(6)[:60] * 2.0 - 1.0
+    spread_evenly[:, -1] = np.where(np.arange(60) % 2, 1.0, -1.0)
+    ones, evaluate = np.ones(60, dtype=np.int64), noisy(two_spheres, 1)
+    design = Runs(spread_evenly, *evaluate(spread_evenly, ones), ones)
+    finest, apart = np.append(np.full(5, np.nan), 2.0), np.append(np.full(5, 0.01), 0.5)
+    first = np.append(np.zeros(5), -1.0)
+    region, plan = Region(-np.ones(6), np.ones(6), first, finest, apart, (2,)), Plan(150, least=1, most=1, usual=1)
+    found = adaptive_front(evaluate, np.zeros(6), np.ones(6), region, design, THREE, plan, first)
+    assert set(found.front.points[:, -1]) == {-1.0, 1.0}, "the front has parts of both"
+    direct = np.vstack([two_spheres(_direct_at(level)) for level in (-1.0, 1.0)])
+    ends = np.zeros(3), np.array([1.0, 1.1, 1.1])
+    assert share_of_best(two_spheres(found.front.points), direct, ends) > 1.0
+
+
+def _direct_at(level):
+    """Finalists of half of the direct search's runs at a level of the category."""
+    evaluate = noisy(two_spheres, 1)
+
+    def at(points):
+        return evaluate(np.column_stack([points, np.full(len(points), level)]), None)[:2]
+
+    found = direct_front(at, -np.ones(5), np.ones(5), goals=THREE, evaluations=1000, seed=1).points
+    return np.column_stack([found, np.full(len(found), level)])
+
+
+def bearing_search(seed, budget=100):
+    """From a central composite design as in the example, on a drawing of micrometres; the finalists in coded units."""
+    centre, half = np.array([0.02, 0.15, 0.30]), np.array([0.005, 0.05, 0.05]) * 1.681792830507429
+    evaluate = bearing_runs(seed)
+    coded = central_composite(3, centre_replicates=6).coded / 1.681792830507429
+    eight, fine = np.full(20, 8), 0.001 / half
+    region = Region(-np.ones(3), np.ones(3), -centre / half, fine, 1.000001 * fine)
+    design = Runs(coded, *evaluate(coded, eight), eight)
+
+    def at(points, replicates):
+        return evaluate((points - centre) / half, replicates)
+
+    found = adaptive_front(at, centre, half, region, design, THREE, Plan(budget, seed=seed), centre)
+    return (found.front.points - centre) / half
