@@ -114,13 +114,19 @@ def in_vectors(parameters):
     NoTraction,
     FourConstantTraction,
     BlendedFourConstantTraction,
+    CoulombTraction,
 )
 def _(parameters):
     return True
 
 
-# Loops within, table look-ups and calls of the C library keep a contact to itself.
-@in_vectors.body(SlicedLineContact, TiltedLineContact, WavyRace, CoulombTraction, TractionSurface, MixedTraction)
+@in_vectors.body(MixedTraction)
+def _(parameters):
+    return in_vectors(parameters.fluid)
+
+
+# Loops within and table look-ups keep a contact to itself.
+@in_vectors.body(SlicedLineContact, TiltedLineContact, WavyRace, TractionSurface)
 def _(parameters):
     return False
 
