@@ -175,7 +175,9 @@ def peak_memory(scene: Scene, turns: int) -> float:
 
     Raises RunError where that process fails.
     """
-    chosen = with_options(scene, [f"numerics.turns={turns}", "numerics.replicates=1", "numerics.companion=false"])
+    # Figures that drift would lengthen the run.
+    alone = ["numerics.replicates=1", "numerics.companion=false", "numerics.extend=false"]
+    chosen = with_options(scene, [f"numerics.turns={turns}", *alone])
     fault = f"the memory of {turns} turns could not be measured"
     return float(printed(print_peak_memory, chosen.model_dump(mode="json", exclude_none=True), fault))
 
