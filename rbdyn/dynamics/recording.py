@@ -75,7 +75,8 @@ class Recording:
     def __init__(self, run: Run) -> None:
         self.run, self.batches = run, batches_of(run.scene)
         self._begin = run.clock_angles()
-        self._ends, self._booked = [0.0], list[tuple[Array, ...]]()
+        # Of each batch whirl, work and largest loads in turn, as plain numbers: an array each would weigh twice as much.
+        self._ends, self._booked = [0.0], array("d")
         self._looks = [self._look()]
         # Places of the cage's centre, x and y in turn, and how many samples there were at the end of each batch.
         self._places, self._sampled = array("d"), list[int]()
@@ -87,12 +88,12 @@ class Recording:
         run, tally = self.run, self.run.tally
         ends = self.batches.ends(counted)
         run.allow(float(ends[-1]))
-        for end in ends[len(self._booked) :]:
-            if len(self._booked) == self.batches.first:
+        for end in ends[self._batches :]:
+            if self._batches == self.batches.first:
                 run.forget()
             self._go(float(end))
-            self._booked.append((tally.whirl.copy(), tally.work.copy(), tally.largest.copy()))
             for kept in (tally.whirl, tally.work, tally.largest):
+                self._booked.frombytes(kept.tobytes())
                 kept[:] = 0.0
             self._ends.append(float(end))
             self._looks.append(self._look())
@@ -100,10 +101,16 @@ class Recording:
         return self.replicate
 
     @property
+    def _batches(self) -> int:
+        return len(self._ends) - 1
+
+    @property
     def replicate(self) -> Replicate:
         """What is kept so far, counted from the end of the warm-up."""
-        run, scale = self.run, scales(self.run.scene)
-        whirl, work, largest = (np.array(kept) for kept in zip(*self._booked, strict=True))
+        run, scale, tally = self.run, scales(self.run.scene), self.run.tally
+        booked = np.array(self._booked).reshape(self._batches, -1)
+        parts = np.split(booked, np.cumsum((tally.whirl.size, tally.work.size)), axis=1)
+        whirl, work, largest = (np.ascontiguousarray(part) for part in parts)
         cage, rolling, energy = np.array(self._looks).T
         return Replicate(
             first=self.batches.first,
