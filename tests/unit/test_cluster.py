@@ -38,6 +38,18 @@ class Cluster(NamedTuple):
     workers: list[subprocess.Popen]
 
 
+def written_address(told: Path) -> str:
+    """The address in a scheduler's file, which stands there empty before it is written."""
+    deadline = time.monotonic() + 60.0
+    while True:
+        try:
+            return json.loads(told.read_text(encoding="utf-8"))["address"]
+        except (FileNotFoundError, json.JSONDecodeError):
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(0.05)
+
+
 @contextmanager
 def started(folder: Path, workers: int, **environment: str) -> Iterator[Cluster]:
     """A scheduler and workers of one thread each, in processes of their own."""
@@ -58,10 +70,7 @@ def started(folder: Path, workers: int, **environment: str) -> Iterator[Cluster]
     with ExitStack() as processes:
         told = folder / "scheduler.json"
         scheduler = start("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(told))
-        deadline = time.monotonic() + 60.0
-        while not told.exists() and time.monotonic() < deadline:
-            time.sleep(0.05)
-        address = json.loads(told.read_text(encoding="utf-8"))["address"]
+        address = written_address(told)
         own = ("--nthreads", "1", "--no-nanny", "--local-directory", str(folder))
         yield Cluster(address, scheduler, [start("dask_worker", address, *own) for _ in range(workers)])
 
