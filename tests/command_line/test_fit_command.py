@@ -234,8 +234,9 @@ def test_bad_names_tell_the_columns(tmp_path, options, words):
     assert shown.exit_code == 2 and words in shown.stderr and len(shown.stderr.splitlines()) == 1
 
 
-def test_a_study_of_a_table_needs_no_scene(tmp_path):
+def test_a_study_of_a_table_needs_no_scene(tmp_path, monkeypatch):
     """What needs runs says that the scene is missing; names stand in one place only."""
+    monkeypatch.chdir(tmp_path)  # the commands write beside
     text = study(tmp_path).read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith(("key = ", 'file = "cyl', "set = "))]
     bare = tmp_path / "bare.toml"

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import subprocess
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SOURCES = [path for package in ("rbdyn", "doe") for path in (ROOT / package).rglob("*.py")]
 LONGEST_FILE, LONGEST_FUNCTION, MOST_AT_THE_ROOT = 360, 70, 6
+TOP = {".ci", ".gitignore", "LICENSE", "README.md", "doe", "examples", "pyproject.toml", "rbdyn", "tests"}
 NOT_SI = re.compile(r"_(mm|mm2|um|mm_um|g|g_mm|rpm|deg|mrad|MPa|GPa)$")
 KERNEL = re.compile(r"kernel|routine|settled_kernel|entry|.*\.body\(|compiled_as\(")
 # Where a drawing's own units may be read: what speaks to people, what makes scenes of scenes, and saved records.
@@ -62,6 +64,13 @@ def test_invariant_files_and_functions_stay_short():
                 long.append(f"{path.name}: {node.name}")
     assert not long
     assert len(list((ROOT / "rbdyn").glob("*.py"))) <= MOST_AT_THE_ROOT
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no clone")
+def test_invariant_nothing_lies_at_the_top():
+    """Invariant: what is committed lies in the packages, tests and examples, or is what tools look for at the top."""
+    listed = subprocess.run(["git", "-C", ROOT, "ls-files"], capture_output=True, text=True, check=True).stdout
+    assert {line.split("/")[0] for line in listed.splitlines()} == TOP
 
 
 def test_invariant_units_end_at_the_scene():
