@@ -13,7 +13,8 @@ import pytest
 from conftest import EVERYTHING, ROOT
 from numpy_twin import POWERS, twin
 
-from rbdyn.dynamics.forces.equations import LOSSES, SHAFT
+from rbdyn.dynamics.forces.equations import LOADS, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT, pocket_loads
+from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.parameters.model import roller_bearing
 
 # Position round-off of 3e-18 m over the smallest approaches of the random states (some 1e-8 m) is 3e-10 of that
@@ -312,6 +313,21 @@ SWITCHES = {
     ("model.land_damping_alpha_s_m=0.0",): {"land_damping"},
     ("model.drag=off",): {"roller_drag"},
 }
+
+
+@pytest.mark.parametrize("fixture", ["outer", "everything"])
+def test_invariant_pocket_loads_alone_are_those_of_all_forces(fixture, request, evaluate, random_state):
+    """Invariant: the same bits, and no other load is touched."""
+    scene, largest = request.getfixturevalue(fixture), 0.0
+    bearing = roller_bearing(scene)
+    for seed in range(20):
+        y, loads = random_state(scene, seed), np.full((2, LOADS), np.nan)
+        pocket_loads(bearing, y, np.int64(1), loads, scratch(bearing.rollers))
+        both = [POCKET_LOAD, POCKET_CONTACT_LOAD]
+        assert (loads[1, both] == evaluate(bearing, y).loads[both]).all()
+        assert np.isnan(loads[0]).all() and np.isfinite(loads[1]).sum() == len(both)
+        largest = max(largest, loads[1, POCKET_LOAD])
+    assert largest > 0.0
 
 
 def test_unit_each_switch_silences_its_own_power():

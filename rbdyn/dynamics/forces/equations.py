@@ -270,6 +270,19 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
 
 
 @routine
+def pocket_loads(bearing, y, row, loads, scratch):
+    """Fill row ``row`` of ``loads`` with those of the pocket walls [N] alone, for the state ``y``."""
+    cage = cage_motion(y, state.PARTS * roller_count(bearing))
+    load = contact_load = 0.0
+    for i in range(touching_rollers(bearing, cage, y, scratch)):
+        wall = roller_pocket(bearing, y, cage, scratch.touching[i])
+        load = max(load, abs(wall.on_wall))
+        contact_load = max(contact_load, wall.load)
+    loads[row, POCKET_LOAD] = load
+    loads[row, POCKET_CONTACT_LOAD] = contact_load
+
+
+@routine
 def derivative_once(bearing, y, row, dy, power, loads, scratch):
     """``derivative`` for calls outside the innermost loop, of which it would otherwise be a copy each.
 

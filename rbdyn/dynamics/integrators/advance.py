@@ -5,14 +5,7 @@ import math
 import numpy as np
 
 from rbdyn.compiled.kernel import entry, kernel, routine
-from rbdyn.dynamics.forces.equations import (
-    LOADS,
-    POCKET_CONTACT_LOAD,
-    POCKET_LOAD,
-    POWERS,
-    derivative_once,
-    roller_count,
-)
+from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS, pocket_loads, roller_count
 from rbdyn.dynamics.forces.state import CAGE_VX, CAGE_VY, PARTS
 from rbdyn.dynamics.integrators import method_laws as laws
 from rbdyn.dynamics.integrators import records as at
@@ -35,7 +28,7 @@ def refine_peak(bearing, carry, h, tally):
         for i in range(y.size):
             inside[i] = laws.interpolate(method, y, stage, k, h, p * spacing, i)
         laws.to_fixed_axes_at(method, carry.clock, p * spacing * h, bearing.rollers, inside)
-        derivative_once(bearing, inside, method.free, k, carry.power, loads, carry.scratch)
+        pocket_loads(bearing, inside, method.free, loads, carry.scratch)
         book_point(values, p, loads, method.free)
     book_peaks(values, carry.clock[at.NOW], h, tally)
 
@@ -100,7 +93,6 @@ def advance(bearing, control, carry, tally, t_end, sample_step):
                 method, PARTS * z, y, stage, k, power, loads, clock, work, largest, largest_time, whirl, h, sample_step
             ):
                 refine_peak(bearing, carry, h, tally)
-                counts[at.DERIVATIVES] += PEAK_POINTS
             counts[at.ACCEPTED] += 1
             clock[at.NOW] = t_end if cut else clock[at.NOW] + h
             for i in range(y.size):

@@ -21,9 +21,12 @@ def stage_state(pair, s, y, k, h, state):
 
 @kernel
 def early_stage_state(s, y, k, w0, w1, w2, state):
-    """``stage_state`` of rows 1 to 3 by the weights of rows 0 to 2, times the step."""
+    """``stage_state`` of rows 0 to 3 by the weights of rows 0 to 2, times the step."""
     n = y.size
-    if s == 1:
+    if s == 0:
+        for i in range(n):
+            state[i] = y[i]
+    elif s == 1:
         for i in range(n):
             state[i] = fma(w0, k[0, i], y[i])
     elif s == 2:

@@ -10,7 +10,7 @@ from rbdyn.compiled.kernel import law
 
 @law
 def begin(method, bearing, y, k, power, loads, scratch, clock, counts):
-    """Right-hand side of the state, where it is not carried along. Returns its first component that is not finite, else -1."""
+    """What a step needs of the state, where it is not carried along. Returns its first component that is not finite, else -1."""
 
 
 @law
