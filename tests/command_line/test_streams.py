@@ -38,7 +38,8 @@ RUN = (
 SIMULATED = [
     RUN,
     f"rbdyn map {EXAMPLE} --speed 20000 --load 900 --turns 2 --replicates 1 --set numerics.companion=false",
-    f"rbdyn accuracy {EXAMPLES}/angular_contact_ball.toml",
+    f"rbdyn accuracy {EXAMPLE} --coverage --repeats 2 --set numerics.turns=1 --set numerics.discard_turns=1 "
+    "--set numerics.replicates=2 --set numerics.extend=false",
 ]
 
 

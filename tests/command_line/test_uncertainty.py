@@ -59,7 +59,8 @@ def _run(*arguments: str) -> Any:
     return CliRunner().invoke(app, ["uncertainty", *arguments])
 
 
-def test_record_files_and_resumption(tmp_path: Path) -> None:
+def test_record_files_and_resumption(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("doe.study.uncertainty.MOST", 64)
     scene, out = _scene(tmp_path), tmp_path / "out"
     command = [str(scene), "--target", "50%", "--out", str(out), "--json", *(f"--set={each}" for each in SHORT)]
     first = _run(*command, "--workers", "2")
@@ -71,7 +72,7 @@ def test_record_files_and_resumption(tmp_path: Path) -> None:
         assert sum(each["variance"].values()) == pytest.approx(1.0)
         assert (each["first"] is None) == (not each["trusted"])
     assert [each["key"] for each in record["inputs"]] == ["cage.mass_g", "model.pocket_bar_stiffness_N_m"]
-    assert record["runs"] in (16, 32, 64, 128, 256, 512) and record["failed"] == 0
+    assert record["runs"] in (16, 32, 64) and record["failed"] == 0
     # A stiffer bar makes harder impacts: its share is the largest wherever it can be told.
     impact = record["responses"]["impact_force_N"]
     if impact["trusted"]:
