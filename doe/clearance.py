@@ -298,11 +298,6 @@ def attempt_text(text: str, version: str) -> Ran:
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
-def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
-    """`figures` of the study's responses."""
-    return figures(study.responses, results)
-
-
 def figures(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
     """Values, 95 % statistical half-widths (NaN where there is none), and about how many independent values are behind
     each, each of shape (runs, responses)."""

@@ -26,7 +26,7 @@ class ParetoFront:
     ``costs`` (f, q) what their goals make of them. ``ideal`` and ``nadir`` (q,) are the best and worst of each cost on
     the front; ``knee``, ``pick`` and ``picks`` (the pick of every rule) are row numbers. ``archive_size`` counts the
     front before thinning and ``hypervolume`` is of that front; ``hypervolume_history`` (generations,) is on the same
-    scale. ``baseline_values`` (m,) and ``baseline_costs`` (q,) are None without a baseline. ``feasible`` is the share
+    scale. ``baseline_values`` (m,) are None without a baseline. ``feasible`` is the share
     of the evaluated points that keep all limits. ``standard_errors`` (f, m), ``uncertainty`` and ``tolerance_aware``
     are None where they were not asked for.
     """
@@ -43,7 +43,6 @@ class ParetoFront:
     picks: dict[Rule, int]
     pick_reason: str
     baseline_values: Array | None
-    baseline_costs: Array | None
     archive_size: int
     evaluations: int
     feasible: float
@@ -112,7 +111,6 @@ def front(
         picks=picks,
         pick_reason=f"{NAMES[pick]} {among}",
         baseline_values=baseline_values,
-        baseline_costs=baseline_costs,
         archive_size=len(costs),
         evaluations=searched.evaluations,
         feasible=searched.feasible,

@@ -13,7 +13,7 @@ from scipy import stats
 
 from doe.arrays import Array, Rows, Whole
 from doe.designs.design import replicate_groups
-from doe.emulator import fit_emulator
+from doe.emulator import Emulator, fit_emulator
 from doe.emulator.emulator import THREADS
 
 # More points than these are left out in groups.
@@ -74,7 +74,6 @@ def compare(
     points, response = np.asarray(coded, float), np.asarray(values, float)
     variances = np.zeros(len(response)) if standard_errors is None else np.asarray(standard_errors, float) ** 2
     whole = fit_emulator(points, response, variances, trend="constant")
-    given = whole.hyperparameters
     group = replicate_groups(points)
     basis = np.zeros((len(points), 1)) if matrix is None else np.linalg.qr(np.asarray(matrix, float))[0]
     firsts = np.unique(group)
@@ -84,7 +83,7 @@ def compare(
 
     def process(rows: Rows, at: Array) -> Array:
         runs = points[rows], response[rows], variances[rows]
-        return fit_emulator(*runs, trend="constant", start=given, search=singly).mean(at)
+        return fit_emulator(*runs, trend="constant", start=whole.hyperparameters, search=singly).mean(at)
 
     def polynomial(rows: Rows, at: Array) -> Array:
         return refit(rows).predict(at)
@@ -98,19 +97,23 @@ def compare(
     scores = [_score(each, truths) for each in squares.T]
     return {
         "polynomial": scores[0],
-        "gaussian_process": {
-            **scores[1],
-            "kernel": "Matern 5/2",
-            "length_scales": dict(zip(ascii_uppercase, given.lengths.tolist(), strict=False)),
-            "deviation": math.sqrt(given.variance),
-            "noise": math.sqrt(given.nugget) if standard_errors is None else None,
-            "log_likelihood": whole.restricted_likelihood,
-        },
+        "gaussian_process": {**scores[1], **_hyperparameters(whole, scatter=standard_errors is None)},
         "difference": difference,
         "points": len(truths),
         "folds": len(folds),
         "recommended": "gaussian_process" if difference["interval"][0] > 0.0 else "polynomial",
         "sentence": _sentence(name, compared, *(each["loo_rmse"] for each in scores), *difference["interval"]),
+    }
+
+
+def _hyperparameters(process: Emulator, scatter: bool) -> dict[str, Any]:
+    given = process.hyperparameters
+    return {
+        "kernel": "Matern 5/2",
+        "length_scales": dict(zip(ascii_uppercase, given.lengths.tolist(), strict=False)),
+        "deviation": math.sqrt(given.variance),
+        "noise": math.sqrt(given.nugget) if scatter else None,
+        "log_likelihood": process.restricted_likelihood,
     }
 
 

@@ -176,8 +176,7 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
 def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
     """Cells as the scene says, in logarithms, variances of one run of each, its counted turns, variances by integration."""
     scenes = [
-        Scene.from_dict(case.data, case.source, [*case.overrides, *case.uncertain.set, "numerics.companion=true"])
-        for case in rows.cases
+        Scene.from_dict(case.data, case.source, [*case.uncertain.set, "numerics.companion=true"]) for case in rows.cases
     ]
     labels = [f"as the scene says, condition {place + 1}" for place in range(len(scenes))]
     ran = rows.run(scenes, labels, "as the scene says")

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from doe import clearance
-from doe.study.input_sets import Case, case_of, impossible
+from doe.study.input_sets import Case, case_of, impossible, tables_of
 from doe.study.rig_file import Rig, read_rig
-from rbdyn.faults import InputError, read_toml, refuse, set_key
+from rbdyn.faults import InputError, refuse
 from rbdyn.records.kept import code_version, digest_of
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import Uncertain, documented
@@ -45,9 +45,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     Raises InputError for all that is wrong with them, before anything runs.
     """
     rig = read_rig(data)
-    tables = copy.deepcopy(read_toml(path))
-    for override in overrides:
-        set_key(tables, override)
+    tables = tables_of(path, overrides)
     base = Scene.from_dict(tables, str(path))
     given = getattr(base, "uncertain", None) or Uncertain()
     refuse([f"{path}: uncertain.sample: is what a calibration gives; leave it out"] if given.sample else [])
@@ -77,11 +75,6 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         f"--free {key}: its documented range does not count in this scene (rbdyn keys {key}); give it a law"
         for key in free
         if key not in {each.key for each in case.every}
-    )
-    refuse(
-        [f'{path}: uncertain.sample = "{given.sample}": calibration starts from laws; leave it out']
-        if given.sample
-        else []
     )
     refuse([] if sought else [f"{path}: uncertain: nothing is unknown that could be found; name keys with a law"])
     if case.scene.calibrate.discrepancy == "none":

@@ -15,7 +15,7 @@ from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.running.failure import Failure, sentence
 from doe.study_file.table import NUMBER, fields
-from doe.unknown import laws, plan, screening
+from doe.unknown import laws, screening
 from doe.unknown.joint import Joint
 from rbdyn.faults import InputError, RunError, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
@@ -50,8 +50,7 @@ class Sets:
 
 @dataclass(frozen=True)
 class Case:
-    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, ``overrides`` of all runs,
-    by key what stands in the rows of a posterior ``sample``, and what is to be doubted of that, in a sentence."""
+    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, by key what stands in the rows of a posterior ``sample``, and what is to be doubted of that, in a sentence."""
 
     source: str
     data: dict[str, Any]
@@ -59,7 +58,6 @@ class Case:
     uncertain: Uncertain
     every: list[Input]
     outputs: tuple[str, ...]
-    overrides: tuple[str, ...] = ()
     sample: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     doubt: str = ""
 
@@ -82,7 +80,7 @@ class Case:
         }
         found: list[Scene | str] = []
         for number, row in enumerate(values):
-            overrides = [*self.overrides, *self.uncertain.set, f"numerics.seed={seed + number}", *more]
+            overrides = [*self.uncertain.set, f"numerics.seed={seed + number}", *more]
             overrides += own[number] if own else ()
             try:
                 tables = with_values(self.data, self.source, by_key, {**row, **tied})
@@ -94,7 +92,7 @@ class Case:
     @property
     def replicates(self) -> int:
         """Replicates of a run."""
-        return Scene.from_dict(self.data, self.source, [*self.overrides, *self.uncertain.set]).numerics.replicates
+        return Scene.from_dict(self.data, self.source, self.uncertain.set).numerics.replicates
 
     def unit(self, each: Input) -> float:
         """What the numbers of an input's law multiply."""
@@ -109,12 +107,17 @@ class Case:
         return Joint(len(keys), laws.copula(keys, pairs), rows, columns)
 
 
-def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> Case:
-    """A scene file with what is not known of it. Raises InputError, also where all is known."""
+def tables_of(path: Path, overrides: Sequence[str]) -> dict[str, Any]:
+    """Tables of a scene file with keys replaced. Raises InputError."""
     data = copy.deepcopy(read_toml(path))
     for override in overrides:
         set_key(data, override)
-    return case_of(str(path), data, outputs)
+    return data
+
+
+def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> Case:
+    """A scene file with what is not known of it. Raises InputError, also where all is known."""
+    return case_of(str(path), tables_of(path, overrides), outputs)
 
 
 def case_of(
@@ -123,7 +126,6 @@ def case_of(
     outputs: Sequence[str],
     declared: Uncertain | None = None,
     fixed: frozenset[str] = frozenset(),
-    overrides: Sequence[str] = (),
     beside: Path | None = None,
 ) -> Case:
     """Tables of a scene with what is not known of it; ``declared``, in the folder ``beside``, counts instead of the scene's
@@ -137,13 +139,10 @@ def case_of(
     }
     every = inputs_of(scene, data, uncertain, fixed, found)
     if not every:
-        raise InputError(
-            [
-                f"{source}: uncertain: nothing is unknown; name keys as \"table.key\" = {{law = ...}} or leave out defaults = 'none'"
-            ]
-        )
+        mend = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
+        raise InputError([f"{source}: uncertain: nothing is unknown; {mend}"])
     doubt = "" if uncertain.sample is None else _doubt(folder / uncertain.sample)
-    case = Case(source, data, scene, uncertain, every, tuple(outputs), tuple(overrides), sample, doubt)
+    case = Case(source, data, scene, uncertain, every, tuple(outputs), sample, doubt)
     case.joint(every)
     refuse(impossible(case))
     return case
@@ -199,15 +198,9 @@ def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[st
     every, tried = case.every, [each for each in case.every if each.key not in case.sample]
     if len(every) <= case.uncertain.inputs or not tried:
         return every, {}
-    quantiles = plan.two_levels(len(tried))
-    sets = run(
-        case,
-        tried,
-        np.column_stack([quantiles, np.full(len(quantiles), 0.5)]),
-        simulations,
-        SCREENING_SEEDS,
-        title="screening",
-    )
+    quantiles = screening.two_levels(len(tried))
+    with_middle = np.column_stack([quantiles, np.full(len(quantiles), 0.5)])
+    sets = run(case, tried, with_middle, simulations, SCREENING_SEEDS, title="screening")
     positive = (sets.outputs > 0.0).all(axis=0)
     share = screening.shares(
         sets.quantiles[:, :-1], np.where(positive, np.log(np.where(positive, sets.outputs, 1.0)), sets.outputs)
@@ -238,16 +231,8 @@ def run(
     check_holes(len(ran) - len(good), len(ran), failures, impossible)
     outputs, variances, freedom = scattered(case.outputs, [result for _, result in good])
     places = np.array([place for place, _ in good], dtype=np.int64)
-    return Sets(
-        places,
-        quantiles[places],
-        [values[place] for place in places],
-        outputs,
-        variances,
-        freedom,
-        failures,
-        impossible,
-    )
+    inputs_there = [values[place] for place in places]
+    return Sets(places, quantiles[places], inputs_there, outputs, variances, freedom, failures, impossible)
 
 
 def outcomes(

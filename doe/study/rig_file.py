@@ -34,11 +34,6 @@ class Row:
     turns: float | None
     held: bool
 
-    @property
-    def condition(self) -> tuple[tuple[str, Any], ...]:
-        """What tells rows of one condition."""
-        return tuple(self.keys.items())
-
 
 @dataclass(frozen=True)
 class Rig:
@@ -53,7 +48,7 @@ class Rig:
     @property
     def conditions(self) -> list[dict[str, Any]]:
         """Different conditions, in their order."""
-        return [dict(each) for each in dict.fromkeys(row.condition for row in self.rows)]
+        return [dict(each) for each in dict.fromkeys(tuple(row.keys.items()) for row in self.rows)]
 
 
 def read_rig(path: Path) -> Rig:

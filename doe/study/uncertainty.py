@@ -10,8 +10,7 @@ from doe.study.input_sets import NORMAL, Sets, read_case, run, screened
 from doe.unknown.joint import Joint
 from doe.unknown.sensitivity import Index, Indices, shapley, sobol
 from doe.unknown.spread import Emulated, Runs, Spread, emulated, spread_of
-from rbdyn.faults import RunError, refuse
-from rbdyn.fields import no_power_of_two
+from rbdyn.faults import RunError
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
 
@@ -84,11 +83,6 @@ def find_uncertainty(
         for name, spread, (_, each) in zip(OUTPUTS, spreads, fitted, strict=True)
     }
     return Uncertainty(path, inputs, rest, outputs, sets, seed, _notes(case.doubt, sets, spreads, count, target))
-
-
-def check_points(points: int | None) -> None:
-    """Raises InputError unless the number of input sets is a power of two."""
-    refuse([] if points is None else no_power_of_two("--points ", points))
 
 
 def _emulated(sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:

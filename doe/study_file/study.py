@@ -15,7 +15,7 @@ from doe.designs.model import Model
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Category, Design, Factor, Name
 from doe.study_file.front_section import Adaptive, Direct, Front, Goal, Robust, Tolerances
-from doe.study_file.table import COUNT, LABELS, Table, read_table
+from doe.study_file.table import COUNT, LABELS
 from rbdyn.faults import InputError, Strict, read_toml, validated
 from rbdyn.fields import or_refuse
 from rbdyn.scene.uncertain import Uncertain
@@ -251,7 +251,3 @@ class Study:
     def beside(self, name: str) -> Path:
         """A file named in the study."""
         return self.path.parent / name
-
-    def read_table(self, path: Path) -> Table:
-        """Runs of a CSV table with a column for each name. Raises InputError with all faults."""
-        return read_table(path, self.factors, self.responses, self.path)

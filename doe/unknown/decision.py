@@ -124,14 +124,12 @@ def _shares(gains: Array, variances: Array, random: np.random.Generator) -> Arra
 def _positive(matrix: Array) -> Array:
     """The nearest matrix without negative eigenvalues."""
     sizes, axes = np.linalg.eigh(0.5 * (matrix + matrix.T))
-    found: Array = (axes * sizes.clip(0.0)) @ axes.T
-    return found
+    return (axes * sizes.clip(0.0)) @ axes.T
 
 
 def _root(matrix: Array) -> Array:
     sizes, axes = np.linalg.eigh(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
-    found: Array = axes * np.sqrt(sizes.clip(0.0))[..., None, :]
-    return found
+    return axes * np.sqrt(sizes.clip(0.0))[..., None, :]
 
 
 def decides(
@@ -171,8 +169,7 @@ def decides(
 
     def all_better(at: Array) -> Array:
         foretold = np.array([_followed(emulator.mean(at), *follow) for emulator, follow in emulators]).T
-        positive: Array = (foretold[None] + missing[:, None] > 0.0).all(axis=2).mean(axis=0)
-        return positive
+        return (foretold[None] + missing[:, None] > 0.0).all(axis=2).mean(axis=0)
 
     better_at = all_better(fresh)
     whole_p = float(better_at.mean())

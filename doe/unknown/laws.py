@@ -23,8 +23,7 @@ def values_of(law: Law | Sampled, quantiles: Array) -> list[Any]:
         choices = law.values or []
         bounds = np.cumsum(_shares(law))[:-1]
         return [choices[int(place)] for place in np.searchsorted(bounds, quantiles, side="right")]
-    found: list[Any] = _distribution(law).ppf(np.clip(quantiles, EDGE, 1.0 - EDGE)).tolist()
-    return found
+    return _distribution(law).ppf(np.clip(quantiles, EDGE, 1.0 - EDGE)).tolist()
 
 
 def quantiles_of(law: Law, values: Sequence[Any]) -> Array:

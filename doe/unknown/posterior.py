@@ -52,8 +52,7 @@ def learnt(quantiles: Array, logarithms: Array, before: Array) -> Learnt:
 
 def contraction(quantiles: Array) -> Array:
     """1 - sd after / sd before (d,) of inputs by their quantiles (n, d), 0 where they spread more than before."""
-    found: Array = (1.0 - quantiles.std(axis=0) / PRIOR_SD).clip(0.0)
-    return found
+    return (1.0 - quantiles.std(axis=0) / PRIOR_SD).clip(0.0)
 
 
 def seen(share: float) -> str:

@@ -21,8 +21,7 @@ from scipy import stats
 
 from doe.arrays import Array
 from doe.emulator import Emulator, fit_emulator
-from doe.unknown.joint import Joint
-from doe.unknown.plan import nested
+from doe.unknown.joint import Joint, nested
 from doe.unknown.spread import Emulated
 
 # Points of an index (a power of two), refits of its interval, and the share of cases that the interval should hold.

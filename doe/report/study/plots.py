@@ -66,7 +66,8 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
         axis.set_ylabel(label(study.factors[panel]), labelpad=8)
         axis.set_zlabel(label(surface.name))
         rest = [place for place in range(1, factors) if place != panel]
-        held = [f"{quantity(study.factors[place])[0]} {_at_centre(study, place)}" for place in rest]
+        named = ((*quantity(study.factors[place]), study.centre[place]) for place in rest)
+        held = [f"{words} {centre:g} {unit}".rstrip() for words, unit, centre in named]
         notes = [*held, *(f"limit {bound:g} in red" for bound in _bounds(study, surface.name))]
         axis.set_title(f"({'abcdefg'[panel - 1]}) {', '.join(notes)}", fontsize=10)
         axis.tick_params(labelsize=8)
@@ -76,11 +77,6 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
     figure.subplots_adjust(left=0.02, right=0.92, bottom=0.06, top=0.94, wspace=0.12)
     figure.savefig(path, dpi=130)
     plt.close(figure)
-
-
-def _at_centre(study: Study, place: int) -> str:
-    """The centre of a factor with its unit."""
-    return f"{study.centre[place]:g} {quantity(study.factors[place])[1]}".rstrip()
 
 
 def _bounds(study: Study, name: str) -> list[float]:
