@@ -78,7 +78,7 @@ def surfaces_doubt(
             missed = missed.and_at(at, misses, errors, surface.prediction_standard_error(at))
             more[index] = float(errors.max())
         fields[index] = Conditioned(missed)
-        quantiles[index] = float(special.stdtrit(max(surface.interval_dof, 1), probability))
+        quantiles[index] = float(special.stdtrit(surface.interval_dof, probability))
 
     def at_share(share: float) -> Doubt:
         def doubt(coded: Array) -> tuple[Array, Array]:

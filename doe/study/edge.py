@@ -153,8 +153,7 @@ def _on_surfaces(
             # The slope of a field of correlation exp(-(d/REACH)^2) has 2/REACH^2 times its variance.
             by_field = float(jacobian(surface, coded)[surface.terms.index("1")])
             variance += by_field**2 * 2.0 / REACH**2 * surface.model_error.variance
-        dof = surface.interval_dof
-        student = float(special.stdtrit(dof, 0.975)) if dof > 0 else np.nan
+        student = float(special.stdtrit(surface.interval_dof, 0.975))
         scale = 1.0 / study.step[index]
         gains[surface.name] = (-slope * (ends[1] - ends[0]) / STEP * scale, student * float(np.sqrt(variance)) * scale)
     return gains
