@@ -133,16 +133,9 @@ def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
 def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], first: int) -> list[Scene]:
     """A scene a run of an adaptive search (n, k), numbered from ``first``: a design run with replicates and a seed of its own."""
     data, adaptive = read_scene(study), study.file.adaptive
-    return [
-        scene_at(
-            study,
-            data,
-            point,
-            adaptive.seed + ADAPTIVE_SEEDS + number,
-            [*study.scene.set, f"numerics.replicates={count}", "numerics.companion=false", *adaptive.set],
-        )
-        for number, (point, count) in enumerate(zip(points, replicates, strict=True), first)
-    ]
+    overrides = [[*study.scene.set, f"numerics.replicates={count}", "numerics.companion=false"] for count in replicates]
+    runs = enumerate(zip(points, overrides, strict=True), adaptive.seed + ADAPTIVE_SEEDS + first)
+    return [scene_at(study, data, point, seed, [*keys, *adaptive.set]) for seed, (point, keys) in runs]
 
 
 def check_direct(study: Study) -> None:

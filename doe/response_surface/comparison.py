@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from string import ascii_uppercase
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from doe.arrays import Array, Rows, Whole
 from doe.designs.design import replicate_groups
 from doe.emulator import Emulator, fit_emulator
 from doe.emulator.emulator import THREADS
+from doe.response_surface.surface import Surface
 
 # More points than these are left out in groups.
 MOST_SINGLY, FOLDS = 60, 20
@@ -22,16 +23,6 @@ MOST_SINGLY, FOLDS = 60, 20
 INDISPENSABLE = 0.95
 
 
-class Predictor(Protocol):
-    """Anything that foretells the response."""
-
-    def predict(self, coded: ArrayLike) -> Array:
-        """Mean response at coded points (..., k), shape (...)."""
-        ...
-
-
-# Made of the runs of some rows; ValueError where they do not suffice.
-Refit = Callable[[Rows], Predictor]
 # What a rival made of the runs of some rows foretells (n,) at coded points (n, k).
 Rival = Callable[[Rows, Array], Array]
 
@@ -39,7 +30,7 @@ Rival = Callable[[Rows, Array], Array]
 def compare(
     coded: ArrayLike,
     values: ArrayLike,
-    refit: Refit,
+    refit: Callable[[Rows], Surface],
     *,
     name: str,
     matrix: ArrayLike | None = None,

@@ -161,7 +161,7 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
     at = [(conditions.index(row.keys), rig.outputs.index(name)) for row, name in places]
     rows = _Rows(cases, inputs, rig.outputs, at, simulations)
     nominal, variances, turns, numerical = _nominal(rows)
-    measured = _measured(case, rig, variances, turns, numerical)
+    measured = _measured(rows, rig, variances, turns, numerical)
     found = matched(
         rows.simulate, measured, _unknowns(case, inputs), case.scene.calibrate.seed, case.scene.calibrate.waves
     )
@@ -193,20 +193,20 @@ def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
     return values[0], variances[0], turns[[condition for condition, _ in rows.cells]], np.array(numerical) ** 2
 
 
-def _measured(case: Case, rig: Rig, variances: Array, turns: Array, numerical: Array) -> Measured:
-    scales = case.scene.calibrate.discrepancy
+def _measured(rows: _Rows, rig: Rig, variances: Array, turns: Array, numerical: Array) -> Measured:
+    scales = rows.cases[0].scene.calibrate.discrepancy
     cells = [(row, name) for row in rig.rows for name in row.values]
     found = []
     for place, (row, name) in enumerate(cells):
         sd = row.sds[name]
         # A run as long as the measurement scatters as that does.
         found.append((sd / row.values[name]) ** 2 if sd else variances[place] * turns[place] / (row.turns or 1.0))
-    conditions = rig.conditions
+    conditions, outputs = np.array(rows.cells).T
     return Measured(
         np.log([row.values[name] for row, name in cells]),
         np.array(found) + numerical,
-        np.array([rig.outputs.index(name) for _, name in cells]),
-        np.array([conditions.index(row.keys) for row, _ in cells]),
+        outputs,
+        conditions,
         np.array([0.0 if scales == "none" else scales.get(name, DISCREPANCY) for name in rig.outputs]),
         np.array([row.held for row, _ in cells]),
     )

@@ -280,17 +280,13 @@ def tolerances(summary: Record) -> Table:
             label(name),
             f"± {rounded_down(each.get('half_width') or 0.0)}",
             shown(each.get("probability")),
-            _limit(each.get("limited_by")),
+            label(each.get("limited_by") or ""),
         )
         for name, each in found.items()
         if name in names and isinstance(each, Mapping)
     ]
     header = ("factor", "tolerance", "probability", "limited by")
     return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,))
-
-
-def _limit(limited_by: Any) -> str:
-    return label(limited_by) if isinstance(limited_by, str) else shown(limited_by)
 
 
 def record_table(caption: str, record: Record | None, folded: bool = False) -> Table:
