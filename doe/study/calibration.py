@@ -68,10 +68,8 @@ class Calibration:
         """Why inputs may not be called calibrated."""
         cells = [self.cells[place] for place in self.found.refuted]
         told = ", ".join(f"{quantity(name)[0]} of row {row}" for row, name in cells)
-        refuted = (
-            f"refuted: no input set within the laws gives what was measured within the allowed discrepancy: {told}"
-        )
-        return [*([refuted] if cells else []), *self.objections]
+        refuted = "refuted: no input set within the laws gives what was measured within the allowed discrepancy"
+        return [*([f"{refuted}: {told}"] if cells else []), *self.objections]
 
     @property
     def quantiles(self) -> Array:
@@ -139,9 +137,8 @@ class _Rows:
         outputs, variances, freedom = scattered(self.outputs, results)
         if not (outputs > 0.0).all():
             name = self.outputs[int(np.argmin(outputs.min(axis=0)))]
-            raise RunError(
-                f"{name}: is nothing in a simulation, so no share of it can be compared; leave its column out"
-            )
+            why = "is nothing in a simulation, so no share of it can be compared"
+            raise RunError(f"{name}: {why}; leave its column out")
         conditions, names = np.array(self.cells).T
         shape = (-1, len(self.cases), len(self.outputs))
         return (

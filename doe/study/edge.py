@@ -111,7 +111,7 @@ def edge_of(
         gains, source = gains_beyond.get(index), "simulation"
         if gains is None:
             gains, source = _on_surfaces(study, surfaces, pick.point, index, side), "the surfaces"
-        unit, scale = _unit(study, index)
+        unit, scale = ("µm", MICROMETRE_MM) if study.factors[index].endswith("_mm") else ("unit", 1.0)
         bound = float(ends[index, int(side > 0)])
         per_unit = {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()}
         goals = {response.name: response.goal for response in study.file.response}
@@ -126,11 +126,6 @@ def _sides(points: Array, ends: Array) -> Whole:
     half = 0.5 * (ends[:, 1] - ends[:, 0])
     off = (points - ends.mean(axis=1)) / half
     return np.where(np.abs(off) >= 1.0 - 2.0 * NEAR, np.sign(off), 0.0).astype(np.int64)
-
-
-def _unit(study: Study, index: int) -> tuple[str, float]:
-    """What a gain is per, and how many units of the factor that is."""
-    return ("µm", MICROMETRE_MM) if study.factors[index].endswith("_mm") else ("unit", 1.0)
 
 
 def _on_surfaces(

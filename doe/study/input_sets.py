@@ -250,9 +250,8 @@ def check_holes(lost: int, sets: int, failures: Sequence[Failure], impossible: S
     """Raises RunError where too many input sets are lost."""
     if lost > HOLES * sets:
         why = sentence(failures) if failures else impossible[0]
-        raise RunError(
-            f"{lost} of {sets} input sets gave no result{where}, more than {100.0 * HOLES:g} %: {why}; narrow the laws of the inputs"
-        )
+        many = f"{lost} of {sets} input sets gave no result{where}, more than {100.0 * HOLES:g} %"
+        raise RunError(f"{many}: {why}; narrow the laws of the inputs")
 
 
 def scattered(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:

@@ -175,11 +175,8 @@ class Study:
     def scene(self) -> SceneFile:
         """Scene of the runs. Raises InputError for a study that has none."""
         if self.file.scene is None:
-            raise InputError(
-                [
-                    f"{self.path}: scene: missing; add [scene] with its file, or give fit or front the runs by --data TABLE.csv"
-                ]
-            )
+            mend = "add [scene] with its file, or give fit or front the runs by --data TABLE.csv"
+            raise InputError([f"{self.path}: scene: missing; {mend}"])
         return self.file.scene
 
     @property

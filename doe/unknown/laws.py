@@ -67,15 +67,11 @@ def copula(names: Sequence[str], pairs: Sequence[Correlation]) -> Array | None:
         i, j = (list(names).index(key) for key in pair.keys)
         matrix[i, j] = matrix[j, i] = 2.0 * np.sin(np.pi * pair.rank / 6.0)
     try:
-        factor = np.asarray(np.linalg.cholesky(matrix), float)
+        return np.asarray(np.linalg.cholesky(matrix), float)
     except np.linalg.LinAlgError:
         told = ", ".join(f"{' and '.join(pair.keys)} {pair.rank:g}" for pair in pairs)
-        raise InputError(
-            [
-                f"uncertain.correlation: {told}: contradict each other; no inputs can go together so, bring them nearer to 0"
-            ]
-        ) from None
-    return factor
+        why = "contradict each other; no inputs can go together so, bring them nearer to 0"
+        raise InputError([f"uncertain.correlation: {told}: {why}"]) from None
 
 
 def dependent(quantiles: Array, factor: Array | None) -> Array:

@@ -14,13 +14,13 @@ SIAM/ASA J. Uncertainty Quantification 8 (2020) 693 (nearest neighbours in place
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import stats
 
 from doe.arrays import Array
-from doe.emulator import Emulator, fit_emulator
+from doe.emulator import fit_emulator
 from doe.unknown.joint import Joint, nested
 from doe.unknown.spread import Emulated
 
@@ -67,11 +67,12 @@ def _with_intervals(fitted: Emulated, measure: Measure, seed: int, points: int =
     random = np.random.default_rng(seed)
     emulator, whole = fitted.emulator, measure(fitted, points, seed)
     noise = np.sqrt(emulator.variances + emulator.hyperparameters.nugget)
+    like: dict[str, Any] = {"trend": "linear", "start": emulator.hyperparameters}
     misses = []
     for again in range(REFITS):
         truth = emulator.draw(1, random)
         values = truth(emulator.points)[0] + noise * random.standard_normal(noise.size)
-        refit = replace(fitted, emulator=_refitted(emulator, values))
+        refit = replace(fitted, emulator=fit_emulator(emulator.points, values, emulator.variances, **like))
         # Both by the same points, whose own error then hardly shows in the difference.
         ours, true = (
             measure(function, POINTS_OF_REFITS, seed + 1 + again)
@@ -83,10 +84,6 @@ def _with_intervals(fitted: Emulated, measure: Measure, seed: int, points: int =
         stats.t.ppf(0.5 + 0.5 * CONFIDENCE, REFITS - 1) * np.std(misses, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / REFITS)
     )
     return np.stack([middle, middle - half, middle + half]).clip(0.0, 1.0)
-
-
-def _refitted(emulator: Emulator, values: Array) -> Emulator:
-    return fit_emulator(emulator.points, values, emulator.variances, trend="linear", start=emulator.hyperparameters)
 
 
 def _indices(inputs: int, function: Function, points: int, seed: int) -> tuple[Array, Array]:
