@@ -159,9 +159,8 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
     rows = _Rows(cases, inputs, rig.outputs, at, simulations)
     nominal, variances, turns, numerical = _nominal(rows)
     measured = _measured(rows, rig, variances, turns, numerical)
-    found = matched(
-        rows.simulate, measured, _unknowns(case, inputs), case.scene.calibrate.seed, case.scene.calibrate.waves
-    )
+    asked = case.scene.calibrate
+    found = matched(rows.simulate, measured, _unknowns(case, inputs), asked.seed, asked.waves)
     cells = [(row.number, name) for row, name in places]
     before = found.cells.mean(found.unknowns.at(np.random.default_rng(0).standard_normal((BEFORE, len(inputs)))))
     whole = Calibration(

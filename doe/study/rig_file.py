@@ -64,9 +64,8 @@ def read_rig(path: Path) -> Rig:
         outputs = tuple(dict.fromkeys([*outputs, *(WHIRL if kind == ORBIT else SPEED for kind in kinds)]))
     known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES, CUTOFF, STILL}
     faults = [f"{path}: {_unknown(name, outputs)}" for name in header if name not in known]
-    faults += [
-        f"{path}: column {name} comes twice; remove one" for name in dict.fromkeys(header) if header.count(name) > 1
-    ]
+    twice = [name for name in dict.fromkeys(header) if header.count(name) > 1]
+    faults += [f"{path}: column {name} comes twice; remove one" for name in twice]
     if not outputs:
         faults.append(f"{path}: no measured output; add a column of {listed(OUTPUTS)}")
     if not keys:

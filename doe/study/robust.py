@@ -65,9 +65,9 @@ class Robust:
 
 def declared(study: Study) -> bool:
     """Whether the study or its scene declares what is not known; to name values as estimates alone is not to ask for it."""
-    return study.file.uncertain is not None or bool(
-        set(clearance.read_scene(study).get("uncertain", {})) - {"estimated"}
-    )
+    if study.file.uncertain is not None:
+        return True
+    return bool(set(clearance.read_scene(study).get("uncertain", {})) - {"estimated"})
 
 
 def robust_advice(study: Study) -> list[str]:
@@ -107,9 +107,8 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
         if rows.size == 0:
             break
         more = [f"numerics.replicates={replicates * many}"]
-        new, lost = simulated(
-            case, inputs, pairs.quantiles[rows], designs, simulations, (again + 1) * ROUND_SEEDS, more
-        )
+        seeds = (again + 1) * ROUND_SEEDS
+        new, lost = simulated(case, inputs, pairs.quantiles[rows], designs, simulations, seeds, more)
         rows, spent, failures = rows[new.places], spent + 2 * many * len(rows), (*failures, *lost)
         pairs = pairs.joined(rows, new)
         still = in_doubt(*pairs.gains(goals))

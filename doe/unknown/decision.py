@@ -25,6 +25,7 @@ from scipy import special, stats
 
 from doe.arrays import Array, Whole
 from doe.emulator import fit_emulator
+from doe.unknown.spread import Share
 
 # Draws of a row's true gains, resamplings of rows, and the share of cases an interval should hold.
 DRAWS, RESAMPLES, CONFIDENCE = 64, 200, 0.95
@@ -32,17 +33,9 @@ DRAWS, RESAMPLES, CONFIDENCE = 64, 200, 0.95
 BINS, PAIR_BINS, RESIDUALS = 32, 8, 48
 
 
-class Share(NamedTuple):
-    """A probability with its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
-
-
 @dataclass(frozen=True)
 class Better:
-    """Probability that each gain is positive, and that all are."""
+    """Probability that each gain is positive, and that all are, with 95 % intervals."""
 
     each: list[Share]
     all: Share

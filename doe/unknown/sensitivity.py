@@ -22,7 +22,7 @@ from scipy import stats
 from doe.arrays import Array
 from doe.emulator import fit_emulator
 from doe.unknown.joint import Joint, nested
-from doe.unknown.spread import Emulated
+from doe.unknown.spread import Emulated, Share
 
 # Points of an index (a power of two), refits of its interval, and the share of cases that the interval should hold.
 POINTS, POINTS_OF_REFITS, REFITS, CONFIDENCE = 1024, 256, 16, 0.9
@@ -33,33 +33,25 @@ Function = Callable[[Array], Array]  # of quantiles (n, d)
 Measure = Callable[[Function, int, int], Array]  # of a function, by so many points and a seed
 
 
-class Index(NamedTuple):
-    """A share of the variance, and its 90 % interval."""
-
-    value: float
-    low: float
-    high: float
-
-
 class Indices(NamedTuple):
-    """First and total indices of every input, in their order."""
+    """First and total indices of every input, in their order, with 90 % intervals."""
 
-    first: list[Index]
-    total: list[Index]
+    first: list[Share]
+    total: list[Share]
 
 
 def sobol(fitted: Emulated, inputs: int, seed: int) -> Indices:
     """Sobol' indices of independent inputs, uniform in their quantiles."""
     ends = _with_intervals(fitted, lambda *of: np.array(_indices(inputs, *of)), seed)
-    first, total = ([Index(*map(float, ends[:, kind, each])) for each in range(inputs)] for kind in (0, 1))
+    first, total = ([Share(*map(float, ends[:, kind, each])) for each in range(inputs)] for kind in (0, 1))
     return Indices(first, total)
 
 
-def shapley(fitted: Emulated, joint: Joint, seed: int) -> list[Index]:
+def shapley(fitted: Emulated, joint: Joint, seed: int) -> list[Share]:
     """Shapley's effects of inputs that depend on each other, and of one that does nothing, the last; their sum is 1."""
     # Rows of a sample are no even plan: they need more of them.
     ends = _with_intervals(fitted, lambda *of: _effects(joint, *of), seed, 4 * POINTS)
-    return [Index(*map(float, each)) for each in ends.T]
+    return [Share(*map(float, each)) for each in ends.T]
 
 
 def _with_intervals(fitted: Emulated, measure: Measure, seed: int, points: int = POINTS) -> Array:

@@ -7,6 +7,7 @@ elsewhere it is that of the runs, shrunk about their mean by sqrt(V_in/s^2(y)).
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,14 @@ from doe.emulator import Emulator, fit_emulator, pooled_variances
 TRUSTED = 0.8
 # Ends of the range, and how many draws or resamplings tell their errors.
 ENDS, DRAWS = (0.05, 0.5, 0.95), 24
+
+
+class Share(NamedTuple):
+    """A share of cases or of a variance, and the ends of its interval."""
+
+    value: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True, eq=False)

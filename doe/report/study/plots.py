@@ -98,9 +98,8 @@ def adaptive_search(record: Record, path: Path) -> None:
             marker, color = MARKERS[why]
             sizes = [7.0 * count for _, count in runs]
             axis.scatter(x, y, sizes, color, marker=marker, alpha=0.8, edgecolors="white", linewidths=0.5, label=why)
-        axis.plot(
-            *(record["pick"][each] for each in (names[0], name)), "*", c="tab:red", mec="white", ms=15, label="pick"
-        )
+        pick = (record["pick"][each] for each in (names[0], name))
+        axis.plot(*pick, "*", c="tab:red", mec="white", ms=15, label="pick")
         axis.set_xlabel(label(names[0]))
         axis.set_ylabel(label(name))
         axis.xaxis.set_major_locator(MaxNLocator(5))
@@ -133,9 +132,8 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
     if outcome.direct is not None:
         clouds.append(("front on the simulator", outcome.direct.front.values, "tab:green"))
     if outcome.adaptive is not None:
-        clouds.append(
-            ("front foretold by emulators", outcome.adaptive.found.foretold[outcome.adaptive.found.shown], "tab:olive")
-        )
+        found = outcome.adaptive.found
+        clouds.append(("front foretold by emulators", found.foretold[found.shown], "tab:olive"))
         clouds.append(("its points, simulated afresh", outcome.adaptive.front.values, "tab:green"))
     for axis, (i, j) in _pairs(len(surfaces), path, 6):
         for words, values, color in clouds:
@@ -165,9 +163,8 @@ def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
         for (name, each), marker in zip(front.confirmed.items(), "*o^v", strict=False):
             x, y = 100.0 * each.gains[[i, j]]
             words = f"{name}, simulated: better in all in {100.0 * each.better.all.value:.0f} %"
-            axis.plot(
-                x, y, marker, mfc="none", color="tab:red" if marker == "*" else "black", markersize=9, label=words
-            )
+            color = "tab:red" if marker == "*" else "black"
+            axis.plot(x, y, marker, mfc="none", color=color, markersize=9, label=words)
         axis.axhline(0.0, color="tab:gray", linewidth=1.0)
         axis.axvline(0.0, color="tab:gray", linewidth=1.0)
         axis.set_xlabel(f"gain in {quantity(responses[i])[0]} [%]")
