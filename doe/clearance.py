@@ -307,9 +307,8 @@ def histories(study: Study, points: dict[str, Array], turns: float) -> "dict[str
     """Motion of the confirmation scene at each point, over at most ``turns`` shaft turns. Raises RunError."""
     from rbdyn.dynamics.motion.history import history
 
-    scenes = {
-        name: confirmation_scene(study.at(()) if name == "baseline" else study, at) for name, at in points.items()
-    }
+    original = study.at(())
+    scenes = {name: confirmation_scene(original if name == "baseline" else study, at) for name, at in points.items()}
     return {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
 
 

@@ -10,10 +10,11 @@ import numpy as np
 from doe.arrays import Array
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
 from doe.pareto.archive import Archive
+from doe.pareto.nsga2 import Doubt
 from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox, tolerance_aware_front
 from doe.pareto.uncertainty import FrontUncertainty, front_uncertainty
 from doe.response_surface import Surface
-from doe.study.back_off import Doubt, surfaces_doubt
+from doe.study.back_off import surfaces_doubt
 from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import check_goals, goals_of, region_of, tolerance_box

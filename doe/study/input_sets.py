@@ -134,9 +134,8 @@ def case_of(
     uncertain = declared or scene.uncertain or Uncertain()
     folder = beside if declared and beside else Path(source).parent
     sample = {} if uncertain.sample is None else read_sample(folder / uncertain.sample)
-    found = {
-        key: Sampled(tuple(column[place] for place in np.argsort(laws.ranks(column)))) for key, column in sample.items()
-    }
+    ordered = ((key, [column[place] for place in np.argsort(laws.ranks(column))]) for key, column in sample.items())
+    found = {key: Sampled(tuple(column)) for key, column in ordered}
     every = inputs_of(scene, data, uncertain, fixed, found)
     if not every:
         mend = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
@@ -202,9 +201,8 @@ def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[st
     with_middle = np.column_stack([quantiles, np.full(len(quantiles), 0.5)])
     sets = run(case, tried, with_middle, simulations, SCREENING_SEEDS, title="screening")
     positive = (sets.outputs > 0.0).all(axis=0)
-    share = screening.shares(
-        sets.quantiles[:, :-1], np.where(positive, np.log(np.where(positive, sets.outputs, 1.0)), sets.outputs)
-    )
+    outputs = np.where(positive, np.log(np.where(positive, sets.outputs, 1.0)), sets.outputs)
+    share = screening.shares(sets.quantiles[:, :-1], outputs)
     declared = [place for place, each in enumerate(tried) if each.key in case.uncertain.laws]
     stay = screening.kept(share, declared, case.uncertain.inputs - len(every) + len(tried))
     left = {tried[place].key: float(share[place].max()) for place in range(len(tried)) if place not in stay}
@@ -240,9 +238,8 @@ def outcomes(
 ) -> list[SimulationResult | Failure | str]:
     """Of each scene its result or failure, of what is no scene why. Raises KeyboardInterrupt."""
     possible = [(scene, label) for scene, label in zip(scenes, labels, strict=True) if isinstance(scene, Scene)]
-    ran = iter(
-        simulations.run([one for one, _ in possible], [label for _, label in possible], simulations.progress(title))
-    )
+    asked, named = [scene for scene, _ in possible], [label for _, label in possible]
+    ran = iter(simulations.run(asked, named, simulations.progress(title)))
     return [next(ran) if isinstance(scene, Scene) else scene for scene in scenes]
 
 

@@ -58,9 +58,8 @@ def read_rig(path: Path) -> Rig:
     keys = tuple(name for name in header if "." in name)
     outputs = tuple(name for name in header if name in OUTPUTS)
     if FILE in header:
-        kinds = [
-            row[header.index(KIND)].strip() if KIND in header else "" for row in rows if row[header.index(FILE)].strip()
-        ]
+        signals = [row for row in rows if row[header.index(FILE)].strip()]
+        kinds = [row[header.index(KIND)].strip() if KIND in header else "" for row in signals]
         outputs = tuple(dict.fromkeys([*outputs, *(WHIRL if kind == ORBIT else SPEED for kind in kinds)]))
     known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES, CUTOFF, STILL}
     faults = [f"{path}: {_unknown(name, outputs)}" for name in header if name not in known]

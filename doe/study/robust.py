@@ -121,25 +121,15 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     if study.file.robust.front != "none":
         front, more_runs, lost = find_robust_front(study, case, inputs, joint, pick, simulations)
         spent, failures = spent + more_runs, (*failures, *lost)
-    return Robust(
-        [study.responses[index] for index in goals.objectives],
-        better(gains, variances, seed),
-        [
-            Decider(inputs[one.place].key, _value(case, inputs[one.place], one.flip), one.worth, one.above)
-            for one in found.inputs
-        ],
-        None if found.pair is None else (inputs[found.pair[0]].key, inputs[found.pair[1]].key, found.pair[2]),
-        found.foretold,
-        found.halved,
-        front,
-        inputs,
-        rest,
-        len(gains),
-        spent,
-        int(in_doubt(gains, variances).size),
-        failures,
-        case.doubt,
-    )
+    deciders = [
+        Decider(inputs[one.place].key, _value(case, inputs[one.place], one.flip), one.worth, one.above)
+        for one in found.inputs
+    ]
+    pair = None if found.pair is None else (inputs[found.pair[0]].key, inputs[found.pair[1]].key, found.pair[2])
+    judged = better(gains, variances, seed), deciders, pair, found.foretold, found.halved, front
+    cost = len(gains), spent, int(in_doubt(gains, variances).size)
+    wanted = [study.responses[index] for index in goals.objectives]
+    return Robust(wanted, *judged, inputs, rest, *cost, failures, case.doubt)
 
 
 def _case(study: Study) -> Case:

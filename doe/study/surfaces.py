@@ -46,9 +46,8 @@ def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
         data, matrix = surface.data, model_matrix(surface.data.points, surface.terms)
         errors = data.standard_errors if surface.weighting == "replicates" else None
         with suppress(ValueError):
-            rival = compare(
-                data.points, data.values, surface.refit, name=surface.name, matrix=matrix, standard_errors=errors
-            )
+            runs = data.points, data.values, surface.refit
+            rival = compare(*runs, name=surface.name, matrix=matrix, standard_errors=errors)
             found[place] = replace(surface, rival=rival)
     return found
 

@@ -62,9 +62,8 @@ def seen(share: float) -> str:
 
 def _combinations(after: Array, before: Array) -> list[Combination]:
     """Combinations of two inputs or more that are known, the best first: eigenvectors of one covariance by the other."""
-    places = np.flatnonzero(
-        np.isfinite(after).all(axis=0) & np.isfinite(before).all(axis=0) & (before.std(axis=0) > 0.0)
-    )
+    numbers = np.isfinite(after).all(axis=0) & np.isfinite(before).all(axis=0)
+    places = np.flatnonzero(numbers & (before.std(axis=0) > 0.0))
     if places.size < 2:
         return []
     spread = before[:, places].std(axis=0)

@@ -72,9 +72,8 @@ def _with_intervals(fitted: Emulated, measure: Measure, seed: int, points: int =
         )
         misses.append(ours - true)
     middle = whole - np.mean(misses, axis=0)
-    half = (
-        stats.t.ppf(0.5 + 0.5 * CONFIDENCE, REFITS - 1) * np.std(misses, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / REFITS)
-    )
+    student = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, REFITS - 1)
+    half = student * np.std(misses, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / REFITS)
     return np.stack([middle, middle - half, middle + half]).clip(0.0, 1.0)
 
 

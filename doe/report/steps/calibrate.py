@@ -136,10 +136,8 @@ def print_calibration(record: dict[str, Any]) -> None:
             "such an error takes the level, only patterns over rows and outputs teach inputs"
         )
     if tried := record["held_out"]:
-        print(
-            f"{tried['rows']}: {tried['inside_90_percent']} of {tried['values']} values in their 90 % interval, "
-            f"CRPS {tried['crps']:.2g} (before {tried['crps_before']:.2g})"
-        )
+        inside = f"{tried['inside_90_percent']} of {tried['values']} values in their 90 % interval"
+        print(f"{tried['rows']}: {inside}, CRPS {tried['crps']:.2g} (before {tried['crps_before']:.2g})")
     for each in record["outliers"]:
         far = f"{each['residual']:.1f} standard deviations"
         print(f"{quantity(each['output'])[0]} of row {each['row']} is {far} off the others")
