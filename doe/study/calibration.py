@@ -244,21 +244,10 @@ def _judged(given: Calibration) -> Calibration:
     against = objections(result, taus, anything=taught.anything, foretells=found.misfit < 2.0)
     rows = np.linspace(0, len(points) - 1, SAMPLE).astype(int)
     after = found.cells.mean(quantiles[rows])
-    notes = [
-        *given.notes,
-        *(
-            f"{given.inputs[place].key}: the posterior crowds at an end of its range, which may be too narrow"
-            for place in taught.narrow
-        ),
-    ]
+    crowds = "the posterior crowds at an end of its range, which may be too narrow"
+    notes = *given.notes, *(f"{given.inputs[place].key}: {crowds}" for place in taught.narrow)
     whole = replace(
-        given,
-        after=after,
-        learnt=taught,
-        trial=result,
-        residuals=residuals,
-        objections=tuple(against),
-        notes=tuple(notes),
+        given, after=after, learnt=taught, trial=result, residuals=residuals, objections=tuple(against), notes=notes
     )
     return replace(whole, without=_without(whole))
 
