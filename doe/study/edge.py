@@ -6,7 +6,7 @@ import numpy as np
 from scipy import special
 
 from doe import clearance
-from doe.arrays import Array, Whole, or_none
+from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.response_surface import Surface
 from doe.response_surface.model_error import REACH
@@ -16,7 +16,7 @@ from doe.study.drawn import jacobian
 from doe.study.goals import goals_of, region_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
-from rbdyn.records.record import Record, derived, keyed, outside_json
+from rbdyn.records.record import Record, derived, finite, keyed, outside_json
 from rbdyn.records.words import improvement, quantity
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
@@ -41,7 +41,7 @@ class Outward(Record):
     gains: Mapping[str, tuple[float, float]] = outside_json()
     goals: Mapping[str, str] = outside_json(default_factory=dict)
     gains_beyond: dict[str, dict[str, float | None]] = derived(
-        lambda self: {name: {"value": gain, "error": or_none(error)} for name, (gain, error) in self.gains.items()},
+        lambda self: {name: {"value": gain, "error": finite(error)} for name, (gain, error) in self.gains.items()},
         "gains",
     )
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from doe.adaptive.emulators import LEAST_DEVIATION
-from doe.arrays import Array, Rows, or_none
+from doe.arrays import Array, Rows
 from doe.emulator.likelihood import JITTER
 from doe.pareto.surrogate_loss import DRAWS, noisy_hypervolume
 from doe.report.steps.confirmation import point_record
@@ -13,6 +13,7 @@ from doe.study.adaptive import Adaptive, levels_at
 from doe.study.compared import Compared
 from doe.study.goals import region_of
 from doe.study_file import Study
+from rbdyn.records.record import finite
 
 
 def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
@@ -39,7 +40,7 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
                 "runs": each.runs,
                 "hypervolume": each.reached,
                 "deviation": each.deviation,
-                "gained": or_none(each.gained),
+                "gained": finite(each.gained),
                 "left": each.left,
                 "why": each.why,
             }

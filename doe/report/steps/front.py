@@ -16,6 +16,7 @@ from doe.study.goals import beyond_runs, goals_of
 from doe.study.predicted import PredictedGain, predicted_gains, statement
 from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
+from rbdyn.records.record import finite
 
 
 def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
@@ -207,7 +208,7 @@ def tolerance_aware_record(study: Study, surfaces: list[Surface], found: Toleran
         "plain_pick_robust": robust(found.plain_pick_costs),
         "plain_pick_inside": found.plain_inside,
         "nominal_loss_percent": found.nominal_loss_percent,
-        "robust_gain_percent": found.robust_gain_percent if np.isfinite(found.robust_gain_percent) else None,
+        "robust_gain_percent": finite(found.robust_gain_percent),
         "pick_gains_percent": {gain.response: gain.percent for gain in gains},
         "survival": {
             "plain_pick": found.plain_survives,
