@@ -53,9 +53,10 @@ def compare(
 
     Returns ``polynomial`` and ``gaussian_process``, each with ``loo_rmse`` and ``loo_r2`` (None where the points all
     have one mean), the latter also with its hyperparameters: ``length_scales`` in coded units by letter, ``deviation`` of the
-    random function and ``noise`` of a run (None where it was given), ``log_likelihood``, restricted; ``difference`` of the squared misses, polynomial less process: ``mean``, ``standard_error``
-    and 95 % ``interval`` by Student's t over the points, which takes them as independent; ``points`` compared;
-    ``folds``: how often some were left out; ``recommended``: "gaussian_process" only where the interval lies above zero, else "polynomial"; ``sentence``.
+    random function and ``noise`` of a run (None where it was given), ``log_likelihood``, restricted; ``difference`` of the
+    squared misses, polynomial less process: ``mean``, ``standard_error`` and 95 % ``interval`` by Student's t over the points,
+    which takes them as independent; ``points`` compared; ``folds``: how often some were left out; ``recommended``:
+    "gaussian_process" only where the interval lies above zero, else "polynomial"; ``sentence``.
 
     Raises ValueError when fewer than three points can be left out.
 

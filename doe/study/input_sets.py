@@ -50,7 +50,8 @@ class Sets:
 
 @dataclass(frozen=True)
 class Case:
-    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, by key what stands in the rows of a posterior ``sample``, and what is to be doubted of that, in a sentence."""
+    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, by key what stands in the
+    rows of a posterior ``sample``, and what is to be doubted of that, in a sentence."""
 
     source: str
     data: dict[str, Any]
