@@ -5,6 +5,7 @@ from typing import Any
 
 from doe.report.words import of_hundred
 from doe.study.robust import Robust
+from doe.study.robust_front import RobustFront
 from doe.unknown.decision import Better
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.words import quantity, shown
@@ -26,7 +27,7 @@ def robust_record(robust: Robust, factors: Sequence[str]) -> dict[str, Any]:
         ],
         "pair": None if robust.pair is None else {"keys": list(robust.pair[:2]), "worth": robust.pair[2]},
         "halved": _halved(robust),
-        "front": None if robust.front is None else _front(robust, factors),
+        "front": None if robust.front is None else _front(robust.front, robust.responses, factors),
         "foretold": dict(zip(robust.responses, robust.foretold, strict=True)),
         "inputs": [
             {"key": each.key, "law": each.law.model_dump(exclude_none=True), "reason": each.reason}
@@ -45,10 +46,7 @@ def _better(responses: Sequence[str], better: Better) -> dict[str, Any]:
     return {"better": each, "all": list(better.all)}
 
 
-def _front(robust: Robust, factors: Sequence[str]) -> dict[str, Any]:
-    front, names = robust.front, robust.responses
-    assert front is not None
-
+def _front(front: RobustFront, names: Sequence[str], factors: Sequence[str]) -> dict[str, Any]:
     def named(keys: Sequence[str], values: Any) -> dict[str, float]:
         return dict(zip(keys, map(float, values), strict=True))
 
