@@ -133,16 +133,9 @@ def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
 def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], first: int) -> list[Scene]:
     """A scene a run of an adaptive search (n, k), numbered from ``first``: a design run with replicates and a seed of its own."""
     data, adaptive = read_scene(study), study.file.adaptive
-    return [
-        scene_at(
-            study,
-            data,
-            point,
-            adaptive.seed + ADAPTIVE_SEEDS + number,
-            [*study.scene.set, f"numerics.replicates={count}", "numerics.companion=false", *adaptive.set],
-        )
-        for number, (point, count) in enumerate(zip(points, replicates, strict=True), first)
-    ]
+    overrides = [[*study.scene.set, f"numerics.replicates={count}", "numerics.companion=false"] for count in replicates]
+    runs = enumerate(zip(points, overrides, strict=True), adaptive.seed + ADAPTIVE_SEEDS + first)
+    return [scene_at(study, data, point, seed, [*keys, *adaptive.set]) for seed, (point, keys) in runs]
 
 
 def check_direct(study: Study) -> None:
@@ -298,11 +291,6 @@ def attempt_text(text: str, version: str) -> Ran:
     return replace(attempt(Scene.from_dict(json.loads(text))), host=host, pid=pid)
 
 
-def responses(study: Study, results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
-    """`figures` of the study's responses."""
-    return figures(study.responses, results)
-
-
 def figures(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
     """Values, 95 % statistical half-widths (NaN where there is none), and about how many independent values are behind
     each, each of shape (runs, responses)."""
@@ -319,9 +307,8 @@ def histories(study: Study, points: dict[str, Array], turns: float) -> "dict[str
     """Motion of the confirmation scene at each point, over at most ``turns`` shaft turns. Raises RunError."""
     from rbdyn.dynamics.motion.history import history
 
-    scenes = {
-        name: confirmation_scene(study.at(()) if name == "baseline" else study, at) for name, at in points.items()
-    }
+    original = study.at(())
+    scenes = {name: confirmation_scene(original if name == "baseline" else study, at) for name, at in points.items()}
     return {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
 
 

@@ -10,7 +10,7 @@ from doe.commands.options import Save
 from doe.commands.steps import save
 from rbdyn.cli.options import Json, flag
 from rbdyn.cli.terminal import BAD_INPUT, guarded, hand_over
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, refuse
 
 
 def chain(
@@ -34,8 +34,7 @@ def chain(
                 results[name] = solve(each, source=f'{path}: chain "{name}"' if several else str(path))
             except InputError as error:
                 faults += error.faults
-        if faults:
-            raise InputError(faults)
+        refuse(faults)
         record = chains_record(results) if several else next(iter(results.values())).as_dict()
         save(out, path, "chain.json", record)
 

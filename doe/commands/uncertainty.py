@@ -9,6 +9,8 @@ from doe.commands.options import Quiet, Retry, Scheduler
 from doe.commands.steps import keeping_runs, simulations_in
 from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
 from rbdyn.cli.terminal import guarded, hand_over, output_folder
+from rbdyn.faults import refuse
+from rbdyn.fields import no_power_of_two
 
 
 def uncertainty(
@@ -31,10 +33,10 @@ def uncertainty(
     folder = out or Path(f"{path.stem}_uncertainty")
     with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.uncertainty import print_uncertainty, record_of, write
-        from doe.study.uncertainty import check_points, find_uncertainty
+        from doe.study.uncertainty import find_uncertainty
         from rbdyn.dynamics.target import target_of
 
-        check_points(points)
+        refuse([] if points is None else no_power_of_two("--points ", points))
         accuracy = target_of(target)
         output_folder(folder, "doe", path)
         with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json) as simulations:

@@ -19,9 +19,8 @@ Criterion = Literal["d", "i"]
 FEWEST, MOST = 4, 40  # random designs that exchanges start from; the best is kept
 WORK = 30_000  # coordinates times terms, of all these designs together, beyond which they are fewer
 MOST_RUNS = 500  # exchanges among more take minutes
-PARTS = (
-    20  # of the half width of the box, on which coordinates lie: finer ones gain next to nothing and part replicates
-)
+# Of the half width of the box, on which coordinates lie: finer ones gain next to nothing and part replicates.
+PARTS = 20
 GRID = np.linspace(-1.0, 1.0, 9)  # of the first exchanges; then coordinates move by so many parts:
 MOVES = (2, 1)
 SWEEPS = 20  # through all coordinates, at most, with one step
@@ -67,9 +66,8 @@ def optimal(
         mend = f"give at least {needed + 1 - len(fixed)}"
         raise ValueError(f"runs = {runs}: {beside}too few for a model of {len(terms)} terms; {mend}")
     if runs > MOST_RUNS:
-        raise ValueError(
-            f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; give fewer, or kind = 'sobol'"
-        )
+        mend = "give fewer, or kind = 'sobol'"
+        raise ValueError(f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; {mend}")
     reach = max(1.0, float(np.abs(old).max(initial=0.0)))
     blocks = np.concatenate([groups, np.full(centre_replicates + runs, new)])
     contrasts = block_contrasts(blocks)

@@ -54,15 +54,14 @@ class Neighbourhood:
 class DirectAware:
     """Robust costs (n, q) of the points of a direct front, and how much of their parts break each limit (n, c).
 
-    ``baseline_costs`` (q,) are the nominal ones of the baseline, ``robust_baseline`` (q,) what tolerances leave of them;
-    ``survives`` (n,) is the share of the parts made at a point that still dominate the nominal baseline. All None without a
+    ``robust_baseline`` (q,) is what tolerances leave of the nominal ones of the baseline;
+    ``survives`` (n,) is the share of the parts made at a point that still dominate the nominal baseline. Both None without a
     baseline that ran.
     """
 
     box: ToleranceBox
     costs: Array
     violations: Array
-    baseline_costs: Array | None
     robust_baseline: Array | None
     survives: Array | None
 
@@ -75,14 +74,13 @@ def direct_aware(
     offsets = _offsets(box)
     judged = box.judge_parts(here.parts(offsets), goals, below, above)
     if baseline is None:
-        return DirectAware(box, judged.costs, judged.violations, None, None, None)
+        return DirectAware(box, judged.costs, judged.violations, None, None)
     nominal = goals.costs(baseline.values)[0]
     made = box.half * even_offsets(SURVIVAL_PARTS, box.half.size, box.distribution)
     return DirectAware(
         box=box,
         costs=judged.costs,
         violations=judged.violations,
-        baseline_costs=nominal,
         robust_baseline=box.judge_parts(baseline.parts(offsets), goals).costs[0],
         survives=np.mean(dominates(goals.costs(here.parts(made)), nominal), axis=1),
     )

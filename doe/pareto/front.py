@@ -26,8 +26,8 @@ class ParetoFront:
     ``costs`` (f, q) what their goals make of them. ``ideal`` and ``nadir`` (q,) are the best and worst of each cost on
     the front; ``knee``, ``pick`` and ``picks`` (the pick of every rule) are row numbers. ``archive_size`` counts the
     front before thinning and ``hypervolume`` is of that front; ``hypervolume_history`` (generations,) is on the same
-    scale. ``baseline_values`` (m,) and ``baseline_costs`` (q,) are None without a baseline. ``feasible`` is the share
-    of the evaluated points that keep all limits. ``standard_errors`` (f, m), ``uncertainty`` and ``tolerance_aware``
+    scale. ``baseline_values`` (m,) are None without a baseline. ``feasible`` is the share
+    of the evaluated points that keep all limits. ``uncertainty`` and ``tolerance_aware``
     are None where they were not asked for.
     """
 
@@ -43,14 +43,12 @@ class ParetoFront:
     picks: dict[Rule, int]
     pick_reason: str
     baseline_values: Array | None
-    baseline_costs: Array | None
     archive_size: int
     evaluations: int
     feasible: float
     generations: int
     seed: int
     goals: Goals
-    standard_errors: Array | None = None
     uncertainty: FrontUncertainty | None = None
     tolerance_aware: ToleranceAware | None = None
 
@@ -67,7 +65,6 @@ def front(
     baseline: ArrayLike | None = None,
     keep: int = 200,
     pick: Rule = "knee",
-    standard_errors: Objectives | None = None,
     doubt: Doubt | None = None,
 ) -> ParetoFront:
     """Find the Pareto front of responses over a box; the same seed gives the same bits.
@@ -80,7 +77,6 @@ def front(
     keep : about how many points to return. A larger front is thinned to evenly spread points, among them
         the best and worst of each cost, the knee and the picks.
     pick : rule that makes the pick.
-    standard_errors : maps points (n, k) to the standard errors (n, m) of their responses.
     doubt : maps points (n, k) to how far below and above (n, m) their responses may be; limits hold all over it.
 
     Raises ValueError when the bounds are not a box, a setting is out of range, or an objective is not finite;
@@ -112,14 +108,12 @@ def front(
         picks=picks,
         pick_reason=f"{NAMES[pick]} {among}",
         baseline_values=baseline_values,
-        baseline_costs=baseline_costs,
         archive_size=len(costs),
         evaluations=searched.evaluations,
         feasible=searched.feasible,
         generations=generations,
         seed=seed,
         goals=goals,
-        standard_errors=None if standard_errors is None else standard_errors(points[rows]),
     )
 
 

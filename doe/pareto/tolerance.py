@@ -65,7 +65,6 @@ def widest_tolerances(
     samples: int = 4096,
     seed: int = 1,
     aim: Aim = "ratios",
-    weights: ArrayLike | None = None,
 ) -> WidestTolerances:
     """Find the widest tolerances with which a part keeps all limits with a given probability.
 
@@ -79,8 +78,8 @@ def widest_tolerances(
     probability : share of the parts that must keep all limits.
     distribution : of the parts within the tolerance, see `doe.pareto.manufacture.offsets`.
     samples, seed : parts drawn; the same for every width (common random numbers).
-    aim : "ratios" keeps them; "product" maximises the product of the half widths to the power of ``weights``, "sum"
-        their sum times ``weights`` (one over the ratios unless given), each within a twentieth to twenty times the given ratios.
+    aim : "ratios" keeps them; "product" maximises the product of the half widths, "sum" their sum in units of the ratios, each
+        within a twentieth to twenty times the given ratios.
 
     The widest is looked for from the pick outwards up to the first loss, so all narrower tolerances keep the limits
     too. Where even the exact pick breaks a limit, all widths are zero.
@@ -101,8 +100,7 @@ def widest_tolerances(
         worst = parts.most_broken(exact)
         return parts.nothing(worst, f"even the exact pick keeps {worst} with a probability below {parts.percent}")
     if aim != "ratios":
-        usual = np.ones(centre.size) if aim == "product" else 1.0 / share
-        share = _best_ratios(parts, share, aim, usual if weights is None else np.asarray(weights, float))
+        share = _best_ratios(parts, share, aim)
     return _result(parts, parts.widest(share), share)
 
 
@@ -159,12 +157,11 @@ class _Parts:
         """No tolerance, because of a limit."""
         zero, share = np.zeros_like(self.centre), self.kept(np.zeros_like(self.centre))
         sentence = f"No tolerance at all: {cause}; ask for less of the gain, or for less certainty."
-        return WidestTolerances(
-            zero, share, error_of_share(share, len(self.offsets)), limit, zero.astype(bool), sentence
-        )
+        error = error_of_share(share, len(self.offsets))
+        return WidestTolerances(zero, share, error, limit, zero.astype(bool), sentence)
 
 
-def _best_ratios(parts: _Parts, share: Array, aim: Aim, weight: Array) -> Array:
+def _best_ratios(parts: _Parts, share: Array, aim: Aim) -> Array:
     """Ratios whose widest tolerances have the largest product or sum."""
     reach = np.log(20.0)
     free = np.flatnonzero(parts.room > 0.0)
@@ -177,8 +174,7 @@ def _best_ratios(parts: _Parts, share: Array, aim: Aim, weight: Array) -> Array:
     def worth(logarithms: Array) -> float:
         trial = ratios(logarithms)
         half = parts.half(trial, parts.widest(trial, march=4))[free]
-        value = weight[free] @ np.log(half.clip(1e-300)) if aim == "product" else weight[free] @ half
-        return -float(value)
+        return -float(np.log(half.clip(1e-300)).sum() if aim == "product" else (1.0 / share[free]) @ half)
 
     start, bounds = np.zeros(free.size), [(-reach, reach)] * free.size
     simplex = np.vstack([start, 0.7 * np.eye(free.size)])

@@ -24,13 +24,11 @@ SELECTIONS = 300  # draws on which the rule picks anew; its own error then hides
 class FrontUncertainty:
     """How sure a front is.
 
-    ``half_widths`` (f, m): 95 % half widths of the mean responses of each front point. ``non_dominated`` (f,):
-    probability that a front point is dominated by none of the others. ``pick_dominates``: probability that the
+    ``non_dominated`` (f,): probability that a front point is dominated by none of the others. ``pick_dominates``: probability that the
     pick dominates the baseline. Probabilities carry their Monte Carlo standard errors. ``optimism`` (q,): by how much
     the rule promises too large a gain of each cost, because it picks what the errors flatter.
     """
 
-    half_widths: Array
     non_dominated: Array
     pick_dominates: float
     pick_dominates_error: float
@@ -48,8 +46,7 @@ def draw_coefficients(
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(values.clip(0.0))
     normal = random.standard_normal((draws, coefficients.size)) @ root.T
-    chi_square = random.chisquare(dof, (draws, 1)) if dof > 0 else np.full((draws, 1), 1.0)
-    return coefficients + normal / np.sqrt(chi_square / max(dof, 1))
+    return coefficients + normal / np.sqrt(random.chisquare(dof, (draws, 1)) / dof)
 
 
 def share(hits: Mask) -> tuple[Array, Array]:
@@ -74,12 +71,11 @@ def non_dominated_share(costs: Array) -> Array:
 
 
 def front_uncertainty(
-    drawn: Array, widths: Array, goals: Goals, values: Array, pick: int, rule: Rule, baseline: Array, original: Array
+    drawn: Array, goals: Goals, values: Array, pick: int, rule: Rule, baseline: Array, original: Array
 ) -> FrontUncertainty:
     """How sure a front is, from drawn responses.
 
     drawn : responses (d, f, m) of the front's points on each drawn set of surfaces.
-    widths : 95 % half widths (f, m) of the mean responses.
     goals : what is wanted of the responses.
     values : responses (f, m) on the fitted surfaces.
     pick, rule : row of the pick and the rule that made it.
@@ -90,7 +86,7 @@ def front_uncertainty(
     real = goals.costs(original) - goals.costs(values)
     optimism = selection_optimism(costs[:SELECTIONS], base[:SELECTIONS], real, goals, rule)
     sure = float(wins), float(error)
-    return FrontUncertainty(widths, non_dominated_share(costs), *sure, optimism, len(drawn))
+    return FrontUncertainty(non_dominated_share(costs), *sure, optimism, len(drawn))
 
 
 def selection_optimism(costs: Array, baseline: Array, real: Array, goals: Goals, rule: Rule) -> Array:

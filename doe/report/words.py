@@ -1,7 +1,7 @@
 """How gains, tolerances and probabilities are written for people; names and numbers by ``rbdyn.records.words``."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rbdyn.records.words import improvement
@@ -20,6 +20,12 @@ def rounded_down(width: float) -> str:
         return "0"
     digit = math.floor(math.log10(width)) - 1
     return f"{math.floor(width / 10.0**digit * (1.0 + 1e-12)) * 10.0**digit:.{max(-digit, 0)}f}"
+
+
+def of_hundred(share: Sequence[float]) -> str:
+    """'87 (80 to 92)' of a share with the ends of its interval: in how many of 100 cases."""
+    value, low, high = (100.0 * each for each in share)
+    return f"{value:.0f} ({low:.0f} to {high:.0f})"
 
 
 def half_width(record: Mapping[str, Any]) -> float | None:

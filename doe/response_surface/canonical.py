@@ -16,6 +16,7 @@ from doe.designs.model import Terms, model_matrix, second_order
 from doe.response_surface.data import Data
 
 FLAT = 1e-10  # curvature as a share of the largest coefficient below which it is rounding
+Nature = Literal["minimum", "maximum", "saddle"]
 SURE = 0.95  # probability of the intervals of the eigenvalues
 
 
@@ -25,7 +26,7 @@ class StationaryPoint(TypedDict):
     coded: list[float]
     actual: list[float]
     eigenvalues: list[float]
-    nature: Literal["minimum", "maximum", "saddle"]
+    nature: Nature
 
 
 class Canonical(TypedDict):
@@ -60,19 +61,20 @@ def canonical(
     errors = _errors(terms, vectors, covariance, dof) if covariance.any() else None
     flat = np.abs(eigenvalues) <= FLAT * np.abs(coefficients).max()
     unsure = flat if errors is None else flat | (np.abs(eigenvalues) <= errors)
-    nature, stationary, inside, distance = _nature(eigenvalues), None, None, None
+    sign: Nature = "minimum" if eigenvalues.min() > 0 else "maximum" if eigenvalues.max() < 0 else "saddle"
+    stationary, inside, distance = None, None, None
     if not flat.any():
         place = np.linalg.solve(-2 * matrix, gradient).astype(float)
         inside, distance = _inside(place, data.points), float(np.linalg.norm(place))
         actual = to_actual(place, data.centre, data.step).tolist()
         coded, values = place.tolist(), np.linalg.eigvalsh(matrix).tolist()
-        stationary = StationaryPoint(coded=coded, actual=actual, eigenvalues=values, nature=nature)
+        stationary = StationaryPoint(coded=coded, actual=actual, eigenvalues=values, nature=sign)
     ridge = "stationary ridge" if inside else "rising ridge"
     return stationary, Canonical(
         eigenvalues=eigenvalues.tolist(),
         eigenvalue_errors=None if errors is None else errors.tolist(),
         eigenvectors=vectors.T.tolist(),
-        nature=ridge if unsure.any() else nature,
+        nature=ridge if unsure.any() else sign,
         inside=inside,
         distance=distance,
     )
@@ -94,10 +96,6 @@ def describe_canonical(analysis: Canonical, place: StationaryPoint | None) -> st
     flat = f"hardly bends along {' '.join(f'{x:+.2f} {letter}' for letter, x in lettered)}"
     why = f"an eigenvalue of {values} is within its error of zero"
     return f"{head}a {analysis['nature']}: {why}, so the response {flat} and the place along it is not determined."
-
-
-def _nature(eigenvalues: Array) -> Literal["minimum", "maximum", "saddle"]:
-    return "minimum" if eigenvalues.min() > 0 else "maximum" if eigenvalues.max() < 0 else "saddle"
 
 
 def _errors(terms: Terms, vectors: Array, covariance: Array, dof: int) -> Array:

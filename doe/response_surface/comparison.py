@@ -1,10 +1,11 @@
-"""A polynomial surface against a Gaussian process: which one foretells points that it has not seen."""
+"""A polynomial surface against a Gaussian process, which bends wherever the runs say so: which one foretells points that it
+has not seen."""
 
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import partial
-from typing import Any, Protocol
+from string import ascii_uppercase
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +13,9 @@ from scipy import stats
 
 from doe.arrays import Array, Rows, Whole
 from doe.designs.design import replicate_groups
-from doe.response_surface.gaussian_process import THREADS, fit_gaussian
+from doe.emulator import Emulator, fit_emulator
+from doe.emulator.emulator import THREADS
+from doe.response_surface.surface import Surface
 
 # More points than these are left out in groups.
 MOST_SINGLY, FOLDS = 60, 20
@@ -20,27 +23,18 @@ MOST_SINGLY, FOLDS = 60, 20
 INDISPENSABLE = 0.95
 
 
-class Predictor(Protocol):
-    """Anything that foretells the response."""
-
-    def predict(self, coded: ArrayLike) -> Array:
-        """Mean response at coded points (..., k), shape (...)."""
-        ...
-
-
-# Made of the runs of some rows; ValueError where they do not suffice.
-Refit = Callable[[Rows], Predictor]
+# What a rival made of the runs of some rows foretells (n,) at coded points (n, k).
+Rival = Callable[[Rows, Array], Array]
 
 
 def compare(
     coded: ArrayLike,
     values: ArrayLike,
-    refit: Refit,
+    refit: Callable[[Rows], Surface],
     *,
     name: str,
     matrix: ArrayLike | None = None,
     standard_errors: ArrayLike | None = None,
-    seed: int = 1,
 ) -> dict[str, Any]:
     """Leave out each point in turn with all its replicates, refit both, and compare what they miss there.
 
@@ -52,15 +46,17 @@ def compare(
 
     coded, values : runs in coded units (n, k) and their response (n,).
     refit : the polynomial fitted to the runs of the given rows; it raises ValueError where they do not suffice.
-    name : of the response, for the sentence. seed : of the search for hyperparameters.
+    name : of the response, for the sentence.
     matrix : model matrix of the polynomial (n, p), to find the points that it cannot do without (leverage of all
         replicates together above 0.95); without it only those whose absence makes ``refit`` fail.
     standard_errors : known standard error of each value (n,), for the process; else it estimates one.
 
     Returns ``polynomial`` and ``gaussian_process``, each with ``loo_rmse`` and ``loo_r2`` (None where the points all
-    have one mean); ``difference`` of the squared misses, polynomial less process: ``mean``, ``standard_error``
-    and 95 % ``interval`` by Student's t over the points, which takes them as independent; ``points`` compared;
-    ``folds``: how often some were left out; ``recommended``: "gaussian_process" only where the interval lies above zero, else "polynomial"; ``sentence``.
+    have one mean), the latter also with its hyperparameters: ``length_scales`` in coded units by letter, ``deviation`` of the
+    random function and ``noise`` of a run (None where it was given), ``log_likelihood``, restricted; ``difference`` of the
+    squared misses, polynomial less process: ``mean``, ``standard_error`` and 95 % ``interval`` by Student's t over the points,
+    which takes them as independent; ``points`` compared; ``folds``: how often some were left out; ``recommended``:
+    "gaussian_process" only where the interval lies above zero, else "polynomial"; ``sentence``.
 
     Raises ValueError when fewer than three points can be left out.
 
@@ -68,28 +64,32 @@ def compare(
     unbiased variance of a cross-validation (Bengio and Grandvalet, J. Mach. Learn. Res. 5 (2004)).
     """
     points, response = np.asarray(coded, float), np.asarray(values, float)
-    errors = None if standard_errors is None else np.asarray(standard_errors, float)
-    whole = fit_gaussian(points, response, name=name, standard_errors=errors, seed=seed)
+    variances = np.zeros(len(response)) if standard_errors is None else np.asarray(standard_errors, float) ** 2
+    whole = fit_emulator(points, response, variances, trend="constant")
     group = replicate_groups(points)
     basis = np.zeros((len(points), 1)) if matrix is None else np.linalg.qr(np.asarray(matrix, float))[0]
     firsts = np.unique(group)
     singly = len(firsts) <= MOST_SINGLY
-    order = firsts if singly else np.random.default_rng(seed).permutation(firsts)
+    order = firsts if singly else np.random.default_rng(1).permutation(firsts)
     folds = np.array_split(order, len(firsts) if singly else FOLDS)
-    gaussian = partial(fit_gaussian, name=name, seed=seed, start=whole, search=singly)
 
-    def process(rows: Rows) -> Predictor:
-        return gaussian(points[rows], response[rows], standard_errors=None if errors is None else errors[rows])
+    def process(rows: Rows, at: Array) -> Array:
+        runs = points[rows], response[rows], variances[rows]
+        return fit_emulator(*runs, trend="constant", start=whole.hyperparameters, search=singly).mean(at)
+
+    def polynomial(rows: Rows, at: Array) -> Array:
+        return refit(rows).predict(at)
 
     spared = [[first for first in fold if (basis[group == first] ** 2).sum() <= INDISPENSABLE] for fold in folds]
-    truths, foretold = _left_out(name, points, response, group, [each for each in spared if each], (refit, process))
+    kept = [fold for fold in spared if fold]
+    truths, foretold = _left_out(name, points, response, group, kept, (polynomial, process))
     squares = (truths[:, None] - foretold) ** 2
     compared = f"{len(truths)} of {len(firsts)} points{'' if singly else f' (in {len(folds)} groups)'}"
     difference = _difference(squares[:, 0] - squares[:, 1])
     scores = [_score(each, truths) for each in squares.T]
     return {
         "polynomial": scores[0],
-        "gaussian_process": {**scores[1], **whole.as_dict()},
+        "gaussian_process": {**scores[1], **_hyperparameters(whole, scatter=standard_errors is None)},
         "difference": difference,
         "points": len(truths),
         "folds": len(folds),
@@ -98,8 +98,19 @@ def compare(
     }
 
 
+def _hyperparameters(process: Emulator, scatter: bool) -> dict[str, Any]:
+    given = process.hyperparameters
+    return {
+        "kernel": "Matern 5/2",
+        "length_scales": dict(zip(ascii_uppercase, given.lengths.tolist(), strict=False)),
+        "deviation": math.sqrt(given.variance),
+        "noise": math.sqrt(given.nugget) if scatter else None,
+        "log_likelihood": process.restricted_likelihood,
+    }
+
+
 def _left_out(
-    name: str, points: Array, response: Array, group: Whole, folds: Sequence[Sequence[int]], rivals: tuple[Refit, ...]
+    name: str, points: Array, response: Array, group: Whole, folds: Sequence[Sequence[int]], rivals: tuple[Rival, ...]
 ) -> tuple[Array, Array]:
     """Mean responses (c,) of points left out a fold at a time, and what rivals fitted without them foretell (c, rivals).
 
@@ -109,7 +120,7 @@ def _left_out(
     for fold in folds:
         rows = np.flatnonzero(~np.isin(group, fold))
         with THREADS.limit(limits=1), suppress(ValueError):
-            foretold.append(np.column_stack([fit(rows).predict(points[fold]) for fit in rivals]))
+            foretold.append(np.column_stack([rival(rows, points[fold]) for rival in rivals]))
             truths.append(np.array([response[group == first].mean() for first in fold]))
     if (count := sum(map(len, truths))) < 3:
         few = f"only {count} points can be left out of the polynomial, too few to compare"

@@ -58,7 +58,10 @@ def checked(
     without: Collection[int] = (),
 ) -> Data:
     """Runs as arrays. Raises ValueError when shapes differ, a number is not finite, or all values are equal."""
-    points, response = points_and_values(name, coded, values)
+    points, response = np.asarray(coded, float), np.asarray(values, float)
+    if points.ndim != 2 or response.shape != (len(points),):
+        shapes = f"points of shape {points.shape} and values of shape {response.shape}"
+        raise ValueError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
     if not np.isfinite(points).all():
         raise ValueError(f"{name}: a coded factor is not a finite number; mend or leave out that run")
     bad = np.flatnonzero(~np.isfinite(response))
@@ -77,15 +80,6 @@ def checked(
         step=np.array(np.broadcast_to(step, points.shape[1]), float),
         without=without,
     )
-
-
-def points_and_values(name: str, coded: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
-    """Points (n, k) and values (n,) as arrays. Raises ValueError when their shapes do not match."""
-    points, response = np.asarray(coded, float), np.asarray(values, float)
-    if points.ndim != 2 or response.shape != (len(points),):
-        shapes = f"points of shape {points.shape} and values of shape {response.shape}"
-        raise ValueError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
-    return points, response
 
 
 def check_errors(name: str, standard_errors: ArrayLike | None) -> None:

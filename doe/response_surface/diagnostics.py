@@ -11,6 +11,7 @@ from scipy import stats
 
 from doe.arrays import Array
 from doe.response_surface.least_squares import LeastSquares
+from rbdyn.records.record import finite
 
 EXACT = 1e-12  # 1 - leverage below which a run is met exactly, whatever its value
 INFLUENTIAL = 1.0  # Cook's distance above which leaving a run out moves the surface beyond its own error
@@ -62,7 +63,7 @@ def diagnose(solution: LeastSquares, response: Array) -> Diagnostics:
     cook = standardized**2 * solution.leverage / safe / len(solution.coefficients)
     predicted, runs = response - solution.residuals, range(1, len(response) + 1)
     figures = response, predicted, solution.residuals, standardized, studentized, solution.leverage, cook
-    rows = zip(runs, *map(_or_none, figures), strict=True)
+    rows = zip(runs, *([finite(value) for value in each.tolist()] for each in figures), strict=True)
     high = solution.leverage > HIGH_LEVERAGE * len(solution.coefficients) / len(response)
     return Diagnostics(
         runs=[cast(RunDiagnostics, dict(zip(RunDiagnostics.__annotations__, row, strict=True))) for row in rows],
@@ -140,7 +141,3 @@ def p_text(p: float) -> str:
 
 def _list(runs: list[int]) -> str:
     return f"run{'s' if len(runs) > 1 else ''} {', '.join(map(str, runs))}"
-
-
-def _or_none(values: Array) -> list[float | None]:
-    return [value if np.isfinite(value) else None for value in values.tolist()]

@@ -14,14 +14,12 @@ import numpy as np
 from scipy import special
 
 from doe.arrays import Array
+from doe.pareto.nsga2 import Doubt
 from doe.response_surface import Surface
 from doe.response_surface.model_error import correlation
 from doe.study.confirmation import Confirmed
 from doe.study.goals import goals_of
 from doe.study_file import Study
-
-# How far below and above what is foretold (n, m) the responses at coded points (n, k) may be.
-Doubt = Callable[[Array], tuple[Array, Array]]
 
 SCALES = np.geomspace(1.0, 100.0, 81)  # of the standard errors, tried against the misses
 MOST_RUNS = 300  # design runs whose misses count; of more, evenly spread ones
@@ -78,7 +76,7 @@ def surfaces_doubt(
             missed = missed.and_at(at, misses, errors, surface.prediction_standard_error(at))
             more[index] = float(errors.max())
         fields[index] = Conditioned(missed)
-        quantiles[index] = float(special.stdtrit(max(surface.interval_dof, 1), probability))
+        quantiles[index] = float(special.stdtrit(surface.interval_dof, probability))
 
     def at_share(share: float) -> Doubt:
         def doubt(coded: Array) -> tuple[Array, Array]:

@@ -68,10 +68,8 @@ class Calibration:
         """Why inputs may not be called calibrated."""
         cells = [self.cells[place] for place in self.found.refuted]
         told = ", ".join(f"{quantity(name)[0]} of row {row}" for row, name in cells)
-        refuted = (
-            f"refuted: no input set within the laws gives what was measured within the allowed discrepancy: {told}"
-        )
-        return [*([refuted] if cells else []), *self.objections]
+        refuted = "refuted: no input set within the laws gives what was measured within the allowed discrepancy"
+        return [*([f"{refuted}: {told}"] if cells else []), *self.objections]
 
     @property
     def quantiles(self) -> Array:
@@ -139,9 +137,8 @@ class _Rows:
         outputs, variances, freedom = scattered(self.outputs, results)
         if not (outputs > 0.0).all():
             name = self.outputs[int(np.argmin(outputs.min(axis=0)))]
-            raise RunError(
-                f"{name}: is nothing in a simulation, so no share of it can be compared; leave its column out"
-            )
+            why = "is nothing in a simulation, so no share of it can be compared"
+            raise RunError(f"{name}: {why}; leave its column out")
         conditions, names = np.array(self.cells).T
         shape = (-1, len(self.cases), len(self.outputs))
         return (
@@ -161,10 +158,9 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
     at = [(conditions.index(row.keys), rig.outputs.index(name)) for row, name in places]
     rows = _Rows(cases, inputs, rig.outputs, at, simulations)
     nominal, variances, turns, numerical = _nominal(rows)
-    measured = _measured(case, rig, variances, turns, numerical)
-    found = matched(
-        rows.simulate, measured, _unknowns(case, inputs), case.scene.calibrate.seed, case.scene.calibrate.waves
-    )
+    measured = _measured(rows, rig, variances, turns, numerical)
+    asked = case.scene.calibrate
+    found = matched(rows.simulate, measured, _unknowns(case, inputs), asked.seed, asked.waves)
     cells = [(row.number, name) for row, name in places]
     before = found.cells.mean(found.unknowns.at(np.random.default_rng(0).standard_normal((BEFORE, len(inputs)))))
     whole = Calibration(
@@ -176,8 +172,7 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
 def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
     """Cells as the scene says, in logarithms, variances of one run of each, its counted turns, variances by integration."""
     scenes = [
-        Scene.from_dict(case.data, case.source, [*case.overrides, *case.uncertain.set, "numerics.companion=true"])
-        for case in rows.cases
+        Scene.from_dict(case.data, case.source, [*case.uncertain.set, "numerics.companion=true"]) for case in rows.cases
     ]
     labels = [f"as the scene says, condition {place + 1}" for place in range(len(scenes))]
     ran = rows.run(scenes, labels, "as the scene says")
@@ -194,20 +189,20 @@ def _nominal(rows: _Rows) -> tuple[Array, Array, Array, Array]:
     return values[0], variances[0], turns[[condition for condition, _ in rows.cells]], np.array(numerical) ** 2
 
 
-def _measured(case: Case, rig: Rig, variances: Array, turns: Array, numerical: Array) -> Measured:
-    scales = case.scene.calibrate.discrepancy
+def _measured(rows: _Rows, rig: Rig, variances: Array, turns: Array, numerical: Array) -> Measured:
+    scales = rows.cases[0].scene.calibrate.discrepancy
     cells = [(row, name) for row in rig.rows for name in row.values]
     found = []
     for place, (row, name) in enumerate(cells):
         sd = row.sds[name]
         # A run as long as the measurement scatters as that does.
         found.append((sd / row.values[name]) ** 2 if sd else variances[place] * turns[place] / (row.turns or 1.0))
-    conditions = rig.conditions
+    conditions, outputs = np.array(rows.cells).T
     return Measured(
         np.log([row.values[name] for row, name in cells]),
         np.array(found) + numerical,
-        np.array([rig.outputs.index(name) for _, name in cells]),
-        np.array([conditions.index(row.keys) for row, _ in cells]),
+        outputs,
+        conditions,
         np.array([0.0 if scales == "none" else scales.get(name, DISCREPANCY) for name in rig.outputs]),
         np.array([row.held for row, _ in cells]),
     )
@@ -249,21 +244,10 @@ def _judged(given: Calibration) -> Calibration:
     against = objections(result, taus, anything=taught.anything, foretells=found.misfit < 2.0)
     rows = np.linspace(0, len(points) - 1, SAMPLE).astype(int)
     after = found.cells.mean(quantiles[rows])
-    notes = [
-        *given.notes,
-        *(
-            f"{given.inputs[place].key}: the posterior crowds at an end of its range, which may be too narrow"
-            for place in taught.narrow
-        ),
-    ]
+    crowds = "the posterior crowds at an end of its range, which may be too narrow"
+    notes = *given.notes, *(f"{given.inputs[place].key}: {crowds}" for place in taught.narrow)
     whole = replace(
-        given,
-        after=after,
-        learnt=taught,
-        trial=result,
-        residuals=residuals,
-        objections=tuple(against),
-        notes=tuple(notes),
+        given, after=after, learnt=taught, trial=result, residuals=residuals, objections=tuple(against), notes=notes
     )
     return replace(whole, without=_without(whole))
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from doe import clearance
-from doe.study.input_sets import Case, case_of, impossible
+from doe.study.input_sets import Case, case_of, impossible, tables_of
 from doe.study.rig_file import Rig, read_rig
-from rbdyn.faults import InputError, read_toml, refuse, set_key
+from rbdyn.faults import InputError, refuse
 from rbdyn.records.kept import code_version, digest_of
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import Uncertain, documented
@@ -34,9 +34,8 @@ def question_of(question: Question) -> str:
     rows = [[row.keys, row.values, row.sds, row.turns, row.held] for row in rig.rows]
     scene = case.scene.model_dump(mode="json")
     version = code_version(clearance.SIMULATION, "doe.study.calibration")
-    return digest_of(
-        json.dumps([version, scene, declared, sought_of, rows, case.source, str(rig.path)], sort_keys=True)
-    )
+    told = [version, scene, declared, sought_of, rows, case.source, str(rig.path)]
+    return digest_of(json.dumps(told, sort_keys=True))
 
 
 def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequence[str]) -> Question:
@@ -45,9 +44,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     Raises InputError for all that is wrong with them, before anything runs.
     """
     rig = read_rig(data)
-    tables = copy.deepcopy(read_toml(path))
-    for override in overrides:
-        set_key(tables, override)
+    tables = tables_of(path, overrides)
     base = Scene.from_dict(tables, str(path))
     given = getattr(base, "uncertain", None) or Uncertain()
     refuse([f"{path}: uncertain.sample: is what a calibration gives; leave it out"] if given.sample else [])
@@ -66,9 +63,8 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         ]
     )
     asked = [key for key in free if key not in laid]
-    declared = given.model_copy(
-        update={"estimated": [*given.estimated, *asked], "defaults": "documented"} if free else {}
-    )
+    named = {"estimated": [*given.estimated, *asked], "defaults": "documented"}
+    declared = given.model_copy(update=named if free else {})
     case = case_of(str(path), tables, rig.outputs, declared, frozenset(rig.keys))
     sought = [each for each in case.every if each.law.kind == "unknown" and (not free or each.key in free)]
     varies = "varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the key that it multiplies"
@@ -78,16 +74,10 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
         for key in free
         if key not in {each.key for each in case.every}
     )
-    refuse(
-        [f'{path}: uncertain.sample = "{given.sample}": calibration starts from laws; leave it out']
-        if given.sample
-        else []
-    )
     refuse([] if sought else [f"{path}: uncertain: nothing is unknown that could be found; name keys with a law"])
     if case.scene.calibrate.discrepancy == "none":
-        notes.append(
-            "discrepancy = none: the simulation is taken as exact; where it is not, intervals are far too narrow"
-        )
+        exact = "discrepancy = none: the simulation is taken as exact"
+        notes.append(f"{exact}; where it is not, intervals are far too narrow")
     else:
         refuse(
             f"{path}: calibrate.discrepancy: {name} is not measured; known are {', '.join(rig.outputs)}"

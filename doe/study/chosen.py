@@ -55,7 +55,8 @@ def choose(
         confirmed, _ = confirm(study, {"pick": wanted["pick"]}, simulations)
         baseline = [confirmed["baseline"]]
         tried.append((confirmed["pick"], front, chosen))
-        if _kept(study, confirmed["pick"]) or len(tried) == study.file.confirmation.tries:
+        kept = verdict_of(limits_of(study, confirmed["pick"])) == "kept"
+        if kept or len(tried) == study.file.confirmation.tries:
             break
         if direct is None:
             try:
@@ -72,10 +73,6 @@ def choose(
     wanted["pick"] = Choice(pick.point, pick.reason)
     confirmed, failures = confirm(study, wanted, simulations)
     return Chosen(front, chosen, confirmed, failures, len(tried))
-
-
-def _kept(study: Study, pick: Confirmed) -> bool:
-    return verdict_of(limits_of(study, pick)) == "kept"
 
 
 def _badness(limits: Sequence[Limit]) -> tuple[int, float]:

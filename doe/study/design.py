@@ -149,10 +149,8 @@ def check_given(study: Study, folder: Path) -> None:
     """Raises InputError where the runs that are given stand in the table that the study writes into its folder."""
     name = study.file.design.augment
     if name is not None and study.beside(name).resolve() == (folder / RUNS_TABLE).resolve():
-        why = "the study writes its own runs there"
-        raise InputError(
-            [f"{study.path}: design.augment = {name!r}: {why}; copy it beside the study and name the copy"]
-        )
+        why = "the study writes its own runs there; copy it beside the study and name the copy"
+        raise InputError([f"{study.path}: design.augment = {name!r}: {why}"])
 
 
 def check_runs(study: Study, design: Design) -> None:
@@ -178,9 +176,8 @@ def check_runs(study: Study, design: Design) -> None:
         model, least = response.model, needed(response.model)
         where = f"{study.path}: response[{number}].model = {model!r}"
         if runs < least:
-            what = f"{least - design.blocks} terms" + (
-                f", {design.blocks - 1} block effects" if design.blocks > 1 else ""
-            )
+            effects = f", {design.blocks - 1} block effects" if design.blocks > 1 else ""
+            what = f"{least - design.blocks} terms{effects}"
             few = f"the {runs} runs of the design are too few; it needs {least} ({what} and one to judge the fit)"
             key = "runs" if "runs" in KEYS_OF[study.file.design.kind] else "centre_replicates"
             more = "enlarge the design" if key != "runs" and lost(model) else f"raise design.{key}"

@@ -70,7 +70,7 @@ class Evaluator:
             if isinstance(result, Failure):
                 self.failures.append(result)
             else:
-                (values[row],), (errors[row],), (samples[row],) = clearance.responses(self._study, [result])
+                (values[row],), (errors[row],), (samples[row],) = clearance.figures(self._study.responses, [result])
         return values, errors, samples
 
     def _watch(self, done: int, total: int) -> None:

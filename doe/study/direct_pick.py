@@ -47,10 +47,10 @@ def direct_pick(
     costs, violations = front.costs, goals.violations(front.values - below, front.values + above)
     aware, after = None, ""
     if (box := tolerance_box(study)) is not None:
-        here, base = _neighbourhood(study, surfaces, direct, coded, front.values), None
+        here, base = neighbourhood(study, surfaces, direct, coded, front.values), None
         if ran is not None:
             at = study.coded(study.baseline)[None]
-            base = _neighbourhood(study, surfaces, direct, at, ran[None])
+            base = neighbourhood(study, surfaces, direct, at, ran[None])
         aware = direct_aware(box, here, goals, base, below, above)
         costs, violations = aware.costs, aware.violations
         if not (violations <= 0.0).all(axis=1).any():
@@ -65,31 +65,10 @@ def direct_pick(
     return DirectPick(int(rows[row]), words, aware)
 
 
-@dataclass(frozen=True, eq=False)
-class Local:
-    """Responses about a simulated point: its own level, the shape of the surfaces and the slopes by which the search's
-    runs correct it. ``coded`` (k,), ``values`` (m,) and ``slopes`` (k, m) are of the point, ``baseline`` (m,) of the baseline.
-    """
-
-    coded: Array
-    values: Array
-    slopes: Array
-    baseline: Array
-
-
-def local_of(
-    study: Study, surfaces: Sequence[Surface], direct: Searched, pick: Confirmed, baseline: Confirmed
-) -> Local:
-    """About the simulated pick of a direct front."""
-    coded = study.coded(pick.point)
-    here = _neighbourhood(study, surfaces, direct, coded[None], pick.values[None])
-    return Local(coded, pick.values, here.slopes[0], baseline.values)
-
-
-def _neighbourhood(
+def neighbourhood(
     study: Study, surfaces: Sequence[Surface], direct: Searched, coded: Array, values: Array
 ) -> Neighbourhood:
-    """About coded points (n, k) of known responses (n, m)."""
+    """About coded points (n, k) of known responses (n, m), in the shape of the surfaces as the search's runs correct it."""
     forms, searched = quadratics(surfaces, len(study.factors)), direct.front.searched
     runs = study.coded(searched.points)
     return Neighbourhood.of(forms, coded, values, runs, searched.values)

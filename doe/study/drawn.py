@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
+from scipy import special
 
 from doe.arrays import Array
 from doe.designs.model import second_order
@@ -19,9 +20,10 @@ def predict_all(surfaces: Sequence[Surface], coded: Array) -> Array:
     return np.column_stack([surface.predict(coded) for surface in surfaces])
 
 
-def standard_errors_all(surfaces: Sequence[Surface], coded: Array) -> Array:
-    """Standard errors (n, m) of the mean responses at coded points (n, k)."""
-    return np.column_stack([surface.prediction_standard_error(coded) for surface in surfaces])
+def half_widths(surfaces: Sequence[Surface], coded: Array) -> Array:
+    """95 % half widths (n, m) of the mean responses at coded points (n, k)."""
+    reach = [special.stdtrit(surface.interval_dof, 0.975) for surface in surfaces]
+    return np.column_stack([surface.prediction_standard_error(coded) for surface in surfaces]) * reach
 
 
 def draw_all(surfaces: Sequence[Surface], draws: int, seed: int) -> list[Array]:

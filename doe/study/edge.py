@@ -6,7 +6,7 @@ import numpy as np
 from scipy import special
 
 from doe import clearance
-from doe.arrays import Array, Whole, or_none
+from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.response_surface import Surface
 from doe.response_surface.model_error import REACH
@@ -16,7 +16,7 @@ from doe.study.drawn import jacobian
 from doe.study.goals import goals_of, region_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
-from rbdyn.records.record import Record, derived, keyed, outside_json
+from rbdyn.records.record import Record, derived, finite, keyed, outside_json
 from rbdyn.records.words import improvement, quantity
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
@@ -41,7 +41,7 @@ class Outward(Record):
     gains: Mapping[str, tuple[float, float]] = outside_json()
     goals: Mapping[str, str] = outside_json(default_factory=dict)
     gains_beyond: dict[str, dict[str, float | None]] = derived(
-        lambda self: {name: {"value": gain, "error": or_none(error)} for name, (gain, error) in self.gains.items()},
+        lambda self: {name: {"value": gain, "error": finite(error)} for name, (gain, error) in self.gains.items()},
         "gains",
     )
 
@@ -111,7 +111,7 @@ def edge_of(
         gains, source = gains_beyond.get(index), "simulation"
         if gains is None:
             gains, source = _on_surfaces(study, surfaces, pick.point, index, side), "the surfaces"
-        unit, scale = _unit(study, index)
+        unit, scale = ("µm", MICROMETRE_MM) if study.factors[index].endswith("_mm") else ("unit", 1.0)
         bound = float(ends[index, int(side > 0)])
         per_unit = {name: (gain * scale, error * scale) for name, (gain, error) in gains.items()}
         goals = {response.name: response.goal for response in study.file.response}
@@ -126,11 +126,6 @@ def _sides(points: Array, ends: Array) -> Whole:
     half = 0.5 * (ends[:, 1] - ends[:, 0])
     off = (points - ends.mean(axis=1)) / half
     return np.where(np.abs(off) >= 1.0 - 2.0 * NEAR, np.sign(off), 0.0).astype(np.int64)
-
-
-def _unit(study: Study, index: int) -> tuple[str, float]:
-    """What a gain is per, and how many units of the factor that is."""
-    return ("µm", MICROMETRE_MM) if study.factors[index].endswith("_mm") else ("unit", 1.0)
 
 
 def _on_surfaces(
@@ -153,8 +148,7 @@ def _on_surfaces(
             # The slope of a field of correlation exp(-(d/REACH)^2) has 2/REACH^2 times its variance.
             by_field = float(jacobian(surface, coded)[surface.terms.index("1")])
             variance += by_field**2 * 2.0 / REACH**2 * surface.model_error.variance
-        dof = surface.interval_dof
-        student = float(special.stdtrit(dof, 0.975)) if dof > 0 else np.nan
+        student = float(special.stdtrit(surface.interval_dof, 0.975))
         scale = 1.0 / study.step[index]
         gains[surface.name] = (-slope * (ends[1] - ends[0]) / STEP * scale, student * float(np.sqrt(variance)) * scale)
     return gains

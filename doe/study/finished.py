@@ -1,6 +1,5 @@
 """Whether a study lies finished in its folder, so that nothing needs to be done again."""
 
-import hashlib
 import json
 from contextlib import suppress
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 from doe.study_file import Study
 from rbdyn.compiled.sources import source_digest
 from rbdyn.faults import InputError, read_toml
+from rbdyn.records.kept import digest_of
 from rbdyn.result import versions
 
 # What simulates, what judges, and what tells it.
@@ -20,18 +20,10 @@ def inputs_digest(study: Study, direct: bool, adaptive: bool = False, robust: bo
     named = [study.scene.file, *(chain.file for chain in study.file.chain)]
     named += [] if study.file.reference is None else [study.file.reference.file]
     named += [study.file.design.augment, *_samples(study)]
-    digest = hashlib.sha256()
-    for text in (
-        study.path.name,
-        study.file.model_dump_json(),
-        json.dumps([direct, adaptive, robust, versions()], sort_keys=True),
-        source_digest(*CODE),
-    ):
-        digest.update(text.encode())
-    for name in named:
-        if name is not None:
-            digest.update(_content(study.beside(name)))
-    return digest.hexdigest()
+    asked = json.dumps([direct, adaptive, robust, versions()], sort_keys=True)
+    texts = study.path.name, study.file.model_dump_json(), asked, source_digest(*CODE)
+    files = (_content(study.beside(name)) for name in named if name is not None)
+    return digest_of(b"".join([*(text.encode() for text in texts), *files]))
 
 
 def finished(folder: Path, digest: str) -> dict[str, Any] | None:

@@ -6,17 +6,17 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from scipy import stats
 
 from doe.arrays import Array
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
 from doe.pareto.archive import Archive
+from doe.pareto.nsga2 import Doubt
 from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox, tolerance_aware_front
 from doe.pareto.uncertainty import FrontUncertainty, front_uncertainty
 from doe.response_surface import Surface
-from doe.study.back_off import Doubt, surfaces_doubt
+from doe.study.back_off import surfaces_doubt
 from doe.study.confirmation import Confirmed
-from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics, standard_errors_all
+from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
 from doe.study_file import Study
 from rbdyn.faults import InputError
@@ -57,7 +57,6 @@ def find_front(
             goals=goals,
             baseline=study.baseline,
             **settings.model_dump(include=SEARCH),
-            standard_errors=lambda points: standard_errors_all(surfaces, study.coded(points)),
             doubt=lambda points: doubt(share)(study.coded(points)),
         )
 
@@ -95,20 +94,14 @@ def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> 
     raise AssertionError("the last share either returns or raises")
 
 
-def half_widths(surfaces: Sequence[Surface], standard_errors: Array) -> Array:
-    """95 % half widths (..., m) of mean responses; NaN for a surface that leaves no residual."""
-    dofs = [surface.interval_dof for surface in surfaces]
-    return np.array([stats.t.ppf(0.975, dof) if dof > 0 else np.nan for dof in dofs]) * standard_errors
-
-
 def _uncertainty(study: Study, surfaces: Sequence[Surface], pareto: ParetoFront) -> FrontUncertainty:
-    assert pareto.standard_errors is not None and pareto.baseline_values is not None
+    assert pareto.baseline_values is not None
     drawn = draw_all(surfaces, study.file.front.draws, study.file.front.seed)
     points = np.vstack([pareto.points, study.baseline])
     values = predict_draws(surfaces, drawn, study.coded(points), study.file.front.seed)
-    sure, baseline = half_widths(surfaces, pareto.standard_errors), (values[:, -1], pareto.baseline_values)
+    baseline = values[:, -1], pareto.baseline_values
     pick = pareto.goals, pareto.values, pareto.pick, study.file.front.pick
-    return front_uncertainty(values[:, :-1], sure, *pick, *baseline)
+    return front_uncertainty(values[:, :-1], *pick, *baseline)
 
 
 def _tolerance_aware(

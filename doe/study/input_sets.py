@@ -15,7 +15,7 @@ from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.running.failure import Failure, sentence
 from doe.study_file.table import NUMBER, fields
-from doe.unknown import laws, plan, screening
+from doe.unknown import laws, screening
 from doe.unknown.joint import Joint
 from rbdyn.faults import InputError, RunError, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
@@ -50,8 +50,8 @@ class Sets:
 
 @dataclass(frozen=True)
 class Case:
-    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, ``overrides`` of all runs,
-    by key what stands in the rows of a posterior ``sample``, and what is to be doubted of that, in a sentence."""
+    """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, by key what stands in the
+    rows of a posterior ``sample``, and what is to be doubted of that, in a sentence."""
 
     source: str
     data: dict[str, Any]
@@ -59,7 +59,6 @@ class Case:
     uncertain: Uncertain
     every: list[Input]
     outputs: tuple[str, ...]
-    overrides: tuple[str, ...] = ()
     sample: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     doubt: str = ""
 
@@ -82,7 +81,7 @@ class Case:
         }
         found: list[Scene | str] = []
         for number, row in enumerate(values):
-            overrides = [*self.overrides, *self.uncertain.set, f"numerics.seed={seed + number}", *more]
+            overrides = [*self.uncertain.set, f"numerics.seed={seed + number}", *more]
             overrides += own[number] if own else ()
             try:
                 tables = with_values(self.data, self.source, by_key, {**row, **tied})
@@ -94,7 +93,7 @@ class Case:
     @property
     def replicates(self) -> int:
         """Replicates of a run."""
-        return Scene.from_dict(self.data, self.source, [*self.overrides, *self.uncertain.set]).numerics.replicates
+        return Scene.from_dict(self.data, self.source, self.uncertain.set).numerics.replicates
 
     def unit(self, each: Input) -> float:
         """What the numbers of an input's law multiply."""
@@ -109,12 +108,17 @@ class Case:
         return Joint(len(keys), laws.copula(keys, pairs), rows, columns)
 
 
-def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> Case:
-    """A scene file with what is not known of it. Raises InputError, also where all is known."""
+def tables_of(path: Path, overrides: Sequence[str]) -> dict[str, Any]:
+    """Tables of a scene file with keys replaced. Raises InputError."""
     data = copy.deepcopy(read_toml(path))
     for override in overrides:
         set_key(data, override)
-    return case_of(str(path), data, outputs)
+    return data
+
+
+def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> Case:
+    """A scene file with what is not known of it. Raises InputError, also where all is known."""
+    return case_of(str(path), tables_of(path, overrides), outputs)
 
 
 def case_of(
@@ -123,7 +127,6 @@ def case_of(
     outputs: Sequence[str],
     declared: Uncertain | None = None,
     fixed: frozenset[str] = frozenset(),
-    overrides: Sequence[str] = (),
     beside: Path | None = None,
 ) -> Case:
     """Tables of a scene with what is not known of it; ``declared``, in the folder ``beside``, counts instead of the scene's
@@ -132,18 +135,14 @@ def case_of(
     uncertain = declared or scene.uncertain or Uncertain()
     folder = beside if declared and beside else Path(source).parent
     sample = {} if uncertain.sample is None else read_sample(folder / uncertain.sample)
-    found = {
-        key: Sampled(tuple(column[place] for place in np.argsort(laws.ranks(column)))) for key, column in sample.items()
-    }
+    ordered = ((key, [column[place] for place in np.argsort(laws.ranks(column))]) for key, column in sample.items())
+    found = {key: Sampled(tuple(column)) for key, column in ordered}
     every = inputs_of(scene, data, uncertain, fixed, found)
     if not every:
-        raise InputError(
-            [
-                f"{source}: uncertain: nothing is unknown; name keys as \"table.key\" = {{law = ...}} or leave out defaults = 'none'"
-            ]
-        )
+        mend = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
+        raise InputError([f"{source}: uncertain: nothing is unknown; {mend}"])
     doubt = "" if uncertain.sample is None else _doubt(folder / uncertain.sample)
-    case = Case(source, data, scene, uncertain, every, tuple(outputs), tuple(overrides), sample, doubt)
+    case = Case(source, data, scene, uncertain, every, tuple(outputs), sample, doubt)
     case.joint(every)
     refuse(impossible(case))
     return case
@@ -199,19 +198,12 @@ def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[st
     every, tried = case.every, [each for each in case.every if each.key not in case.sample]
     if len(every) <= case.uncertain.inputs or not tried:
         return every, {}
-    quantiles = plan.two_levels(len(tried))
-    sets = run(
-        case,
-        tried,
-        np.column_stack([quantiles, np.full(len(quantiles), 0.5)]),
-        simulations,
-        SCREENING_SEEDS,
-        title="screening",
-    )
+    quantiles = screening.two_levels(len(tried))
+    with_middle = np.column_stack([quantiles, np.full(len(quantiles), 0.5)])
+    sets = run(case, tried, with_middle, simulations, SCREENING_SEEDS, title="screening")
     positive = (sets.outputs > 0.0).all(axis=0)
-    share = screening.shares(
-        sets.quantiles[:, :-1], np.where(positive, np.log(np.where(positive, sets.outputs, 1.0)), sets.outputs)
-    )
+    outputs = np.where(positive, np.log(np.where(positive, sets.outputs, 1.0)), sets.outputs)
+    share = screening.shares(sets.quantiles[:, :-1], outputs)
     declared = [place for place, each in enumerate(tried) if each.key in case.uncertain.laws]
     stay = screening.kept(share, declared, case.uncertain.inputs - len(every) + len(tried))
     left = {tried[place].key: float(share[place].max()) for place in range(len(tried)) if place not in stay}
@@ -238,16 +230,8 @@ def run(
     check_holes(len(ran) - len(good), len(ran), failures, impossible)
     outputs, variances, freedom = scattered(case.outputs, [result for _, result in good])
     places = np.array([place for place, _ in good], dtype=np.int64)
-    return Sets(
-        places,
-        quantiles[places],
-        [values[place] for place in places],
-        outputs,
-        variances,
-        freedom,
-        failures,
-        impossible,
-    )
+    inputs_there = [values[place] for place in places]
+    return Sets(places, quantiles[places], inputs_there, outputs, variances, freedom, failures, impossible)
 
 
 def outcomes(
@@ -255,9 +239,8 @@ def outcomes(
 ) -> list[SimulationResult | Failure | str]:
     """Of each scene its result or failure, of what is no scene why. Raises KeyboardInterrupt."""
     possible = [(scene, label) for scene, label in zip(scenes, labels, strict=True) if isinstance(scene, Scene)]
-    ran = iter(
-        simulations.run([one for one, _ in possible], [label for _, label in possible], simulations.progress(title))
-    )
+    asked, named = [scene for scene, _ in possible], [label for _, label in possible]
+    ran = iter(simulations.run(asked, named, simulations.progress(title)))
     return [next(ran) if isinstance(scene, Scene) else scene for scene in scenes]
 
 
@@ -265,9 +248,8 @@ def check_holes(lost: int, sets: int, failures: Sequence[Failure], impossible: S
     """Raises RunError where too many input sets are lost."""
     if lost > HOLES * sets:
         why = sentence(failures) if failures else impossible[0]
-        raise RunError(
-            f"{lost} of {sets} input sets gave no result{where}, more than {100.0 * HOLES:g} %: {why}; narrow the laws of the inputs"
-        )
+        many = f"{lost} of {sets} input sets gave no result{where}, more than {100.0 * HOLES:g} %"
+        raise RunError(f"{many}: {why}; narrow the laws of the inputs")
 
 
 def scattered(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:

@@ -62,18 +62,8 @@ def simulated(
     more: Sequence[str] = (),
 ) -> tuple[Pairs, tuple[Failure, ...]]:
     """Designs, each as overrides of the scene, at input sets; one at which any failed is left out."""
-    every = [
-        run(
-            case,
-            inputs,
-            quantiles,
-            simulations,
-            seeds,
-            [*design, *more],
-            f"input sets of the {name}, from seed {seeds},",
-        )
-        for name, design in designs.items()
-    ]
+    given, title = (case, inputs, quantiles, simulations, seeds), f"input sets of the {{}}, from seed {seeds},"
+    every = [run(*given, [*design, *more], title.format(name)) for name, design in designs.items()]
     places = reduce(np.intersect1d, (sets.places for sets in every))
     kept = [np.flatnonzero(np.isin(sets.places, places)) for sets in every]
     outputs, variances, freedom = (

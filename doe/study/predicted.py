@@ -17,10 +17,8 @@ from rbdyn.records.record import Record, derived, keyed, outside_json
 from rbdyn.records.words import improvement
 
 
-def verdict(percent: float, error: float | None) -> str:
+def verdict(percent: float, error: float) -> str:
     """Whether a gain is more than its error."""
-    if error is None:
-        return "without error"
     if abs(percent) <= error:
         return "within error"
     return "better" if percent > 0.0 else "worse"
@@ -31,14 +29,14 @@ class PredictedGain(Record):
 
     ``error`` is that of the difference of the two predictions: the errors that they share cancel (contrast c'Vc, and
     what the model misses at either point, with the degrees of freedom of `Surface.interval_dof`). ``scatter`` is by how much two single runs at one point differ (pure error of
-    the replicates), and ``within_scatter`` whether the gain is no more. Either is None where the runs do not tell it.
+    the replicates), and ``within_scatter`` whether the gain is no more; both None where no run is repeated.
     """
 
     response: str = outside_json()
     baseline: float = outside_json()
     value: float = outside_json()
     percent: float
-    error: float | None = keyed("error_percent")
+    error: float = keyed("error_percent")
     verdict: str = derived(lambda self: verdict(self.percent, self.error))
     scatter: float | None = keyed("single_run_scatter_percent")
     goal: str = "min"
@@ -55,7 +53,6 @@ class PredictedGain(Record):
             "within error": "which is inside its own noise",
             "better": "which is more than its error",
             "worse": "a loss that is more than its error",
-            "without error": "whose error the runs do not tell",
         }[self.verdict]
         if self.scatter is None:
             return f"{said}, {judged}."
@@ -74,11 +71,9 @@ def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> 
         surface = surfaces[index]
         rows = [slopes[end, column] * jacobian(surface, coded[end]) for end in (0, 1)]
         scale = 100.0 / abs(float(values[0, index])) if values[0, index] else math.nan
-        dof, error, scatter = surface.interval_dof, None, None
-        if dof > 0:
-            shared = contrast_error(rows[0] - rows[1], surface.covariance)
-            error = float(stats.t.ppf(0.975, dof)) * math.hypot(shared, _missed(surface, coded, rows))
-        pure = surface.pure_error
+        shared = contrast_error(rows[0] - rows[1], surface.covariance)
+        error = float(stats.t.ppf(0.975, surface.interval_dof)) * math.hypot(shared, _missed(surface, coded, rows))
+        pure, scatter = surface.pure_error, None
         if pure["ms"] is not None and surface.residual_mean_square > 0.0:
             constant = surface.terms.index("1")
             # With weights the mean squares have no unit; the variance of a run has.
@@ -91,7 +86,7 @@ def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> 
                 baseline=float(values[0, index]),
                 value=float(values[1, index]),
                 percent=float(scale * (costs[0, column] - costs[1, column])),
-                error=None if error is None else error * scale,
+                error=error * scale,
                 scatter=None if scatter is None else scatter * scale,
                 goal=study.file.response[index].goal,
             )
@@ -113,10 +108,7 @@ def _missed(surface: Surface, coded: Array, rows: Sequence[Array]) -> float:
 
 
 # What a verdict amounts to.
-AMOUNT = {
-    "better": "better beyond its error", "worse": "worse beyond its error",
-    "within error": "not told from noise", "without error": "of unknown error",
-}  # fmt: skip
+AMOUNT = {"better": "better beyond its error", "worse": "worse beyond its error", "within error": "not told from noise"}
 
 
 def statement(gains: Sequence[PredictedGain]) -> str:

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from doe.response_surface import Surface
-from doe.study.runs import Runs, design_points, read_runs
+from doe.study.design import design_of
+from doe.study.runs import Runs, read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
 from rbdyn.faults import InputError
@@ -55,7 +56,7 @@ def reference_runs(study: Study) -> Runs | None:
     table = read_runs(study, path)
     left = list(range(len(table.coded)))
     order = []
-    for point in design_points(study):
+    for point in design_of(study).coded:
         distance = [float(np.abs(table.coded[row] - point).max()) for row in left]
         if not distance or min(distance) > 0.02:
             place = f"the design point {point.round(3).tolist()} (coded)"

@@ -34,11 +34,6 @@ class Row:
     turns: float | None
     held: bool
 
-    @property
-    def condition(self) -> tuple[tuple[str, Any], ...]:
-        """What tells rows of one condition."""
-        return tuple(self.keys.items())
-
 
 @dataclass(frozen=True)
 class Rig:
@@ -53,7 +48,7 @@ class Rig:
     @property
     def conditions(self) -> list[dict[str, Any]]:
         """Different conditions, in their order."""
-        return [dict(each) for each in dict.fromkeys(row.condition for row in self.rows)]
+        return [dict(each) for each in dict.fromkeys(tuple(row.keys.items()) for row in self.rows)]
 
 
 def read_rig(path: Path) -> Rig:
@@ -63,15 +58,13 @@ def read_rig(path: Path) -> Rig:
     keys = tuple(name for name in header if "." in name)
     outputs = tuple(name for name in header if name in OUTPUTS)
     if FILE in header:
-        kinds = [
-            row[header.index(KIND)].strip() if KIND in header else "" for row in rows if row[header.index(FILE)].strip()
-        ]
+        signals = [row for row in rows if row[header.index(FILE)].strip()]
+        kinds = [row[header.index(KIND)].strip() if KIND in header else "" for row in signals]
         outputs = tuple(dict.fromkeys([*outputs, *(WHIRL if kind == ORBIT else SPEED for kind in kinds)]))
     known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES, CUTOFF, STILL}
     faults = [f"{path}: {_unknown(name, outputs)}" for name in header if name not in known]
-    faults += [
-        f"{path}: column {name} comes twice; remove one" for name in dict.fromkeys(header) if header.count(name) > 1
-    ]
+    twice = [name for name in dict.fromkeys(header) if header.count(name) > 1]
+    faults += [f"{path}: column {name} comes twice; remove one" for name in twice]
     if not outputs:
         faults.append(f"{path}: no measured output; add a column of {listed(OUTPUTS)}")
     if not keys:

@@ -42,9 +42,8 @@ def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> tuple[float, floa
     if kind == "cage_pulses":
         took = np.diff(time[::pulses_per_turn])
         whole = took <= LOST * np.median(took) if took.size else np.zeros(0, bool)
-        told = (
-            f"{path}: {(~whole).sum()} of {took.size} turns lack pulses and are left out" if not whole.all() else None
-        )
+        lost = f"{(~whole).sum()} of {took.size} turns lack pulses and are left out"
+        told = None if whole.all() else f"{path}: {lost}"
         moments = np.column_stack([np.full(whole.sum(), 60.0), took[whole]])
     else:
         # Each sample counts for the time to the next one.
@@ -70,14 +69,12 @@ def whirl(path: Path, cutoff: float, notches: Sequence[float], still: Path | Non
     speed, rate = _filtered(path, cutoff, notches)
     noise = 0.0 if still is None else float((_filtered(still, cutoff, notches)[0] ** 2).mean()) / 2.0
     if 2.0 * noise > LOUDEST * float((speed**2).mean()):
-        raise InputError(
-            [f"{still}: has more than {100.0 * LOUDEST:g} % of the mean square speed of {path.name}; lower cutoff_hz"]
-        )
+        loud = f"has more than {100.0 * LOUDEST:g} % of the mean square speed of {path.name}"
+        raise InputError([f"{still}: {loud}; lower cutoff_hz"])
     parts = min(int(len(speed) * cutoff / rate / PERIODS), MOST_PARTS)
     if parts < FEWEST:
-        raise InputError(
-            [f"{path}: shorter than {FEWEST * PERIODS} periods of cutoff_hz = {cutoff:g}; measure longer or raise it"]
-        )
+        short = f"shorter than {FEWEST * PERIODS} periods of cutoff_hz = {cutoff:g}"
+        raise InputError([f"{path}: {short}; measure longer or raise it"])
     nearly = np.maximum(speed, np.sqrt(noise))
     mean = speed - noise / (2.0 * nearly) if noise else speed
     moments = np.stack([np.ones_like(speed), mean, speed**2 - 2.0 * noise])
@@ -100,12 +97,8 @@ def _filtered(path: Path, cutoff: float, notches: Sequence[float]) -> tuple[Arra
         raise InputError([f"{path}: t_s does not rise evenly; give samples at equal intervals"])
     rate = 1.0 / interval
     if rate * (1.0 + 1e-6) < SAMPLES_A_PERIOD * cutoff:
-        raise InputError(
-            [
-                f"{path}: {rate:.4g} samples a second are fewer than {SAMPLES_A_PERIOD} a period of cutoff_hz = {cutoff:g}; "
-                f"sample faster or give {rate / SAMPLES_A_PERIOD:.4g} at most"
-            ]
-        )
+        few = f"{rate:.4g} samples a second are fewer than {SAMPLES_A_PERIOD} a period of cutoff_hz = {cutoff:g}"
+        raise InputError([f"{path}: {few}; sample faster or give {rate / SAMPLES_A_PERIOD:.4g} at most"])
     return filtered_speed(np.stack(place), rate, cutoff, notches), rate
 
 

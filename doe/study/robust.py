@@ -65,9 +65,9 @@ class Robust:
 
 def declared(study: Study) -> bool:
     """Whether the study or its scene declares what is not known; to name values as estimates alone is not to ask for it."""
-    return study.file.uncertain is not None or bool(
-        set(clearance.read_scene(study).get("uncertain", {})) - {"estimated"}
-    )
+    if study.file.uncertain is not None:
+        return True
+    return bool(set(clearance.read_scene(study).get("uncertain", {})) - {"estimated"})
 
 
 def robust_advice(study: Study) -> list[str]:
@@ -107,9 +107,8 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
         if rows.size == 0:
             break
         more = [f"numerics.replicates={replicates * many}"]
-        new, lost = simulated(
-            case, inputs, pairs.quantiles[rows], designs, simulations, (again + 1) * ROUND_SEEDS, more
-        )
+        seeds = (again + 1) * ROUND_SEEDS
+        new, lost = simulated(case, inputs, pairs.quantiles[rows], designs, simulations, seeds, more)
         rows, spent, failures = rows[new.places], spent + 2 * many * len(rows), (*failures, *lost)
         pairs = pairs.joined(rows, new)
         still = in_doubt(*pairs.gains(goals))
@@ -122,25 +121,15 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     if study.file.robust.front != "none":
         front, more_runs, lost = find_robust_front(study, case, inputs, joint, pick, simulations)
         spent, failures = spent + more_runs, (*failures, *lost)
-    return Robust(
-        [study.responses[index] for index in goals.objectives],
-        better(gains, variances, seed),
-        [
-            Decider(inputs[one.place].key, _value(case, inputs[one.place], one.flip), one.worth, one.above)
-            for one in found.inputs
-        ],
-        None if found.pair is None else (inputs[found.pair[0]].key, inputs[found.pair[1]].key, found.pair[2]),
-        found.foretold,
-        found.halved,
-        front,
-        inputs,
-        rest,
-        len(gains),
-        spent,
-        int(in_doubt(gains, variances).size),
-        failures,
-        case.doubt,
-    )
+    deciders = [
+        Decider(inputs[one.place].key, _value(case, inputs[one.place], one.flip), one.worth, one.above)
+        for one in found.inputs
+    ]
+    pair = None if found.pair is None else (inputs[found.pair[0]].key, inputs[found.pair[1]].key, found.pair[2])
+    judged = better(gains, variances, seed), deciders, pair, found.foretold, found.halved, front
+    cost = len(gains), spent, int(in_doubt(gains, variances).size)
+    wanted = [study.responses[index] for index in goals.objectives]
+    return Robust(wanted, *judged, inputs, rest, *cost, failures, case.doubt)
 
 
 def _case(study: Study) -> Case:

@@ -20,8 +20,7 @@ from doe.study.input_sets import Case, run
 from doe.study.pairs import simulated
 from doe.study_file import Study
 from doe.unknown.decision import Better, better, shrunk
-from doe.unknown.joint import Joint
-from doe.unknown.plan import nested
+from doe.unknown.joint import Joint, nested
 from doe.unknown.spread import Emulated, Runs, emulated
 from rbdyn.scene.unknown import Input
 
@@ -145,8 +144,7 @@ class _Foretold:
 
 def _over_inputs(values: Array, share: float | None, axis: int = 0) -> Array:
     """Mean, or quantile."""
-    found: Array = values.mean(axis=axis) if share is None else np.quantile(values, share, axis=axis)
-    return found
+    return values.mean(axis=axis) if share is None else np.quantile(values, share, axis=axis)
 
 
 def _choices(study: Study, found: ParetoFront, foretold: _Foretold) -> dict[str, tuple[Array, str]]:

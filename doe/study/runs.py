@@ -15,6 +15,7 @@ from doe.running.runner import Progress
 from doe.running.store import Store
 from doe.study.design import actual_of, check_runs, design_of, terms_of
 from doe.study_file import Study
+from doe.study_file.table import read_table
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
 
@@ -51,11 +52,6 @@ class Runs:
         coded, actual, values, errors = (array[places] for array in (self.coded, self.actual, self.values, self.errors))
         replicates, block = (None if array is None else array[places] for array in (self.replicates, self.block))
         return type(self)(coded, actual, values, errors, self.notes, replicates, block)
-
-
-def design_points(study: Study) -> Array:
-    """Coded design points (n, k) in the order of the runs. Raises InputError when the design is impossible."""
-    return design_of(study).coded
 
 
 @dataclass(frozen=True)
@@ -105,14 +101,16 @@ def runs_of(study: Study, ordered: Ordered, simulations: clearance.Simulations, 
     results = simulations.run(ordered.scenes, ordered.labels, progress, ordered.factors)
     failures = tuple(result for result in results if isinstance(result, Failure))
     left = [row for row, result in enumerate(results) if not isinstance(result, Failure)]
-    if failures and len(left) < (needed := fewest_runs(study, design)):
+    # One a term, one a block beyond the first, one to judge the fit.
+    needed = design.blocks + max(len(terms_of(study, response.model)) for response in study.file.response)
+    if failures and len(left) < needed:
         few = f"only {len(left)} of {len(results)} design runs went well, of which the response models need {needed}"
         raise RunError(f"{few}: {sentence(failures)}")
     sound = [result for result in results if not isinstance(result, Failure)]
     notes = _each_once(note for result in sound for note in result.notes)
     if failures:
         notes.append(f"{len(failures)} design runs failed and are left out: {sentence(failures)}")
-    values, errors, independent = clearance.responses(study, sound)
+    values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[left] if design.blocks > 1 else None
     return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)
 
@@ -123,13 +121,8 @@ def _each_once(notes: Iterable[str]) -> list[str]:
     return [group[0] if same else f"{group[0]} (so or similarly {len(group)} runs)" for group, same in told]
 
 
-def fewest_runs(study: Study, design: Design) -> int:
-    """Runs that the largest response model needs: one a term, one a block beyond the first, one to judge the fit."""
-    return design.blocks + max(len(terms_of(study, response.model)) for response in study.file.response)
-
-
 def read_runs(study: Study, path: Path) -> Runs:
     """Runs of a CSV table instead of simulated ones. Raises InputError."""
-    table = study.read_table(path)
+    table = read_table(path, study.factors, study.responses, study.path)
     coded = study.coded(table.actual)
     return Runs(coded, table.actual, table.values, table.errors, replicates=table.replicates, block=table.block)

@@ -9,7 +9,7 @@ from typing import Any
 from doe import clearance
 from doe.running.failure import Failure, grouped
 from doe.running.owner import folders_of
-from doe.running.store import Claim, EndedRun, Point, Store
+from doe.running.store import Claim, EndedRun, RunResult, Store
 from doe.study.runs import STORE, ordered_runs
 from doe.study_file import Study
 from rbdyn.faults import InputError
@@ -21,29 +21,10 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
     """Record of ``doe status``. Changes nothing, not even while the study runs. Raises InputError."""
     ordered = ordered_runs(study)
     points = clearance.points_of(ordered.scenes, ordered.labels, ordered.factors)
-    if not (folder / STORE).exists():
-        return _record(study, folder, points, {}, [], [])
-    with Store(folder / STORE, read_only=True) as store:
-        return _record(study, folder, points, store.outcomes(points, clearance.sound), store.claims(), store.ended())
-
-
-def folder_of(study: Study) -> Path:
-    """Folder in which the study runs, or its usual one while it does not. Raises InputError where it runs in several."""
-    running = folders_of(study.path)
-    if len(running) > 1:
-        folders = " and in ".join(map(str, running))
-        raise InputError([f"{study.path}: runs in {folders}; name one of them by --out"])
-    return running[0] if running else Path(f"{study.path.stem}_results")
-
-
-def _record(
-    study: Study,
-    folder: Path,
-    points: list[Point],
-    outcomes: dict[str, dict[str, Any] | Failure],
-    claims: list[Claim],
-    ended: list[EndedRun],
-) -> dict[str, Any]:
+    outcomes, claims, ended = dict[str, RunResult](), list[Claim](), list[EndedRun]()
+    if (folder / STORE).exists():
+        with Store(folder / STORE, read_only=True) as store:
+            outcomes, claims, ended = store.outcomes(points, clearance.sound), store.claims(), store.ended()
     keys = {point.key for point in points}
     failures = [outcome for outcome in outcomes.values() if isinstance(outcome, Failure)]
     claims = [claim for claim in claims if claim.key not in outcomes]
@@ -72,6 +53,15 @@ def _record(
         "spent_s": sum(run.seconds or 0.0 for run in ended if run.key in keys),
         "left_s": _left_s(missing + len(running), claims, [run for run in ended if run.key in keys]),
     }
+
+
+def folder_of(study: Study) -> Path:
+    """Folder in which the study runs, or its usual one while it does not. Raises InputError where it runs in several."""
+    running = folders_of(study.path)
+    if len(running) > 1:
+        folders = " and in ".join(map(str, running))
+        raise InputError([f"{study.path}: runs in {folders}; name one of them by --out"])
+    return running[0] if running else Path(f"{study.path.stem}_results")
 
 
 def _running(claim: Claim) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """A response surface for each response of a study, and its rival."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -33,25 +34,22 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
     return surfaces
 
 
-def with_rivals(surfaces: Sequence[Surface], seed: int = 1) -> list[Surface]:
+def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
     """The surfaces, each compared with a Gaussian process by leaving out every point in turn.
 
     It takes of the order of a second a response. ``rival`` stays None where too few points can be left out.
     """
-    return [_with_rival(surface, seed) for surface in surfaces]
-
-
-def _with_rival(surface: Surface, seed: int) -> Surface:
     from doe.response_surface.comparison import compare
 
-    data, matrix = surface.data, model_matrix(surface.data.points, surface.terms)
-    errors = data.standard_errors if surface.weighting == "replicates" else None
-    named: dict[str, Any] = {"name": surface.name, "seed": seed}
-    try:
-        rival = compare(data.points, data.values, surface.refit, matrix=matrix, standard_errors=errors, **named)
-    except ValueError:
-        return surface
-    return replace(surface, rival=rival)
+    found = list(surfaces)
+    for place, surface in enumerate(surfaces):
+        data, matrix = surface.data, model_matrix(surface.data.points, surface.terms)
+        errors = data.standard_errors if surface.weighting == "replicates" else None
+        with suppress(ValueError):
+            runs = data.points, data.values, surface.refit
+            rival = compare(*runs, name=surface.name, matrix=matrix, standard_errors=errors)
+            found[place] = replace(surface, rival=rival)
+    return found
 
 
 def independent_values(runs: Runs) -> Whole:

@@ -8,10 +8,9 @@ from doe.clearance import Simulations
 from doe.running.failure import Failure
 from doe.study.input_sets import NORMAL, Sets, read_case, run, screened
 from doe.unknown.joint import Joint
-from doe.unknown.sensitivity import Index, Indices, shapley, sobol
-from doe.unknown.spread import Emulated, Runs, Spread, emulated, spread_of
-from rbdyn.faults import RunError, refuse
-from rbdyn.fields import no_power_of_two
+from doe.unknown.sensitivity import Indices, shapley, sobol
+from doe.unknown.spread import Emulated, Runs, Share, Spread, emulated, spread_of
+from rbdyn.faults import RunError
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
 
@@ -31,11 +30,11 @@ class OutputRange:
     nominal: Quantity
     spread: Spread
     indices: Indices | None = None
-    shapley: list[Index] | None = None
-    floor: Index | None = None
+    shapley: list[Share] | None = None
+    floor: Share | None = None
 
     @property
-    def shares(self) -> list[Index] | None:
+    def shares(self) -> list[Share] | None:
         """What each input makes: its total index, or its Shapley effect."""
         return self.shapley if self.indices is None else self.indices.total
 
@@ -86,20 +85,10 @@ def find_uncertainty(
     return Uncertainty(path, inputs, rest, outputs, sets, seed, _notes(case.doubt, sets, spreads, count, target))
 
 
-def check_points(points: int | None) -> None:
-    """Raises InputError unless the number of input sets is a power of two."""
-    refuse([] if points is None else no_power_of_two("--points ", points))
-
-
 def _emulated(sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:
     numerical = _quantity(nominal, OUTPUTS[place]).numerical_error or 0.0
-    runs = Runs(
-        sets.quantiles,
-        sets.outputs[:, place],
-        sets.variances[:, place],
-        sets.freedom[:, place],
-        (numerical / NORMAL) ** 2,
-    )
+    ran = sets.outputs[:, place], sets.variances[:, place], sets.freedom[:, place]
+    runs = Runs(sets.quantiles, *ran, (numerical / NORMAL) ** 2)
     return runs, emulated(runs)
 
 
@@ -121,21 +110,18 @@ def _notes(doubt: str, sets: Sets, spreads: Sequence[Spread], count: int, target
     notes = [doubt] if doubt else []
     lost = len(sets.failures) + len(sets.impossible)
     if lost:
-        notes.append(
-            f"{lost} input sets gave no result and are left out: {(*map(str, sets.failures), *sets.impossible)[0]}"
-        )
+        why = (*map(str, sets.failures), *sets.impossible)[0]
+        notes.append(f"{lost} input sets gave no result and are left out: {why}")
     for name, spread in zip(OUTPUTS, spreads, strict=True):
         if spread.hidden:
-            notes.append(
-                f"{name}: noise hides the inputs; raise numerics.replicates or numerics.turns in uncertain.set"
-            )
+            mend = "raise numerics.replicates or numerics.turns in uncertain.set"
+            notes.append(f"{name}: noise hides the inputs; {mend}")
         elif not spread.by_emulator:
             notes.append(
                 f"{name}: emulators foretell too little of it (Q2 {spread.q2:.2f} of at most {spread.ceiling:.2f}) to say which "
                 "input makes it"
             )
         if spread.known > target and not spread.hidden:
-            notes.append(
-                f"{name}: after {count} input sets an end of its range is known to {100.0 * spread.known:.0f} % of its width only"
-            )
+            known = f"known to {100.0 * spread.known:.0f} % of its width only"
+            notes.append(f"{name}: after {count} input sets an end of its range is {known}")
     return tuple(notes)

@@ -23,7 +23,7 @@ from doe.study.compared import Compared, compared, kept_direct
 from doe.study.confirmation import Confirmed, Gain, gains
 from doe.study.design import check_given, design_of
 from doe.study.direct import Direct, find_direct
-from doe.study.direct_pick import DirectPick, local_of
+from doe.study.direct_pick import DirectPick, neighbourhood
 from doe.study.edge import Edge, edge_of
 from doe.study.finished import inputs_digest
 from doe.study.front import find_front
@@ -225,8 +225,10 @@ def _tolerances(
     pick, wished = confirmed["pick"], study.file.tolerances
     if wished is None:
         return None
-    local = None if searched is None else local_of(study, surfaces, searched, pick, confirmed["baseline"])
-    return widest_of(study, surfaces, pick.point, wished, local)
+    if searched is None:
+        return widest_of(study, surfaces, pick.point, wished)
+    here = neighbourhood(study, surfaces, searched, study.coded(pick.point)[None], pick.values[None])
+    return widest_of(study, surfaces, pick.point, wished, here, confirmed["baseline"].values)
 
 
 def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from doe.arrays import Array
+from doe.pareto.direct_tolerance import Neighbourhood
 from doe.pareto.tolerance import WidestTolerances, widest_tolerances
 from doe.response_surface import Surface
-from doe.study.direct_pick import Local
 from doe.study.drawn import draw_all, predict_all, predict_paired
 from doe.study.goals import goals_of, known_tolerances, region_of, rigid
 from doe.study_file import Study
@@ -15,12 +15,18 @@ from doe.study_file.front_section import Tolerances
 
 
 def widest_of(
-    study: Study, surfaces: Sequence[Surface], point: Array, settings: Tolerances, local: Local | None = None
+    study: Study,
+    surfaces: Sequence[Surface],
+    point: Array,
+    settings: Tolerances,
+    here: Neighbourhood | None = None,
+    simulated: Array | None = None,
 ) -> WidestTolerances | None:
     """Widest half widths, in factor units, about a point (k,) in factor units; None where no factor has a tolerance.
 
-    ``local``, of a pick of the direct front, stands for the level of the surfaces there; then parts may lie beyond the
-    region by the factors' own tolerances, which the runs of the search bear out by their slopes.
+    ``here``, about a pick of the direct front, and the responses ``simulated`` (m,) at the baseline stand for the level of the
+    surfaces; then parts may lie beyond the region by the factors' own tolerances, which the runs of the search bear out by
+    their slopes.
 
     A part keeps its promise when every response with a goal has at least the share ``keep`` of the gain that the
     surfaces predict at the point (or, where they predict a loss, loses no more), and when all limits hold.
@@ -31,8 +37,8 @@ def widest_of(
     goals = goals_of(study)
     base, nominal = (study.coded(each)[None] for each in (study.baseline, point))
     ends = [predict_all(surfaces, each) for each in (base, nominal)]
-    if local is not None:
-        ends = [local.baseline[None], local.values[None]]
+    if here is not None and simulated is not None:
+        ends = [simulated[None], here.values]
     gain = (goals.costs(ends[0]) - goals.costs(ends[1]))[0]
     keep = np.where(gain > 0.0, settings.keep * gain, gain)
     drawn = draw_all(surfaces, settings.samples, settings.seed) if settings.surface_uncertainty else None
@@ -47,21 +53,21 @@ def widest_of(
         points[:, free] = parts
         coded = study.coded(points)
         values = responses(coded)
-        if local is not None:
-            values = values - centre_values + local.values + (coded - local.coded) @ local.slopes
+        if here is not None:
+            values = values - centre_values + here.values + (coded - here.points) @ here.slopes[0]
         return np.hstack([goals.costs(values), goals.violations(values, values)])
 
     # Of every part its own nominal point and baseline: they may have surfaces of their own.
     centre_values, reference_values = (responses(np.repeat(each, settings.samples, axis=0)) for each in (nominal, base))
-    if local is not None:
-        reference_values = np.broadcast_to(local.baseline, reference_values.shape)
+    if simulated is not None:
+        reference_values = np.broadcast_to(simulated, reference_values.shape)
     reference = goals.costs(reference_values)
     held = np.zeros((settings.samples, len(goals.limited)))
     known = known_tolerances(study)
     ratios = np.array([known.get(name, np.nan) for name in study.factors])
     reach = region_of(study) * study.step
     low, high = study.centre - reach, study.centre + reach
-    if local is not None:
+    if here is not None:
         beyond = np.nan_to_num(ratios)
         low, high = np.minimum(low, point - beyond), np.maximum(high, point + beyond)
     found = widest_tolerances(

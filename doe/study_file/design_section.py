@@ -72,10 +72,8 @@ class Category(Consistent):
 
     def faults(self) -> Iterator[str]:
         values = [_in_toml(each) for each in self.categories]
-        mend = f"write one of {', '.join(values)}"
-        yield from (
-            f"inactive.{name}: is none of the categories; {mend}" for name in self.inactive if name not in values
-        )
+        mend, alien = f"write one of {', '.join(values)}", [name for name in self.inactive if name not in values]
+        yield from (f"inactive.{name}: is none of the categories; {mend}" for name in alien)
         if len(self.categories) > len({*map(str, self.categories)}):
             yield f"categories = {self.categories}: name each value once"
 

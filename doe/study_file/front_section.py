@@ -1,14 +1,15 @@
 """Goals of the responses, the front, the direct front and the widest tolerances of STUDY.toml."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from rbdyn.faults import Strict
-from rbdyn.fields import no_power_of_two, or_refuse
+from rbdyn.faults import Consistent, Strict
+from rbdyn.fields import no_power_of_two
 
 
-class Goal(Strict):
+class Goal(Consistent):
     """What is wanted of a response."""
 
     goal: Literal["min", "max", "target", "none"] = "min"
@@ -24,24 +25,21 @@ class Goal(Strict):
     desired: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     """Ends of the desirability: nil at one, full at the other (for a target nil at both)."""
 
-    @model_validator(mode="after")
-    def _goal_is_whole(self) -> Self:
-        faults = []
+    def faults(self) -> Iterator[str]:
         if self.goal == "target" and self.target is None:
-            faults.append('target: missing; goal = "target" needs the number to come near to')
+            yield 'target: missing; goal = "target" needs the number to come near to'
         if self.goal != "target" and self.target is not None:
-            faults.append(f'target = {self.target}: goal = "{self.goal}" has none; write goal = "target"')
+            yield f'target = {self.target}: goal = "{self.goal}" has none; write goal = "target"'
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
-            faults.append(f"lower = {self.lower}: must be below upper = {self.upper}")
+            yield f"lower = {self.lower}: must be below upper = {self.upper}"
         if self.desired is not None:
             low, high = self.desired
             if self.goal == "none":
-                faults.append(f'desired = {self.desired}: goal = "none" desires nothing; leave it out')
+                yield f'desired = {self.desired}: goal = "none" desires nothing; leave it out'
             elif low >= high:
-                faults.append(f"desired = {self.desired}: must rise; write the lower end first")
+                yield f"desired = {self.desired}: must rise; write the lower end first"
             elif self.target is not None and not low < self.target < high:
-                faults.append(f"desired = {self.desired}: must have target = {self.target} between its ends")
-        return or_refuse(self, faults)
+                yield f"desired = {self.desired}: must have target = {self.target} between its ends"
 
 
 class Front(Strict):
@@ -67,7 +65,7 @@ class Front(Strict):
     """Parts drawn for a quantile."""
 
 
-class Direct(Strict):
+class Direct(Consistent):
     """NSGA-II on the simulator itself."""
 
     evaluations: Annotated[int, Field(ge=50, le=10_000_000)] = 2000
@@ -91,12 +89,9 @@ class Direct(Strict):
     set: list[str] = []
     """Keys of the scene that are replaced, as "key=value"."""
 
-    @model_validator(mode="after")
-    def _something_is_counted(self) -> Self:
+    def faults(self) -> Iterator[str]:
         if self.turns is not None and (self.discard_turns or 0.0) >= self.turns:
-            below = f"must be below turns = {self.turns:g}"
-            raise ValueError(f"discard_turns = {self.discard_turns:g}: {below}; discard fewer")
-        return self
+            yield f"discard_turns = {self.discard_turns:g}: must be below turns = {self.turns:g}; discard fewer"
 
 
 class Adaptive(Strict):
@@ -117,7 +112,7 @@ class Adaptive(Strict):
     """Keys of the scene that are replaced, as "key=value"."""
 
 
-class Robust(Strict):
+class Robust(Consistent):
     """Whether the pick beats the baseline over what is not known of the scene, with --robust."""
 
     points: Annotated[int, Field(ge=32, le=1024)] = 256
@@ -130,9 +125,8 @@ class Robust(Strict):
     quantile: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.1
     """Quantile of a robust front: in how many of the cases a gain may be less."""
 
-    @model_validator(mode="after")
-    def _power_of_two(self) -> Self:
-        return or_refuse(self, no_power_of_two("points = ", self.points))
+    def faults(self) -> list[str]:
+        return no_power_of_two("points = ", self.points)
 
 
 class Tolerances(Strict):

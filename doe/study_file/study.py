@@ -15,9 +15,8 @@ from doe.designs.model import Model
 from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Category, Design, Factor, Name
 from doe.study_file.front_section import Adaptive, Direct, Front, Goal, Robust, Tolerances
-from doe.study_file.table import COUNT, LABELS, Table, read_table
-from rbdyn.faults import InputError, Strict, read_toml, validated
-from rbdyn.fields import or_refuse
+from doe.study_file.table import COUNT, LABELS
+from rbdyn.faults import Consistent, InputError, Strict, read_toml, validated
 from rbdyn.scene.uncertain import Uncertain
 
 
@@ -74,7 +73,7 @@ class Reference(Strict):
     """What to expect of each response, by its name."""
 
 
-class StudyFile(Strict):
+class StudyFile(Consistent):
     """The whole file."""
 
     scene: SceneFile | None = None
@@ -120,11 +119,10 @@ class StudyFile(Strict):
         )
         return {**data, "factor": kept, "category": [*data.get("category", []), *moved]} if moved else data
 
-    @model_validator(mode="after")
-    def _names_agree(self) -> Self:
+    def faults(self) -> list[str]:
         names, responses = [factor.name for factor in self.factor], [response.name for response in self.response]
         keys = [factor.key for factor in self.factor if factor.key] + [each.key for each in self.category]
-        faults = []
+        faults: list[str] = []
         if self.scene is not None:
             faults += [f"factor[{n}].key: missing; add it" for n, one in enumerate(self.factor, 1) if not one.key]
             faults += ["factor: one is too few to simulate; add another"] * (len(names) == 1)
@@ -153,7 +151,7 @@ class StudyFile(Strict):
             for chain in self.chain
             if chain.factor not in names
         ]
-        return or_refuse(self, faults)
+        return faults
 
 
 @dataclass(frozen=True)
@@ -175,11 +173,8 @@ class Study:
     def scene(self) -> SceneFile:
         """Scene of the runs. Raises InputError for a study that has none."""
         if self.file.scene is None:
-            raise InputError(
-                [
-                    f"{self.path}: scene: missing; add [scene] with its file, or give fit or front the runs by --data TABLE.csv"
-                ]
-            )
+            mend = "add [scene] with its file, or give fit or front the runs by --data TABLE.csv"
+            raise InputError([f"{self.path}: scene: missing; {mend}"])
         return self.file.scene
 
     @property
@@ -251,7 +246,3 @@ class Study:
     def beside(self, name: str) -> Path:
         """A file named in the study."""
         return self.path.parent / name
-
-    def read_table(self, path: Path) -> Table:
-        """Runs of a CSV table with a column for each name. Raises InputError with all faults."""
-        return read_table(path, self.factors, self.responses, self.path)

@@ -71,9 +71,8 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
 def columns_of(path: Path) -> dict[str, bool]:
     """Names of the columns of a table, and whether all in it are numbers. Raises InputError."""
     header, rows = fields(path)
-    return {
-        name: all(NUMBER.fullmatch(row[place].strip()) for row in rows) for place, name in enumerate(header) if name
-    }
+    named = ((place, name) for place, name in enumerate(header) if name)
+    return {name: all(NUMBER.fullmatch(row[place].strip()) for row in rows) for place, name in named}
 
 
 def listed(names: Iterable[str]) -> str:

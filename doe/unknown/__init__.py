@@ -1,8 +1,7 @@
 """Unknown inputs: what is not known of a scene, and what it does to an answer. Methods on tables; knows no bearing.
 
 - ``laws``: distributions of inputs and their dependence
-- ``plan``: nested input sets
-- ``joint``: how inputs depend on each other, and sets that share some of them
+- ``joint``: nested input sets, how inputs depend on each other, and sets that share some of them
 - ``screening``: which of many inputs matter
 - ``spread``: what an output ranges over, and how much of that is noise
 - ``sensitivity``: which input makes it

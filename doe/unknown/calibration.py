@@ -9,9 +9,10 @@ import numpy as np
 from scipy import special
 
 from doe.arrays import Array, Mask, Whole
-from doe.unknown import matching, plan
+from doe.unknown import matching
 from doe.unknown.cells import Cells, fit_cells
 from doe.unknown.discrepancy import BY_ROW, Joint, Measured, joint
+from doe.unknown.joint import nested
 from doe.unknown.sampler import PARTICLES, Sampled, sampled
 
 # Input sets of a wave: so many, and so many an input; candidates that tell what is left; sets that try the posterior.
@@ -82,7 +83,7 @@ def matched(
     """
     random = np.random.default_rng(seed)
     count, inputs = max(FEWEST, EACH * unknowns.inputs), unknowns.inputs
-    candidates = plan.nested(inputs, CANDIDATES, seed)
+    candidates = nested(inputs, CANDIDATES, seed)
     points, volumes, refuted, batch, cells = candidates[:count], list[float](), list[int](), None, None
     for wave in range(waves):
         new = simulate(_dependent(unknowns, points), wave)
@@ -143,7 +144,7 @@ def _spread_over(
     candidates = matching.more(left, fits, 4 * count, random)
     if len(candidates) > 20 * count:
         candidates = random.permutation(candidates)[: 20 * count]
-    return matching.spread_out(candidates, candidates[:1], count)
+    return matching.spread_out(candidates, count)
 
 
 def _emulated(batch: Batch, measured: Measured, before: Cells | None) -> Cells:

@@ -25,6 +25,7 @@ from scipy import special, stats
 
 from doe.arrays import Array, Whole
 from doe.emulator import fit_emulator
+from doe.unknown.spread import Share
 
 # Draws of a row's true gains, resamplings of rows, and the share of cases an interval should hold.
 DRAWS, RESAMPLES, CONFIDENCE = 64, 200, 0.95
@@ -32,17 +33,9 @@ DRAWS, RESAMPLES, CONFIDENCE = 64, 200, 0.95
 BINS, PAIR_BINS, RESIDUALS = 32, 8, 48
 
 
-class Share(NamedTuple):
-    """A probability with its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
-
-
 @dataclass(frozen=True)
 class Better:
-    """Probability that each gain is positive, and that all are."""
+    """Probability that each gain is positive, and that all are, with 95 % intervals."""
 
     each: list[Share]
     all: Share
@@ -124,14 +117,12 @@ def _shares(gains: Array, variances: Array, random: np.random.Generator) -> Arra
 def _positive(matrix: Array) -> Array:
     """The nearest matrix without negative eigenvalues."""
     sizes, axes = np.linalg.eigh(0.5 * (matrix + matrix.T))
-    found: Array = (axes * sizes.clip(0.0)) @ axes.T
-    return found
+    return (axes * sizes.clip(0.0)) @ axes.T
 
 
 def _root(matrix: Array) -> Array:
     sizes, axes = np.linalg.eigh(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
-    found: Array = axes * np.sqrt(sizes.clip(0.0))[..., None, :]
-    return found
+    return axes * np.sqrt(sizes.clip(0.0))[..., None, :]
 
 
 def decides(
@@ -171,8 +162,7 @@ def decides(
 
     def all_better(at: Array) -> Array:
         foretold = np.array([_followed(emulator.mean(at), *follow) for emulator, follow in emulators]).T
-        positive: Array = (foretold[None] + missing[:, None] > 0.0).all(axis=2).mean(axis=0)
-        return positive
+        return (foretold[None] + missing[:, None] > 0.0).all(axis=2).mean(axis=0)
 
     better_at = all_better(fresh)
     whole_p = float(better_at.mean())

@@ -71,9 +71,8 @@ class Joint(NamedTuple):
         within = self.roots[:, known] @ roots[:, :, known] + self.own[:, known, None] * np.eye(known.size)
         weights = np.linalg.solve(within, np.swapaxes(across, 1, 2))
         mean = self.mean[:, asked] + np.einsum("nka,nk->na", weights, values[known] - self.mean[:, known])
-        variance = (
-            self.own[:, asked] + (self.roots[:, asked] ** 2).sum(axis=2) - np.einsum("nak,nka->na", across, weights)
-        )
+        told = np.einsum("nak,nka->na", across, weights)
+        variance = self.own[:, asked] + (self.roots[:, asked] ** 2).sum(axis=2) - told
         return mean, np.sqrt(variance.clip(1e-300))
 
 

@@ -9,13 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 from scipy.spatial import KDTree
+from scipy.stats import qmc
 
 from doe.arrays import Array
 from doe.unknown.laws import EDGE, dependent
-from doe.unknown.plan import nested
 
 # Rows beside one of a sample that are as good as on it.
 NEAR = 8
+
+
+def nested(inputs: int, points: int, seed: int) -> Array:
+    """Quantiles (points, inputs) of scrambled Sobol' points; ``points`` is a power of two, and half as many are the first half."""
+    return qmc.Sobol(inputs, rng=np.random.default_rng(seed)).random_base2(int(points).bit_length() - 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,7 @@ def values_of(law: Law | Sampled, quantiles: Array) -> list[Any]:
         choices = law.values or []
         bounds = np.cumsum(_shares(law))[:-1]
         return [choices[int(place)] for place in np.searchsorted(bounds, quantiles, side="right")]
-    found: list[Any] = _distribution(law).ppf(np.clip(quantiles, EDGE, 1.0 - EDGE)).tolist()
-    return found
+    return _distribution(law).ppf(np.clip(quantiles, EDGE, 1.0 - EDGE)).tolist()
 
 
 def quantiles_of(law: Law, values: Sequence[Any]) -> Array:
@@ -68,15 +67,11 @@ def copula(names: Sequence[str], pairs: Sequence[Correlation]) -> Array | None:
         i, j = (list(names).index(key) for key in pair.keys)
         matrix[i, j] = matrix[j, i] = 2.0 * np.sin(np.pi * pair.rank / 6.0)
     try:
-        factor = np.asarray(np.linalg.cholesky(matrix), float)
+        return np.asarray(np.linalg.cholesky(matrix), float)
     except np.linalg.LinAlgError:
         told = ", ".join(f"{' and '.join(pair.keys)} {pair.rank:g}" for pair in pairs)
-        raise InputError(
-            [
-                f"uncertain.correlation: {told}: contradict each other; no inputs can go together so, bring them nearer to 0"
-            ]
-        ) from None
-    return factor
+        why = "contradict each other; no inputs can go together so, bring them nearer to 0"
+        raise InputError([f"uncertain.correlation: {told}: {why}"]) from None
 
 
 def dependent(quantiles: Array, factor: Array | None) -> Array:

@@ -38,8 +38,7 @@ def kept(implausible: Array, wave: int) -> Mask:
     """Which input sets (n,) are left: in the first wave one cell may be off, as emulators are poor still."""
     place = max(implausible.shape[1] - (2 if wave == 0 else 1), 0)
     worst = np.partition(implausible, place, axis=1)[:, place]
-    found: Mask = worst < RULED_OUT
-    return found
+    return worst < RULED_OUT
 
 
 def ruling_out(implausible: Array) -> Whole:
@@ -61,11 +60,9 @@ def more(left: Array, fits: Callable[[Array], Mask], wanted: int, random: np.ran
     return left
 
 
-def spread_out(candidates: Array, near: Array, count: int) -> Array:
-    """``count`` of the candidates (n, d), each the farthest from those before it and from ``near`` (m, d)."""
-    distance = np.full(len(candidates), np.inf)
-    for each in near:
-        distance = np.minimum(distance, ((candidates - each) ** 2).sum(axis=1))
+def spread_out(candidates: Array, count: int) -> Array:
+    """``count`` of the candidates (n, d), each the farthest from the first and from those before it."""
+    distance = ((candidates - candidates[0]) ** 2).sum(axis=1)
     places: list[int] = []
     for _ in range(min(count, len(candidates))):
         places.append(int(np.argmax(distance)))

@@ -52,8 +52,7 @@ def learnt(quantiles: Array, logarithms: Array, before: Array) -> Learnt:
 
 def contraction(quantiles: Array) -> Array:
     """1 - sd after / sd before (d,) of inputs by their quantiles (n, d), 0 where they spread more than before."""
-    found: Array = (1.0 - quantiles.std(axis=0) / PRIOR_SD).clip(0.0)
-    return found
+    return (1.0 - quantiles.std(axis=0) / PRIOR_SD).clip(0.0)
 
 
 def seen(share: float) -> str:
@@ -63,9 +62,8 @@ def seen(share: float) -> str:
 
 def _combinations(after: Array, before: Array) -> list[Combination]:
     """Combinations of two inputs or more that are known, the best first: eigenvectors of one covariance by the other."""
-    places = np.flatnonzero(
-        np.isfinite(after).all(axis=0) & np.isfinite(before).all(axis=0) & (before.std(axis=0) > 0.0)
-    )
+    numbers = np.isfinite(after).all(axis=0) & np.isfinite(before).all(axis=0)
+    places = np.flatnonzero(numbers & (before.std(axis=0) > 0.0))
     if places.size < 2:
         return []
     spread = before[:, places].std(axis=0)

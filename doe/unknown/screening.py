@@ -4,8 +4,22 @@ Source: Box, Hunter and Hunter, Statistics for Experimenters, second edition, se
 """
 
 import numpy as np
+from scipy.linalg import hadamard
 
 from doe.arrays import Array
+
+# Quantiles at which a screening sets an input low and high.
+LOW, HIGH = 0.1, 0.9
+
+
+def two_levels(inputs: int) -> Array:
+    """Quantiles (n, inputs) of a folded-over two-level design: main effects free of each other and of all pairs.
+
+    Hadamard's matrix and its mirror image (Plackett and Burman 1946; Box and Wilson 1951 for the fold).
+    """
+    size = 1 << int(inputs).bit_length()
+    signs = hadamard(size)[:, 1 : inputs + 1]
+    return np.where(np.vstack([signs, -signs]) > 0, HIGH, LOW)
 
 
 def shares(quantiles: Array, values: Array) -> Array:

@@ -14,16 +14,15 @@ SIAM/ASA J. Uncertainty Quantification 8 (2020) 693 (nearest neighbours in place
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import stats
 
 from doe.arrays import Array
-from doe.emulator import Emulator, fit_emulator
-from doe.unknown.joint import Joint
-from doe.unknown.plan import nested
-from doe.unknown.spread import Emulated
+from doe.emulator import fit_emulator
+from doe.unknown.joint import Joint, nested
+from doe.unknown.spread import Emulated, Share
 
 # Points of an index (a power of two), refits of its interval, and the share of cases that the interval should hold.
 POINTS, POINTS_OF_REFITS, REFITS, CONFIDENCE = 1024, 256, 16, 0.9
@@ -34,33 +33,25 @@ Function = Callable[[Array], Array]  # of quantiles (n, d)
 Measure = Callable[[Function, int, int], Array]  # of a function, by so many points and a seed
 
 
-class Index(NamedTuple):
-    """A share of the variance, and its 90 % interval."""
-
-    value: float
-    low: float
-    high: float
-
-
 class Indices(NamedTuple):
-    """First and total indices of every input, in their order."""
+    """First and total indices of every input, in their order, with 90 % intervals."""
 
-    first: list[Index]
-    total: list[Index]
+    first: list[Share]
+    total: list[Share]
 
 
 def sobol(fitted: Emulated, inputs: int, seed: int) -> Indices:
     """Sobol' indices of independent inputs, uniform in their quantiles."""
     ends = _with_intervals(fitted, lambda *of: np.array(_indices(inputs, *of)), seed)
-    first, total = ([Index(*map(float, ends[:, kind, each])) for each in range(inputs)] for kind in (0, 1))
+    first, total = ([Share(*map(float, ends[:, kind, each])) for each in range(inputs)] for kind in (0, 1))
     return Indices(first, total)
 
 
-def shapley(fitted: Emulated, joint: Joint, seed: int) -> list[Index]:
+def shapley(fitted: Emulated, joint: Joint, seed: int) -> list[Share]:
     """Shapley's effects of inputs that depend on each other, and of one that does nothing, the last; their sum is 1."""
     # Rows of a sample are no even plan: they need more of them.
     ends = _with_intervals(fitted, lambda *of: _effects(joint, *of), seed, 4 * POINTS)
-    return [Index(*map(float, each)) for each in ends.T]
+    return [Share(*map(float, each)) for each in ends.T]
 
 
 def _with_intervals(fitted: Emulated, measure: Measure, seed: int, points: int = POINTS) -> Array:
@@ -68,11 +59,12 @@ def _with_intervals(fitted: Emulated, measure: Measure, seed: int, points: int =
     random = np.random.default_rng(seed)
     emulator, whole = fitted.emulator, measure(fitted, points, seed)
     noise = np.sqrt(emulator.variances + emulator.hyperparameters.nugget)
+    like: dict[str, Any] = {"trend": "linear", "start": emulator.hyperparameters}
     misses = []
     for again in range(REFITS):
         truth = emulator.draw(1, random)
         values = truth(emulator.points)[0] + noise * random.standard_normal(noise.size)
-        refit = replace(fitted, emulator=_refitted(emulator, values))
+        refit = replace(fitted, emulator=fit_emulator(emulator.points, values, emulator.variances, **like))
         # Both by the same points, whose own error then hardly shows in the difference.
         ours, true = (
             measure(function, POINTS_OF_REFITS, seed + 1 + again)
@@ -80,14 +72,9 @@ def _with_intervals(fitted: Emulated, measure: Measure, seed: int, points: int =
         )
         misses.append(ours - true)
     middle = whole - np.mean(misses, axis=0)
-    half = (
-        stats.t.ppf(0.5 + 0.5 * CONFIDENCE, REFITS - 1) * np.std(misses, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / REFITS)
-    )
+    student = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, REFITS - 1)
+    half = student * np.std(misses, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / REFITS)
     return np.stack([middle, middle - half, middle + half]).clip(0.0, 1.0)
-
-
-def _refitted(emulator: Emulator, values: Array) -> Emulator:
-    return fit_emulator(emulator.points, values, emulator.variances, trend="linear", start=emulator.hyperparameters)
 
 
 def _indices(inputs: int, function: Function, points: int, seed: int) -> tuple[Array, Array]:

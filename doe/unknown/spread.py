@@ -7,6 +7,7 @@ elsewhere it is that of the runs, shrunk about their mean by sqrt(V_in/s^2(y)).
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,14 @@ from doe.emulator import Emulator, fit_emulator, pooled_variances
 TRUSTED = 0.8
 # Ends of the range, and how many draws or resamplings tell their errors.
 ENDS, DRAWS = (0.05, 0.5, 0.95), 24
+
+
+class Share(NamedTuple):
+    """A share of cases or of a variance, and the ends of its interval."""
+
+    value: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +77,12 @@ class Spread:
     low: float
     median: float
     high: float
-    errors: tuple[float, float, float]
+    errors: tuple[float, ...]
     variance: dict[str, float]
     hidden: bool
     by_emulator: bool
-    q2: float | None = None
-    ceiling: float | None = None
+    q2: float
+    ceiling: float
 
     @property
     def known(self) -> float:
@@ -110,19 +119,10 @@ def spread_of(runs: Runs, fitted: Emulated, fresh: Array, seed: int) -> Spread:
         ends = np.quantile(_shrunk(runs.values, shrink), ENDS)
         resampled = random.choice(runs.values, (DRAWS, len(runs.values)))
         others = np.quantile(_shrunk(resampled, shrink), ENDS, axis=1)
-    low, median, high = map(float, ends)
-    errors = others.std(axis=1, ddof=1)
-    return Spread(
-        low,
-        median,
-        high,
-        (float(errors[0]), float(errors[1]), float(errors[2])),
-        shares,
-        left == 0.0,
-        fitted.trusted,
-        fitted.q2,
-        fitted.ceiling,
-    )
+    errors = tuple(others.std(axis=1, ddof=1).tolist())
+    by_emulator = fitted.trusted, fitted.q2, fitted.ceiling
+    low, median, high = ends.tolist()
+    return Spread(low, median, high, errors, shares, left == 0.0, *by_emulator)
 
 
 def _shrunk(values: Array, by: float) -> Array:

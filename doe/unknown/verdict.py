@@ -51,11 +51,6 @@ class Trial:
     crps_before: float
 
     @property
-    def coverage(self) -> float:
-        """Share of the cells inside."""
-        return self.inside / max(self.cells, 1)
-
-    @property
     def rejected(self) -> bool:
         """Whether so few inside are hardly chance."""
         return bool(stats.binom.cdf(self.inside, self.cells, INSIDE) < REJECTED)

@@ -14,7 +14,7 @@ from doe_command import doe, invoke, loaded_by
 from instant_runs import instantly
 from short_studies import short_study, silent
 
-from doe.report.steps.status import print_status
+from doe.commands.status import print_status
 from doe.running.owner import at_work
 from doe.running.store import Point, Store
 from doe.study.runs import STORE, run_design

@@ -7,7 +7,7 @@ from scipy import stats
 from doe.arrays import Array
 from doe.emulator import pooled_variances
 from doe.unknown.decision import better, decides, in_doubt, wilson
-from doe.unknown.plan import nested
+from doe.unknown.joint import nested
 
 
 def _noisy(truth: Array, sd: float, seed: int) -> tuple[Array, Array, Array]:

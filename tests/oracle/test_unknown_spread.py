@@ -7,10 +7,9 @@ import pytest
 from scipy import stats
 
 from doe.arrays import Array
-from doe.unknown.joint import Joint
+from doe.unknown.joint import Joint, nested
 from doe.unknown.laws import ranks
-from doe.unknown.plan import nested, two_levels
-from doe.unknown.screening import kept, shares
+from doe.unknown.screening import kept, shares, two_levels
 from doe.unknown.sensitivity import shapley, sobol
 from doe.unknown.spread import Runs, emulated, spread_of
 

@@ -19,7 +19,7 @@ from doe.adaptive.emulators import Emulators, fit_emulators
 from doe.adaptive.runs import Runs
 from doe.pareto.goals import Goals
 from doe.report.html import html_report
-from doe.report.steps.emulators import emulators_record
+from doe.report.steps.adaptive import emulators_record
 from doe.study_file import Study
 from doe.study_file.design_section import Category
 

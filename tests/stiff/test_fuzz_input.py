@@ -16,6 +16,7 @@ from doe.dimension_chain import read_chains
 from doe.study.checked import check_study
 from doe.study.design import design_of
 from doe.study_file import Study
+from doe.study_file.table import read_table as read_runs_table
 from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError
 from rbdyn.quasistatic.sweep.result import FORMAT as SWEEP_FORMAT
 from rbdyn.quasistatic.sweep.result import SweepResult
@@ -116,7 +117,8 @@ def read_study(path: Path) -> object:
 
 def read_table(path: Path) -> object:
     """A table, as ``doe fit --data`` reads it."""
-    return Study.load(EXAMPLES / "clearance_study.toml").read_table(path)
+    study = Study.load(EXAMPLES / "clearance_study.toml")
+    return read_runs_table(path, study.factors, study.responses, study.path)
 
 
 def outcome(read: Callable[[Path], object], path: Path) -> str:

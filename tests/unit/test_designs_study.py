@@ -13,7 +13,6 @@ from doe import clearance
 from doe.cli import app
 from doe.designs import central_composite
 from doe.study.design import check_runs, design_of, evaluation
-from doe.study.runs import design_points
 from doe.study_file import Study
 from rbdyn.faults import InputError
 
@@ -57,7 +56,7 @@ def test_random_order_gives_every_point_its_own_seed(tmp_path):
     study, plain = Study.load(tmp_path / "study.toml"), Study.load(EXAMPLE)
     design = design_of(study)
     mixed = clearance.design_scenes(study, study.centre + design.coded * study.step, design.order.tolist())
-    given = clearance.design_scenes(plain, plain.centre + design_points(plain) * plain.step)
+    given = clearance.design_scenes(plain, plain.centre + design_of(plain).coded * plain.step)
     assert [scene.numerics.seed for scene in mixed] != [scene.numerics.seed for scene in given]
     assert {scene.model_dump_json() for scene in mixed} == {scene.model_dump_json() for scene in given}
 

@@ -17,7 +17,7 @@ from doe.pareto.uncertainty import (
     non_dominated_share,
     selection_optimism,
 )
-from doe.study.drawn import draw_all, jacobian, predict_all, predict_draws, predict_paired
+from doe.study.drawn import draw_all, half_widths, jacobian, predict_all, predict_draws, predict_paired
 from doe.study.front import find_front
 from doe.study.predicted import predicted_gains, statement
 
@@ -125,7 +125,7 @@ def test_probability_of_dominance_of_two_independent_gains():
     # Gains of one standard error in two independent responses: Phi(1)^2.
     drawn = np.random.default_rng(1).standard_normal((20000, 1, 2))
     sure = front_uncertainty(
-        *(drawn, np.ones((1, 2)), Goals.of(["min", "min"]), np.zeros((1, 2)), 0, "knee"),
+        *(drawn, Goals.of(["min", "min"]), np.zeros((1, 2)), 0, "knee"),
         baseline=np.ones((20000, 2)),
         original=np.ones(2),
     )
@@ -176,6 +176,8 @@ def test_front_of_the_published_table_knows_its_errors(table):
     sure = found.uncertainty
     assert np.array_equal(sure.non_dominated, again.uncertainty.non_dominated)
     # Student's t of the lack of fit, 11 degrees of freedom for the linear surface and 5 for the others.
-    assert sure.half_widths == pytest.approx(found.standard_errors * [2.2010, 2.5706, 2.5706], rel=1e-4)
+    coded = study.coded(found.points)
+    errors = np.column_stack([surface.prediction_standard_error(coded) for surface in surfaces])
+    assert half_widths(surfaces, coded) == pytest.approx(errors * [2.2010, 2.5706, 2.5706], rel=1e-4)
     assert 0.3 < sure.pick_dominates < 0.95
     assert 0.0 < sure.non_dominated.min() < sure.non_dominated.max() <= 1.0

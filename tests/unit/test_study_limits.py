@@ -153,9 +153,9 @@ def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
     corner = study.centre + reach * [0.0, 1.0, 0.0]
     assert share_at_edge(study, np.array([corner, study.centre])) == 0.5
     from doe.response_surface import fit
-    from doe.study.runs import design_points
+    from doe.study.design import design_of
 
-    coded = design_points(study)
+    coded = design_of(study).coded
     values = [50.0 - 2.0 * coded[:, 1] + 1e-9 * np.sin(np.arange(20)) for _ in study.responses]
     surfaces = [
         fit(coded, each, name=name, model="linear", centre=study.centre, step=study.step)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from doe.unknown.joint import nested
 from doe.unknown.laws import copula, dependent, quantiles_of, table_of, values_of
-from doe.unknown.plan import nested, two_levels
+from doe.unknown.screening import two_levels
 from rbdyn.cli.keys import keys
 from rbdyn.faults import InputError, read_toml, validated
 from rbdyn.scene import Scene

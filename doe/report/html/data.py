@@ -69,6 +69,8 @@ def _rounded(value: float | None, digits: int = 6) -> float | None:
 
 def _surfaces(summary: Record) -> list[dict[str, Any]]:
     """Terms and coefficients; with the covariance also what a 95 % confidence interval needs."""
+    from scipy.stats import t
+
     found, limits = [], bounds(summary)
     for name, fitted in fits(summary).items():
         coefficients = fitted["coefficients"]
@@ -82,21 +84,9 @@ def _surfaces(summary: Record) -> list[dict[str, Any]]:
                 "terms": list(coefficients),
                 "coefficients": list(coefficients.values()),
                 "covariance": covariance,
-                "student": _student(missed.get("dof") or residual) if covariance and residual else None,
+                "student": float(t.ppf(0.975, missed.get("dof") or residual)) if covariance and residual else None,
                 "missed": missed.get("variance"),
-                "power": _power(fitted.get("transform")),
+                "power": fitted.get("transform"),
             }
         )
     return found
-
-
-def _student(dof: int) -> float:
-    from scipy.stats import t
-
-    return float(t.ppf(0.975, dof))
-
-
-def _power(transform: Any) -> float | None:
-    """Exponent of a Box-Cox transform of the response; None where there is none."""
-    value = transform.get("lambda") if isinstance(transform, Mapping) else transform
-    return float(value) if isinstance(value, int | float) else None

@@ -5,7 +5,7 @@ from typing import Any
 
 from doe.report.sections.blocks import Block, Bullets, Section, Table, Tile, Tiles, Words
 from doe.report.sections.record import Factor, Record, factors, nearest, part, responses, scalars
-from doe.report.words import change, dimension, half_width, moved, rounded_down
+from doe.report.words import change, dimension, half_width, moved, of_hundred, rounded_down
 from rbdyn.records.words import label, quantity, shown, with_error
 
 # Characters above which a value is a sentence, to be broken.
@@ -60,7 +60,7 @@ def _held(summary: Record) -> Table:
 
 def _kept(gain: float | None, share: Sequence[float] | None) -> str:
     kept = "" if gain is None else f"{100.0 * gain:.1f} %, "
-    return "" if share is None else f"{kept}{100.0 * share[0]:.0f} ({100.0 * share[1]:.0f} to {100.0 * share[2]:.0f})"
+    return "" if share is None else f"{kept}{of_hundred(share)}"
 
 
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
@@ -205,9 +205,8 @@ def settings(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 
 def _wish(response: Record) -> tuple[str, str, str, str]:
-    goal = {"min": "small", "max": "large", "none": "watched"}.get(
-        str(response.get("goal")), str(response.get("goal") or "")
-    )
+    asked = str(response.get("goal") or "")
+    goal = {"min": "small", "max": "large", "none": "watched"}.get(asked, asked)
     if response.get("target") is not None:
         goal = f"at {shown(response['target'])}"
     limits = [
@@ -280,17 +279,13 @@ def tolerances(summary: Record) -> Table:
             label(name),
             f"± {rounded_down(each.get('half_width') or 0.0)}",
             shown(each.get("probability")),
-            _limit(each.get("limited_by")),
+            label(each.get("limited_by") or ""),
         )
         for name, each in found.items()
         if name in names and isinstance(each, Mapping)
     ]
     header = ("factor", "tolerance", "probability", "limited by")
     return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,))
-
-
-def _limit(limited_by: Any) -> str:
-    return label(limited_by) if isinstance(limited_by, str) else shown(limited_by)
 
 
 def record_table(caption: str, record: Record | None, folded: bool = False) -> Table:

@@ -79,14 +79,7 @@ def _by_term(columns: Mapping[str, Record]) -> Table:
     return Table("By term", ["term", *flat], rows)
 
 
-def failure_table(failures: Sequence[Any]) -> Table:
-    """Failures grouped by their cause."""
-    groups: dict[str, list[str]] = defaultdict(list)
-    for failure in failures:
-        if isinstance(failure, Mapping):
-            runs = failure.get("runs", failure.get("run", ""))
-            groups[str(failure.get("cause") or "unknown")].append(shown(failure.get("labels") or runs))
-        else:
-            groups[str(failure)].append("")
-    rows = [(cause, ", ".join(filter(None, runs))) for cause, runs in groups.items()]
+def failure_table(failures: Sequence[Record]) -> Table:
+    """Failures as they are grouped, by their cause."""
+    rows = [(str(each.get("cause") or "unknown"), shown(each.get("labels") or each.get("runs"))) for each in failures]
     return Table("What failed, by cause", ("cause", "runs"), rows, text_columns=(1,))

@@ -75,12 +75,9 @@ def diagnostics(summary: Record, motion: Mapping[str, Any]) -> Section | None:
 
 def _one(name: str, fitted: Record) -> list[Block]:
     blocks: list[Block] = [Heading(label(name))]
-    # What judges itself may have been quoted among the sentences of the fit already.
-    sentences = list(dict.fromkeys([*(fitted.get("sentences") or []), *_sentences(fitted)]))
-    if sentences:
-        # The heading says already of which response they speak.
-        said = [sentence.removeprefix(f"{name}: ") for sentence in sentences]
-        blocks.append(Bullets([text[:1].upper() + text[1:] for text in said]))
+    # The heading says already of which response they speak.
+    said = [sentence.removeprefix(f"{name}: ") for sentence in fitted.get("sentences") or []]
+    blocks.append(Bullets([text[:1].upper() + text[1:] for text in said]))
     if runs := part(fitted, "diagnostics", "runs"):
         caption = "Predicted on observed, residuals on predicted, normal plot, Cook's distance on leverage."
         blocks.append(Figures(diagnostic_plots(name, runs), caption))
@@ -99,9 +96,3 @@ def _one(name: str, fitted: Record) -> list[Block]:
     }
     blocks.append(record_table(f"Further figures of {label(name)}", rest, folded=True))
     return blocks
-
-
-def _sentences(fitted: Record) -> list[str]:
-    """Words of the parts that judge themselves."""
-    found = (part(fitted, "diagnostics", "normality"), fitted.get("transform"), fitted.get("rival"))
-    return [each["sentence"] for each in found if isinstance(each, Mapping) and each.get("sentence")]

@@ -107,12 +107,6 @@ class Plot:
                 ends = max(point[along] - half, low), min(point[along] + half, high)
                 self.line([(x, end) if along else (end, y) for end in ends], role)
 
-    def bar(self, x: float, y: float, half: float, role: str, title: str = "") -> None:
-        """An upright bar from zero, ``half`` wide to each side of x."""
-        (u, v), (p, q) = self.place(x - half, max(y, 0.0)), self.place(x + half, min(y, 0.0))
-        words = f"<title>{escape(title)}</title>" if title else ""
-        self.marks.append(f'<rect class="bar {role}" x="{u:.1f}" y="{v:.1f}" width="{p - u:.1f}" height="{max(q - v, 0.0):.1f}">{words}</rect>')  # fmt: skip
-
     def svg(self, words: str, extra: str = "") -> str:
         """The picture; ``words`` describe it to those who cannot see it, ``extra`` are further attributes."""
         told = f'viewBox="0 0 {self.width:g} {self.height:g}" role="img" aria-label="{escape(words)}"{extra}'

@@ -56,10 +56,11 @@ def pairs(
         for each in sets:
             plot.dots([_pair(point, one, two) for point in each.points], each.role, first=each.first)
         for name, point in marks.items():
-            plot.symbol(_pair(point, one, two), _shape(name), _role(name), name)
+            plot.symbol(_pair(point, one, two), *_mark(name), name)
         for name, (place, error) in simulated.items():
-            plot.cross(place, error, f"error {_role(name)}")
-            plot.symbol(place, _shape(name), f"hollow {_role(name)}", f"{name}, simulated")
+            shape, role = _mark(name)
+            plot.cross(place, error, f"error {role}")
+            plot.symbol(place, shape, f"hollow {role}", f"{name}, simulated")
         plot.marks.append('<circle class="chosen" r="7" cx="-50" cy="-50"/>')
         drawn.append(plot.svg(f"Front: {quantity(two)[0]} on {quantity(one)[0]}", ' data-front="pair"'))
     return drawn
@@ -75,12 +76,9 @@ def _simulated(point: Record, one: str, two: str) -> tuple[Point, tuple[float | 
     return None if x is None or y is None else ((x, y), (half_width(found[0]), half_width(found[1])))
 
 
-def _shape(name: str) -> str:
-    return MARKS.get(name.replace("_", " "), OTHER)[0]
-
-
-def _role(name: str) -> str:
-    return MARKS.get(name.replace("_", " "), OTHER)[1]
+def _mark(name: str) -> tuple[str, str]:
+    """Shape and role of a point."""
+    return MARKS.get(name.replace("_", " "), OTHER)
 
 
 def legend_of(
@@ -88,8 +86,9 @@ def legend_of(
 ) -> str:
     """What the symbols of the pictures mean."""
     entries = [("dot", each.role, f"front {each.words}") for each in sets]
-    entries += [(_shape(name), _role(name), name) for name in marks]
-    entries += [(_shape(name), f"hollow {_role(name)}", f"{name.replace('_', ' ')}, simulated") for name in confirmed]
+    entries += [(*_mark(name), name) for name in marks]
+    hollow = ((*_mark(name), name.replace("_", " ")) for name in confirmed)
+    entries += [(shape, f"hollow {role}", f"{words}, simulated") for shape, role, words in hollow]
     return legend(entries + [("line", "limit", "limit")] * limited)
 
 
@@ -104,11 +103,11 @@ def parallel(given: Sequence[Factor], names: Sequence[str], sets: Sequence[Front
             parts.append(f'<polyline class="thread {each.role}" data-point="{each.first + number}" points="{_thread(point, axes)}"/>')  # fmt: skip
     for name, point in marks.items():
         if name in ("baseline", "pick"):
-            corners = _thread(point, axes)
-            parts.append(f'<polyline class="thread mark {_role(name)}" points="{corners}"><title>{name}</title></polyline>')  # fmt: skip
+            corners, (shape, role) = _thread(point, axes), _mark(name)
+            parts.append(f'<polyline class="thread mark {role}" points="{corners}"><title>{name}</title></polyline>')  # fmt: skip
             for corner in corners.split():
                 u, v = (float(x) for x in corner.split(","))
-                parts.append(symbol(u, v, _shape(name), _role(name), 4.0, name))
+                parts.append(symbol(u, v, shape, role, 4.0, name))
     parts.append('<polyline class="thread chosen" points=""/>')
     parts += [_axis(number, len(axes), name, limits) for number, (_, name, limits) in enumerate(axes)]
     words = f"Parallel coordinates of {len(points)} points of the front"

@@ -1,1 +1,1 @@
-"""JSON and tables of each step: ``design``, ``fit``, ``front``, ``confirmation``, ``chain``, ``status``."""
+"""JSON and tables of each step: ``design``, ``fit``, ``front``, ``confirmation``, ``chain``."""

@@ -4,14 +4,16 @@ from typing import Any
 
 import numpy as np
 
-from doe.arrays import Array, Rows, or_none
+from doe.adaptive.emulators import LEAST_DEVIATION
+from doe.arrays import Array, Rows
+from doe.emulator.likelihood import JITTER
 from doe.pareto.surrogate_loss import DRAWS, noisy_hypervolume
 from doe.report.steps.confirmation import point_record
-from doe.report.steps.emulators import emulators_record
 from doe.study.adaptive import Adaptive, levels_at
 from doe.study.compared import Compared
 from doe.study.goals import region_of
 from doe.study_file import Study
+from rbdyn.records.record import finite
 
 
 def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
@@ -38,7 +40,7 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
                 "runs": each.runs,
                 "hypervolume": each.reached,
                 "deviation": each.deviation,
-                "gained": or_none(each.gained),
+                "gained": finite(each.gained),
                 "left": each.left,
                 "why": each.why,
             }
@@ -110,3 +112,51 @@ def archive_table(study: Study, adaptive: Adaptive, rows: Rows | slice = slice(N
         _factors(study, at) | dict(zip(names, row, strict=True))
         for at, row in zip(found.archive[rows], table, strict=True)
     ]
+
+
+def emulators_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
+    """Mean and standard deviation of every response without its scatter, anywhere.
+
+    The coordinates of a point are x = (factor - ``centre``) / ``half_range``, and of each of the ``categories`` 1 for the level
+    that it has and 0 for each other one; ``pick``: that of the pick. Factors in the places that ``inactive`` lists by level are
+    at 0 there. A response that has ``shares`` s of factors knows these by ln(1 + s x)/s. ``points`` (n, k) are the runs'
+    factors, ``kinds`` (n, c) the places of their levels. A response is a trend of ``terms`` with ``coefficients``, A the first factor, and a process: the
+    covariances of the point with the runs, Matern of smoothness 5/2 with ``lengths`` a coordinate and ``variance``, times
+    ``weights`` (n,). The runs' ``values`` (n,) have the variances ``noise`` (n,). The deviation is that of universal kriging
+    times ``stretch``, ``least`` at least.
+    """
+    emulators, numbers = adaptive.found.emulators, len(study.factors)
+    runs = emulators.runs.points
+    categories = zip(study.file.category, adaptive.study.levels, strict=True)
+    responses = {}
+    each_one = zip(study.responses, emulators.each, emulators.stretch.tolist(), emulators.shares, strict=True)
+    for name, one, stretch, shares in each_one:
+        given = one.hyperparameters
+        responses[name] = {
+            "terms": list(one.terms),
+            "coefficients": one.solution.coefficients.tolist(),
+            "lengths": given.lengths.tolist(),
+            "variance": given.variance,
+            "weights": one.solution.weights.tolist(),
+            "values": one.values.tolist(),
+            "noise": (one.variances + given.nugget + JITTER * given.variance).tolist(),
+            "stretch": stretch,
+            "shares": list(shares),
+            "least": LEAST_DEVIATION * float(abs(one.values).max()),
+        }
+    return {
+        "centre": study.centre.tolist(),
+        "half_range": (region_of(study) * study.step).tolist(),
+        "categories": [
+            {
+                "name": each.name,
+                "levels": list(each.categories),
+                "pick": place,
+                "inactive": [[*map(study.factors.index, each.inactive_at(at))] for at in range(len(each.categories))],
+            }
+            for each, place in categories
+        ],
+        "points": runs[:, :numbers].tolist(),
+        "kinds": [levels_at(study, point) for point in runs],
+        "responses": responses,
+    }

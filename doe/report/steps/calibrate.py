@@ -136,14 +136,11 @@ def print_calibration(record: dict[str, Any]) -> None:
             "such an error takes the level, only patterns over rows and outputs teach inputs"
         )
     if tried := record["held_out"]:
-        print(
-            f"{tried['rows']}: {tried['inside_90_percent']} of {tried['values']} values in their 90 % interval, "
-            f"CRPS {tried['crps']:.2g} (before {tried['crps_before']:.2g})"
-        )
+        inside = f"{tried['inside_90_percent']} of {tried['values']} values in their 90 % interval"
+        print(f"{tried['rows']}: {inside}, CRPS {tried['crps']:.2g} (before {tried['crps_before']:.2g})")
     for each in record["outliers"]:
-        print(
-            f"{quantity(each['output'])[0]} of row {each['row']} is {each['residual']:.1f} standard deviations off the others"
-        )
+        far = f"{each['residual']:.1f} standard deviations"
+        print(f"{quantity(each['output'])[0]} of row {each['row']} is {far} off the others")
     if record["without_outliers"]:
         told = ", ".join(f"{key} {share:.2f}" for key, share in record["without_outliers"].items())
         print(f"contraction without these: {told}")
@@ -230,9 +227,8 @@ def draw_corner(found: Calibration, record: dict[str, Any], path: Path) -> None:
             axis.set_xlabel(key.key.replace(".", ".\n"), fontsize=6.5)
         if across == 0 and down > 0:
             axis.set_ylabel(other.key.replace(".", ".\n"), fontsize=6.5)
-    figure.suptitle(
-        f"inputs after the measurements, over their range before; {record['verdict']}", fontsize=8, color=GREY
-    )
+    title = f"inputs after the measurements, over their range before; {record['verdict']}"
+    figure.suptitle(title, fontsize=8, color=GREY)
     save(figure, path)
 
 

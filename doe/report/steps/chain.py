@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from doe.dimension_chain import ChainResult
+from doe.dimension_chain.selective_assembly import SelectiveAssembly
 from rbdyn.cli.terminal import print_table
 
 BAR = 20  # characters of a contribution of 100 %
@@ -39,7 +40,7 @@ def print_chain(name: str, chain: ChainResult, quiet: bool = False, verbose: boo
     if not chain.refused:
         print(chain.status)
     if chain.selective is not None:
-        _print_selective(chain, verbose)
+        _print_selective(chain.selective, verbose)
 
 
 def _percent(percent: float) -> str:
@@ -81,9 +82,7 @@ def _print_answer(chain: ChainResult) -> None:
         print(f"cost of the allocated tolerances {chain.cost:.4g}")
 
 
-def _print_selective(chain: ChainResult, verbose: bool) -> None:
-    found = chain.selective
-    assert found is not None
+def _print_selective(found: SelectiveAssembly, verbose: bool) -> None:
     low, high = found.worst_case_mm
     needed = "no number of classes keeps" if found.classes_needed is None else f"{found.classes_needed} would keep"
     closing = f"closing link {low:.4f} to {high:.4f} mm in worst case ({needed} the limits)"

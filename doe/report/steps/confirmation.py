@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from doe import clearance
-from doe.arrays import Array, or_none
+from doe.arrays import Array
 from doe.study.confirmation import Confirmed, Gain, statement
 from doe.study.direct import Direct
 from doe.study.limits import Limit, limits_of
 from doe.study.predicted import PredictedGain
 from doe.study.whole import StudyResult
 from doe.study_file import Study
+from rbdyn.records.record import finite
 
 
 def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
@@ -39,7 +40,7 @@ def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
     """Limits judged by simulation, by response: of a lower and an upper one that with the worse verdict, or less room."""
     return {
         limit.response: {key: getattr(limit, key) for key in ("bound", "sense", "value", "error", "verdict")}
-        | {"error": or_none(limit.error)}
+        | {"error": finite(limit.error)}
         for limit in limits
     }
 
@@ -76,7 +77,7 @@ def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
 def _quantities(study: Study, confirmed: Confirmed) -> Mapping[str, Any]:
     columns = (confirmed.values.tolist(), confirmed.statistical, confirmed.numerical)
     return {
-        response: {"value": value, "statistical_error": or_none(statistical), "numerical_error": or_none(numerical)}
+        response: {"value": value, "statistical_error": finite(statistical), "numerical_error": finite(numerical)}
         for response, value, statistical, numerical in zip(study.responses, *columns, strict=True)
     }
 
@@ -86,5 +87,5 @@ def point_record(study: Study, point: Array, values: Array, errors: Array) -> di
     return {
         "factors": study.by_factor(point),
         "responses": dict(zip(study.responses, values.tolist(), strict=True)),
-        "errors": dict(zip(study.responses, map(or_none, errors), strict=True)),
+        "errors": dict(zip(study.responses, map(finite, errors), strict=True)),
     }

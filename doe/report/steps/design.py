@@ -11,6 +11,7 @@ from rbdyn.cli.terminal import print_table
 def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:
     """Runs in their order, from 1."""
     actual = actual_of(study, design)
+    rows = zip(design.order.tolist(), design.kind, design.block_numbers, design.coded, actual, strict=True)
     return [
         {
             "run": number,
@@ -20,9 +21,7 @@ def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:
             "factors": study.by_factor(values),
             "seed": study.file.design.seed + place,
         }
-        for number, (place, kind, block, coded, values) in enumerate(
-            zip(design.order.tolist(), design.kind, design.block_numbers, design.coded, actual, strict=True), 1
-        )
+        for number, (place, kind, block, coded, values) in enumerate(rows, 1)
     ]
 
 

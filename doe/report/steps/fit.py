@@ -87,9 +87,8 @@ def _print_equations(surface: Surface, factors: Sequence[str]) -> None:
         named = zip("ABCDEFGHIJKLMNOPQRSTUVWXYZ", factors, strict=False)
         print(", ".join(f"{letter} = {name}" for letter, name in named))
     unit = "times the known error " if surface.weighting == "replicates" else ""
-    explained = (
-        f"R² {_shown(surface.r2)}, adjusted {_shown(surface.adjusted_r2)}, predicted {_shown(surface.predicted_r2)}"
-    )
+    shares = map(_shown, (surface.r2, surface.adjusted_r2, surface.predicted_r2))
+    explained = "R² {}, adjusted {}, predicted {}".format(*shares)
     missed = f"PRESS {_shown(surface.press)}, CV {_shown(surface.cv_percent)} %"
     precision = f"adequate precision {_shown(surface.adequate_precision)}"
     rest = f"{_shown(surface.residual_mean_square**0.5)} {unit}on {surface.residual_dof} degrees of freedom"

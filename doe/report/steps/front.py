@@ -11,24 +11,22 @@ from doe.pareto.tolerance_aware import ToleranceAware
 from doe.report.steps.confirmation import gains_record, point_record
 from doe.report.words import change
 from doe.response_surface import Surface
-from doe.study.drawn import predict_all
-from doe.study.front import half_widths
+from doe.study.drawn import half_widths, predict_all
 from doe.study.goals import beyond_runs, goals_of
 from doe.study.predicted import PredictedGain, predicted_gains, statement
 from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
+from rbdyn.records.record import finite
 
 
 def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
     """JSON of ``doe front``: factor and response values in their own units and senses."""
-    assert front.baseline_values is not None and front.standard_errors is not None
     assert front.uncertainty is not None
     sure = front.uncertainty
+    rows = zip(front.points, front.values, half_widths(surfaces, study.coded(front.points)), strict=True)
     points = [
-        {**point_record(study, point, values, errors), "non_dominated_probability": float(probability)}
-        for point, values, errors, probability in zip(
-            front.points, front.values, sure.half_widths, sure.non_dominated, strict=True
-        )
+        {**point_record(study, *row), "non_dominated_probability": float(probability)}
+        for row, probability in zip(rows, sure.non_dominated, strict=True)
     ]
     gains = predicted_gains(study, surfaces, front.points[front.pick])
     beyond = beyond_runs(study, study.coded(front.points[front.pick]))
@@ -66,10 +64,8 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
 
 def predicted_record(study: Study, surfaces: list[Surface], point: Array) -> dict[str, Any]:
     """Factors, responses on the surfaces and their 95 % half widths at a point in factor units."""
-    coded = study.coded(point)
-    errors = np.array([surface.prediction_standard_error(coded) for surface in surfaces])
-    values = predict_all(surfaces, coded[None])[0]
-    return point_record(study, point, values, half_widths(surfaces, errors))
+    coded = study.coded(point)[None]
+    return point_record(study, point, predict_all(surfaces, coded)[0], half_widths(surfaces, coded)[0])
 
 
 def given_point_record(study: Study, surfaces: list[Surface], front: ParetoFront, point: Array) -> dict[str, Any]:
@@ -212,7 +208,7 @@ def tolerance_aware_record(study: Study, surfaces: list[Surface], found: Toleran
         "plain_pick_robust": robust(found.plain_pick_costs),
         "plain_pick_inside": found.plain_inside,
         "nominal_loss_percent": found.nominal_loss_percent,
-        "robust_gain_percent": found.robust_gain_percent if np.isfinite(found.robust_gain_percent) else None,
+        "robust_gain_percent": finite(found.robust_gain_percent),
         "pick_gains_percent": {gain.response: gain.percent for gain in gains},
         "survival": {
             "plain_pick": found.plain_survives,

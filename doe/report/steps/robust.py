@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
+from doe.report.words import of_hundred
 from doe.study.robust import Robust
-from doe.unknown.decision import Better, Share
+from doe.study.robust_front import RobustFront
+from doe.unknown.decision import Better
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.words import quantity, shown
 
@@ -25,7 +27,7 @@ def robust_record(robust: Robust, factors: Sequence[str]) -> dict[str, Any]:
         ],
         "pair": None if robust.pair is None else {"keys": list(robust.pair[:2]), "worth": robust.pair[2]},
         "halved": _halved(robust),
-        "front": None if robust.front is None else _front(robust, factors),
+        "front": None if robust.front is None else _front(robust.front, robust.responses, factors),
         "foretold": dict(zip(robust.responses, robust.foretold, strict=True)),
         "inputs": [
             {"key": each.key, "law": each.law.model_dump(exclude_none=True), "reason": each.reason}
@@ -44,10 +46,7 @@ def _better(responses: Sequence[str], better: Better) -> dict[str, Any]:
     return {"better": each, "all": list(better.all)}
 
 
-def _front(robust: Robust, factors: Sequence[str]) -> dict[str, Any]:
-    front, names = robust.front, robust.responses
-    assert front is not None
-
+def _front(front: RobustFront, names: Sequence[str], factors: Sequence[str]) -> dict[str, Any]:
     def named(keys: Sequence[str], values: Any) -> dict[str, float]:
         return dict(zip(keys, map(float, values), strict=True))
 
@@ -74,17 +73,13 @@ def _front(robust: Robust, factors: Sequence[str]) -> dict[str, Any]:
 def robust_sentences(robust: Robust, factors: Sequence[str]) -> list[str]:
     """How likely the pick is better, what decides that, what hangs on the ranges, and what a robust point does."""
     each = ", ".join(
-        f"in {quantity(name)[0]} in {_cases(share)}"
+        f"in {quantity(name)[0]} in {of_hundred(share)}"
         for name, share in zip(robust.responses, robust.better.each, strict=True)
     )
     whole = robust.better.all
-    sure = (
-        "the gains hold over what is not known"
-        if whole.value >= NEARLY_ALL
-        else "the gains depend on what is not known"
-    )
+    sure = f"the gains {'hold over' if whole.value >= NEARLY_ALL else 'depend on'} what is not known"
     return [
-        f"Of 100 cases the pick is better {each}, and in all of these in {_cases(whole)}: {sure} ({len(robust.inputs)} inputs, "
+        f"Of 100 cases the pick is better {each}, and in all of these in {of_hundred(whole)}: {sure} ({len(robust.inputs)} inputs, "
         f"{robust.pairs} input sets, both designs at each).",
         _decision(robust),
         *_of_front(robust, factors),
@@ -113,8 +108,8 @@ def _of_front(robust: Robust, factors: Sequence[str]) -> list[str]:
         for name, x in zip(factors, best.point, strict=True)
     )
     return [
-        f"Surer is {place}: better in all in {_cases(best.better.all)}, the pick at the same input sets in "
-        f"{_cases(pick.better.all)}{loose}."
+        f"Surer is {place}: better in all in {of_hundred(best.better.all)}, the pick at the same input sets in "
+        f"{of_hundred(pick.better.all)}{loose}."
     ]
 
 
@@ -126,20 +121,15 @@ def print_robust_front(robust: Robust, factors: Sequence[str]) -> None:
         (
             name.removeprefix("robust "),
             *(shown(float(x)) for x in each.point),
-            *(f"{100.0 * gain:.1f}, {_cases(p)}" for gain, p in zip(each.gains, each.better.each, strict=True)),
-            _cases(each.better.all),
+            *(f"{100.0 * gain:.1f}, {of_hundred(p)}" for gain, p in zip(each.gains, each.better.each, strict=True)),
+            of_hundred(each.better.all),
         )
         for name, each in robust.front.confirmed.items()
     ]
     if rows:
         header = ("", *(quantity(name)[0] for name in (*factors, *robust.responses)), "all")
-        print_table(
-            "over what is not known: gain that is kept [%], and in how many of 100 cases it is one", header, rows
-        )
-
-
-def _cases(share: Share) -> str:
-    return f"{100.0 * share.value:.0f} ({100.0 * share.low:.0f} to {100.0 * share.high:.0f})"
+        title = "over what is not known: gain that is kept [%], and in how many of 100 cases it is one"
+        print_table(title, header, rows)
 
 
 def _decision(robust: Robust) -> str:
@@ -161,8 +151,7 @@ def _decision(robust: Robust) -> str:
         )
     if p >= NEARLY_ALL or p <= 1.0 - NEARLY_ALL:
         return "No measurement would change the choice."
-    lost = [
-        quantity(name)[0] for name, share in zip(robust.responses, robust.foretold, strict=True) if share < FORETOLD
-    ]
+    foretold = zip(robust.responses, robust.foretold, strict=True)
+    lost = [quantity(name)[0] for name, share in foretold if share < FORETOLD]
     told = f": the gain in {' and '.join(lost)} follows none of the inputs" if lost else ""
     return f"Which input decides cannot be told{told}."

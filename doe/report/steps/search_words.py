@@ -69,9 +69,8 @@ def held_sentence(outcome: StudyResult) -> str:
         held.setdefault(_why(study, each), []).append(f"{_place(each.factor, each.at)}{told}")
     why = [f"{_listed(places)}, {words}" for words, places in held.items()]
     why += [f"the limit {each.shown} is near" for each in near_limits(adaptive, study, outcome.limits)]
-    why += [
-        f"the parts of dimension chain {name} cannot be made" for name, each in outcome.chains.items() if each.refused
-    ]
+    refused = [name for name, each in outcome.chains.items() if each.refused]
+    why += [f"the parts of dimension chain {name} cannot be made" for name in refused]
     return f"What holds the pick: {'; '.join(why)}."
 
 
@@ -80,9 +79,8 @@ def _why(study: Study, pull: Pull) -> str:
     if pull.face is not None:
         return _end(study, pull.factor) if pull.face.held == "allowed" else HELD[pull.face.held]
     ways = [f"where {_listed(pull.turn)} {'turns' if len(pull.turn) == 1 else 'turn'}"] if pull.turn else []
-    ways += [
-        f"{_listed(names)} would gain with {way}" for names, way in ((pull.more, "more"), (pull.less, "less")) if names
-    ]
+    gaining = (pull.more, "more"), (pull.less, "less")
+    ways += [f"{_listed(names)} would gain with {way}" for names, way in gaining if names]
     return " and ".join(ways) or "where nothing changes much"
 
 
@@ -102,13 +100,11 @@ def trust_sentence(study: Study, adaptive: Adaptive) -> str:
     missed = np.hypot(found.bias, found.spread).tolist()
     told = [f"{name} by {times:.1f}" for name, times in zip(study.responses, missed, strict=True)]
     sure = [name for name, times in zip(study.responses, missed, strict=True) if times > SURE]
-    claim = (
-        f"they claimed to know {_listed(sure)} better than they did" if sure else "they claimed no more than they knew"
-    )
+    claim = f"to know {_listed(sure)} better than they did" if sure else "no more than they knew"
     return (
         f"The emulators foretold the fresh runs at {len(front.points)} points of the front better than these came, on average "
         f"{_listed(flattered)} of the range on the front (below 0: worse), and missed {_listed(told)} standard deviations in root "
-        f"mean square: {claim}. What is reported of the front are these fresh runs alone."
+        f"mean square: they claimed {claim}. What is reported of the front are these fresh runs alone."
     )
 
 

@@ -4,8 +4,10 @@ import csv
 from pathlib import Path
 from typing import Any
 
+from doe.report.words import of_hundred
 from doe.study.uncertainty import OutputRange, Uncertainty
-from doe.unknown.sensitivity import CONFIDENCE, Index
+from doe.unknown.sensitivity import CONFIDENCE
+from doe.unknown.spread import Share
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.words import quantity, shown, with_error
 from rbdyn.result import write_json
@@ -106,8 +108,8 @@ def _what(found: Uncertainty) -> str:
     return "share of the variance that is left while an input is unknown"
 
 
-def _share(index: Index | None) -> str:
-    return "" if index is None else f"{100.0 * index.value:.0f} ({100.0 * index.low:.0f} to {100.0 * index.high:.0f})"
+def _share(share: Share | None) -> str:
+    return "" if share is None else of_hundred(share)
 
 
 def write(found: Uncertainty, folder: Path) -> list[str]:

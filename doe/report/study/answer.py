@@ -52,10 +52,8 @@ def _print_answer(outcome: StudyResult) -> None:
     study = outcome.study
     if outcome.direct is not None:
         direct = outcome.direct
-        print(
-            f"direct front: {direct.front.evaluations} simulations in {direct.seconds['search']:.0f} s. "
-            f"{direct.loss.sentence}"
-        )
+        spent = f"{direct.front.evaluations} simulations in {direct.seconds['search']:.0f} s"
+        print(f"direct front: {spent}. {direct.loss.sentence}")
         print(f"a run of the direct search: {direct_run(study)}")
     for sentence in search_sentences(outcome):
         print(sentence)
@@ -95,17 +93,11 @@ def _print_limits(outcome: StudyResult) -> None:
 def _print_clearances(outcome: StudyResult) -> None:
     found = outcome.tolerances
     half_widths = [None] * len(outcome.study.factors) if found is None else found.half_widths.tolist()
-    rows = [
-        (
-            name,
-            f"{base:.4g}",
-            f"{pick:.4g}",
-            *([] if half is None else ["" if half != half else f"± {rounded_down(half)}"]),
-        )
-        for name, base, pick, half in zip(
-            outcome.study.factors, outcome.baseline.point, outcome.pick.point, half_widths, strict=True
-        )
-    ]
+    points = outcome.baseline.point, outcome.pick.point
+    rows = []
+    for name, base, pick, half in zip(outcome.study.factors, *points, half_widths, strict=True):
+        widest = [] if half is None else ["" if half != half else f"± {rounded_down(half)}"]
+        rows.append((name, f"{base:.4g}", f"{pick:.4g}", *widest))
     header = ("", "baseline", "pick", *([] if found is None else ["widest tolerance"]))
     print_table("chosen clearances", header, rows)
     if found is not None:

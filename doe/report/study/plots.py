@@ -66,7 +66,8 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
         axis.set_ylabel(label(study.factors[panel]), labelpad=8)
         axis.set_zlabel(label(surface.name))
         rest = [place for place in range(1, factors) if place != panel]
-        held = [f"{quantity(study.factors[place])[0]} {_at_centre(study, place)}" for place in rest]
+        named = ((*quantity(study.factors[place]), study.centre[place]) for place in rest)
+        held = [f"{words} {centre:g} {unit}".rstrip() for words, unit, centre in named]
         notes = [*held, *(f"limit {bound:g} in red" for bound in _bounds(study, surface.name))]
         axis.set_title(f"({'abcdefg'[panel - 1]}) {', '.join(notes)}", fontsize=10)
         axis.tick_params(labelsize=8)
@@ -76,11 +77,6 @@ def response_surface(study: Study, surface: Surface, path: Path) -> None:
     figure.subplots_adjust(left=0.02, right=0.92, bottom=0.06, top=0.94, wspace=0.12)
     figure.savefig(path, dpi=130)
     plt.close(figure)
-
-
-def _at_centre(study: Study, place: int) -> str:
-    """The centre of a factor with its unit."""
-    return f"{study.centre[place]:g} {quantity(study.factors[place])[1]}".rstrip()
 
 
 def _bounds(study: Study, name: str) -> list[float]:
@@ -102,9 +98,8 @@ def adaptive_search(record: Record, path: Path) -> None:
             marker, color = MARKERS[why]
             sizes = [7.0 * count for _, count in runs]
             axis.scatter(x, y, sizes, color, marker=marker, alpha=0.8, edgecolors="white", linewidths=0.5, label=why)
-        axis.plot(
-            *(record["pick"][each] for each in (names[0], name)), "*", c="tab:red", mec="white", ms=15, label="pick"
-        )
+        pick = (record["pick"][each] for each in (names[0], name))
+        axis.plot(*pick, "*", c="tab:red", mec="white", ms=15, label="pick")
         axis.set_xlabel(label(names[0]))
         axis.set_ylabel(label(name))
         axis.xaxis.set_major_locator(MaxNLocator(5))
@@ -137,9 +132,8 @@ def pareto_front(outcome: StudyResult, path: Path) -> None:
     if outcome.direct is not None:
         clouds.append(("front on the simulator", outcome.direct.front.values, "tab:green"))
     if outcome.adaptive is not None:
-        clouds.append(
-            ("front foretold by emulators", outcome.adaptive.found.foretold[outcome.adaptive.found.shown], "tab:olive")
-        )
+        found = outcome.adaptive.found
+        clouds.append(("front foretold by emulators", found.foretold[found.shown], "tab:olive"))
         clouds.append(("its points, simulated afresh", outcome.adaptive.front.values, "tab:green"))
     for axis, (i, j) in _pairs(len(surfaces), path, 6):
         for words, values, color in clouds:
@@ -169,9 +163,8 @@ def robust_front(responses: list[str], front: RobustFront, path: Path) -> None:
         for (name, each), marker in zip(front.confirmed.items(), "*o^v", strict=False):
             x, y = 100.0 * each.gains[[i, j]]
             words = f"{name}, simulated: better in all in {100.0 * each.better.all.value:.0f} %"
-            axis.plot(
-                x, y, marker, mfc="none", color="tab:red" if marker == "*" else "black", markersize=9, label=words
-            )
+            color = "tab:red" if marker == "*" else "black"
+            axis.plot(x, y, marker, mfc="none", color=color, markersize=9, label=words)
         axis.axhline(0.0, color="tab:gray", linewidth=1.0)
         axis.axvline(0.0, color="tab:gray", linewidth=1.0)
         axis.set_xlabel(f"gain in {quantity(responses[i])[0]} [%]")

@@ -4,7 +4,6 @@ from string import ascii_uppercase
 from typing import Any
 
 from doe import clearance
-from doe.arrays import or_none
 from doe.report.steps.adaptive import adaptive_record, compared_record
 from doe.report.steps.confirmation import confirmation_record, direct_record, gains_record, limits_record
 from doe.report.steps.design import runs_record
@@ -20,6 +19,7 @@ from doe.study.direct_pick import DirectPick
 from doe.study.goals import known_tolerances, region_of
 from doe.study.whole import StudyResult
 from doe.study_file import Study
+from rbdyn.records.record import finite
 from rbdyn.result import versions
 
 FORMAT = "doe.study/1"
@@ -140,6 +140,6 @@ def _responses(outcome: StudyResult, row: int | None) -> dict[str, Any]:
         return {}
     runs = outcome.runs
     return {
-        name: {"value": float(value), "error": or_none(error)}
+        name: {"value": float(value), "error": finite(error)}
         for name, value, error in zip(outcome.study.responses, runs.values[row], runs.errors[row], strict=True)
     }
