@@ -19,7 +19,7 @@ from rbdyn.scene import Scene
 SPEED_SHARES = {"rk45": 0.05, "rk43": 0.05, "rosenbrock": 1.0}
 # Tolerance of the cage's speeds over that of a contact's. Only impacts change them, in two or three explicit steps each,
 # which damp an impact where the races alone rule the steps: with it impact and whirl of the bearing of Chen et al. 2022
-# are off by -0.14 +- 0.12 and -0.1 +- 0.4 % in 1970 right-hand sides of rk43 a turn, without it by -0.3 and -0.9 % in 1550.
+# are off by -0.14 +- 0.12 and -0.1 +- 0.4 % in 1890 right-hand sides of rk43 a turn, without it by -0.3 and -0.9 % in 1490.
 # The implicit method damps less: whirl goes from +0.6 +- 1.1 to +0.2 +- 0.8 % for a hundredth more right-hand sides.
 CAGE_SHARES = {"rk45": 0.01, "rk43": 0.01, "rosenbrock": 0.1}
 
