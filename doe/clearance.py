@@ -35,15 +35,14 @@ if TYPE_CHECKING:
 # What simulates a run: its code decides whether a stored one is still good.
 SIMULATION = "rbdyn.dynamics.simulate"
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
-# Confirmation runs use seeds that no design run has.
+# Seeds that no design run has; the input sets are those of an uncertainty.
 CONFIRMATION_SEEDS = 1_000_000
-# So do the evaluations of a direct front, one each, and the input sets of an uncertainty.
 DIRECT_SEEDS = 2_000_000
-# And the runs of an adaptive search.
-ADAPTIVE_SEEDS = 4_000_000
 INPUT_SEEDS = 3_000_000
-# And the input sets of a calibration.
+ADAPTIVE_SEEDS = 4_000_000
 CALIBRATION_SEEDS = 5_000_000
+# Times as long as asked for that a run of an adaptive search gets at most where it drifts: 8 cost twice, for no better a front.
+ADAPTIVE_EXTENDED = 2.0
 # Of a motion that goes into a report.
 ORBIT_POINTS, FRAMES, PLAYED_TURNS = 2000, 300, 2.0
 
@@ -133,9 +132,11 @@ def direct_scenes(study: Study, points: Array, first: int) -> list[Scene]:
 def adaptive_scenes(study: Study, points: Array, replicates: Sequence[int], first: int) -> list[Scene]:
     """A scene a run of an adaptive search (n, k), numbered from ``first``: a design run with replicates and a seed of its own."""
     data, adaptive = read_scene(study), study.file.adaptive
-    overrides = [[*study.scene.set, f"numerics.replicates={count}", "numerics.companion=false"] for count in replicates]
+    usual = scene_at(study, data, study.baseline, adaptive.seed, study.scene.set).numerics.extend_limit
+    shared = ["numerics.companion=false", f"numerics.extend_limit={min(usual, ADAPTIVE_EXTENDED)!r}", *adaptive.set]
+    overrides = [[*study.scene.set, f"numerics.replicates={count}", *shared] for count in replicates]
     runs = enumerate(zip(points, overrides, strict=True), adaptive.seed + ADAPTIVE_SEEDS + first)
-    return [scene_at(study, data, point, seed, [*keys, *adaptive.set]) for seed, (point, keys) in runs]
+    return [scene_at(study, data, point, seed, keys) for seed, (point, keys) in runs]
 
 
 def check_direct(study: Study) -> None:
@@ -233,11 +234,11 @@ def _in_threads(
 
     stop, taken = Stop(), list[Point]()
     threads = workers or os.cpu_count() or 1
-    # Of few points the replicates go side by side too, lest threads wait for the longest point.
-    inside = threads if len(points) < 2 * threads else 1
 
     def runs() -> Iterator[Callable[[], Ran]]:
-        for point in points:
+        for left, point in zip(range(len(points), 0, -1), points, strict=True):
+            # Of the last points the replicates go side by side too, lest threads wait for the longest point.
+            inside = threads if left < 2 * threads else 1
             if take([point]):
                 scene = scenes[point.key]
                 if not taken:

@@ -66,7 +66,9 @@ def levels_of(front: Array, hopes: Array, random: np.random.Generator) -> Levels
 def dominated(costs: Array, kept: Mask, levels: Array) -> Mask:
     """Whether each of levels (u, q) is dominated by any of the drawn costs (s, n, q) that keep their limits (s, n): (s, u)."""
     found = np.zeros((len(costs), len(levels)), dtype=bool)
-    for row, drawn, allowed in zip(found, costs, kept, strict=True):
+    # What lies beyond the highest level in any cost dominates none.
+    near = kept & (costs <= levels.max(axis=0)).all(axis=2)
+    for row, drawn, allowed in zip(found, costs, near, strict=True):
         below = np.ones((int(allowed.sum()), len(levels)), dtype=bool)
         for column, level in zip(drawn[allowed].T, levels.T, strict=True):
             below &= column[:, None] <= level[None]

@@ -26,13 +26,13 @@ def correlation(first: Array, second: Array, lengths: Array) -> Array:
     return (1.0 + far + far**2 / 3.0) * np.exp(-far)
 
 
-def with_slopes(along: Array, lengths: Array) -> tuple[Array, Array]:
-    """Correlation (n, n) of squared distances ``along`` (k, n, n), and its derivatives (k, n, n) by the logarithm of each
-    length."""
-    scaled = along / (lengths**2)[:, None, None]
-    far = np.sqrt(5.0 * scaled.sum(axis=0))
+def with_falls(along: Array, lengths: Array) -> tuple[Array, Array]:
+    """Correlation (n, n) of squared distances ``along`` (k, n, n), and what its derivative by the logarithm of a length is over
+    the squared distance along that factor in lengths (n, n)."""
+    far = np.sqrt(5.0 * np.tensordot(1.0 / lengths**2, along, axes=1))
     fall = np.exp(-far)
-    return (1.0 + far + far**2 / 3.0) * fall, scaled * ((5.0 / 3.0) * (1.0 + far) * fall)
+    steep = (1.0 + far) * fall
+    return steep + far**2 / 3.0 * fall, (5.0 / 3.0) * steep
 
 
 class Features(NamedTuple):

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from doe.arrays import Array
-from doe.emulator.covariance import correlation, with_slopes
+from doe.emulator.covariance import correlation, with_falls
 
 JITTER = 1e-10  # of the process's variance: keeps the matrix of runs invertible where runs repeat without scatter
 
@@ -50,9 +50,11 @@ class Solved(NamedTuple):
     def projection(self) -> Array:
         """P (n, n): the inverse covariance of what the trend leaves."""
         half = back_substituted(self.factor, self.trend)
-        inside = np.linalg.solve(self.root.T, half.T) if half.size else half.T
+        inside = lapack.dtrtrs(self.root, half.T, trans=True)[0] if half.size else half.T
         lower: Array = lapack.dpotri(self.factor, lower=True)[0]
-        return lower + np.tril(lower, -1).T - np.asarray(inside.T @ inside)
+        whole = lower + lower.T
+        np.fill_diagonal(whole, np.diag(lower))
+        return whole - np.asarray(inside.T @ inside)
 
 
 def forward_substituted(factor: Array, right: Array) -> Array:
@@ -76,8 +78,10 @@ def solved(covariance: Array, trend: Array, values: Array) -> Solved:
         raise np.linalg.LinAlgError("covariance of the runs is not positive definite")
     inside = forward_substituted(factor, np.column_stack([trend, values]))
     across, target = inside[:, :-1], inside[:, -1]
-    base, root = np.linalg.qr(across)
-    coefficients = np.linalg.solve(root, base.T @ target)
+    # The last column of the triangle is the target along the trend: the orthogonal base itself is not needed.
+    rows = np.asarray(np.linalg.qr(inside, mode="r"))[: across.shape[1]]
+    root = rows[:, :-1]
+    coefficients = np.linalg.solve(root, rows[:, -1])
     return Solved(factor, across, root, coefficients, back_substituted(factor, target - across @ coefficients))
 
 
@@ -93,8 +97,9 @@ def loss(logarithms: Array, along: Array, trend: Array, values: Array, variances
     ``along`` (k, n, n) are squared distances of the runs along each factor. Infinite where the matrix is singular.
     """
     given, count = of_logarithms(logarithms), len(values)
-    near, slopes = with_slopes(along, given.lengths)
-    covariance = given.variance * near + np.diag(variances + given.nugget + JITTER * given.variance)
+    near, falls = with_falls(along, given.lengths)
+    covariance = given.variance * near
+    covariance.flat[:: count + 1] += variances + given.nugget + JITTER * given.variance
     try:
         found = solved(covariance, trend, values)
         projection = found.projection
@@ -106,6 +111,6 @@ def loss(logarithms: Array, along: Array, trend: Array, values: Array, variances
     value = determinants - gram + constant + 0.5 * float(values @ found.weights)
     # Half the trace of (P - a a') dV for every hyperparameter.
     change = 0.5 * (projection - np.outer(found.weights, found.weights))
-    by_length = given.variance * np.einsum("kij,ij->k", slopes, change)
-    by_variance = given.variance * ((near * change).sum() + JITTER * np.trace(change))
+    by_length = given.variance * np.tensordot(along, falls * change, axes=2) / given.lengths**2
+    by_variance = given.variance * (np.vdot(near, change) + JITTER * np.trace(change))
     return float(value), np.array([*by_length, by_variance, given.nugget * np.trace(change)])

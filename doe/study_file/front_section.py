@@ -98,7 +98,7 @@ class Adaptive(Strict):
     """The search with emulators, from the runs of the design on."""
 
     budget: Annotated[int, Field(ge=10, le=10000)] = 100
-    """Runs, those of the design and the last 30 %, fresh ones at the points of the front, included."""
+    """Runs, those of the design and the last fifth, fresh ones at the points of the front, included."""
     batch: Annotated[int, Field(ge=1, le=1000)] = 8
     """Runs chosen at once, so that many workers have work; the search knows a little less of each than one by one."""
     extend: bool = True
@@ -109,7 +109,8 @@ class Adaptive(Strict):
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the search and its runs."""
     set: list[str] = []
-    """Keys of the scene that are replaced, as "key=value"."""
+    """Keys of the scene that are replaced, as "key=value". Where figures drift, a run is lengthened to twice the turns asked for
+    at most, unless numerics.extend_limit stands here or is less in the scene."""
 
 
 class Robust(Consistent):

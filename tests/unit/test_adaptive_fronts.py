@@ -41,9 +41,10 @@ def test_literature_80_runs_find_the_front_under_noise(problem):
 
 @pytest.mark.slow
 def test_a_tabulated_bearing_100_runs():
-    """Whirl turns several times there, and its least lies in a narrow valley on a face of the region. Measured: in the mean of
-    5 seeds 0.978 of the front, and 0.993 (0.979 to 1.003) of what 2000 runs of the direct search find of it; before the last
-    changes, of 12 seeds 0.965 and 0.980 (0.934 to 0.999). With 60 runs 0.92 and 0.93."""
+    """Whirl turns several times there, and its least lies in a narrow valley on a face of the region. Measured, of what 2000 runs
+    of the direct search find: over 24 seeds 0.980 +- 0.005 (0.910 to 1.004), seeds 1 to 5 0.979 (0.955 to 0.997); any rounding
+    gives other searches, and seeds 1 to 5 had 0.993 in one. With 60 runs 0.92 over 12 seeds: where no run met the valley 0.89 to
+    0.95, where some did 0.92 to 0.98."""
     found = [bearing_search(seed) for seed in (1, 2, 3)]
     shares = [bearing_share(points) for points in found]
     assert np.mean(shares) > 0.95
@@ -56,7 +57,8 @@ def test_a_tabulated_bearing_100_runs():
 
 @pytest.mark.slow
 def test_six_factors_with_a_category_150_runs():
-    """Against 2000 runs of the direct search, 1000 a level. Measured over 3 seeds: 1.07 to 1.11 of its hypervolume."""
+    """Against 2000 runs of the direct search, 1000 a level. Measured over 3 seeds: 1.07 to 1.11 of its hypervolume. On the bearing
+    itself (three clearances, rollers, mass and guidance of the cage) 1.002 +- 0.018 and 1.025 +- 0.015, both fronts run afresh."""
     spread_evenly = qmc.Sobol(6, seed=1).random_base2(6)[:60] * 2.0 - 1.0
     spread_evenly[:, -1] = np.where(np.arange(60) % 2, 1.0, -1.0)
     ones, evaluate = np.ones(60, dtype=np.int64), noisy(two_spheres, 1)

@@ -50,6 +50,34 @@ def search(path, folder, workers):
         return find_adaptive(study, runs, Simulations(store, workers, None, False, lambda title: silent))
 
 
+def limits(path, *replicates):
+    study = Study.load(path)
+    scenes = clearance.adaptive_scenes(study, np.tile(study.baseline, (len(replicates), 1)), replicates, 0)
+    assert [scene.numerics.replicates for scene in scenes] == list(replicates)
+    return {scene.numerics.extend_limit for scene in scenes}
+
+
+def test_runs_that_drift_are_lengthened_to_twice_at_most_unless_the_study_says_so(tmp_path):
+    assert limits(written(tmp_path), 2, 5) == {2.0}
+    own = ("batch = 6\n", 'batch = 6\nset = ["numerics.extend_limit=5"]\n')
+    assert limits(written(tmp_path / "own", own), 4) == {5.0}
+    short = ('set = ["', 'set = ["numerics.extend_limit=1.5", "')
+    assert limits(written(tmp_path / "short", short), 4) == {1.5}
+
+
+def test_replicates_of_the_last_points_run_side_by_side(tmp_path, monkeypatch):
+    """Of seven points, two threads and the last three, that threads may otherwise wait for."""
+    instantly(monkeypatch.setattr)
+    study, asked, run = Study.load(written(tmp_path)), [], clearance.attempt
+    monkeypatch.setattr(
+        clearance, "attempt", lambda scene, stop, inside: asked.append((scene.numerics.seed, inside)) or run(scene)
+    )
+    scenes = clearance.adaptive_scenes(study, np.tile(study.baseline, (7, 1)), [2] * 7, 0)
+    with Store(tmp_path / STORE) as store:
+        Simulations(store, 2, None, False, lambda title: silent).run(scenes, ["run"] * 7, silent)
+    assert [inside for _, inside in sorted(asked)] == [1, 1, 1, 1, 2, 2, 2]
+
+
 def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     instantly(monkeypatch.setattr)
     monkeypatch.setattr(clearance, "histories", lambda *rest: {})
