@@ -36,7 +36,7 @@ inactive = {roller = ["guide_clearance_mm"]}
 """
 
 
-def guided_study(folder, *more, budget=70):
+def guided_study(folder, *more, budget=60):
     return written(folder, ("[design]\n", GUIDANCE[GUIDANCE.index("\n") + 1 :]), *more, budget=budget)
 
 

@@ -42,7 +42,7 @@ def studied(tmp_path_factory):
     path = short_study(source, SHORT, (f'{GOAL}"min"', f'{GOAL}"max"'))
     text = path.read_text(encoding="utf-8").replace("population = 100", "population = 24")
     text = text.replace("evaluations = 2000", "evaluations = 130").replace("population = 50", "population = 20")
-    path.write_text(f"{text}\n[adaptive]\nbudget = 44\nbatch = 6\n", encoding="utf-8")
+    path.write_text(f"{text}\n[adaptive]\nbudget = 36\nbatch = 6\n", encoding="utf-8")
     study, found = Study.load(path), {}
     for name, searches in (("alone", ("adaptive",)), ("beside", ("direct", "adaptive", "adaptive"))):
         folder = tmp_path_factory.mktemp(name)

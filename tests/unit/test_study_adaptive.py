@@ -29,7 +29,7 @@ from rbdyn.faults import InputError
 GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '
 
 
-def written(folder, *replacements, budget=44):
+def written(folder, *replacements, budget=36):
     """The example, short, with a trade-off between whirl and the rest; one run of the design fails where asked."""
     folder.mkdir(exist_ok=True)
     path = short_study(folder, SHORT, (f'{GOAL}"min"', f'{GOAL}"max"'))
@@ -95,7 +95,7 @@ def test_the_study_follows_the_adaptive_front(tmp_path, monkeypatch):
     keys = {"front", "runs", "hypervolume", "history", "stopped", "extended"}
     assert keys <= set(found)
     assert {"factors", "responses", "errors"} == set(found["front"][0])
-    assert found["runs"] + found["fresh"] <= 44
+    assert found["runs"] + found["fresh"] <= 36
     assert found["history"][0]["runs"] == 20
     assert {each["why"] for each in found["points"]} <= {"design", "improvement", "check"}
     assert found["chosen"]["row"] == chosen.row
