@@ -53,8 +53,8 @@ def spent_sentence(study: Study, adaptive: Adaptive) -> str:
     grown = [_place(study.factors[place[0]], float(adaptive.edges[place]), " to") for place in moved]
     return (
         f"The search ended because {found.stopped}: {len(found.spent)} runs of design and search and {found.fresh} fresh ones at "
-        f"its points and the baseline in {adaptive.seconds:.0f} s, with at most {left:.1f} % of the hypervolume of its front still "
-        f"to gain.{f' Its region grew: {_listed(grown)}.' if grown else ''}"
+        f"its points and the baseline, in {adaptive.seconds:.0f} s from the end of the design on, with at most {left:.1f} % of the "
+        f"hypervolume of its front still to gain.{f' Its region grew: {_listed(grown)}.' if grown else ''}"
     )
 
 
