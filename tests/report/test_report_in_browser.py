@@ -5,52 +5,20 @@ from __future__ import annotations
 import base64
 import math
 import re
-from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
-import numpy as np
 import pytest
-from headless import as_wide_as, offline_browser, widths
-from short_studies import EXAMPLES
+from headless import as_wide_as, widths
+from report_page import PICTURE, keys, opened, report_in_browser, text_of
 from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, motion, predicted, summary
 
-from doe.adaptive.emulators import Emulators, fit_emulators
-from doe.adaptive.runs import Runs
-from doe.pareto.goals import Goals
 from doe.report.html import html_report
-from doe.report.steps.adaptive import emulators_record
-from doe.study_file import Study
-from doe.study_file.design_section import Category
-
-PICTURE = "return document.getElementById(arguments[0]).toDataURL()"
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     """One headless browser for all tests, with the page in a file."""
-    folder = tmp_path_factory.mktemp("report")
-    (folder / "report.html").write_text(html_report(summary(), motion()), encoding="utf-8")
-    with offline_browser() as driver:
-        yield driver, folder
-
-
-def opened(browser: Any, scheme: str = "light", motion: str = "reduce", name: str = "report.html") -> Any:
-    """The page as just opened, by a reader with these wishes."""
-    driver, folder = browser
-    wishes = {"prefers-color-scheme": scheme, "prefers-reduced-motion": motion}
-    features = [{"name": name, "value": value} for name, value in wishes.items()]
-    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-    driver.get((folder / name).as_uri())
-    return driver
-
-
-def text_of(page: Any, key: str) -> str:
-    return page.execute_script("return document.getElementById(arguments[0]).textContent", key)
-
-
-def keys(page: Any, key: str, *pressed: str) -> None:
-    page.find_element("id", key).send_keys(*pressed)
+    with report_in_browser(tmp_path_factory.mktemp("report")) as both:
+        yield both
 
 
 def test_opens_offline_with_the_answer_and_no_complaint(browser):
@@ -305,107 +273,3 @@ def test_wide_pictures_stay_legible(browser, width):
     assert len(found) >= 2
     for scale, box, whole in found:
         assert 10.0 * scale >= 6.0 and box <= whole <= width
-
-
-def with_emulators(record: dict[str, Any], levels: tuple[str, ...]) -> tuple[dict[str, Any], Emulators]:
-    """The record as after a search whose region has grown at the end of the last factor, and its emulators; the second factor
-    means nothing at the second of the levels."""
-    random = np.random.default_rng(3)
-    numbers = random.uniform(-1.0, 1.0, (24, 3))
-    kinds = np.where(random.uniform(size=24) < 0.5, -1.0, 1.0)
-    values = np.column_stack(
-        [
-            5.0 * numbers[:, 0] ** 2 + 3.0 * np.sin(4.0 * numbers[:, 1]) + kinds,
-            0.4 + 0.1 * numbers[:, 2] * numbers[:, 0],
-            240.0 - 9.0 * numbers[:, 1] + 4.0 * np.cos(3.0 * numbers[:, 2] + kinds),
-        ]
-    )
-    points = np.column_stack([numbers, kinds]) if levels else numbers
-    whole, errors = np.full((24, 3), 7), 0.02 * np.abs(values) * random.uniform(0.5, 1.0, (24, 3))
-    runs = Runs(points, values, errors, whole, np.full(24, 8))
-    category, idle = [], ()
-    if levels:
-        named = {"categories": list(levels), "inactive": {levels[1]: [FACTORS[1]]}}
-        category, idle = [Category(name="guidance", key="cage.guidance", **named)], ((0, 1, (1,)),)
-    shares = (0.42, 0.0, 0.28)
-    emulators = fit_emulators(Goals.of(["min"] * 3), runs, None, (len(levels),) if levels else (), idle, shares)
-    assert shares in emulators.shares and () in emulators.shares
-    study = Study.load(EXAMPLES / "clearance_study.toml")
-    study = replace(study, file=study.file.model_copy(update={"category": category}))
-    found = SimpleNamespace(
-        found=SimpleNamespace(emulators=emulators), study=SimpleNamespace(levels=(1,) * len(category))
-    )
-    region = {each["name"]: [each["low"], each["high"]] for each in record["asked"]["factors"]}
-    region[FACTORS[2]][1] += 0.1
-    return record | {"adaptive": {"emulators": emulators_record(study, found), "region": region}}, emulators
-
-
-@pytest.mark.parametrize("levels", [(), ("outer", "inner")])
-def test_oracle_scripts_evaluate_emulators_as_python_does(browser, levels):
-    """Oracle: means and deviations of `doe.adaptive.emulators` at points in and beyond the runs, in all responses."""
-    driver, folder = browser
-    record, emulators = with_emulators(summary(), levels)
-    (folder / "emulated.html").write_text(html_report(record), encoding="utf-8")
-    page = opened(browser, name="emulated.html")
-    points = np.random.default_rng(4).uniform(-1.3, 1.3, (40, 3))
-    points[:10] = emulators.runs.points[:10, :3]
-    half = record["adaptive"]["emulators"]["half_range"]
-    kinds = np.arange(len(points)) % 2
-    asked = np.column_stack([points, 2.0 * kinds - 1.0]) if levels else points
-    found = page.execute_script(
-        """const all = page.data.emulators;
-        return Object.values(all.responses).map(one => arguments[0].map((factors, i) => {
-          const point = emulator.point(all, factors, [arguments[1][i]]);
-          return [emulator.mean(all, one, point), emulator.deviation(all, one, point)];
-        }));""",
-        (CENTRE + half * points).tolist(),
-        kinds.tolist(),
-    )
-    scale = 1e-8 * np.ptp(emulators.runs.values, axis=0)
-    for column, each in enumerate(emulators.predict(asked)):
-        off = np.abs(np.array(found)[:, :, column].T - each)
-        assert (off < scale).all(), off.max(axis=0)
-    assert driver.get_log("browser") == []
-
-
-def test_the_widget_switches_between_polynomial_and_emulator(browser):
-    """Same colours for both, a level of a category to choose, the emulator's deviation read out, nothing of it without a search."""
-    from selenium.webdriver.support.ui import Select
-
-    driver, folder = browser
-    record, emulators = with_emulators(summary(), ("outer", "inner"))
-    (folder / "switched.html").write_text(html_report(record), encoding="utf-8")
-    page = opened(browser, name="switched.html")
-    page.find_element("id", "surface_pick").click()
-    chosen = np.array(list(record["front"]["pick"]["factors"].values()))
-    coded = (chosen - CENTRE) / record["adaptive"]["emulators"]["half_range"]
-    told = {}
-    for level, name in ((1.0, "inner"), (-1.0, "outer")):
-        (kinds,) = (each for each in page.find_elements("css selector", "#surface select") if "outer" in each.text)
-        Select(kinds).select_by_visible_text(name)
-        (mean, *_), (deviation, *_) = (part[0] for part in emulators.predict(np.array([[*coded, level]])))
-        told[name] = text_of(page, "surface_read")
-        value, spread = re.match(
-            r"impact force (\S+) N by the emulator, standard deviation (\S+) N; ", told[name]
-        ).groups()
-        assert float(value) == pytest.approx(mean, abs=deviation) and float(spread) == pytest.approx(
-            deviation, rel=0.06
-        )
-        assert f"guidance {name}" in told[name]
-    polynomial = predicted(RESPONSES[0], [(x - c) / s for x, c, s in zip(chosen, CENTRE, STEP, strict=True)])
-    assert f"; {polynomial:.2f} ± " in told["inner"] and " N by the polynomial; at radial" in told["inner"]
-    assert "not known to the polynomial" in told["outer"], "it was fitted to runs with the categories of the pick"
-    page.find_element("id", "surface_pick").click()
-    maps = []
-    for by in ("polynomial", "emulator"):
-        Select(page.find_element("id", "surface_by")).select_by_visible_text(by)
-        maps.append(page.execute_script(PICTURE, "surface_map"))
-    assert maps[0] != maps[1]
-    # The axis goes as far as the search went, the polynomial does not.
-    keys(page, "surface_y", "pocket")
-    keys(page, "surface_map", *["\ue013"] * 41)
-    assert "not known to the polynomial" in text_of(page, "surface_read")
-    assert "pocket clearance 0.48409 mm" in text_of(page, "surface_read")
-    assert driver.get_log("browser") == []
-    plain = opened(browser)
-    assert plain.find_elements("id", "surface_by") == [] and "emulator" not in plain.find_element("id", "surface").text
