@@ -74,6 +74,17 @@ EVERYTHING = (
 )
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--fuzz-cases N``: how many cases each fuzz test draws."""
+    parser.addoption("--fuzz-cases", type=int, default=100, help="cases that each fuzz test draws (100)")
+
+
+@pytest.fixture(scope="session")
+def fuzz_cases(request: pytest.FixtureRequest) -> int:
+    """How many cases a fuzz test draws."""
+    return int(request.config.getoption("--fuzz-cases"))
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_cmdline_main(config: pytest.Config) -> None:
     """Two processes where pytest-xdist is installed and nothing else is asked for; a file's tests stay in one."""
