@@ -148,6 +148,14 @@ def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[
         raise InputError([f"{path}: not a whole {what}; run the scene again"]) from None
 
 
+def read_json(path: Path | str) -> Any:
+    """What a file holds as JSON. Raises OSError, and ValueError where it holds none or nests it too deep."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+
+
 def write_json(path: Path | str, data: dict[str, Any]) -> None:
     """Write JSON so that an interruption, or another process, leaves the old file or the new one, never half of it."""
     with whole_file(path) as new:
@@ -156,11 +164,17 @@ def write_json(path: Path | str, data: dict[str, Any]) -> None:
 
 @contextmanager
 def whole_file(path: Path | str) -> Iterator[Path]:
-    """A file to write, which then takes the place of ``path``: whoever reads that finds the old one or the new one."""
+    """A file to write, which then takes the place of ``path``: whoever reads that finds the old one or the new one.
+
+    What fails, or is interrupted, leaves no part of the new one.
+    """
     path = Path(path)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    yield partial
-    os.replace(partial, path)
+    try:
+        yield partial
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def versions() -> dict[str, str]:

@@ -11,7 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
+
+from rbdyn.records.user_cache import user_cache
+from rbdyn.result import read_json
 
 # A process of another machine that has not given a sign of life for so long [s] counts as gone. One whose clock is behind
 # by more than this seems gone too soon, and its runs are run twice; of one dated ahead see ``Owner.lives``.
@@ -102,23 +105,25 @@ def at_work(study: Path, folder: Path) -> Iterator[None]:
 
     Where no note can be written the study runs all the same, and is found by its folder only.
     """
-    owner = this_process()
+    owner, place = this_process(), _place()
     owner.enter()
-    note = _place() / f"{owner.token}.json"
+    note = None if place is None else place / f"{owner.token}.json"
     with suppress(OSError):
-        note.parent.mkdir(parents=True, exist_ok=True)
         # A process that was killed has left its note.
-        for other, _, gone in _notes():
-            if gone.host == socket.gethostname() and not gone.lives(other.stat().st_mtime):
-                other.unlink(missing_ok=True)
-        told = {"study": str(study.resolve()), "folder": str(folder.resolve()), "owner": asdict(owner)}
-        note.write_text(json.dumps(told), encoding="utf-8")
+        for other in _notes():
+            if other.owner.host == socket.gethostname() and not other.owner.lives(other.path.stat().st_mtime):
+                other.path.unlink(missing_ok=True)
+        if note is not None:
+            note.parent.mkdir(parents=True, exist_ok=True)
+            content = {"study": str(study.resolve()), "folder": str(folder.resolve()), "owner": asdict(owner)}
+            note.write_text(json.dumps(content), encoding="utf-8")
     try:
         yield
     finally:
         owner.leave()
         with suppress(OSError):
-            note.unlink(missing_ok=True)
+            if note is not None:
+                note.unlink(missing_ok=True)
 
 
 def folders_of(study: Path) -> list[Path]:
@@ -126,21 +131,38 @@ def folders_of(study: Path) -> list[Path]:
     with suppress(OSError):
         return sorted(
             {
-                Path(told["folder"])
-                for note, told, owner in _notes()
-                if told["study"] == str(study.resolve()) and owner.lives(note.stat().st_mtime)
+                Path(note.folder)
+                for note in _notes()
+                if note.study == str(study.resolve()) and note.owner.lives(note.path.stat().st_mtime)
             }
         )
     return []
 
 
-def _place() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rbdyn" / "at_work"
+class _Note(NamedTuple):
+    path: Path
+    study: str
+    folder: str
+    owner: Owner
+
+    @property
+    def whole(self) -> bool:
+        """Whether each field is of the kind that was written."""
+        texts = (self.study, self.folder, *(getattr(self.owner, name) for name in ("host", "machine", "born", "token")))
+        return all(isinstance(text, str) for text in texts) and type(self.owner.pid) is int
 
 
-def _notes() -> Iterator[tuple[Path, dict[str, Any], Owner]]:
-    for note in _place().glob("*.json"):
-        # One that is being written or has just been taken away tells nothing.
+def _place() -> Path | None:
+    base = user_cache()
+    return None if base is None else base / "rbdyn" / "at_work"
+
+
+def _notes() -> Iterator[_Note]:
+    place = _place()
+    for path in () if place is None else place.glob("*.json"):
+        # One that is being written or has just been taken away tells nothing, nor does one that was spoilt.
         with suppress(OSError, ValueError, TypeError, KeyError):
-            told = json.loads(note.read_text(encoding="utf-8"))
-            yield note, told, Owner(**told["owner"])
+            content = read_json(path)
+            note = _Note(path, content["study"], content["folder"], Owner(**content["owner"]))
+            if note.whole:
+                yield note

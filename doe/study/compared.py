@@ -1,6 +1,5 @@
 """Fronts of one study beside each other on one scale: what an adaptive search reached run by run, and what other fronts reach."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,8 @@ from doe.pareto.surrogate_loss import DRAWS, noisy_hypervolume
 from doe.study.adaptive import Adaptive, costs_foretold
 from doe.study.finished import inputs_digest
 from doe.study_file import Study
+from rbdyn.records.kept import intact
+from rbdyn.result import read_json
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,9 @@ def kept_direct(folder: Path, study: Study) -> dict[str, Any] | None:
     they follow from. The record of an adaptive search hands them on.
     """
     try:
-        record = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        record = read_json(folder / "summary.json")
+        if not intact(record):
+            return None
         direct = record.get("direct")
         found = {**direct, "inputs": record["inputs"]} if direct else record["adaptive"]["compared"]["direct"]
         kept = {key: found[key] for key in ("inputs", "evaluations", "front")}

@@ -8,8 +8,8 @@ from typing import Any
 from doe.study_file import Study
 from rbdyn.compiled.sources import source_digest
 from rbdyn.faults import InputError, read_toml
-from rbdyn.records.kept import digest_of
-from rbdyn.result import versions
+from rbdyn.records.kept import digest_of, intact
+from rbdyn.result import read_json, versions
 
 # What simulates, what judges, and what tells it.
 CODE = ("rbdyn.dynamics.simulate", "doe.study.whole", "doe.report.study.files")
@@ -27,11 +27,16 @@ def inputs_digest(study: Study, direct: bool, adaptive: bool = False, robust: bo
 
 
 def finished(folder: Path, digest: str) -> dict[str, Any] | None:
-    """The record of a finished study of these inputs whose files are all there, else None."""
+    """The record of a finished study of these inputs, as it was written, whose files are all there; else None."""
     try:
-        record = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        whole = record["inputs"] == digest and all((folder / name).is_file() for name in record["files"])
-    except (OSError, ValueError, KeyError, TypeError):
+        record = read_json(folder / "summary.json")
+        whole = (
+            intact(record)
+            and record["inputs"] == digest
+            and all(map(Path.is_file, map(folder.joinpath, record["files"])))
+        )
+        whole = whole and record["answer_sha256"] == digest_of((folder / "answer.txt").read_bytes())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
     return record if whole else None
 

@@ -36,7 +36,7 @@ def run(scene: "BallScene", texts: Sequence[str], out: Path | None, source: Path
     folder = output_folder(out, "rbdyn ball", source) if out else None
     from rbdyn.quasistatic.sweep.run import sweep
 
-    kept_in = folder / "sweep.part.npz" if folder else None
+    kept_in = folder / "sweep.part" if folder else None
     with keeping(kept_in), progress_bar("sweeping", quiet or as_json) as progress:
         result = sweep(scene, keys, progress, kept_in)
     files = write(result, folder) if folder else []

@@ -15,7 +15,7 @@ from rbdyn.cli.loading import INTERRUPTED
 from rbdyn.cli.streams import FAILED
 from rbdyn.faults import InputError, RunError
 from rbdyn.records.kept import digest_of
-from rbdyn.result import write_json
+from rbdyn.result import read_json, write_json
 
 BAD_INPUT = 2
 # Names what a folder of results was made of.
@@ -95,7 +95,7 @@ def output_folder(path: Path, command: str, source: Path) -> Path:
         digest = digest_of(source.read_bytes())
         # From the folder on, so that both can be moved, or mounted elsewhere, together.
         own = {"command": command, "file": os.path.relpath(source, path.resolve()), "sha256": digest}
-        marked = json.loads(mark.read_text(encoding="utf-8")) if mark.exists() and len(os.listdir(path)) > 1 else own
+        marked = read_json(mark) if mark.exists() and len(os.listdir(path)) > 1 else own
         if marked["command"] != command or (own["file"] != marked["file"] and digest != marked["sha256"]):
             whose = f"what {marked['command']} made of {os.path.normpath(path / marked['file'])}"
             raise InputError([f"--out {path}: holds {whose}; name another folder or remove this one"])

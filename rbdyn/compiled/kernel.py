@@ -4,15 +4,15 @@
 - ``@law``: a function whose body is chosen, at compile time, by the type of its first argument (a
   NamedTuple of parameters). A law that a scene leaves out is thus not compiled at all.
 - ``@entry``: the few functions called from Python, and large ones that several of these share. Their machine code is
-  kept on disk, in a folder named by a hash of every module that kernels are made of (``sources``), so that an edit can
-  never bring back stale code.
+  kept on disk (``cache``), in a folder named by a hash of every module that kernels are made of (``sources``), so that
+  an edit can never bring back stale code.
 """
 
+import contextlib
 import functools
 import gc
 import hashlib
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,8 +26,10 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
+from rbdyn.compiled.cache import EntryCache
 from rbdyn.compiled.parts import KernelCompiler, PartCompiler, SettledCompiler
 from rbdyn.compiled.sources import compiled_digest
+from rbdyn.records.user_cache import user_cache
 
 # No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
 # arrays happen to lie: only when every operation is rounded by itself do both give the same bits. And NaN stays a signal.
@@ -208,30 +210,25 @@ def _choice(of: Any) -> Callable[..., Any]:
 
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls: releases the GIL and keeps its machine code on disk."""
-    config: Any = numba.core.config
-    previous = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_folder())
-    try:
-        make: Any = njit
-        compiled = make(**OPTIONS, cache=True, nogil=True, no_cfunc_wrapper=True, pipeline_class=KernelCompiler)(
-            function
-        )
-    finally:
-        config.CACHE_DIR = previous
+    make: Any = njit
+    compiled = make(**OPTIONS, nogil=True, no_cfunc_wrapper=True, pipeline_class=KernelCompiler)(function)
     if isinstance(compiled, CPUDispatcher):
         compiled.__class__ = Entry
+        if (folder := cache_folder()) is not None:
+            keep_code(compiled, folder)
     return compiled
 
 
+def keep_code(compiled: Any, folder: Path) -> None:
+    """Let a dispatcher keep its machine code in a folder, and look for it there."""
+    with contextlib.suppress(OSError):  # without a source file nothing tells old code from new
+        compiled._cache = EntryCache(compiled.py_func, folder)
+
+
 @functools.cache
-def cache_folder() -> Path:
-    """Folder of the compiled code of exactly these kernels; a temporary one where the home is read-only."""
+def cache_folder() -> Path | None:
+    """Folder of the compiled code of exactly these kernels, made when it is first needed; None where there is no home."""
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(named).absolute() if named else user_cache()
     digest = hashlib.sha256((numba.__version__ + compiled_digest()).encode())
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(base) / "rbdyn" / digest.hexdigest()[:16]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="rbdyn-"))
+    return None if base is None else base / "rbdyn" / digest.hexdigest()[:16]

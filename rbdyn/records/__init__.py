@@ -1,1 +1,2 @@
-"""What is written down: records as JSON and in words, and finished parts of a long command."""
+"""What is written down: records as JSON and in words, finished parts of a long command, files that carry their digest, and
+where caches lie."""

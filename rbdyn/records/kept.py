@@ -52,6 +52,18 @@ def code_version(*modules: str) -> str:
     return json.dumps({**packages, "sources": source_digest(*modules)}, sort_keys=True)
 
 
+def sign(record: dict[str, Any]) -> None:
+    """Put the digest of all else under ``sha256``, so that a record read back is known to be as it was written."""
+    record.pop("sha256", None)
+    record["sha256"] = digest_of(json.dumps(record))
+
+
+def intact(record: dict[str, Any]) -> bool:
+    """Whether a record read from JSON is as ``sign`` left it."""
+    rest = {key: value for key, value in record.items() if key != "sha256"}
+    return record.get("sha256") == digest_of(json.dumps(rest))
+
+
 def digest_of(content: str | bytes) -> str:
     """SHA-256 of a text or of the content of a file."""
     return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()

@@ -140,4 +140,4 @@ def test_command_line_second_process_finds_compiled_code(command, tmp_path):
         json.loads(command(*arguments, NUMBA_CACHE_DIR=str(tmp_path)).stdout)["cost"]["compile_s"] for _ in range(2)
     )
     assert second < 0.25 * first
-    assert list(tmp_path.rglob("*.nbi"))
+    assert list(tmp_path.rglob("*.nbc"))

@@ -115,7 +115,10 @@ def test_a_direct_front_of_another_study_is_none(studied, tmp_path):
     other = study.file.front.model_copy(update={"seed": 7})
     assert kept_direct(found["beside"], replace(study, file=study.file.model_copy(update={"front": other}))) is None
     assert kept_direct(tmp_path, study) is None
-    for text in ("no json", "[1]", '{"adaptive": 3}', '{"direct": {"front": []}}'):
+    whole = (found["beside"] / "summary.json").read_text(encoding="utf-8")
+    assert kept_direct(tmp_path, study) is None and '"evaluations": ' in whole
+    changed = whole.replace('"evaluations": ', '"evaluations": 1')
+    for text in ("no json", "[1]", '{"adaptive": 3}', '{"direct": {"front": []}}', "[" * 100_000, changed):
         (tmp_path / "summary.json").write_text(text, encoding="utf-8")
         assert kept_direct(tmp_path, study) is None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -81,6 +82,19 @@ def test_a_finished_study_is_not_done_again(finished):
     (folder / "front.csv").rename(folder / "aside.csv")
     assert is_finished(folder, asked) is None
     (folder / "aside.csv").rename(folder / "front.csv")
+    for name in ("summary.json", "answer.txt"):
+        whole = (folder / name).read_bytes()
+        digit = re.search(rb"\d\.\d+", whole).start()
+        for spoilt in (
+            whole[:digit] + bytes([whole[digit] ^ 1]) + whole[digit + 1 :],
+            whole[:digit],
+            b"[" * 100_000,
+            b"",
+        ):
+            (folder / name).write_bytes(spoilt)
+            assert is_finished(folder, asked) is None, "a record that was changed is not shown as the answer"
+        (folder / name).write_bytes(whole)
+    assert is_finished(folder, asked) is not None
 
 
 def test_summary_answers_the_question(finished):
@@ -200,7 +214,12 @@ def test_direct_front_killed_in_its_search_resumes_with_the_same_bits(tmp_path):
     one, two = (json.loads((tmp_path / out / "summary.json").read_text()) for out in ("whole", "out"))
     assert one.pop("cost") != two.pop("cost")
     for record in (one, two):
-        del record["direct"]["seconds"], record["direct"]["comparison_seconds"]
+        del (
+            record["direct"]["seconds"],
+            record["direct"]["comparison_seconds"],
+            record["sha256"],
+            record["answer_sha256"],
+        )
     assert one == two
     for name in ("front.csv", "confirmation.csv", "design_runs.csv"):
         assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()

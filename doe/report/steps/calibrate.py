@@ -1,7 +1,6 @@
 """What measurements on a rig taught of a scene's inputs, on the terminal, as JSON, as tables and as pictures."""
 
 import csv
-import json
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,9 @@ from doe.study.input_sets import NORMAL
 from doe.unknown import laws
 from doe.unknown.posterior import seen
 from rbdyn.cli.terminal import print_table
-from rbdyn.records.kept import digest_of
+from rbdyn.records.kept import digest_of, intact, sign
 from rbdyn.records.words import quantity, shown
-from rbdyn.result import write_json
+from rbdyn.result import read_json, write_json
 from rbdyn.scene.unknown import Input
 
 FORMAT, POSTERIOR = "doe.calibration/1", "doe.posterior/1"
@@ -176,6 +175,7 @@ def write(found: Calibration, record: dict[str, Any], folder: Path) -> None:
         write_json(folder / OF_SAMPLE, {"format": POSTERIOR, "sample": SAMPLE, "sha256": sha256, **told})
         draw_corner(found, record, folder / CORNER)
     # Last, for it says that all is there.
+    sign(record)
     write_json(folder / RECORD, record)
 
 
@@ -187,9 +187,10 @@ def files_of(record: dict[str, Any]) -> list[str]:
 def stored(folder: Path, made_of: str) -> dict[str, Any] | None:
     """The record in a folder, where it was made of the same question by the same code and its files are there."""
     try:
-        record = json.loads((folder / RECORD).read_text("utf-8"))
-        whole = record["made_of"] == made_of and all((folder / name).exists() for name in files_of(record))
-    except (OSError, ValueError, KeyError, TypeError):
+        record = read_json(folder / RECORD)
+        whole = intact(record) and record["made_of"] == made_of
+        whole = whole and all((folder / name).exists() for name in files_of(record))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
     return dict(record) if whole else None
 

@@ -13,6 +13,7 @@ from doe.report.study.answer import answer_text
 from doe.report.study.summary import summary
 from doe.study.design import RUNS_TABLE
 from doe.study.whole import StudyResult
+from rbdyn.records.kept import digest_of, sign
 from rbdyn.result import write_json
 
 # Shaft turns of the motion that is drawn.
@@ -69,6 +70,8 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     record["files"] = [*texts, "summary.json", *tables, *pictures]
+    record["answer_sha256"] = digest_of((folder / "answer.txt").read_bytes())
+    sign(record)
     write_json(folder / "summary.json", record)
     return record
 

@@ -1,9 +1,10 @@
 """What an interrupted sweep leaves beside its results: the same sweep goes on from there, to the same bits."""
 
 import functools
+import io
 import json
-import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from rbdyn.arrays import Array
 from rbdyn.quasistatic.remarks import Remark
 from rbdyn.quasistatic.row.equilibrium import Solution
+from rbdyn.records.digest import content_of, with_digest
 from rbdyn.result import whole_file
 
 Arrays = dict[str, NDArray[Any]]
@@ -29,9 +31,9 @@ class Partial(NamedTuple):
         if self.path is None:
             return {}
         try:
-            with np.load(self.path, allow_pickle=False) as file:
+            with np.load(io.BytesIO(content_of(self.path.read_bytes())), allow_pickle=False) as file:
                 arrays = dict(file)
-        except (OSError, ValueError, zipfile.BadZipFile):
+        except (OSError, ValueError):
             return {}
         return arrays if str(arrays.pop("key", "")) == self.key else {}
 
@@ -39,13 +41,16 @@ class Partial(NamedTuple):
         """Keep arrays in place of those before, whole or not at all. Raises OSError."""
         if self.path is None:
             return
-        with whole_file(self.path) as new, new.open("wb") as file:
-            np.savez(file, key=self.key, **arrays)
+        file = io.BytesIO()
+        np.savez(file, key=self.key, **arrays)
+        with whole_file(self.path) as new:
+            new.write_bytes(with_digest(file.getvalue()))
 
     def remove(self) -> None:
-        """Remove the file: the sweep is done."""
+        """Remove the file, for the sweep is done. One that cannot be removed does no harm: the key tells what it is of."""
         if self.path is not None:
-            self.path.unlink(missing_ok=True)
+            with suppress(OSError):
+                self.path.unlink()
 
 
 class Solved(NamedTuple):
