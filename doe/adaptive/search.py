@@ -23,12 +23,12 @@ from doe.adaptive.result import AdaptiveFront, Batch
 from doe.adaptive.runs import Border, Evaluate, Face, Runs
 from doe.adaptive.settling import CHECKS, as_foretold, missed, nothing_gained
 from doe.arrays import Array, Whole
-from doe.emulator.emulator import THREADS
 from doe.pareto.archive import best_for_hypervolume, hypervolume, spread
 from doe.pareto.direct import DirectFront, Samples
 from doe.pareto.goals import Goals
 from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import NAMES, Rule, pick_all
+from doe.threads import one_thread
 
 FRESH = 0.2  # of the budget: fresh runs at the finalists
 TESTED = 4  # last batches that tell how right the emulators' deviations are
@@ -62,6 +62,7 @@ class Plan:
 Tell = Callable[[Batch, int, int], None]
 
 
+@one_thread
 def adaptive_front(
     evaluate: Evaluate,
     centre: Array,
@@ -85,11 +86,10 @@ def adaptive_front(
     check_budget(plan, len(design.points))
     widest = border or region
     shares = shares_of(centre, step, widest.low, widest.high)
-    with THREADS.limit(limits=1):
-        why = ["design"] * len(design.points)
-        search = _Search(evaluate, centre, step, region, goals, plan, design, tell, border, shares, why=why)
-        stopped = search.spend()
-        return search.finish(baseline, stopped)
+    why = ["design"] * len(design.points)
+    search = _Search(evaluate, centre, step, region, goals, plan, design, tell, border, shares, why=why)
+    stopped = search.spend()
+    return search.finish(baseline, stopped)
 
 
 def check_budget(plan: Plan, design: int) -> None:

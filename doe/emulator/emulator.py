@@ -14,7 +14,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize
-from threadpoolctl import ThreadpoolController
 
 from doe.arrays import Array
 from doe.designs.model import model_matrix, model_terms
@@ -29,6 +28,7 @@ from doe.emulator.likelihood import (
     of_logarithms,
     solved,
 )
+from doe.threads import one_thread
 
 Trend = Literal["none", "constant", "linear", "quadratic"]
 
@@ -43,8 +43,6 @@ STARTS = ((1.0, 1.0, 1e-3), (0.4, 1.0, 1e-5), (4.0, 10.0, 1e-2))
 MOST_SEARCHED = 200
 FEATURES = 512
 ENOUGH = {"ftol": 1e-7, "maxiter": 100}  # of a logarithm of the likelihood
-# The matrices are small: one thread is as fast as several, and has the same bits everywhere.
-THREADS = ThreadpoolController()
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +61,7 @@ class Emulator:
     restricted_likelihood: float
     solution: Solved
 
+    @one_thread
     def predict(self, points: ArrayLike) -> tuple[Array, Array]:
         """Mean and standard deviation (n,) of the response without scatter at points (n, k)."""
         columns, across = self._beside(np.asarray(points, float))
@@ -70,11 +69,13 @@ class Emulator:
         variance = self.hyperparameters.variance - (inside**2).sum(axis=0) + (left**2).sum(axis=0)
         return columns @ self.solution.coefficients + across @ self.solution.weights, np.sqrt(variance.clip(0.0))
 
+    @one_thread
     def mean(self, points: ArrayLike) -> Array:
         """Mean (n,) of the response at points (n, k), for a fraction of the time of ``predict``."""
         columns, across = self._beside(np.asarray(points, float))
         return np.asarray(columns @ self.solution.coefficients + across @ self.solution.weights)
 
+    @one_thread
     def covariance(self, points: ArrayLike, other: ArrayLike) -> Array:
         """Covariance (n, m) of what is not known of the response at points (n, k) and (m, k)."""
         first, second, given = np.asarray(points, float), np.asarray(other, float), self.hyperparameters
@@ -93,6 +94,7 @@ class Emulator:
         left = np.linalg.solve(self.solution.root.T, (columns - inside.T @ self.solution.trend).T)
         return inside, np.asarray(left)
 
+    @one_thread
     def leave_one_out(self) -> tuple[Array, Array]:
         """What every run would be foretold by the others: mean and standard deviation (n,), its own scatter included."""
         projection = self.solution.projection
@@ -104,6 +106,7 @@ class Emulator:
         missed = self.values - self.leave_one_out()[0]
         return 1.0 - float((missed**2).sum() / ((self.values - self.values.mean()) ** 2).sum())
 
+    @one_thread
     def draw(self, count: int, random: np.random.Generator) -> "Draws":
         """Functions that the runs might as well have come from, ``count`` of them."""
         given = self.hyperparameters
@@ -127,6 +130,7 @@ class Draws:
     coefficients: Array
     weights: Array
 
+    @one_thread
     def __call__(self, points: ArrayLike) -> Array:
         """Values (s, n) at points (n, k)."""
         at, given = np.asarray(points, float), self.emulator.hyperparameters
@@ -135,6 +139,7 @@ class Draws:
         return (trend + self.features(at) @ self.loads + across @ self.weights).T
 
 
+@one_thread
 def fit_emulator(
     points: ArrayLike,
     values: ArrayLike,
@@ -163,15 +168,14 @@ def fit_emulator(
             "emulator: a point, value or variance is not a finite number, or a variance is below 0; mend it"
         )
     terms = _terms(trend, len(at), at.shape[1] if trended is None else trended)
-    with THREADS.limit(limits=1):
-        found = start
-        if search or found is None:
-            rows = slice(None, None, -(-len(at) // MOST_SEARCHED))
-            found = _search(at[rows], y[rows], known[rows], terms, start, prior)
-        columns = model_matrix(at, terms)
-        rest = solved(covariance_of(at, known, found), columns, y)
-        likelihood = -loss(found.logarithms, squares(at, at), columns, y, known)[0]
-    return Emulator(at, y, known, terms, found, likelihood, rest)
+    fitted = start
+    if search or fitted is None:
+        rows = slice(None, None, -(-len(at) // MOST_SEARCHED))
+        fitted = _search(at[rows], y[rows], known[rows], terms, start, prior)
+    columns = model_matrix(at, terms)
+    rest = solved(covariance_of(at, known, fitted), columns, y)
+    likelihood = -loss(fitted.logarithms, squares(at, at), columns, y, known)[0]
+    return Emulator(at, y, known, terms, fitted, likelihood, rest)
 
 
 def _terms(trend: Trend, runs: int, factors: int) -> tuple[str, ...]:

@@ -14,8 +14,8 @@ from scipy import stats
 from doe.arrays import Array, Rows, Whole
 from doe.designs.design import replicate_groups
 from doe.emulator import Emulator, fit_emulator
-from doe.emulator.emulator import THREADS
 from doe.response_surface.surface import Surface
+from doe.threads import one_thread
 
 # More points than these are left out in groups.
 MOST_SINGLY, FOLDS = 60, 20
@@ -109,6 +109,7 @@ def _hyperparameters(process: Emulator, scatter: bool) -> dict[str, Any]:
     }
 
 
+@one_thread
 def _left_out(
     name: str, points: Array, response: Array, group: Whole, folds: Sequence[Sequence[int]], rivals: tuple[Rival, ...]
 ) -> tuple[Array, Array]:
@@ -119,7 +120,7 @@ def _left_out(
     truths, foretold = [np.empty(0)], [np.empty((0, len(rivals)))]
     for fold in folds:
         rows = np.flatnonzero(~np.isin(group, fold))
-        with THREADS.limit(limits=1), suppress(ValueError):
+        with suppress(ValueError):
             foretold.append(np.column_stack([rival(rows, points[fold]) for rival in rivals]))
             truths.append(np.array([response[group == first].mean() for first in fold]))
     if (count := sum(map(len, truths))) < 3:

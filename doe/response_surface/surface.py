@@ -25,6 +25,7 @@ from doe.response_surface.data import Data, check_errors, check_matrix, checked
 from doe.response_surface.diagnostics import Diagnostics, diagnose
 from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import KnownVariance, ModelError, compare, model_error
+from doe.threads import one_thread
 from rbdyn.records.record import Record, derived, outside_json
 
 Weighting = Literal["equal", "replicates"]
@@ -157,6 +158,7 @@ class Surface(Record):
         return backward(values, self.transform)
 
 
+@one_thread
 def fit(
     coded: ArrayLike,
     values: ArrayLike,

@@ -27,6 +27,7 @@ from doe.study.goals import goals_of, region_of
 from doe.study.runs import Runs, ordered_runs, runs_of
 from doe.study.surfaces import independent_values, standard_errors
 from doe.study_file import Study
+from doe.threads import one_thread
 from rbdyn.faults import InputError, RunError, check_all, refuse
 
 SIGNIFICANT = 0.05
@@ -81,6 +82,7 @@ def plan_of(study: Study) -> Plan:
     return Plan(settings.budget, settings.batch, settings.seed, usual=usual, pick=study.file.front.pick)
 
 
+@one_thread
 def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptive:
     """Search the front from the runs of the design on, in batches that are the same for any number of workers.
 

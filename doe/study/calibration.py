@@ -15,6 +15,7 @@ from doe.running.failure import Failure
 from doe.study.calibration_question import Question, cases_of
 from doe.study.input_sets import NORMAL, Case, check_holes, outcomes, scattered, screened
 from doe.study.rig_file import Rig
+from doe.threads import one_thread
 from doe.unknown import laws
 from doe.unknown.calibration import Batch, Matched, Unknowns, matched
 from doe.unknown.discrepancy import Measured
@@ -148,6 +149,7 @@ class _Rows:
         )
 
 
+@one_thread
 def find_calibration(question: Question, simulations: Simulations) -> Calibration:
     """Find the unknown inputs of a scene from a rig's table. Raises RunError, KeyboardInterrupt."""
     case, sought, rig, notes = question

@@ -13,6 +13,7 @@ from doe.running.failure import Failure
 from doe.study.goals import goals_of
 from doe.study.predicted import verdict
 from doe.study_file import Study
+from doe.threads import one_thread
 from rbdyn.faults import RunError
 from rbdyn.records.record import Record, derived, keyed, outside_json
 from rbdyn.records.words import improvement
@@ -64,6 +65,7 @@ class Gain(Record):
     verdict: str = derived(lambda self: verdict(self.percent, self.error))
 
 
+@one_thread
 def confirm(
     study: Study, choices: Mapping[str, Choice], simulations: Simulations
 ) -> tuple[dict[str, Confirmed], list[Failure]]:

@@ -19,6 +19,7 @@ from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
 from doe.study_file import Study
+from doe.threads import one_thread
 from rbdyn.faults import InputError
 
 Found = TypeVar("Found", "ParetoFront", "ToleranceAware")
@@ -30,6 +31,7 @@ SHARES = (1.0, 0.5, 0.25, 0.0)
 SEARCH = {"population", "generations", "seed", "pick"}
 
 
+@one_thread
 def find_front(
     study: Study, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = (), failed: int = 0
 ) -> ParetoFront:

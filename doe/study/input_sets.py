@@ -1,7 +1,6 @@
 """Input sets of a scene whose inputs are not known: which inputs vary, the scenes at values of them, their runs."""
 
 import copy
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +19,7 @@ from doe.unknown.joint import Joint
 from rbdyn.faults import InputError, RunError, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import shown
-from rbdyn.result import SimulationResult
+from rbdyn.result import SimulationResult, read_json
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, value_of, with_values
@@ -163,7 +162,7 @@ def read_sample(path: Path) -> dict[str, list[Any]]:
 def _doubt(sample: Path) -> str:
     """What the record beside a posterior sample says of its calibration, unless that succeeded; empty without a record."""
     try:
-        record = json.loads(sample.with_suffix(".json").read_text(encoding="utf-8"))
+        record = read_json(sample.with_suffix(".json"))
         verdict, same = record["verdict"], record["sha256"] == digest_of(sample.read_bytes())
         reason = next(iter(record["reasons"]), "")
     except (OSError, ValueError, KeyError, TypeError):

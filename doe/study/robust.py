@@ -19,6 +19,7 @@ from doe.study.input_sets import Case, case_of, screened
 from doe.study.pairs import simulated
 from doe.study.robust_front import RobustFront, find_robust_front
 from doe.study_file import Study
+from doe.threads import one_thread
 from doe.unknown import laws
 from doe.unknown.decision import Better, better, decides, in_doubt
 from rbdyn.faults import set_key
@@ -86,6 +87,7 @@ def check_robust(study: Study) -> None:
     _case(study)
 
 
+@one_thread
 def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     """Judge the pick (k,) beside the baseline. Raises InputError, RunError, KeyboardInterrupt."""
     case, goals = _case(study), goals_of(study)

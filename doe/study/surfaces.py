@@ -13,9 +13,11 @@ from doe.response_surface import Surface, fit, model_matrix
 from doe.study.runs import Runs
 from doe.study_file import Study
 from doe.study_file.study import Fitted
+from doe.threads import one_thread
 from rbdyn.faults import refuse
 
 
+@one_thread
 def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
     """A surface a response. Raises InputError when the runs do not suffice."""
     surfaces, faults = [], []
@@ -34,6 +36,7 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
     return surfaces
 
 
+@one_thread
 def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
     """The surfaces, each compared with a Gaussian process by leaving out every point in turn.
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from doe.clearance import Simulations
 from doe.running.failure import Failure
 from doe.study.input_sets import NORMAL, Sets, read_case, run, screened
+from doe.threads import one_thread
 from doe.unknown.joint import Joint
 from doe.unknown.sensitivity import Indices, shapley, sobol
 from doe.unknown.spread import Emulated, Runs, Share, Spread, emulated, spread_of
@@ -53,6 +54,7 @@ class Uncertainty:
     notes: tuple[str, ...]
 
 
+@one_thread
 def find_uncertainty(
     path: Path, overrides: Sequence[str], simulations: Simulations, points: int | None = None, target: float = TARGET
 ) -> Uncertainty:

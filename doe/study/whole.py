@@ -35,6 +35,7 @@ from doe.study.runs import STORE, Runs, run_design
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
 from doe.study_file import Study
+from doe.threads import one_thread
 from rbdyn.records.words import html_table, improvement, label, quantity, shown, with_error
 
 
@@ -114,6 +115,7 @@ class StudyResult:
         return sentence(self.limits, self.study.file.confirmation.limit_probability, self.tried)
 
 
+@one_thread
 def run_study(
     study: Study,
     folder: Path,

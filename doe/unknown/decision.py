@@ -25,6 +25,7 @@ from scipy import special, stats
 
 from doe.arrays import Array, Whole
 from doe.emulator import fit_emulator
+from doe.threads import one_thread
 from doe.unknown.spread import Share
 
 # Draws of a row's true gains, resamplings of rows, and the share of cases an interval should hold.
@@ -63,6 +64,7 @@ class Decides:
     halved: float
 
 
+@one_thread
 def better(gains: Array, variances: Array, seed: int) -> Better:
     """How likely the true gains (n, m) are positive, given what was simulated and its variances (n, m)."""
     random = np.random.default_rng(seed)
@@ -125,6 +127,7 @@ def _root(matrix: Array) -> Array:
     return axes * np.sqrt(sizes.clip(0.0))[..., None, :]
 
 
+@one_thread
 def decides(
     quantiles: Array,
     gains: Array,

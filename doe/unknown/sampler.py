@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from doe.arrays import Array
+from doe.threads import one_thread
 from rbdyn.faults import RunError
 
 PARTICLES = 4000
@@ -47,6 +48,7 @@ class Sampled:
         return self.levels[-1].points
 
 
+@one_thread
 def sampled(log_likelihood: LogDensity, inputs: int, seed: int, particles: int = PARTICLES) -> Sampled:
     """Sample a posterior over ``inputs`` normal scores; ``particles`` is even. Raises RunError where nothing is likely."""
     random = np.random.default_rng(seed)

@@ -21,6 +21,7 @@ from scipy import stats
 
 from doe.arrays import Array
 from doe.emulator import fit_emulator
+from doe.threads import one_thread
 from doe.unknown.joint import Joint, nested
 from doe.unknown.spread import Emulated, Share
 
@@ -40,6 +41,7 @@ class Indices(NamedTuple):
     total: list[Share]
 
 
+@one_thread
 def sobol(fitted: Emulated, inputs: int, seed: int) -> Indices:
     """Sobol' indices of independent inputs, uniform in their quantiles."""
     ends = _with_intervals(fitted, lambda *of: np.array(_indices(inputs, *of)), seed)
@@ -47,6 +49,7 @@ def sobol(fitted: Emulated, inputs: int, seed: int) -> Indices:
     return Indices(first, total)
 
 
+@one_thread
 def shapley(fitted: Emulated, joint: Joint, seed: int) -> list[Share]:
     """Shapley's effects of inputs that depend on each other, and of one that does nothing, the last; their sum is 1."""
     # Rows of a sample are no even plan: they need more of them.

@@ -13,6 +13,7 @@ import numpy as np
 
 from doe.arrays import Array, Whole
 from doe.emulator import Emulator, fit_emulator, pooled_variances
+from doe.threads import one_thread
 
 # An emulator is trusted that foretells this share of what noise leaves to foretell.
 TRUSTED = 0.8
@@ -91,6 +92,7 @@ class Spread:
         return max(self.errors[0], self.errors[2]) / width if width > 0.0 else np.inf
 
 
+@one_thread
 def emulated(runs: Runs) -> Emulated:
     """Emulator of the runs, their variances smoothed over the inputs. Raises ValueError for fewer than two runs."""
     logarithmic = bool((runs.values > 0.0).all())
@@ -103,6 +105,7 @@ def emulated(runs: Runs) -> Emulated:
     return Emulated(emulator, logarithmic, float((smooth * unit).mean()), emulator.q2(), ceiling)
 
 
+@one_thread
 def spread_of(runs: Runs, fitted: Emulated, fresh: Array, seed: int) -> Spread:
     """Range of an output; ``fresh``: quantiles (m, d) of many input sets as likely as those of the runs."""
     random = np.random.default_rng(seed)

@@ -1,0 +1,29 @@
+"""Linear algebra on one thread: its last bits depend on how many threads share a sum, and matrices here are too small to gain."""
+
+import functools
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+from threadpoolctl import ThreadpoolController
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+@functools.cache
+def _controller() -> ThreadpoolController:
+    # numpy and scipy bring a library each; what is not loaded yet would not be limited.
+    import scipy.linalg  # noqa: F401
+
+    return ThreadpoolController()
+
+
+def one_thread(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, within which linear algebra takes one thread; simulations keep theirs."""
+
+    @functools.wraps(function)
+    def limited(*arguments: P.args, **named: P.kwargs) -> R:
+        with _controller().limit(limits=1, user_api="blas"):
+            return function(*arguments, **named)
+
+    return limited

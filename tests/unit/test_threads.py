@@ -1,0 +1,95 @@
+"""Bits do not depend on how many threads linear algebra has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from doe.emulator import fit_emulator
+from doe.report.steps.fit import fit_record
+from doe.study.runs import read_runs
+from doe.study.surfaces import fit_surfaces, with_rivals
+from doe.study_file import Study
+from doe.threads import one_thread
+from doe.unknown.sampler import sampled
+from doe.unknown.sensitivity import sobol
+from doe.unknown.spread import Runs, emulated, spread_of
+
+THREADS = (1, 2)
+
+
+def runs_of(seed, rows, inputs):
+    """Outputs of a bent function with scatter, more rows than one search of an emulator takes."""
+    draw = np.random.default_rng(seed)
+    points = draw.random((rows, inputs))
+    values = np.exp(points[:, 0]) + np.sin(6.0 * points[:, 1]) * points[:, 2] + 0.05 * draw.standard_normal(rows)
+    return points, values
+
+
+def with_threads(figures):
+    """What a function gives under each number of threads."""
+    shown = []
+    for count in THREADS:
+        with threadpool_limits(count, user_api="blas"):
+            shown.append(figures())
+    return shown
+
+
+def test_invariant_emulators_have_the_same_bits_on_any_number_of_threads():
+    """Invariant: fit, predictions, leave-one-out, covariances and draws of 600 runs."""
+    points, values = runs_of(1, 600, 9)
+
+    def figures():
+        fitted = fit_emulator(points, values, np.full(600, 0.0025))
+        draws = fitted.draw(16, np.random.default_rng(2))(points[:300])
+        parts = (*fitted.predict(points), fitted.mean(points), fitted.covariance(points, points), draws)
+        return [part.tobytes() for part in (*parts, *fitted.leave_one_out(), np.array(fitted.q2()))]
+
+    one, *others = with_threads(figures)
+    assert all(other == one for other in others)
+
+
+def test_invariant_spread_and_samples_have_the_same_bits_on_any_number_of_threads():
+    """Invariant: spread over unknown inputs, shares of the variance, and a posterior sample."""
+    points, values = runs_of(3, 256, 4)
+    runs = Runs(points, values, np.full(256, 0.0025), np.full(256, 7))
+    matrix = np.random.default_rng(4).random((4, 400))
+
+    def density(at):
+        return -(((at - 0.5) @ matrix) ** 2).sum(axis=1) / 40.0
+
+    def figures():
+        fitted = emulated(runs)
+        return repr((spread_of(runs, fitted, points, 5), sobol(fitted, 4, 6), sampled(density, 4, 7, 400)))
+
+    one, *others = with_threads(figures)
+    assert all(other == one for other in others)
+
+
+def test_unit_threads_are_given_back():
+    """Unit: within there is one thread, afterwards as many as before, after an exception too."""
+
+    def counts():
+        return [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
+
+    @one_thread
+    def inside(fails):
+        assert set(counts()) == {1}
+        if fails:
+            raise KeyError
+
+    with threadpool_limits(2, user_api="blas"):
+        inside(False)
+        with pytest.raises(KeyError):
+            inside(True)
+        assert set(counts()) == {2}
+
+
+def test_invariant_a_fit_has_the_same_bits_on_any_number_of_threads():
+    """Invariant: surfaces, their analysis of variance and their rivals."""
+    study = Study.load(ROOT / "examples" / "clearance_study.toml")
+    runs = read_runs(study, ROOT / "examples" / "ccd_table4.csv")
+    one, *others = with_threads(lambda: repr(fit_record(with_rivals(fit_surfaces(study, runs)))))
+    assert all(other == one for other in others)
