@@ -1,15 +1,15 @@
 """Limits of responses, judged by what was simulated: kept, broken or undecided."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Literal
 
-import numpy as np
-
 from doe.study.confirmation import Confirmed
 from doe.study.goals import goals_of
 from doe.study_file import Study
+from rbdyn.records.words import with_error
 
 Verdict = Literal["kept", "undecided", "broken"]
 
@@ -46,8 +46,8 @@ class Limit:
     @property
     def shown(self) -> str:
         """The limit with its value in words."""
-        error = "?" if np.isnan(self.error) else f"{self.error:.2g}"
-        return f"{self.response} {self.sense} {self.bound:g} (simulated {self.value:.5g} ± {error})"
+        unknown = ", error unknown" if math.isnan(self.error) else ""
+        return f"{self.response} {self.sense} {self.bound:g} (simulated {with_error(self.value, self.error)}{unknown})"
 
 
 def limits_of(study: Study, confirmed: Confirmed) -> list[Limit]:

@@ -17,6 +17,7 @@ from doe.study.predicted import PredictedGain, predicted_gains, statement
 from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.record import finite
+from rbdyn.records.words import error_alone, with_error
 
 
 def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
@@ -110,7 +111,7 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
     luck = {name: gain["selection_optimism_percent"] for name, gain in record["predicted_gains"].items()}
     flattered = ", ".join(f"{name} {percent:+.2f} %" for name, percent in luck.items())
     print(f"the rule picks what errors flatter; luck expected in these gains: {flattered}")
-    chance = f"{sure['probability']:.3f} ± {1.96 * sure['standard_error']:.3f}"
+    chance = with_error(sure["probability"], 1.96 * sure["standard_error"])
     drawn = f"on {sure['draws']} surfaces drawn from their errors it dominates the baseline with probability {chance}"
     print(f"pick: {record['pick']['reason']}; {drawn}")
     for limit in record["constraints"]:
@@ -140,7 +141,9 @@ def _print_gains(whose: str, gains: dict[str, Any]) -> None:
     rows = []
     for name, gain in gains.items():
         scatter = gain["single_run_scatter_percent"]
-        rows.append((name, change(gain), gain["verdict"], f"± {'?' if scatter is None else f'{scatter:.2f}'} %"))
+        rows.append(
+            (name, change(gain), gain["verdict"], "unknown" if scatter is None else f"{error_alone(scatter)} %")
+        )
     header = ("", "against the baseline", "verdict", "scatter of two single runs")
     print_table(f"predicted gains of {whose}", header, rows)
 
@@ -148,11 +151,7 @@ def _print_gains(whose: str, gains: dict[str, Any]) -> None:
 def _cells(point: dict[str, Any]) -> list[str]:
     errors = point.get("errors", {})
     factors = [f"{x:.5g}" for x in point["factors"].values()]
-    shown = [
-        f"{x:.5g}" if errors.get(name) is None else f"{x:.5g} ± {errors[name]:.2g}"
-        for name, x in point["responses"].items()
-    ]
-    return factors + shown
+    return factors + [with_error(x, errors.get(name)) for name, x in point["responses"].items()]
 
 
 def _extreme(study: Study, front: ParetoFront, rows: Any) -> dict[str, float]:
@@ -221,7 +220,7 @@ def tolerance_aware_record(study: Study, surfaces: list[Surface], found: Toleran
 def print_tolerance_aware(record: dict[str, Any]) -> None:
     """What the tolerances cost, and whether the picks survive them."""
     pick, names = record["pick"], list(record["baseline_robust"])
-    widths = ", ".join(f"{name} ± {width:g}" for name, width in record["half_widths"].items())
+    widths = ", ".join(f"{name} within ± {width:g}" for name, width in record["half_widths"].items())
     kind = "worst case" if record["kind"] == "worst_case" else f"{100 * record['quantile']:g} % of the parts keep"
     rows = [
         ("baseline", *(f"{record['baseline_robust'][name]:.5g}" for name in names)),
@@ -229,7 +228,7 @@ def print_tolerance_aware(record: dict[str, Any]) -> None:
         ("tolerance-aware pick", *(f"{pick['robust'][name]:.5g}" for name in names)),
         ("the same, nominal", *(f"{pick['responses'][name]:.5g}" for name in names)),
     ]
-    print_table(f"after manufacture within {widths}: {kind}", ("", *names), rows)
+    print_table(f"after manufacture, {widths}: {kind}", ("", *names), rows)
     at = ", ".join(f"{name} = {x:.5g}" for name, x in pick["factors"].items())
     print(f"tolerance-aware pick: {at}; {pick['reason']}")
     less = f"{record['nominal_loss_percent']:.2f} % less hypervolume than the plain one in nominal values"
@@ -237,7 +236,7 @@ def print_tolerance_aware(record: dict[str, Any]) -> None:
     more = "" if percent is None else f", and {percent:.2f} % more in what manufacture leaves"
     print(f"the tolerance-aware front has {less}{more}")
     plain = f"{100 * survival['plain_pick']:.1f} % at the plain pick"
-    aware = f"{100 * survival['pick']:.1f} % at the tolerance-aware one (± {196 * survival['standard_error']:.2f} %)"
+    aware = f"{with_error(100 * survival['pick'], 196 * survival['standard_error'])} % at the tolerance-aware one"
     print(f"parts that still dominate the baseline: {plain}, {aware}")
     if not record["plain_pick_inside"]:
         print("the tolerance box of the plain pick reaches out of the region: its figures are extrapolated")
