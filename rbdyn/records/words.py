@@ -115,6 +115,13 @@ def improvement(gain: float, error: float | None, goal: str, unit: str = "%") ->
     return f"{size} {unit}".rstrip() + f" {worse if gain < 0.0 else better}"
 
 
+def chance(probability: float) -> str:
+    """A probability to three decimals: '0.978', and 'above 0.999' or 'below 0.001' where that would be one or zero."""
+    if probability > 0.9995:
+        return "above 0.999"
+    return "below 0.001" if probability < 0.0005 else f"{probability:.3f}"
+
+
 class Figure(NamedTuple):
     """A figure of a result: what it is, its value, the half-width of its 95 % interval where there is one, its unit."""
 
