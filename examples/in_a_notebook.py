@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rbdyn
+from rbdyn.records.words import with_error
 
 drawn = rbdyn.Scene.load(Path(__file__).with_name("cylindrical_roller.toml"))
 scene = drawn.changed({"cage.mass_g": 50, "numerics.turns": 20, "numerics.discard_turns": 5, "numerics.replicates": 2})
@@ -31,6 +32,6 @@ angle = np.degrees((motion.azimuth + np.pi) % (2.0 * np.pi) - np.pi)
 axis.plot(angle.ravel(), motion.inner_load.ravel(), ".", markersize=1)
 axis.set_xlabel("roller from the load direction [deg]")
 axis.set_ylabel("load on the inner race [N]")
-axis.set_title(f"power loss {result.power_loss.value:.1f} ± {result.power_loss.error:.1f} W, carried {carried:.0f} N")
+axis.set_title(f"power loss {with_error(result.power_loss.value, result.power_loss.error)} W, carried {carried:.0f} N")
 if __name__ == "__main__":
     figure.savefig("load_zone.png", dpi=130)

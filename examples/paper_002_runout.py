@@ -28,6 +28,7 @@ from rbdyn.quasistatic.runout.model import bench_of
 from rbdyn.quasistatic.runout.race_errors import RaceErrors, ball_path, perfect, waviness
 from rbdyn.quasistatic.runout.tolerance_design import Bench, RaceLimits, design, runouts
 from rbdyn.quasistatic.runout.turn import Followed, follow
+from rbdyn.records.words import with_error
 from rbdyn.scene.ball import BallScene
 
 SCENE = Path(__file__).parent / "angular_contact_7014.toml"
@@ -247,7 +248,7 @@ def design_table(found: dict[tuple[str, str], RaceLimits]) -> Table:
         heights = (limits.inner_roundness, limits.outer_roundness, limits.inner_sway, limits.outer_sway)
         rows.append((
             target, lot, *(f"{1e6 * height:.2f}" for height in heights),
-            f"{100 * limits.yielded:.1f} ± {100 * limits.standard_error:.1f} %",
+            f"{with_error(100 * limits.yielded, 100 * limits.standard_error)} %",
             f"{100 * limits.proportional:.1f} %", off, agree,
             *(f"{value:.2f}" for value in limits.homogenisation),
         ))  # fmt: skip

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.faults import InputError, bounded, read_text
 from rbdyn.records.record import Record, derived, json_fields, keyed
-from rbdyn.records.words import Brief, Figure, quantity
+from rbdyn.records.words import Brief, Figure, error_alone, quantity, value_alone
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,9 +44,9 @@ class Quantity(Record):
         return math.hypot(*known) if known else None
 
     def __str__(self) -> str:
-        errors = [f"± {self.statistical_error:.2g} (statistical)" if self.statistical_error is not None else ""]
-        errors.append(f"± {self.numerical_error:.2g} (numerical)" if self.numerical_error is not None else "")
-        return " ".join((f"{self.value:.5g}", *filter(None, errors)))
+        parts = {"statistical": self.statistical_error, "numerical": self.numerical_error}
+        errors = [f"{error_alone(error)} ({kind})" for kind, error in parts.items() if error is not None]
+        return " ".join((value_alone(self.value, self.error), *errors))
 
 
 class SavedRecord(Record):

@@ -7,6 +7,7 @@ import numpy as np
 from doe.arrays import Array
 from doe.pareto.archive import hypervolume, non_dominated
 from doe.pareto.direct import DirectFront
+from rbdyn.records.words import signed_with_error
 
 DRAWS = 200  # of the noise of a front
 
@@ -30,7 +31,7 @@ class SurrogateLoss:
         """Whether the surfaces lose anything that can be told from noise."""
         if self.loss_percent is None or self.loss_error_percent is None:
             return "The direct front lies wholly behind that of the surfaces; give the direct search more runs."
-        figure = f"{self.loss_percent:+.1f} ± {self.loss_error_percent:.1f} % of the direct front's hypervolume"
+        figure = f"{signed_with_error(self.loss_percent, self.loss_error_percent)} % of the direct front's hypervolume"
         if abs(self.loss_percent) <= self.loss_error_percent:
             return f"The surfaces lose {figure}: nothing that can be told from the noise."
         if self.loss_percent > 0.0:

@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 
 from doe.arrays import Array, Mask, Rows
 from doe.pareto.manufacture import Distribution, error_of_share, random_offsets
+from rbdyn.records.words import with_error
 
 Costs = Callable[[Array], Array]
 Aim = Literal["ratios", "product", "sum"]
@@ -65,6 +66,7 @@ def widest_tolerances(
     samples: int = 4096,
     seed: int = 1,
     aim: Aim = "ratios",
+    promise: str = "keep all limits",
 ) -> WidestTolerances:
     """Find the widest tolerances with which a part keeps all limits with a given probability.
 
@@ -80,6 +82,7 @@ def widest_tolerances(
     samples, seed : parts drawn; the same for every width (common random numbers).
     aim : "ratios" keeps them; "product" maximises the product of the half widths, "sum" their sum in units of the ratios, each
         within a twentieth to twenty times the given ratios.
+    promise : what the parts do that count, in words, for the sentence.
 
     The widest is looked for from the pick outwards up to the first loss, so all narrower tolerances keep the limits
     too. Where even the exact pick breaks a limit, all widths are zero.
@@ -94,11 +97,13 @@ def widest_tolerances(
     if (room < -1e-9 * (high - low)).any():
         raise ValueError(f"pick = {centre.tolist()}: lies outside the region; pick a point within it")
     drawn = random_offsets(samples, centre.size, distribution, seed)
-    parts = _Parts(objectives, centre, np.asarray(limits, float), room.clip(0.0), drawn, names, probability)
+    parts = _Parts(objectives, centre, np.asarray(limits, float), room.clip(0.0), drawn, names, probability, promise)
     exact = np.zeros(centre.size)
     if parts.kept(exact) < probability:
         worst = parts.most_broken(exact)
-        return parts.nothing(worst, f"even the exact pick keeps {worst} with a probability below {parts.percent}")
+        return parts.nothing(
+            worst, f"even the exact pick keeps {worst} with a probability below the {parts.percent} demanded"
+        )
     if aim != "ratios":
         share = _best_ratios(parts, share, aim)
     return _result(parts, parts.widest(share), share)
@@ -115,6 +120,7 @@ class _Parts:
     offsets: Array
     names: Sequence[str]
     wanted: float
+    promise: str
 
     @property
     def percent(self) -> str:
@@ -189,11 +195,13 @@ def _result(parts: _Parts, scale: float, ratios: Array) -> WidestTolerances:
         return parts.nothing(first, f"as soon as parts differ, less than {parts.percent} of them keep {first}")
     half = parts.half(ratios, scale)
     at_rim = half >= parts.room * (1.0 - 1e-9)
-    # Just beyond, the limit that parts break most is what holds the tolerances back.
+    # Just beyond, the tolerances are limited by what most parts break.
     limit = RIM if at_rim.all() else parts.most_broken(parts.half(ratios, scale * 1.02))
     share = parts.kept(half)
     error = error_of_share(share, len(parts.offsets))
-    within = f"Within these tolerances {100 * share:.1f} ± {196 * error:.1f} % of the parts keep all limits"
+    within = f"Within these tolerances {with_error(100 * share, 196 * error)} % of the parts {parts.promise}"
     rim = " Where a tolerance ends at the rim of the region, no run tells whether it may be wider."
-    sentence = f"{within}; {limit} holds them back." + (rim if at_rim.any() else "")
+    sentence = f"{within}, {parts.percent} demanded; the tolerances are limited by {limit}." + (
+        rim if at_rim.any() else ""
+    )
     return WidestTolerances(half, share, error, limit, at_rim, sentence)

@@ -6,7 +6,7 @@ what was missed there is known: the field is conditioned on it, after its scale 
 are likely, if they are not (maximum likelihood). Source: Sacks, Welch, Mitchell and Wynn, Stat. Sci. 4 (1989), section 4.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -58,40 +58,53 @@ class Conditioned:
         return projected @ self._missed.misses, np.sqrt(left.clip(0.0))
 
 
-def surfaces_doubt(
-    study: Study, surfaces: Sequence[Surface], simulated: Sequence[Confirmed]
-) -> Callable[[float], Doubt]:
-    """Range in which the limited responses lie with the study's probability, from the surfaces, what these missed at the
-    design runs and at points ``simulated``; a function of the share of it that is taken."""
-    probability = study.file.confirmation.limit_probability
-    limited = sorted({index for index, _, _ in goals_of(study).limited})
-    fields, quantiles, more = {}, {}, {}
-    for index in limited:
-        surface = surfaces[index]
-        missed = _at_design(surface)
-        if simulated:
-            at = study.coded(np.array([each.point for each in simulated]))
-            errors = standard_errors_of(simulated)[:, index]
-            misses = np.array([each.values[index] for each in simulated]) - surface.predict(at)
-            missed = missed.and_at(at, misses, errors, surface.prediction_standard_error(at))
-            more[index] = float(errors.max())
-        fields[index] = Conditioned(missed)
-        quantiles[index] = float(special.stdtrit(surface.interval_dof, probability))
+class SurfaceDoubt:
+    """How far the limited responses may lie off their surfaces, from what these missed at the design runs and at points
+    ``simulated``."""
 
-    def at_share(share: float) -> Doubt:
+    def __init__(self, study: Study, surfaces: Sequence[Surface], simulated: Sequence[Confirmed] = ()) -> None:
+        self._surfaces, self._probability = surfaces, study.file.confirmation.limit_probability
+        self._fields: dict[int, Conditioned] = {}
+        # The error of one more simulation counts too.
+        self._more: dict[int, float] = {}
+        for index in sorted({index for index, _, _ in goals_of(study).limited}):
+            surface = surfaces[index]
+            missed = _at_design(surface)
+            if simulated:
+                at = study.coded(np.array([each.point for each in simulated]))
+                errors = standard_errors_of(simulated)[:, index]
+                misses = np.array([each.values[index] for each in simulated]) - surface.predict(at)
+                missed = missed.and_at(at, misses, errors, surface.prediction_standard_error(at))
+                self._more[index] = float(errors.max())
+            self._fields[index] = Conditioned(missed)
+
+    def _off(self, index: int, coded: Array) -> tuple[Array, Array]:
+        """Mean (n,) and standard deviation (n,) of what a response lies off its surface."""
+        shift, deviation = self._fields[index](coded, self._surfaces[index].prediction_standard_error(coded))
+        return shift, np.hypot(deviation, self._more.get(index, 0.0))
+
+    def at_share(self, share: float) -> Doubt:
+        """Range in which the responses lie with the study's probability, or a share of it."""
+
         def doubt(coded: Array) -> tuple[Array, Array]:
-            shift, margin = np.zeros((2, len(coded), len(surfaces)))
-            for index in limited:
-                stated = surfaces[index].prediction_standard_error(coded)
-                shift[:, index], deviation = fields[index](coded, stated)
-                # The error of one more simulation counts too.
-                margin[:, index] = quantiles[index] * np.hypot(deviation, more.get(index, 0.0))
+            shift, margin = np.zeros((2, len(coded), len(self._surfaces)))
+            for index in self._fields:
+                quantile = float(special.stdtrit(self._surfaces[index].interval_dof, self._probability))
+                shift[:, index], deviation = self._off(index, coded)
+                margin[:, index] = quantile * deviation
             # A limit is never loosened: the surface itself keeps it too.
             return share * (margin - shift).clip(0.0), share * (margin + shift).clip(0.0)
 
         return doubt
 
-    return at_share
+    def kept_with(self, index: int, sense: str, bound: float, coded: Array) -> float:
+        """Probability with which a limited response keeps a bound ("<=" or ">=") at a coded point (k,)."""
+        shift, deviation = (float(each[0]) for each in self._off(index, coded[None]))
+        room = bound - float(self._surfaces[index].predict(coded)) - shift
+        room = room if sense == "<=" else -room
+        if deviation == 0.0:
+            return float(room >= 0.0)
+        return float(special.stdtr(self._surfaces[index].interval_dof, room / deviation))
 
 
 def standard_errors_of(simulated: Sequence[Confirmed]) -> Array:

@@ -1,6 +1,7 @@
 """Where a pick or a front lies at the edge of the region, and what is to be had beyond it."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy import special
@@ -13,16 +14,35 @@ from doe.response_surface.model_error import REACH
 from doe.running.failure import Failure
 from doe.study.confirmation import Choice, Confirmed, confirmed_from
 from doe.study.drawn import jacobian
-from doe.study.goals import goals_of, region_of
+from doe.study.goals import beyond_runs, goals_of, region_of
 from doe.study_file import Study
 from rbdyn.faults import InputError
 from rbdyn.records.record import Record, derived, finite, keyed, outside_json
-from rbdyn.records.words import improvement, quantity
+from rbdyn.records.words import improvement, quantity, shown
 
 NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
 STEP = 1e-3  # coded units over which surfaces are differentiated
 MICROMETRE_MM = 1e-3
+
+
+class Place(NamedTuple):
+    """Where a point lies: by factor at a bound its side and that bound, and whether it is farther out than any run."""
+
+    bounds: Mapping[str, tuple[str, float]]
+    beyond: bool
+
+    @property
+    def at_bounds(self) -> dict[str, str]:
+        """Side by factor, for JSON."""
+        return {factor: side for factor, (side, _) in self.bounds.items()}
+
+    def sentence(self, point: str) -> str:
+        """Where the ``point`` of that name lies, in words; empty inside the region that the runs reach."""
+        ends = [f"the {side} bound of {name}, {shown(bound)}" for name, (side, bound) in self.bounds.items()]
+        where = [f"at {' and '.join(ends)}"] if ends else []
+        where += ["farther out than any run: the surfaces extrapolate there"] if self.beyond else []
+        return f"{point} lies {', and '.join(where)}." if where else ""
 
 
 class Outward(Record):
@@ -62,10 +82,11 @@ class Outward(Record):
 class Edge(Record):
     """Factors of the pick at a bound, and the shares of the fronts within `NEAR` of one (None: no such front).
 
-    ``sentence`` is all of it in words.
+    ``beyond_runs``: whether the pick is farther out than any run of the design. ``sentence`` is all of it in words.
     """
 
     outward: tuple[Outward, ...] = outside_json()
+    beyond_runs: bool
     factors: dict[str, Outward] = derived(lambda self: {each.factor: each for each in self.outward})
     front_share: float
     direct_share: float | None = keyed("direct_front_share")
@@ -76,16 +97,32 @@ class Edge(Record):
         if self.direct_share is not None:
             shares += f" and {100.0 * self.direct_share:.0f} % of the simulator's own front"
         shares += f" lies within {100.0 * NEAR:g} % of a bound of the region"
+        beyond = "farther out than any run: the surfaces extrapolate there"
         if not self.outward:
-            return f"The pick lies inside the region; {shares}."
+            where = f"between the bounds of the region, but {beyond}" if self.beyond_runs else "inside the region"
+            return f"The pick lies {where}; {shares}."
         where = "; ".join(each.sentence for each in self.outward)
+        where += f". It lies {beyond}" if self.beyond_runs else ""
         return f"THE PICK LIES AT THE EDGE of the region: {where}. {shares}; a wider design may find more."
 
 
 def share_at_edge(study: Study, points: Array) -> float:
     """Share of points (n, k) in factor units within `NEAR` of a bound of the region."""
+    return float(_sides(points, ends_of(study)).any(axis=1).mean())
+
+
+def ends_of(study: Study) -> Array:
+    """Bounds (k, 2) of the region, in factor units."""
     reach = region_of(study) * study.step
-    return float(_sides(points, np.column_stack([study.centre - reach, study.centre + reach])).any(axis=1).mean())
+    return np.column_stack([study.centre - reach, study.centre + reach])
+
+
+def place_of(study: Study, point: Array) -> Place:
+    """Where a point (k,) in factor units lies in the region of the design."""
+    ends = ends_of(study)
+    sides = zip(study.factors, _sides(point[None], ends)[0].tolist(), ends.tolist(), strict=True)
+    bounds = {name: ("upper", high) if side > 0 else ("lower", low) for name, side, (low, high) in sides if side}
+    return Place(bounds, beyond_runs(study, study.coded(point)))
 
 
 def edge_of(
@@ -101,8 +138,7 @@ def edge_of(
 
     ``ends`` (k, 2), in factor units, of the region that the pick was searched in, where that has grown.
     """
-    reach = region_of(study) * study.step
-    ends = np.column_stack([study.centre - reach, study.centre + reach]) if ends is None else ends
+    ends = ends_of(study) if ends is None else ends
     sides = _sides(pick.point[None], ends)[0]
     names = [(index, side) for index, side in enumerate(sides.tolist()) if side]
     gains_beyond = {} if simulations is None else _simulated(study, pick, names, simulations)
@@ -118,7 +154,7 @@ def edge_of(
         which = "upper" if side > 0 else "lower"
         outward.append(Outward(study.factors[index], which, bound, unit, source, per_unit, goals))
     far = None if direct is None else float(_sides(direct, ends).any(axis=1).mean())
-    return Edge(tuple(outward), share_at_edge(study, front), far)
+    return Edge(tuple(outward), beyond_runs(study, study.coded(pick.point)), share_at_edge(study, front), far)
 
 
 def _sides(points: Array, ends: Array) -> Whole:

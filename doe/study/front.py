@@ -14,7 +14,7 @@ from doe.pareto.nsga2 import Doubt
 from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox, tolerance_aware_front
 from doe.pareto.uncertainty import FrontUncertainty, front_uncertainty
 from doe.response_surface import Surface
-from doe.study.back_off import surfaces_doubt
+from doe.study.back_off import SurfaceDoubt
 from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
@@ -49,7 +49,7 @@ def find_front(
     check_goals(study)
     box = tolerance_box(study)
 
-    doubt = surfaces_doubt(study, surfaces, simulated)
+    doubt = SurfaceDoubt(study, surfaces, simulated)
 
     def plain(share: float) -> ParetoFront:
         return front(
@@ -59,7 +59,7 @@ def find_front(
             goals=goals,
             baseline=study.baseline,
             **settings.model_dump(include=SEARCH),
-            doubt=lambda points: doubt(share)(study.coded(points)),
+            doubt=lambda points: doubt.at_share(share)(study.coded(points)),
         )
 
     with named_faults(study, goals, lambda point: point, ""):
@@ -68,7 +68,9 @@ def find_front(
     if box is None:
         return found
     with named_faults(study, goals, study.actual, " after manufacture"):
-        aware = _backed_off(study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt(share)), failed)
+        aware = _backed_off(
+            study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt.at_share(share)), failed
+        )
     return replace(found, tolerance_aware=_idle_at(study, np.zeros_like(study.centre), aware))
 
 
@@ -90,8 +92,9 @@ def _backed_off(study: Study, search: Callable[[float], Found], failed: int) -> 
                 raise
             continue
         probability = study.file.confirmation.limit_probability
-        how = f"with {100.0 * share:g} % of the back-off for" if share < 1.0 else "with"
-        words = f"; on the surfaces it keeps the limits {how} a probability of {probability:g}"
+        words = f"; limits keep the margin for the demanded probability of {probability:g}"
+        if share < 1.0:
+            words = f"; limits keep {100.0 * share:g} % of the margin for the demanded probability of {probability:g}"
         return replace(searched, pick_reason=searched.pick_reason + words)
     raise AssertionError("the last share either returns or raises")
 

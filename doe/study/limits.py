@@ -1,15 +1,15 @@
 """Limits of responses, judged by what was simulated: kept, broken or undecided."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Literal
 
-import numpy as np
-
 from doe.study.confirmation import Confirmed
 from doe.study.goals import goals_of
 from doe.study_file import Study
+from rbdyn.records.words import chance, with_error
 
 Verdict = Literal["kept", "undecided", "broken"]
 
@@ -44,10 +44,17 @@ class Limit:
         return "broken" if -self.room > self.error else "undecided"
 
     @property
+    def probability(self) -> float:
+        """With which the bound is kept, by the error of the value; NaN where that is unknown."""
+        if not self.error > 0.0:
+            return math.nan if math.isnan(self.error) else float(self.room >= 0.0)
+        return NormalDist().cdf(self.room / self.error * NormalDist().inv_cdf(0.975))
+
+    @property
     def shown(self) -> str:
         """The limit with its value in words."""
-        error = "?" if np.isnan(self.error) else f"{self.error:.2g}"
-        return f"{self.response} {self.sense} {self.bound:g} (simulated {self.value:.5g} ± {error})"
+        sure = "error unknown" if math.isnan(self.error) else f"probability {chance(self.probability)}"
+        return f"{self.response} {self.sense} {self.bound:g} (simulated {with_error(self.value, self.error)}, {sure})"
 
 
 def limits_of(study: Study, confirmed: Confirmed) -> list[Limit]:
@@ -76,7 +83,7 @@ def sentence(limits: Sequence[Limit], probability: float, tried: int) -> str:
     words = {
         "broken": "LIMIT BROKEN at the pick: {}, beyond by more than its error",
         "undecided": "LIMIT UNDECIDED at the pick: {}, within its error of the bound",
-        "kept": f"Limit kept at the pick with a probability of at least {probability:g}: {{}}",
+        "kept": f"Limit kept at the pick, probability {probability:g} demanded: {{}}",
     }
     parts = []
     for verdict in reversed(ORDER):

@@ -14,7 +14,7 @@ from doe.study.drawn import jacobian, predict_all
 from doe.study.goals import goals_of
 from doe.study_file import Study
 from rbdyn.records.record import Record, derived, keyed, outside_json
-from rbdyn.records.words import improvement
+from rbdyn.records.words import error_alone, improvement
 
 
 def verdict(percent: float, error: float) -> str:
@@ -57,7 +57,7 @@ class PredictedGain(Record):
         if self.scatter is None:
             return f"{said}, {judged}."
         place = "inside" if self.within_scatter else "outside"
-        return f"{said}, {judged} and {place} the scatter of single runs (± {self.scatter:.2f} %)."
+        return f"{said}, {judged} and {place} the scatter of single runs ({error_alone(self.scatter)} %)."
 
 
 def predicted_gains(study: Study, surfaces: Sequence[Surface], point: Array) -> list[PredictedGain]:

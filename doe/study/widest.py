@@ -70,6 +70,7 @@ def widest_of(
     if here is not None:
         beyond = np.nan_to_num(ratios)
         low, high = np.minimum(low, point - beyond), np.maximum(high, point + beyond)
+    promise = f"keep {100.0 * settings.keep:g} % of every gain{' and all limits' if goals.limited else ''}"
     found = widest_tolerances(
         objectives,
         point[free],
@@ -81,6 +82,7 @@ def widest_of(
             *(f"the gain of {study.responses[index]}" for index in goals.objectives),
             *(f"{study.responses[index]} {sense} {limit:g}" for index, sense, limit in goals.limited),
         ],
+        promise=promise,
         **settings.model_dump(include={"probability", "distribution", "samples", "seed", "aim"}),
     )
     return found.among(free, point.size)

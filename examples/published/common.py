@@ -143,14 +143,6 @@ def error(figure: Quantity) -> float:
     return math.nan if figure.statistical_error is None else figure.statistical_error
 
 
-def plus_minus(value: float, half_width: float) -> str:
-    """Value and error, the error to two digits and the value to as many places."""
-    if not half_width > 0.0:
-        return f"{value:.4g}"
-    places = max(1 - math.floor(math.log10(half_width)), 0)
-    return f"{value:.{places}f} ± {half_width:.{places}f}"
-
-
 def trend(values: Sequence[float], errors: Sequence[float]) -> str:
     """How a row of values runs: 'falls, then rises' only where the lowest lies below both ends by more than error."""
     y, e = np.asarray(values, float), np.asarray(errors, float)

@@ -23,7 +23,6 @@ from published.common import (
     error,
     findings_table,
     percent,
-    plus_minus,
     quantity,
     save,
     simulated,
@@ -32,6 +31,7 @@ from published.common import (
 )
 from rbdyn import Scene
 from rbdyn.properties.lubricants import oil_at
+from rbdyn.records.words import with_error
 
 # Table 8: as designed, and the paper's optimum.
 DESIGNS = {"design": (0.020, 0.150, 0.300), "optimum": (0.017, 0.187, 0.285)}
@@ -80,7 +80,7 @@ def figure14(
         for response in RESPONSES:
             values, errors = part[response].to_numpy(), part[f"{response}_error"].to_numpy()
             found, stated = trend(values, errors), STATED[sweep, response]
-            ends = (plus_minus(values[0], errors[0]), plus_minus(values[-1], errors[-1]))
+            ends = (with_error(values[0], errors[0]), with_error(values[-1], errors[-1]))
             rows.append((f"{PLAIN[response]} with {sweep}", law, design, *ends, percent(values[-1] / values[0] - 1.0),
                          found, stated))  # fmt: skip
     trends = trend_findings(rows)
@@ -125,7 +125,7 @@ def optimum_findings(frame: pd.DataFrame) -> tuple[Finding, ...]:
             found.append(
                 Finding(
                     f"{PLAIN[response]} of the optimum {percent(claimed)}", "Chen et al. 2022, Table 8", "model against model",
-                    f"{plus_minus(100.0 * mean, 100.0 * half_width)} % ({law})",
+                    f"{with_error(100.0 * mean, 100.0 * half_width)} % ({law})",
                     "agrees" if abs(mean - claimed) <= half_width else "differs",
                 )
             )  # fmt: skip

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from published.common import PLAIN, RESPONSES, Check, Effort, Table, canvas, plus_minus, save
+from published.common import PLAIN, RESPONSES, Check, Effort, Table, canvas, save
 from published.table4 import Theirs, level_ratio, ours, theirs
+from rbdyn.records.words import with_error
 
 # What is changed, to what, and where the range comes from.
 INPUTS: tuple[tuple[str, tuple[str, ...], str], ...] = (
@@ -96,8 +97,8 @@ def sensitivity(effort: Effort, names: Sequence[str] | None = None, whole_design
     rows = tuple(
         (
             str(name),
-            *(plus_minus(row[r], row[f"{r}_error"]) for r in RESPONSES),
-            plus_minus(row["distance"], row["distance_error"]),
+            *(with_error(row[r], row[f"{r}_error"]) for r in RESPONSES),
+            with_error(row["distance"], row["distance_error"]),
             "yes" if row["nearer"] else "",
             row["reason"],
         )

@@ -24,13 +24,13 @@ from published.common import (
     canvas,
     error,
     findings_table,
-    plus_minus,
     save,
     simulated,
     tally,
     verdict_of,
 )
 from rbdyn import Scene
+from rbdyn.records.words import with_error
 
 NU215 = Path(__file__).parent / "nu215.toml"
 SPEEDS_RPM = (2400, 3600, 5000)
@@ -132,7 +132,7 @@ def nu215(
 
 def percent_slip(value: float, half_width: float) -> str:
     """Slip in per cent."""
-    return plus_minus(100.0 * value, 100.0 * half_width)
+    return with_error(100.0 * value, 100.0 * half_width)
 
 
 def sliding_speed(slip: float, epicyclic_rpm: float) -> float:
@@ -157,7 +157,7 @@ def findings(base: pd.DataFrame, changed: pd.DataFrame, loads: Sequence[int]) ->
     found.append(
         Finding(
             f"sliding at {YAN_SLIDING_M_S:g} m/s at 5000 rpm and 1000 N", YAN, "model against model",
-            f"{plus_minus(ours, half_width)} m/s", "agrees" if near else "differs",
+            f"{with_error(ours, half_width)} m/s", "agrees" if near else "differs",
         )
     )  # fmt: skip
     along = [base.loc[(5000, load)] for load in loads if (5000, load) in base.index]

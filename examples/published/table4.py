@@ -25,12 +25,12 @@ from published.common import (
     Verdict,
     canvas,
     error,
-    plus_minus,
     quantity,
     save,
     simulated,
     tally,
 )
+from rbdyn.records.words import with_error
 
 FACTORS = {
     "radial_clearance_mm": ("bearing.radial_clearance_mm", 0.020, 0.005),
@@ -195,7 +195,7 @@ def findings(frame: pd.DataFrame) -> tuple[Finding, ...]:
         found.append(
             Finding(
                 f"level of the {name}", SOURCE, "model against model",
-                f"{plus_minus(row['level_ratio'], row['level_ratio_error'])} of theirs ({law})",
+                f"{with_error(row['level_ratio'], row['level_ratio_error'])} of theirs ({law})",
                 "agrees" if abs(row["level_ratio"] - 1.0) <= row["level_ratio_error"] else "differs",
             )
         )  # fmt: skip
@@ -216,7 +216,7 @@ def levels_table(frame: pd.DataFrame) -> Table:
             (
                 PLAIN[row["response"]],
                 row["law"],
-                plus_minus(row["level_ratio"], row["level_ratio_error"]),
+                with_error(row["level_ratio"], row["level_ratio_error"]),
                 "model against model",
                 f"{row['spearman']:+.2f}",
                 f"{row['spearman_low']:+.2f} to {row['spearman_high']:+.2f}",
@@ -231,7 +231,7 @@ def effects_table(frame: pd.DataFrame) -> Table:
     rows = []
     for row in frame.to_dict("records"):
         for name in FACTORS:
-            pairs = [plus_minus(row[f"{who}_{name}"], row[f"{who}_error_{name}"]) for who in ("ours", "theirs")]
+            pairs = [with_error(row[f"{who}_{name}"], row[f"{who}_error_{name}"]) for who in ("ours", "theirs")]
             rows.append((PLAIN[row["response"]], row["law"], SHORT[name], *pairs, row[f"sign_{name}"], "trend"))
     return Table(
         "linear effects per step (A 0.005, B and C 0.05 mm); 'unclear' where one of the two is within its error",

@@ -19,12 +19,12 @@ from published.common import (
     canvas,
     error,
     findings_table,
-    plus_minus,
     save,
     simulated,
     tally,
 )
 from rbdyn import History, Scene, history
+from rbdyn.records.words import with_error
 
 FILLS = (1.0, 0.3, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 PAPER = (0.72, 0.96)
@@ -78,10 +78,10 @@ def whirl(
     frame = pd.DataFrame(records)
     rows = tuple(
         (
-            row["law"], f"{row['fill']:g}", plus_minus(row["ratio"], row["ratio_error"]),
-            f"{row['eccentricity']:.2f} ± {row['eccentricity_deviation']:.2f}", f"{round(row['whirl_speed_ratio'], 2) + 0.0:.2f}",
+            row["law"], f"{row['fill']:g}", with_error(row["ratio"], row["ratio_error"]),
+            with_error(row["eccentricity"], row["eccentricity_deviation"]), f"{round(row['whirl_speed_ratio'], 2) + 0.0:.2f}",
             f"{100.0 * row['dry_share']:.1f}", f"{row['contacts_per_turn']:.1f}", f"{row['land_N']:.0f}",
-            plus_minus(row["impact_N"], row["impact_error"]), f"{100.0 * row['slip']:.2f}", row["regime"],
+            with_error(row["impact_N"], row["impact_error"]), f"{100.0 * row['slip']:.2f}", row["regime"],
         )
         for row in records
     )  # fmt: skip
@@ -130,7 +130,7 @@ def findings(frame: pd.DataFrame) -> tuple[Finding, ...]:
         found.append(
             Finding(
                 f"cage whirl deviation ratio of {PAPER[0]:g} to {PAPER[1]:g}", "Chen et al. 2022, Table 4",
-                "model against model", f"{plus_minus(flooded['ratio'], flooded['ratio_error'])} ({law}, fill {flooded['fill']:g})",
+                "model against model", f"{with_error(flooded['ratio'], flooded['ratio_error'])} ({law}, fill {flooded['fill']:g})",
                 "agrees" if off <= 0.0 else "unclear" if off <= flooded["ratio_error"] else "differs",
             )
         )  # fmt: skip

@@ -12,6 +12,7 @@ from rbdyn.cli.ball import ball
 from rbdyn.cli.keys import command as keys
 from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
+from rbdyn.records.words import error_alone, value_alone
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -244,7 +245,7 @@ def _write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str
 
 def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
     def shown(error: float | None) -> str:
-        return "not estimated" if error is None else f"± {error:.2g}"
+        return "not estimated" if error is None else error_alone(error)
 
     contact = {"largest of it by contact alone, without the film [N]": result.impact_contact_force}
     figures = {
@@ -259,7 +260,7 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
     rows = []
     for label, of in figures.items():
         errors = shown(of.statistical_error), shown(of.numerical_error)
-        rows.append((label, f"{of.value:.5g}", *errors, f"{of.effective_samples:.0f}"))
+        rows.append((label, value_alone(of.value, of.error), *errors, f"{of.effective_samples:.0f}"))
     columns = len(header) if verbose else -1
     terminal.print_table("", header[:columns], [row[:columns] for row in rows])
     if result.target is not None:
@@ -280,7 +281,7 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
             print(f"transient: {result.transient_turns:g} shaft turns")
         terms = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
         gap = result.power_gap * result.power_loss.value
-        terminal.print_table(f"power lost, each to ± {gap:.2g} W (gap of the power balance)", ("term", "W"), terms)
+        terminal.print_table(f"power lost; the power balance closes to {gap:.2g} W", ("term", "W"), terms)
         terminal.print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
     terminal.print_notes(result.notes, quiet)
 

@@ -22,6 +22,7 @@ from rbdyn.quasistatic.runout.turn import Followed
 from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.quasistatic.sweep.run import grouped
+from rbdyn.records.words import with_error
 from rbdyn.result import write_json
 from rbdyn.scene import BallScene
 from rbdyn.scene.ball import SingleRowScene
@@ -173,6 +174,6 @@ def _print_limits(record: dict[str, Any]) -> None:
     rows = [(race, f"{roundness:.3g}", f"{sway:.3g}") for race, (roundness, sway) in of_race.items()]
     title = f"class {record['class']}: {record['radial_limit_um']:g} um radial, {record['axial_limit_um']:g} um axial runout"
     print_table(title, ("race", "roundness up to [um]", "side-sway up to [um]"), rows)
-    good = f"{100.0 * record['yield']:.1f} +- {100.0 * record['standard_error']:.1f} % (standard error)"
+    good = f"{with_error(100.0 * record['yield'], 100.0 * record['standard_error'])} % (standard error)"
     solved = f"{record['solved_in_full']} of them solved in full, seed {record['seed']}"
     print(f"yield {good} of {record['bearings']} bearings, {solved}")

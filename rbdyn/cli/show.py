@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from rbdyn.cli.terminal import print_notes, print_table
 from rbdyn.faults import refuse
+from rbdyn.records.words import with_error
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
 
@@ -193,7 +194,7 @@ def print_record(record: dict[str, Any], quiet: bool, verbose: bool) -> None:
     rows = [
         ("whirl speed over cage speed, mean", f"{record['whirl_ratio']:.4g}"),
         ("  median, and 5 % to 95 %", f"{quantiles['50%']:.3g}, {quantiles['5%']:.3g} to {quantiles['95%']:.3g}"),
-        ("eccentricity of the cage [µm]", f"{away['mean']:.4g} ± {away['standard_deviation']:.2g}{of}"),
+        ("eccentricity of the cage [µm]", f"{with_error(away['mean'], away['standard_deviation'])}{of}"),
     ]
     for name, hit in record["largest"].items():
         where = "" if hit["roller"] is None else f", roller {hit['roller']}"
@@ -209,9 +210,9 @@ def print_record(record: dict[str, Any], quiet: bool, verbose: bool) -> None:
     if "lyapunov" in record:
         chaos = record["lyapunov"]
         width = chaos["per_turn_half_width"]
-        error = "error not estimated" if width is None else f"± {width:.2g} (95 %)"
+        error = " error not estimated" if width is None else " (95 %)"
         words = f"largest Lyapunov exponent a shaft turn, over {chaos['turns']:g} turns"
-        rows.append((words, f"{chaos['per_turn']:.3g} {error}"))
+        rows.append((words, f"{with_error(chaos['per_turn'], width)}{error}"))
     title = f"{record['turns']:g} shaft turns of replicate {record['replicate']}, seed {record['seed']}"
     print_table(title, ("figure", "value"), rows)
     if verbose:

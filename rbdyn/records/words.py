@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 UNITS = {
     "mm": "mm", "um": "µm", "N": "N", "W": "W", "rpm": "rpm", "s": "s", "ms": "ms", "h": "h", "MPa": "MPa",
@@ -14,6 +14,8 @@ UNITS = {
 PLAIN_BELOW = 1e7
 # What is smaller is left over from rounding.
 NOISE = 1e-12
+# Of more decimals than these a number is written with an exponent.
+MOST_DECIMALS = 9
 MARK = re.compile(r"\{\{([A-Z]+)\}\}")
 
 
@@ -48,16 +50,59 @@ def shown(value: Any, digits: int = 4) -> str:
 
 
 def decimals(error: float) -> int:
-    """Decimals that show two significant digits of an error."""
-    return min(max(1 - math.floor(math.log10(error)), 0), 9)
+    """Decimal place of the second significant digit of an error: 2 of 0.35 and of 0.0996, -1 of 123."""
+    return 1 - int(f"{error:.1e}".partition("e")[2])
+
+
+def rounded(value: float, error: float) -> tuple[str, str]:
+    """'87.09' and '0.35' of 87.0943 and 0.352: the error to two significant digits, the value to the same place.
+
+    The error is positive. Where plain digits are many, both have one exponent: '2.31e-12' and '0.12e-12'.
+    """
+    places, largest = decimals(error), max(abs(value), error)
+    if largest < PLAIN_BELOW and places <= MOST_DECIMALS:
+        return _to_place(value, places), _to_place(error, places)
+    power = int(f"{largest:e}".partition("e")[2])
+    texts = [f"{_to_place(each / 10.0**power, places + power)}e{power}" for each in (value, error)]
+    return texts[0], texts[1]
+
+
+def _to_place(value: float, places: int) -> str:
+    """A number to so many decimals; whole tens, hundreds and so on where ``places`` is negative."""
+    return f"{round(value, places) if places < 0 else value:z.{max(places, 0)}f}"
 
 
 def with_error(value: float | None, error: float | None) -> str:
-    """'87.09 ± 0.35': the error to two digits, the value to the same place."""
-    if value is None or error is None or not math.isfinite(error) or error <= 0.0:
+    """'87.09 ± 0.35': the error to two significant digits, the value to the same place, five digits without an error.
+
+    This is the only place where a value is written with its error.
+    """
+    if value is None or not math.isfinite(value) or not known(error):
         return shown(value, 5)
-    places = decimals(error)
-    return f"{value:.{places}f} ± {error:.{places}f}"
+    return " ± ".join(rounded(value, error))
+
+
+def value_alone(value: float, error: float | None) -> str:
+    """'87.09' where the error, or its parts, stand elsewhere."""
+    return with_error(value, error).partition(" ± ")[0]
+
+
+def signed_with_error(value: float, error: float | None) -> str:
+    """'+1.00 ± 0.52' of a difference."""
+    text = with_error(value, error)
+    return text if text.startswith("-") or not math.isfinite(value) else f"+{text}"
+
+
+def error_alone(error: float | None) -> str:
+    """'± 0.35' where the value stands elsewhere; nothing where the error is unknown."""
+    if error == 0.0:
+        return "± 0"
+    return f"± {rounded(error, error)[1]}" if known(error) else ""
+
+
+def known(error: float | None) -> TypeGuard[float]:
+    """Whether an error is one to round by: a positive finite number."""
+    return error is not None and math.isfinite(error) and error > 0.0
 
 
 def improvement(gain: float, error: float | None, goal: str, unit: str = "%") -> str:
@@ -66,8 +111,15 @@ def improvement(gain: float, error: float | None, goal: str, unit: str = "%") ->
     ``goal``: "min" or "max", else the distance from a target is what grew less.
     """
     better, worse = {"min": ("less", "more"), "max": ("more", "less")}.get(goal, ("off target less", "off target more"))
-    size = with_error(abs(gain), error) if error else f"{abs(gain):.2f}"
+    size = with_error(abs(gain), error) if known(error) else f"{abs(gain):.2f}"
     return f"{size} {unit}".rstrip() + f" {worse if gain < 0.0 else better}"
+
+
+def chance(probability: float) -> str:
+    """A probability to three decimals: '0.978', and 'above 0.999' or 'below 0.001' where that would be one or zero."""
+    if probability > 0.9995:
+        return "above 0.999"
+    return "below 0.001" if probability < 0.0005 else f"{probability:.3f}"
 
 
 class Figure(NamedTuple):

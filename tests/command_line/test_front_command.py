@@ -8,7 +8,7 @@ from pareto_cases import TABLE, TOLERANCES, edited_study, table_surfaces
 from typer.testing import CliRunner
 
 from doe.cli import app
-from doe.report.steps.front import front_record
+from doe.report.steps.front import front_record, limit_sentence
 from doe.study.front import find_front
 from doe.study.goals import known_tolerances
 from doe.study.widest import widest_of
@@ -82,14 +82,20 @@ def test_goals_limits_and_rule_of_the_file_are_kept(tmp_path):
     assert set(record["ideal"]) == {"impact_force_N", "whirl_deviation_ratio"}
     # The back-off from the limits of the loss, whose surface misses much, keeps the impact off its target.
     assert 189.5 < record["ideal"]["impact_force_N"] < 210.0
-    assert "the limits with" in record["pick"]["reason"]
+    assert "demanded probability of 0.95" in record["pick"]["reason"]
     assert all(380.0 <= point["responses"]["power_loss_W"] <= 400.0 for point in record["front"])
     assert [limit["sense"] for limit in record["constraints"]] == [">=", "<="]
     assert all(limit["kept"] for limit in record["constraints"])
     assert record["pick"]["factors"] == record["picks"]["weights"]["factors"]
     assert set(record["predicted_gains"]) == {"impact_force_N", "whirl_deviation_ratio"}
     shown = command(study)
-    assert "limit: power_loss_W <= 400; the pick has" in shown.output
+    for limit in record["constraints"]:
+        assert limit["demanded_probability"] == 0.95 and limit["error"] > 0.0
+        # The odds follow from value and error, whatever was demanded.
+        room = 400.0 - limit["value"] if limit["sense"] == "<=" else limit["value"] - 380.0
+        assert (limit["probability"] > 0.5) == (room > 0.0)
+        assert limit_sentence(limit).replace("\n", "") in shown.output.replace("\n", "")
+    assert "limit: power_loss_W <= 400: " in shown.output and "0.95 demanded" in shown.output
     assert "of the evaluated points keep all limits" in shown.output
 
 

@@ -12,6 +12,7 @@ from report_page import PICTURE, keys, opened, report_in_browser, text_of
 from synthetic_study import CENTRE, FACTORS, RESPONSES, STEP, motion, predicted, summary
 
 from doe.report.html import html_report
+from rbdyn.records.words import with_error
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +114,14 @@ def test_scripts_evaluate_terms_transforms_and_contours(browser):
     assert half == pytest.approx(2.0 * math.sqrt(7.0))
     cut = page.execute_script("return contours.segments([[0, 0, 0], [1, 1, 1], [2, 2, 2]], 1.25)")
     assert sorted(place for segment in cut for place in segment) == [[1.25, 0], [1.25, 1], [1.25, 1], [1.25, 2]]
+
+
+def test_unit_scripts_write_values_with_errors_as_the_tables_do(browser):
+    """Unit: the page's scripts round a value with its error exactly as its tables."""
+    page = opened(browser)
+    cases = [(231.472, 0.0057), (5.0, 0.0996), (1234.5, 99.6), (2.5e9, 1.23e7), (2.31e-12, 1.24e-13), (-1e-9, 0.03)]
+    script = "return arguments[0].map(([value, error]) => page.with_error(value, error))"
+    assert page.execute_script(script, cases) == [with_error(*case) for case in cases]
 
 
 def test_axes_of_a_surface_never_coincide(browser):

@@ -16,8 +16,8 @@ from doe.cli import app
 from doe.report.study.files import write
 from doe.study.back_off import Conditioned, Missed
 from doe.study.confirmation import Confirmed
-from doe.study.edge import edge_of, share_at_edge
-from doe.study.goals import rounded_within
+from doe.study.edge import edge_of, place_of, share_at_edge
+from doe.study.goals import region_of, rounded_within
 from doe.study.limits import Limit, limits_of, sentence, verdict_of
 from doe.study.whole import run_study
 from doe.study_file import Study
@@ -171,6 +171,37 @@ def test_the_edge_is_named_with_the_gain_beyond_it(tmp_path):
     assert "THE PICK LIES AT THE EDGE" in edge.sentence and "50 % of the front" in edge.sentence
     inside = SimpleNamespace(point=study.centre)
     assert not edge_of(study, surfaces, inside, study.centre[None], None, None).outward
+
+
+def test_unit_one_rule_says_where_a_point_lies(tmp_path):
+    """Unit: a corner between the bounds may be farther out than any run, and no sentence calls that inside."""
+    study = Study.load(limited_study(tmp_path))
+    reach = region_of(study)
+    places = {share: place_of(study, study.actual(share * reach)) for share in (0.0, 0.5, 0.9, 1.0)}
+    assert [(bool(each.bounds), each.beyond) for each in places.values()] == [
+        (False, False), (False, False), (False, True), (True, True),
+    ]  # fmt: skip
+    assert places[0.5].sentence("The pick") == ""
+    assert places[0.9].sentence("The pick").startswith("The pick lies farther out than any run")
+    corner = places[1.0].sentence("The point")
+    assert set(places[1.0].at_bounds) == set(study.factors) and set(places[1.0].at_bounds.values()) == {"upper"}
+    assert "at the upper bound of radial_clearance_mm" in corner and "surfaces extrapolate" in corner
+    for share, words in ((0.5, "The pick lies inside the region; 50 %"), (0.9, "farther out than any run")):
+        point = SimpleNamespace(point=study.actual(share * reach))
+        edge = edge_of(study, [], point, np.array([study.centre, study.actual(reach)]), None, None)
+        assert words in edge.sentence and edge.beyond_runs == ("inside" not in edge.sentence)
+
+
+@pytest.mark.parametrize(
+    ("value", "reached"), [(85.0, "0.975"), (90.0, "0.500"), (50.0, "above 0.999"), (130.0, "below 0.001")]
+)
+def test_unit_the_probability_reached_is_not_the_one_demanded(value, reached):
+    """Unit: of a value with a half-width of 5 against a bound of 90; an exact value keeps it or not."""
+    judged = limit(value, 5.0)
+    assert f"probability {reached})" in judged.shown
+    assert "0.9 demanded" in sentence([limit(50.0, 5.0)], 0.9, 1)
+    assert limit(value, 0.0).probability == (value <= 90.0)
+    assert "error unknown" in limit(value, float("nan")).shown
 
 
 def test_rounding_does_not_leave_the_region(tmp_path):

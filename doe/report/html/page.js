@@ -47,12 +47,21 @@ const page = (() => {
     return Math.abs(text) >= 1e7 || (text !== 0 && Math.abs(text) < 1e-4) ? value.toPrecision(digits) : String(text);
   }
 
-  // The error to two digits, the value to the same place.
-  function with_error(value, error) {
-    if (!error || !Number.isFinite(error)) return shown(value, 5);
-    const places = Math.min(Math.max(1 - Math.floor(Math.log10(error)), 0), 9);
-    return `${value.toFixed(places)} ± ${error.toFixed(places)}`;
+  // The error to two significant digits, the value to the same place; the rule of `rounded` in rbdyn.records.words.
+  function rounded(value, error) {
+    if (!(error > 0) || !Number.isFinite(error) || !Number.isFinite(value)) return [shown(value, 5), ""];
+    const power = number => Number(number.toExponential(1).split("e")[1]), places = 1 - power(error);
+    const largest = Math.max(Math.abs(value), error);
+    const fixed = (number, digits) => {
+      const text = digits < 0 ? String(Math.round(number / 10 ** -digits) * 10 ** -digits) : number.toFixed(Math.min(digits, 100));
+      return Number(text) === 0 ? text.replace("-", "") : text;
+    };
+    if (largest < 1e7 && places <= 9) return [fixed(value, places), fixed(error, places)];
+    const exponent = Number(largest.toExponential(6).split("e")[1]);
+    return [value, error].map(each => `${fixed(each / 10 ** exponent, places + exponent)}e${exponent}`);
   }
+
+  const with_error = (value, error) => rounded(value, error).filter(text => text).join(" ± ");
 
   const named = each => each.unit ? `${each.words} [${each.unit}]` : each.words;
 
@@ -77,5 +86,5 @@ const page = (() => {
   // Paper is light whatever the screen is.
   window.addEventListener("beforeprint", () => { document.documentElement.classList.add("printing"); redraw(); });
   window.addEventListener("afterprint", () => { document.documentElement.classList.remove("printing"); redraw(); });
-  return {data, by, colour, draws, redraw: later, sharp, shown, with_error, named, element, ticks};
+  return {data, by, colour, draws, redraw: later, sharp, shown, rounded, with_error, named, element, ticks};
 })();

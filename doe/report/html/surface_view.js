@@ -80,7 +80,7 @@
     let height = `${page.with_error(polynomial(one, place), model.half_width(one, c))}${unit}`;
     if (searched) {
       const known = Number.isFinite(polynomial(one, place)) ? `${height} by the polynomial` : "not known to the polynomial";
-      const [value, deviation] = page.with_error(by_emulator(one, place), by_emulator(one, place, emulator.deviation)).split(" ± ");
+      const [value, deviation] = page.rounded(by_emulator(one, place), by_emulator(one, place, emulator.deviation));
       height = `${value}${unit} by the emulator, standard deviation ${deviation}${unit}; ${known};`;
       searched.categories.forEach((each, c) => where.push(`${each.name} ${each.levels[kinds[c]]}`));
     }

@@ -10,7 +10,7 @@ from doe.report.sections.plots_of_fronts import Front
 from doe.report.sections.record import Record, factors, nearest, part, responses
 from doe.report.sections.searches import in_few_runs
 from doe.report.words import change
-from rbdyn.records.words import label, shown, with_error
+from rbdyn.records.words import chance, label, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400
@@ -97,7 +97,7 @@ def front(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         header = ("response", "change", "verdict")
         blocks.append(Table(f"Changes on the surfaces {where}", header, rows, text_columns=(2,)))
     blocks.append(Words(record.get("statement") or ""))
-    blocks += [_limits(record), tolerances(summary)]
+    blocks += [_limits(record, where), tolerances(summary)]
     blocks.append(Words(part(summary, "tolerances_sentence") or ""))
     blocks += _search(record)
     blocks += _beside(summary)
@@ -124,17 +124,20 @@ def _picks(summary: Record, names: Sequence[str], marks: Mapping[str, Record]) -
     return Table("Picks on the surfaces", header, rows)
 
 
-def _limits(record: Record) -> Table:
+def _limits(record: Record, where: str) -> Table:
     rows = [
         (
             f"{label(limit['response'])} {limit['sense']} {shown(limit['limit'])}",
-            shown(limit["value"]),
+            with_error(limit["value"], limit.get("error")),
             shown(limit.get("kept")),
+            "" if limit.get("probability") is None else chance(limit["probability"]),
+            shown(limit.get("demanded_probability")),
         )
         for limit in record.get("constraints") or []
         if {"response", "sense", "limit", "value"} <= set(limit)
     ]
-    return Table("Limits at the pick on the surfaces", ("limit", "value", "kept"), rows)
+    header = ("limit", "value", "kept by the value", "probability of keeping it", "demanded")
+    return Table(f"Limits on the surfaces {where}", header, rows)
 
 
 def _search(record: Record) -> list[Block]:
@@ -154,11 +157,13 @@ def _search(record: Record) -> list[Block]:
 def _beside(summary: Record) -> list[Block]:
     """How sure the pick is, and the fronts found in other ways."""
     blocks: list[Block] = []
+    aware = part(summary, "front", "tolerance_aware")
     if sure := part(summary, "front", "pick_dominates_baseline"):
         chance = with_error(sure.get("probability"), 1.96 * (sure.get("standard_error") or 0.0))
-        words = "On surfaces drawn from their errors the pick dominates the baseline with probability"
+        pick = "the pick without tolerances" if aware else "the pick"
+        words = f"On surfaces drawn from their errors {pick} dominates the baseline with probability"
         blocks.append(Words(f"{words} {chance}."))
-    if aware := part(summary, "front", "tolerance_aware"):
+    if aware:
         blocks += _with_tolerances(aware, [each["name"] for each in responses(summary)])
     if direct := part(summary, "direct"):
         blocks += _on_the_simulator(direct)

@@ -6,6 +6,7 @@ from typing import Any
 from doe.dimension_chain import ChainResult
 from doe.dimension_chain.selective_assembly import SelectiveAssembly
 from rbdyn.cli.terminal import print_table
+from rbdyn.records.words import with_error
 
 BAR = 20  # characters of a contribution of 100 %
 
@@ -52,7 +53,7 @@ def _print_yields(chain: ChainResult) -> None:
     rows = [
         (
             kind.replace("_", " "),
-            f"{share:.6f} ± {chain.standard_errors[kind]:.1g}",
+            with_error(share, chain.standard_errors[kind]),
             f"{exact[kind]:.6f}" if kind in exact else "",
             *(_ppm(chain.rejected[kind], side) for side in ("low", "high")),
         )
@@ -63,13 +64,13 @@ def _print_yields(chain: ChainResult) -> None:
 
 
 def _ppm(rejected: Mapping[str, float], side: str) -> str:
-    return f"{rejected[f'{side}_ppm']:.0f} ± {rejected[f'{side}_standard_error_ppm']:.1f}"
+    return with_error(rejected[f"{side}_ppm"], rejected[f"{side}_standard_error_ppm"])
 
 
 def _print_answer(chain: ChainResult) -> None:
     (low, high), (least, most), out = chain.worst_case_mm, chain.rss_mm, chain.rejected["as_given"]
     closing = f"closing link {low:.4f} to {high:.4f} mm in worst case, {least:.4f} to {most:.4f} mm by root sum square"
-    good = f"{chain.yields['as_given']:.6f} ± {chain.standard_errors['as_given']:.1g}"
+    good = with_error(chain.yields["as_given"], chain.standard_errors["as_given"])
     able = f", Cp {chain.cp:.2f}, Cpk {chain.cpk:.2f}" if chain.cp is not None else ""
     ppm = f"({out['low_ppm']:.0f} ppm below, {out['high_ppm']:.0f} ppm above){able}"
     print(f"{'as given: ' if chain.refused else ''}{closing}, yield {good} {ppm}")
@@ -86,7 +87,7 @@ def _print_selective(found: SelectiveAssembly, verbose: bool) -> None:
     low, high = found.worst_case_mm
     needed = "no number of classes keeps" if found.classes_needed is None else f"{found.classes_needed} would keep"
     closing = f"closing link {low:.4f} to {high:.4f} mm in worst case ({needed} the limits)"
-    mates = f"{100 * found.matched:.2f} % of the parts find a mate, {found.good:.6f} ± {found.standard_error:.1g}"
+    mates = f"{100 * found.matched:.2f} % of the parts find a mate, {with_error(found.good, found.standard_error)}"
     good = f"of the matched within the limits ({found.random:.6f} at random)"
     print(f"matched in {found.classes} classes: {closing}, {mates} {good}")
     if verbose:

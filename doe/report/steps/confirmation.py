@@ -40,7 +40,7 @@ def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
     """Limits judged by simulation, by response: of a lower and an upper one that with the worse verdict, or less room."""
     return {
         limit.response: {key: getattr(limit, key) for key in ("bound", "sense", "value", "error", "verdict")}
-        | {"error": finite(limit.error)}
+        | {"error": finite(limit.error), "probability": finite(limit.probability)}
         for limit in limits
     }
 

@@ -1,5 +1,6 @@
 """The Pareto front, and the tolerance-aware one beside it, as JSON and on the terminal."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,15 @@ from doe.pareto.tolerance_aware import ToleranceAware
 from doe.report.steps.confirmation import gains_record, point_record
 from doe.report.words import change
 from doe.response_surface import Surface
+from doe.study.back_off import SurfaceDoubt
 from doe.study.drawn import half_widths, predict_all
-from doe.study.goals import beyond_runs, goals_of
+from doe.study.edge import place_of
+from doe.study.goals import goals_of
 from doe.study.predicted import PredictedGain, predicted_gains, statement
 from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.record import finite
+from rbdyn.records.words import chance, error_alone, with_error
 
 
 def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
@@ -29,7 +33,8 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         for row, probability in zip(rows, sure.non_dominated, strict=True)
     ]
     gains = predicted_gains(study, surfaces, front.points[front.pick])
-    beyond = beyond_runs(study, study.coded(front.points[front.pick]))
+    place = place_of(study, front.points[front.pick])
+    pick = "The pick" if front.tolerance_aware is None else "The pick without tolerances"
     picks: dict[str, Any] = {rule: points[row] for rule, row in front.picks.items()}
     record: dict[str, Any] = {
         "front": points,
@@ -39,7 +44,12 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
         "ideal": _extreme(study, front, front.costs.argmin(axis=0)),
         "nadir": _extreme(study, front, front.costs.argmax(axis=0)),
         "knee": points[front.knee],
-        "pick": {**points[front.pick], "reason": front.pick_reason, "beyond_runs": beyond},
+        "pick": {
+            **points[front.pick],
+            "reason": front.pick_reason,
+            "beyond_runs": place.beyond,
+            "at_bounds": place.at_bounds,
+        },
         "picks": picks,
         "baseline": predicted_record(study, surfaces, study.baseline),
         "pick_dominates_baseline": {
@@ -48,14 +58,12 @@ def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> d
             "draws": sure.draws,
         },
         "predicted_gains": _with_optimism(gains, sure.optimism),
-        "statement": statement(gains),
-        "constraints": _limits(study, front.values[front.pick]),
+        "statement": f"{statement(gains)} {place.sentence(pick)}".rstrip(),
+        "constraints": _limits(study, surfaces, front.points[front.pick]),
         "archive": front.archive_size,
         "feasible_share": front.feasible,
         **{key: getattr(front, key) for key in ("evaluations", "generations", "seed")},
     }
-    if beyond:
-        record["statement"] += " The pick lies farther out than any run: the surfaces extrapolate there."
     if front.tolerance_aware is not None:
         record["tolerance_aware"] = tolerance_aware_record(study, surfaces, front.tolerance_aware)
         picks["tolerance_aware"] = record["tolerance_aware"]["pick"]
@@ -73,16 +81,16 @@ def given_point_record(study: Study, surfaces: list[Surface], front: ParetoFront
     gains = predicted_gains(study, surfaces, point)
     coded = study.coded(point)
     costs = goals_of(study).costs(predict_all(surfaces, coded[None])[0])
-    beyond = beyond_runs(study, coded)
-    outside = " The point lies farther out than any run: the surfaces extrapolate there." if beyond else ""
+    place = place_of(study, point)
     return {
         **predicted_record(study, surfaces, point),
         "predicted_gains": gains_record(gains),
         "dominated_by": int(dominates(front.costs, costs).sum()),
-        "beyond_runs": beyond,
-        "constraints": _limits(study, predict_all(surfaces, coded[None])[0]),
+        "beyond_runs": place.beyond,
+        "at_bounds": place.at_bounds,
+        "constraints": _limits(study, surfaces, point),
         "sentences": [gain.sentence for gain in gains],
-        "statement": statement(gains) + outside,
+        "statement": f"{statement(gains)} {place.sentence('The point')}".rstrip(),
     }
 
 
@@ -110,11 +118,11 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
     luck = {name: gain["selection_optimism_percent"] for name, gain in record["predicted_gains"].items()}
     flattered = ", ".join(f"{name} {percent:+.2f} %" for name, percent in luck.items())
     print(f"the rule picks what errors flatter; luck expected in these gains: {flattered}")
-    chance = f"{sure['probability']:.3f} ± {1.96 * sure['standard_error']:.3f}"
+    chance = with_error(sure["probability"], 1.96 * sure["standard_error"])
     drawn = f"on {sure['draws']} surfaces drawn from their errors it dominates the baseline with probability {chance}"
     print(f"pick: {record['pick']['reason']}; {drawn}")
     for limit in record["constraints"]:
-        print(f"limit: {limit['response']} {limit['sense']} {limit['limit']:g}; the pick has {limit['value']:.5g}")
+        print(f"limit: {limit_sentence(limit)}")
     if record["feasible_share"] < 1.0:
         print(f"{100 * record['feasible_share']:.1f} % of the evaluated points keep all limits")
     _print_convergence(record)
@@ -125,6 +133,8 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
         _print_gains("the point asked for", point["predicted_gains"])
         for sentence in [*point["sentences"], point["statement"]]:
             print(sentence)
+        for limit in point["constraints"]:
+            print(f"limit at the point asked for: {limit_sentence(limit)}")
         print(f"{point['dominated_by']} of the {len(record['front'])} points of the front dominate it")
 
 
@@ -140,7 +150,9 @@ def _print_gains(whose: str, gains: dict[str, Any]) -> None:
     rows = []
     for name, gain in gains.items():
         scatter = gain["single_run_scatter_percent"]
-        rows.append((name, change(gain), gain["verdict"], f"± {'?' if scatter is None else f'{scatter:.2f}'} %"))
+        rows.append(
+            (name, change(gain), gain["verdict"], "unknown" if scatter is None else f"{error_alone(scatter)} %")
+        )
     header = ("", "against the baseline", "verdict", "scatter of two single runs")
     print_table(f"predicted gains of {whose}", header, rows)
 
@@ -148,11 +160,7 @@ def _print_gains(whose: str, gains: dict[str, Any]) -> None:
 def _cells(point: dict[str, Any]) -> list[str]:
     errors = point.get("errors", {})
     factors = [f"{x:.5g}" for x in point["factors"].values()]
-    shown = [
-        f"{x:.5g}" if errors.get(name) is None else f"{x:.5g} ± {errors[name]:.2g}"
-        for name, x in point["responses"].items()
-    ]
-    return factors + shown
+    return factors + [with_error(x, errors.get(name)) for name, x in point["responses"].items()]
 
 
 def _extreme(study: Study, front: ParetoFront, rows: Any) -> dict[str, float]:
@@ -161,17 +169,36 @@ def _extreme(study: Study, front: ParetoFront, rows: Any) -> dict[str, float]:
     return {study.responses[index]: float(front.values[row, index]) for index, row in pairs}
 
 
-def _limits(study: Study, values: Array) -> list[dict[str, Any]]:
+def _limits(study: Study, surfaces: list[Surface], point: Array) -> list[dict[str, Any]]:
+    """Every limit at a point in factor units: what the surfaces say there, and the probability of keeping it."""
+    coded = study.coded(point)
+    values, errors = predict_all(surfaces, coded[None])[0], half_widths(surfaces, coded[None])[0]
+    doubt = SurfaceDoubt(study, surfaces)
     return [
         {
             "response": study.responses[index],
             "sense": sense,
             "limit": limit,
             "value": float(values[index]),
+            "error": finite(errors[index]),
             "kept": bool(values[index] <= limit if sense == "<=" else values[index] >= limit),
+            "probability": doubt.kept_with(index, sense, limit, coded),
+            "demanded_probability": study.file.confirmation.limit_probability,
         }
         for index, sense, limit in goals_of(study).limited
     ]
+
+
+def limit_sentence(limit: Mapping[str, Any]) -> str:
+    """A limit at a point of the surfaces in words, the probability reached beside the one demanded."""
+    value = with_error(limit["value"], limit["error"])
+    odds = f"kept with a probability {_of(limit['probability'])}, {limit['demanded_probability']:g} demanded"
+    return f"{limit['response']} {limit['sense']} {limit['limit']:g}: {value} on the surfaces, {odds}"
+
+
+def _of(probability: float) -> str:
+    text = chance(probability)
+    return text if text[0].isalpha() else f"of {text}"
 
 
 def tolerance_aware_record(study: Study, surfaces: list[Surface], found: ToleranceAware) -> dict[str, Any]:
@@ -221,7 +248,7 @@ def tolerance_aware_record(study: Study, surfaces: list[Surface], found: Toleran
 def print_tolerance_aware(record: dict[str, Any]) -> None:
     """What the tolerances cost, and whether the picks survive them."""
     pick, names = record["pick"], list(record["baseline_robust"])
-    widths = ", ".join(f"{name} ± {width:g}" for name, width in record["half_widths"].items())
+    widths = ", ".join(f"{name} within ± {width:g}" for name, width in record["half_widths"].items())
     kind = "worst case" if record["kind"] == "worst_case" else f"{100 * record['quantile']:g} % of the parts keep"
     rows = [
         ("baseline", *(f"{record['baseline_robust'][name]:.5g}" for name in names)),
@@ -229,7 +256,7 @@ def print_tolerance_aware(record: dict[str, Any]) -> None:
         ("tolerance-aware pick", *(f"{pick['robust'][name]:.5g}" for name in names)),
         ("the same, nominal", *(f"{pick['responses'][name]:.5g}" for name in names)),
     ]
-    print_table(f"after manufacture within {widths}: {kind}", ("", *names), rows)
+    print_table(f"after manufacture, {widths}: {kind}", ("", *names), rows)
     at = ", ".join(f"{name} = {x:.5g}" for name, x in pick["factors"].items())
     print(f"tolerance-aware pick: {at}; {pick['reason']}")
     less = f"{record['nominal_loss_percent']:.2f} % less hypervolume than the plain one in nominal values"
@@ -237,7 +264,7 @@ def print_tolerance_aware(record: dict[str, Any]) -> None:
     more = "" if percent is None else f", and {percent:.2f} % more in what manufacture leaves"
     print(f"the tolerance-aware front has {less}{more}")
     plain = f"{100 * survival['plain_pick']:.1f} % at the plain pick"
-    aware = f"{100 * survival['pick']:.1f} % at the tolerance-aware one (± {196 * survival['standard_error']:.2f} %)"
+    aware = f"{with_error(100 * survival['pick'], 196 * survival['standard_error'])} % at the tolerance-aware one"
     print(f"parts that still dominate the baseline: {plain}, {aware}")
     if not record["plain_pick_inside"]:
         print("the tolerance box of the plain pick reaches out of the region: its figures are extrapolated")

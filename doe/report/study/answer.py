@@ -4,8 +4,6 @@ import io
 from contextlib import redirect_stdout
 from typing import Any
 
-import numpy as np
-
 from doe.clearance import direct_run
 from doe.report.steps.chain import print_chain
 from doe.report.steps.robust import print_robust_front, robust_sentences
@@ -16,7 +14,7 @@ from doe.study.confirmation import statement
 from doe.study.limits import limits_of
 from doe.study.whole import StudyResult
 from rbdyn.cli.terminal import print_table
-from rbdyn.records.words import improvement
+from rbdyn.records.words import improvement, with_error
 
 
 def print_outcome(outcome: StudyResult, quiet: bool) -> None:
@@ -83,7 +81,7 @@ def _print_limits(outcome: StudyResult) -> None:
     rows = []
     for limit in outcome.limits:
         base = next(each for each in limits_of(outcome.study, outcome.baseline) if each.response == limit.response)
-        values = [(f"{each.value:.5g} ± {each.error:.2g}", each.verdict) for each in (base, limit)]
+        values = [(with_error(each.value, each.error), each.verdict) for each in (base, limit)]
         rows.append((f"{limit.response} {limit.sense} {limit.bound:g}", *values[0], *values[1]))
     if rows:
         header = ("", "baseline", "verdict", "pick", "verdict")
@@ -137,7 +135,7 @@ def _print_beside(reference: str, outcome: StudyResult) -> None:
 
 
 def _value(confirmed: Any, index: int) -> str:
-    return f"{confirmed.values[index]:.5g} ± {np.nan_to_num(confirmed.error[index]):.2g}"
+    return with_error(float(confirmed.values[index]), float(confirmed.error[index]))
 
 
 def _effect(effect: float, significant: bool) -> str:

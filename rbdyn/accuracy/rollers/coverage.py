@@ -9,11 +9,12 @@ always holds the truth is too wide.
 import math
 from typing import Any
 
-from rbdyn.accuracy.report import Progress, Report, Reporter, columns_of, records, reported, tabled
+from rbdyn.accuracy.report import Columns, Progress, Report, Reporter, columns_of, records, reported, tabled
 from rbdyn.dynamics.run import with_numerics
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.error_bars import FIGURES
 from rbdyn.records.record import Record, shown
+from rbdyn.records.words import error_alone, value_alone, with_error
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
@@ -31,12 +32,19 @@ class Row(Record):
     half-width and mean offset relative to it."""
 
     figure: str = shown("figure")
-    truth: float = shown("truth", ".6g")
-    truth_error: float = shown("±", ".2g")
+    truth: float = shown("truth")
+    truth_error: float = shown("±")
     covered: float = shown("covered", ".3f")
     statistical_alone: float = shown("statistical alone", ".3f")
     half_width: float = shown("half-width", ".2g %")
     offset: float = shown("offset", "+.2g %")
+
+
+COLUMNS: Columns = {
+    **columns_of(Row),
+    "truth": lambda row: value_alone(row.truth, row.truth_error),
+    "±": lambda row: error_alone(row.truth_error).removeprefix("± "),
+}
 
 
 def study(scene: Scene, progress: Reporter = None, repeats: int = REPEATS) -> Report:
@@ -54,7 +62,7 @@ def study(scene: Scene, progress: Reporter = None, repeats: int = REPEATS) -> Re
     asked = each * (scene.numerics.replicates + scene.numerics.companions)
     took = f"A run took {turns:.0f} shaft turns over all replicates and companions; asked for were {asked:.0f}"
     sentences = [conclusion(rows, repeats), f"{took}, and {100.0 * longer:.0f} % of the runs were lengthened."]
-    table = tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, columns_of(Row))
+    table = tabled(f"95 % intervals that hold the truth, {repeats} repeats", rows, COLUMNS)
     written = records(rows)
     told: dict[str, Any] = {"pooled": pooled(rows), "repeats": repeats, "mean_turns": turns, "lengthened": longer}
     return reported("coverage", (table,), sentences, written, rows=written, **told, conclusion=" ".join(sentences))
@@ -130,7 +138,7 @@ def conclusion(rows: list[Row], repeats: int) -> str:
     low, high = POOLED
     share, scatter = pooled(rows), 1.96 * math.sqrt(0.95 * 0.05 / repeats)
     narrow = [f"{one.figure} {one.covered:.2f}" for one in rows if one.covered < LOWEST]
-    over_all = f"Pooled over the figures {share:.3f} (0.95 ± {scatter:.3f} for a sound interval of one figure)"
+    over_all = f"Pooled over the figures {share:.3f} ({with_error(0.95, scatter)} for a sound interval of one figure)"
     if narrow:
         return f"{over_all}; too narrow (below {LOWEST:.2f}): {', '.join(narrow)}."
     if share > high:

@@ -22,6 +22,7 @@ from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
 from rbdyn.dynamics.statistics.batch_means import student_factor
 from rbdyn.records.record import Record, shown
+from rbdyn.records.words import with_error
 from rbdyn.scene import Scene
 
 POOL = 32
@@ -158,7 +159,7 @@ def conclusion(
             verdict = f"undecided: errors of {fall.half_width:.2g} hide a difference of {abs(fall.power + 0.5):.2g}"
             larger = about(1.0 + (pool - 1) * (fall.half_width / SLOPE_ERROR) ** 2)
             verdict += f"; a pool of about {larger} replicates tells"
-        what = f"{name}: scatter falls with counted turns to the power {fall.power:.2f} ± {fall.half_width:.2f}"
+        what = f"{name}: scatter falls with counted turns to the power {with_error(fall.power, fall.half_width)}"
         sentences.append(f"{what}, {verdict}.")
     sentences += [_choice(name, rows, scatter_error(pool), sought) for name in OUTPUTS]
     numerics = scene.numerics

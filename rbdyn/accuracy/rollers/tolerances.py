@@ -21,6 +21,7 @@ from rbdyn.dynamics.statistics.batch_means import student_half_width
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import RunError
 from rbdyn.records.record import Record, shown
+from rbdyn.records.words import signed_with_error
 from rbdyn.scene import Scene
 
 TOLERANCES = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 1e-3, 1e-4)
@@ -165,7 +166,7 @@ def bias_columns(sought: float, reference: Bias | None = None) -> dict[str, Call
     """Columns of the bias of each output with its error, and of what they say; ``reference`` is not judged."""
 
     def output(name: str) -> Callable[[Bias], str]:
-        return lambda row: f"{100.0 * row.bias[name]:+.2f} ± {100.0 * row.bias_error[name]:.2f} %"
+        return lambda row: f"{signed_with_error(100.0 * row.bias[name], 100.0 * row.bias_error[name])} %"
 
     return {
         **{name: output(name) for name in OUTPUTS},
