@@ -5,10 +5,11 @@ Which thread takes a run, and in which order runs end, changes nothing in them: 
 
 import os
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import count
 from typing import Generic, TypeVar
 
 from rbdyn.faults import RunError
@@ -42,9 +43,10 @@ class Stop:
 
 @dataclass(frozen=True)
 class Ended(Generic[T]):
-    """A run that has ended: its place among all, and what it found or why it could not go on."""
+    """A run that has ended: its place among all, the run itself, and what it found or why it could not go on."""
 
     place: int
+    run: Callable[[], T]
     found: T | None
     fault: RunError | None
 
@@ -57,32 +59,39 @@ class Ended(Generic[T]):
 
 
 def run_all(
-    runs: Iterable[Callable[[], T]], workers: int | None, stop: Stop, ended: Callable[[Ended[T]], None]
+    runs: Iterable[Callable[[], T]],
+    workers: int | None,
+    stop: Stop,
+    ended: Callable[[Ended[T]], Iterable[Callable[[], T]] | None],
 ) -> None:
     """Run all on ``workers`` threads (all processors by default) and hand over each as it ends.
 
-    ``runs`` is drawn from as threads become free. Whatever is raised, by ``runs``, ``ended`` or Ctrl-C, stops the others
+    ``runs`` is drawn from as threads become free; runs that ``ended`` returns come before the rest. Places count runs in
+    the order in which they are drawn. Whatever is raised, by ``runs``, ``ended`` or Ctrl-C, stops the others
     at their next look at ``stop`` and is raised on; on Ctrl-C what has ended by then is handed over first.
     """
     workers = workers or os.cpu_count() or 1
     pool = ThreadPoolExecutor(workers)
-    todo = enumerate(runs)
-    pending: dict[Future[T], int] = {}
+    first, rest, places = deque[Callable[[], T]](), iter(runs), count()
+    pending: dict[Future[T], tuple[int, Callable[[], T]]] = {}
 
     def hand_over(done: Iterable[Future[T]]) -> None:
-        for future in sorted(done, key=pending.__getitem__):
-            place = pending.pop(future)
+        for future in sorted(done, key=lambda each: pending[each][0]):
+            place, run = pending.pop(future)
             try:
-                one = Ended(place, future.result(), None)
+                one = Ended(place, run, future.result(), None)
             except RunError as fault:
-                one = Ended(place, None, fault)
-            ended(one)
+                one = Ended(place, run, None, fault)
+            first.extend(ended(one) or ())
+
+    def draw() -> Callable[[], T] | None:
+        return first.popleft() if first else next(rest, None)
 
     try:
         while True:
             # One more than there are threads, so that none waits for the next run to be drawn.
-            for place, run in islice(todo, workers + 1 - len(pending)):
-                pending[pool.submit(run)] = place
+            while len(pending) <= workers and (run := draw()) is not None:
+                pending[pool.submit(run)] = next(places), run
             if not pending:
                 break
             hand_over(wait(pending, timeout=NAP_S, return_when=FIRST_COMPLETED).done)

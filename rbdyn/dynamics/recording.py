@@ -10,13 +10,14 @@ from functools import partial
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.dynamics.companions import Companions
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, REJECTED
 from rbdyn.dynamics.parameters.scales import scales
-from rbdyn.dynamics.run import Run
+from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed, speed_sums
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
@@ -159,9 +160,26 @@ class Recording:
         )
 
 
+def recording_of(
+    scene: Scene, bearing: RollerBearing, replicate: int, companions: Companions | None, stop: Stop
+) -> Recording:
+    """The recording of a replicate, or of the companion of it that is integrated so."""
+    if companions is None:
+        return Recording(Run(scene, bearing, replicate, scene.numerics.rtol, stop))
+    companion = with_numerics(scene, method=companions.method)
+    return Recording(Run(companion, bearing, replicate, companions.rtol, stop, companions.longest_step))
+
+
 def record(run: Run) -> Replicate:
     """Run for the turns of its scene. Raises RunError or CancelledError."""
     return Recording(run).to(run.scene.numerics.turns)
+
+
+def run_one(
+    scene: Scene, bearing: RollerBearing, replicate: int, companions: Companions | None, stop: Stop
+) -> Replicate:
+    """Run a replicate, or the companion of it, the transient included. Raises RunError or CancelledError."""
+    return recording_of(scene, bearing, replicate, companions, stop).to(scene.numerics.turns)
 
 
 def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> Replicate:

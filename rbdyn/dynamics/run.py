@@ -29,12 +29,21 @@ SMALLEST_STEP_TURNS = 1e-12
 class Run:
     """One replicate under way: parameters, integrator memory and where it stands.
 
-    ``method``: "auto" until its first step, where the scene leaves it open.
+    ``longest_step`` [s] bounds the steps of explicit methods. ``method``: "auto" until its first step, where the scene
+    leaves it open.
     """
 
-    def __init__(self, scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        bearing: RollerBearing,
+        replicate: int,
+        rtol: float,
+        stop: Stop,
+        longest_step: float = math.inf,
+    ) -> None:
         self.scene, self.bearing, self.replicate, self.stop = scene, bearing, replicate, stop
-        self.rtol = rtol
+        self.rtol, self.longest_step = rtol, longest_step
         self.layout = layout_of(scene)
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
         y = start_state(scene, bearing, np.random.default_rng(seeds))
@@ -66,7 +75,7 @@ class Run:
         return Control(
             1.0 / absolute_tolerance(self.scene, self.bearing, self.rtol, method),
             SMALLEST_STEP_TURNS * self.scene.turn_s,
-            LARGEST_STEP_TURNS * self.scene.turn_s,
+            min(LARGEST_STEP_TURNS * self.scene.turn_s, self.longest_step if method in EXPLICIT else math.inf),
             int(min(numerics.step_budget_per_turn * math.ceil(turns), 2**62)),
         )
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
+from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.recording import Recording, batches_of
-from rbdyn.dynamics.statistics.bias import companion_tolerance
 from rbdyn.dynamics.statistics.drift import drifting, start_of_counting
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import RunError
@@ -32,12 +32,13 @@ class Stage(NamedTuple):
 
 @dataclass(frozen=True)
 class Ensemble:
-    """Replicates and companions as they are counted, the batch from which they count where nothing drifts, why there are
+    """Replicates and companions as they are counted, how these are integrated, the batch from which they count where nothing drifts, why there are
     no companions although asked for, shaft turns of the transient (None where it cannot be told), and what a result has
     to say of its length."""
 
     runs: list[Replicate]
     companions: list[Replicate]
+    plan: Companions
     since: int
     fault: str | None
     transient_turns: float | None
@@ -46,8 +47,8 @@ class Ensemble:
 
 # How many times as long a run gets at the first drift, and at every other or where that is too much.
 GROWTH = (4.0, 2.0)
-# Makes the recording of a replicate at a tolerance.
-Start = Callable[[int, float, Stop], Recording]
+# Makes the recording of a replicate, or of a companion where it is given how.
+Start = Callable[[int, Companions | None, Stop], Recording]
 
 
 def run_until_settled(scene: Scene, start: Start, workers: int | None, progress: Reporter, stop: Stop) -> Ensemble:
@@ -56,7 +57,7 @@ def run_until_settled(scene: Scene, start: Start, workers: int | None, progress:
     Raises RunError when a replicate cannot go on, KeyboardInterrupt.
     """
     numerics = scene.numerics
-    team = Team(start, range(numerics.replicates), numerics.rtol, workers, stop, progress, numerics.companions)
+    team = Team(start, range(numerics.replicates), None, workers, stop, progress, numerics.companions)
     extends = numerics.extend and scene.operation.schedule is None
     stage = Stage(-1, whole_windows(scene) if extends else numerics.turns)
     begin = None
@@ -71,16 +72,16 @@ def run_until_settled(scene: Scene, start: Start, workers: int | None, progress:
             break
         stage = longer
     notes = (*begin.notes, *length_notes(scene, runs, stage, extends))
+    plan = companions_of(scene, runs)
     if not numerics.companions:
-        return Ensemble(runs, [], begin.first, None, begin.turns, notes)
-    rtol = companion_tolerance(numerics.rtol)
-    others = Team(start, range(numerics.companions), rtol, workers, Stop(outer=stop), progress, 0, team.done)
+        return Ensemble(runs, [], plan, begin.first, None, begin.turns, notes)
+    others = Team(start, range(numerics.companions), plan, workers, Stop(outer=stop), progress, 0, team.done)
     try:
         companions = [run.counted_from(stage.first) for run in others.to(stage.turns)]
     except RunError as error:
-        fault = f"a companion at numerics.rtol = {rtol:g} could not go on ({error})"
-        return Ensemble(runs, [], begin.first, fault, begin.turns, notes)
-    return Ensemble(runs, companions, begin.first, None, begin.turns, notes)
+        fault = f"a companion at numerics.rtol = {plan.rtol:g} could not go on ({error})"
+        return Ensemble(runs, [], plan, begin.first, fault, begin.turns, notes)
+    return Ensemble(runs, companions, plan, begin.first, None, begin.turns, notes)
 
 
 @dataclass
@@ -90,7 +91,7 @@ class Team:
 
     start: Start
     replicates: range
-    rtol: float
+    plan: Companions | None
     workers: int | None
     stop: Stop
     progress: Reporter
@@ -105,7 +106,7 @@ class Team:
 
         def go_on(replicate: int) -> Replicate:
             if replicate not in self.recordings:
-                self.recordings[replicate] = self.start(replicate, self.rtol, self.stop)
+                self.recordings[replicate] = self.start(replicate, self.plan, self.stop)
             return self.recordings[replicate].to(turns)
 
         def ended(one: Ended[Replicate]) -> None:

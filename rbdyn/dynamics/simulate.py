@@ -1,18 +1,20 @@
 """Replicates of a scene, gathered with error bars."""
 
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from rbdyn.dynamics.companions import TIGHT
 from rbdyn.dynamics.ensemble import Reporter, Stop
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
 from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.parameters.left_out import heat_notes, left_out_notes, light_load_notes
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.race_report import race_notes, race_report
-from rbdyn.dynamics.recording import Recording
-from rbdyn.dynamics.run import Run, prepare
+from rbdyn.dynamics.recording import recording_of
+from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.settling import Ensemble, run_until_settled
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.metrics import work_done
@@ -60,10 +62,7 @@ def simulate(
         _prepared.add(laws)
     started = time.perf_counter()
 
-    def recording(replicate: int, rtol: float, stop: Stop) -> Recording:
-        return Recording(Run(scene, bearing, replicate, rtol, stop))
-
-    ensemble = run_until_settled(scene, recording, workers, progress, stop)
+    ensemble = run_until_settled(scene, partial(recording_of, scene, bearing), workers, progress, stop)
     wall_s = time.perf_counter() - started
     return _gather(scene, ensemble, wall_s, compile_s)
 
@@ -71,9 +70,10 @@ def simulate(
 def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -> SimulationResult:
     runs, companions = ensemble.runs, ensemble.companions
     everything = [*runs, *companions]
-    figures = quantities(scene, runs, companions, ensemble.since)
+    figures = quantities(scene, runs, companions, ensemble.plan.share, ensemble.since)
     power_gap = max(run.power_gap for run in runs)
     inner_load, outer_load = (max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD))
+    tighter = TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
     races = race_report(scene, inner_load, outer_load)
     return SimulationResult(
         status="ok",
@@ -115,7 +115,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
             *_notes(scene, power_gap),
             *left_out_notes(scene, figures["power_loss_W"].value),
             *ensemble.notes,
-            *error_notes(scene, figures, ensemble.fault),
+            *error_notes(scene, figures, ensemble.fault, tighter),
             *stiffness_notes(scene, runs),
         ),
         versions=versions(),

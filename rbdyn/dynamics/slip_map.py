@@ -5,20 +5,20 @@ its cause, and the others go on. Finished points may be kept in a file, so that 
 """
 
 import time
-from collections import Counter
 from collections.abc import Sequence
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from rbdyn.cli.ranges import MOST_VALUES
+from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
+from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.parameters.model import roller_bearing
-from rbdyn.dynamics.recording import run_replicate
+from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare
-from rbdyn.dynamics.statistics.bias import companion_tolerance
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError
@@ -87,6 +87,68 @@ class SlipMap(Record):
         return np.array(values).reshape(len(self.loads_N), len(self.speeds_rpm))
 
 
+@dataclass(frozen=True)
+class Job:
+    """A run to make: a replicate of a point, or a companion of it."""
+
+    series: "Series"
+    replicate: int
+    companions: Companions | None
+
+    def __call__(self) -> Replicate:
+        """Make it. Raises RunError or CancelledError."""
+        point = self.series
+        return run_one(point.scene, point.bearing, self.replicate, self.companions, point.stop)
+
+
+class Series:
+    """Runs of the point at ``place``: its replicates, then companions by the steps that these took; none where a replicate failed.
+
+    ``waiting``: how many of those begun have not ended; ``left_out``: companions that were not begun.
+    """
+
+    def __init__(self, place: int, scene: Scene, bearing: RollerBearing, stop: Stop) -> None:
+        self.place, self.scene, self.bearing, self.stop = place, scene, bearing, stop
+        self.waiting, self.left_out = scene.numerics.replicates, scene.numerics.companions
+        self.plan: Companions | None = None
+        self.runs: dict[tuple[Companions | None, int], Replicate] = {}
+        self.faults: list[str] = []
+
+    def replicates(self) -> list[Job]:
+        """The runs to begin with."""
+        return [Job(self, replicate, None) for replicate in range(self.scene.numerics.replicates)]
+
+    def take(self, one: Ended[Replicate]) -> list[Job]:
+        """Take a run that has ended; returns those to make next."""
+        job = cast(Job, one.run)
+        if one.fault is None:
+            self.runs[job.companions, job.replicate] = one.result()
+        else:
+            self.faults.append(str(one.fault))
+        self.waiting -= 1
+        if self.waiting or self.faults or not self.left_out:
+            return []
+        self.plan = companions_of(self.scene, self._ended(None))
+        self.waiting, self.left_out = self.left_out, 0
+        return [Job(self, replicate, self.plan) for replicate in range(self.waiting)]
+
+    def point(self) -> Point:
+        """What the runs show."""
+        speed, load = self.scene.operation.inner_speed_rpm, self.scene.operation.radial_load_N
+        if self.faults:
+            return Point(speed, load, f"failed: {min(self.faults)}", {}, None)
+        share = 0.0 if self.plan is None else self.plan.share
+        runs, companions, _ = after_transient(
+            self.scene, self._ended(None), self._ended(self.plan) if self.plan else []
+        )
+        figures = quantities(self.scene, runs, companions, share)
+        power_gap = max(run.power_gap for run in runs)
+        return Point(speed, load, "ok", {name: figures[name] for name in FIGURES}, power_gap)
+
+    def _ended(self, plan: Companions | None) -> list[Replicate]:
+        return [run for (of, _), run in sorted(self.runs.items(), key=lambda item: item[0][1]) if of == plan]
+
+
 def slip_map(
     scene: Scene,
     speeds_rpm: Sequence[float],
@@ -110,36 +172,25 @@ def slip_map(
     bearings = {place: roller_bearing(point) for place, point in enumerate(scenes) if place not in points}
     for place in list(bearings)[:1]:
         prepare(scenes[place], bearings[place])
-    numerics = scene.numerics
-    series = ((numerics.rtol, numerics.replicates), (companion_tolerance(numerics.rtol), numerics.companions))
-    stop = Stop()
-    tasks = [(place, rtol, replicate) for place in bearings for rtol, count in series for replicate in range(count)]
-    waiting = Counter(place for place, _, _ in tasks)
-    runs: dict[tuple[int, float, int], Replicate] = {}
-    causes: dict[int, str] = {}
-    done = 0
+    numerics, stop = scene.numerics, Stop()
+    series = [Series(place, scenes[place], bearings[place], stop) for place in bearings]
+    total, done = len(series) * (numerics.replicates + numerics.companions), 0
 
-    def ended(one: Ended[Replicate]) -> None:
+    def ended(one: Ended[Replicate]) -> list[Job]:
         nonlocal done
+        ran = cast(Job, one.run).series
+        more = ran.take(one)
         done += 1
-        place = tasks[one.place][0]
-        if one.fault is None:
-            runs[tasks[one.place]] = one.result()
-        else:
-            causes[place] = min(str(one.fault), causes.get(place, str(one.fault)))
-        waiting[place] -= 1
-        if not waiting[place]:
-            cause = causes.get(place)
-            whole = series if cause is None else [(rtol, 0) for rtol, _ in series]
-            ours, theirs = ([runs.pop((place, rtol, i)) for i in range(count)] for rtol, count in whole)
-            points[place] = _point(scenes[place], ours, theirs, cause)
-            kept.put(keys[place], points[place].as_dict())
+        if not ran.waiting:
+            done += ran.left_out
+            points[ran.place] = ran.point()
+            kept.put(keys[ran.place], points[ran.place].as_dict())
         if progress is not None:
-            progress(done, len(tasks))
+            progress(done, total)
+        return more
 
     started = time.perf_counter()
-    work = [partial(run_replicate, scenes[place], bearings[place], i, rtol, stop) for place, rtol, i in tasks]
-    run_all(work, workers, stop, ended)
+    run_all((job for one in series for job in one.replicates()), workers, stop, ended)
     wall_s = time.perf_counter() - started
     ordered = tuple(points[place] for place in range(len(scenes)))
     return SlipMap(tuple(speeds_rpm), tuple(loads_N), ordered, wall_s, scene.numerics.seed)
@@ -149,12 +200,3 @@ def _at(scene: Scene, speed: float, load: float) -> Scene:
     data = scene.model_dump(mode="json", exclude_none=True)
     data["operation"] |= {"inner_speed_rpm": speed, "radial_load_N": load}
     return Scene.from_dict(data, f"--speed {speed:g} --load {load:g}")
-
-
-def _point(scene: Scene, runs: list[Replicate], companions: list[Replicate], cause: str | None) -> Point:
-    speed, load = scene.operation.inner_speed_rpm, scene.operation.radial_load_N
-    if cause is not None:
-        return Point(speed, load, f"failed: {cause}", {}, None)
-    runs, companions, _ = after_transient(scene, runs, companions)
-    found = quantities(scene, runs, companions)
-    return Point(speed, load, "ok", {name: found[name] for name in FIGURES}, max(run.power_gap for run in runs))

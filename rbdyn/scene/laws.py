@@ -148,7 +148,8 @@ class Numerics(Consistent):
     whirl_notches_hz: list[Positive] = []
     """Frequencies taken out of the filtered whirl, as a rig's runout at cage and shaft rotation is."""
     companion: bool = True
-    """Repeat a share of the replicates at ten times the tolerance to estimate the numerical error."""
+    """Repeat a share of the replicates at ten times the tolerance to estimate the numerical error. Where stability holds the
+    steps of a slow bearing, they are repeated with steps that resolve its light contacts instead."""
     companion_share: Share = 0.25
     """Share of the replicates that companion repeats."""
     step_budget_per_turn: Annotated[int, Field(ge=100)] = 100_000

@@ -11,7 +11,7 @@ import pytest
 from rbdyn.accuracy.rollers import coverage
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.batch_means import Estimate, autocorrelation_time, estimate
-from rbdyn.dynamics.statistics.bias import companion_error, companion_tolerance
+from rbdyn.dynamics.statistics.bias import bias_scale, companion_error, companion_tolerance
 from rbdyn.dynamics.statistics.drift import find_transient
 from rbdyn.dynamics.statistics.error_bars import error_notes
 from rbdyn.dynamics.target import Model, checked, choose, learned, predicted_error, target_of, total_error
@@ -96,9 +96,9 @@ def test_unit_companions_looser_where_they_can():
     # The difference of 3 and its half-width of 0.6, with three times fewer turns: over nine of a looser one, ten ninths of
     # a tighter one.
     both = math.hypot(3.0, 0.6)
-    assert companion_error(ours, 13.0, 3.0, 1e-2) == pytest.approx(both / 9.0)
-    assert companion_error(ours, 7.0, 3.0, 0.05) == pytest.approx(both * 10.0 / 9.0)
-    assert companion_error(Estimate(1.0, None, 1.0), 13.0, 3.0, 1e-2) is None
+    assert companion_error(ours, 13.0, 3.0, bias_scale(1e-2)) == pytest.approx(both / 9.0)
+    assert companion_error(ours, 7.0, 3.0, bias_scale(0.05)) == pytest.approx(both * 10.0 / 9.0)
+    assert companion_error(Estimate(1.0, None, 1.0), 13.0, 3.0, 1.0) is None
 
 
 def test_invariant_power_gap_is_the_bias_of_the_loss(outer):
@@ -166,6 +166,8 @@ def test_unit_notes_name_the_figure_and_the_mend(outer):
     assert error_notes(outer, figures, None) == []
     (biased,) = error_notes(outer, {**figures, "power_loss_W": Quantity(100.0, 0.1, 2.0, 40.0)}, None)
     assert "power loss may be off by 2 %" in biased and "numerics.rtol = 0.01 to 0.001" in biased
+    (bound,) = error_notes(outer, {**figures, "power_loss_W": Quantity(100.0, 0.1, 2.0, 40.0)}, None, 1e-6)
+    assert "numerics.rtol = 0.01 to 1e-06" in bound
     (scattered,) = error_notes(outer, {**figures, "impact_force_N": Quantity(100.0, 4.0, 6.0, 40.0)}, None)
     assert "impact force" in scattered and "numerics.turns" in scattered
     (few,) = error_notes(outer, {**figures, "impact_force_N": Quantity(100.0, 0.5, 0.5, 4.0)}, None)

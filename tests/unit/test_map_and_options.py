@@ -43,6 +43,17 @@ def test_unit_map_is_what_single_runs_give(found, outer):
     assert found.failed == []
 
 
+def test_unit_a_point_has_the_companions_of_a_single_run(make_scene):
+    """Unit: at a slow speed, where companions follow the steps of the runs, a map states the errors of a simulation."""
+    from rbdyn.dynamics.simulate import simulate
+
+    slow = make_scene("numerics.companion=true", "operation.inner_speed_rpm=3000.0", "operation.radial_load_N=4000.0")
+    alone = simulate(slow)
+    (point,) = slip_map(slow, (3000.0,), (4000.0,), workers=2).points
+    assert point.figures["power_loss_W"] == alone.power_loss
+    assert alone.power_loss.numerical_error > 0.0
+
+
 def test_physics_light_load_slips_more(found):
     """Trend: at both speeds the cage slips more under 60 N than under 1300 N, beyond the errors of both."""
     slips = {(p.inner_speed_rpm, p.radial_load_N): p.figures["cage_slip"] for p in found.points}
@@ -78,13 +89,13 @@ def counted(monkeypatch) -> list[float]:
     """Loads of the runs that a map begins from here on."""
     from rbdyn.dynamics import slip_map as module
 
-    ran, usual = [], module.run_replicate
+    ran, usual = [], module.run_one
 
     def run(scene, *rest):
         ran.append(scene.operation.radial_load_N)
         return usual(scene, *rest)
 
-    monkeypatch.setattr(module, "run_replicate", run)
+    monkeypatch.setattr(module, "run_one", run)
     return ran
 
 

@@ -106,7 +106,7 @@ class Written:
 def settled_run(scene, settles, workers=1, progress=None):
     warm_up = int(scene.numerics.warm_up_turns)
 
-    def start(replicate, rtol, stop):
+    def start(replicate, companions, stop):
         return Written(scene, replicate, settles, warm_up)
 
     return run_until_settled(scene, start, workers, progress, Stop())
@@ -166,8 +166,8 @@ def test_unit_whole_windows_are_counted(example):
     assert whole_windows(odd) == 40.0 and whole_windows(example) == 40.0
     assert len(settled_run(odd, lambda turns: 0.0 * turns).runs[0].durations) == 60
 
-    def start(replicate, rtol, stop):
-        if rtol > example.numerics.rtol:
+    def start(replicate, companions, stop):
+        if companions is not None:
             raise RunError("replicate 1 stopped")
         return Written(example, replicate, lambda turns: 0.0 * turns, 20)
 

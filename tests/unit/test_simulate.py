@@ -96,7 +96,7 @@ def test_unit_companions_give_a_numerical_error(outer, outer_result):
 
 def test_unit_a_failing_companion_leaves_the_figures(outer, outer_result, monkeypatch):
     """Unit: where only a companion cannot go on, figures stay and the note says why there is no numerical error."""
-    import rbdyn.dynamics.simulate as module
+    import rbdyn.dynamics.recording as module
 
     class Failing(module.Run):
         def to(self, turns):
@@ -381,13 +381,13 @@ def test_unit_quantity(outer):
         return [record_of([1.0], outer, largest=each) for each in loads]
 
     runs = series(1.0, 2.0, 3.0)
-    found = quantity(IMPACT_FORCE, runs, series(11.0, 12.0, 13.0), 0.01, 0.0, 2.0)
+    found = quantity(IMPACT_FORCE, runs, series(11.0, 12.0, 13.0), 1.0 / 9.0, 0.0, 2.0)
     assert found.value == 4.0
     student = 4.302652729911275 / math.sqrt(3.0)  # t(2, 0.975)
     assert found.statistical_error == pytest.approx(2.0 * student)
     assert found.numerical_error == pytest.approx(2.0 * math.hypot(10.0, math.sqrt(2.0) * student) / 9.0)
-    slow = quantity(IMPACT_FORCE, runs, [], 0.01, 3.0)
+    slow = quantity(IMPACT_FORCE, runs, [], 1.0, 3.0)
     assert slow.statistical_error == pytest.approx(math.hypot(student, 3.0)) and slow.numerical_error is None
-    assert quantity(POWER_LOSS, runs, [], 0.01, 0.0).numerical_error == 0.0
+    assert quantity(POWER_LOSS, runs, [], 1.0, 0.0).numerical_error == 0.0
     assert str(Quantity(2.0, None, None, 1.0)) == "2"
     assert "(numerical)" in str(found)

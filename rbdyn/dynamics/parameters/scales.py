@@ -22,6 +22,8 @@ SPEED_SHARES = {"rk45": 0.05, "rk43": 0.05, "rosenbrock": 1.0}
 # are off by -0.14 +- 0.12 and -0.1 +- 0.4 % in 1890 right-hand sides of rk43 a turn, without it by -0.3 and -0.9 % in 1490.
 # The implicit method damps less: whirl goes from +0.6 +- 1.1 to +0.2 +- 0.8 % for a hundredth more right-hand sides.
 CAGE_SHARES = {"rk45": 0.01, "rk43": 0.01, "rosenbrock": 0.1}
+# Centrifugal force over the mean load share, below which rollers outside the load zone lie lightly and jump.
+LIGHT = 0.05
 
 
 @dataclass(frozen=True)
@@ -53,10 +55,25 @@ def scales(scene: Scene) -> Scales:
 def _scales(scene: Scene) -> Scales:
     geometry, mass = scene.geometry, scene.geometry.roller_mass
     load = max(scene.operation.largest_load_N / scene.bearing.rollers, geometry.centrifugal_force, 9.81 * mass)
+    approach = _approach(scene, load)
+    return Scales(load, approach, approach * _frequency(load, approach, mass))
+
+
+def _approach(scene: Scene, load: float) -> float:
     modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
-    approach = (load / palmgren(modulus, scene.bearing.effective_length).stiffness) ** 0.9
-    frequency = math.sqrt(10.0 / 9.0 * load / approach / mass)
-    return Scales(load, approach, approach * frequency)
+    return float((load / palmgren(modulus, scene.bearing.effective_length).stiffness) ** 0.9)
+
+
+def _frequency(load: float, approach: float, mass: float) -> float:
+    return math.sqrt(10.0 / 9.0 * load / approach / mass)
+
+
+def light_contact_frequency(scene: Scene) -> float | None:
+    """Frequency [rad/s] of a roller on the outer race under its centrifugal force alone; None where that force is not light."""
+    force, mass = scene.geometry.centrifugal_force, scene.geometry.roller_mass
+    if not 0.0 < force < LIGHT * scales(scene).load:
+        return None
+    return _frequency(force, _approach(scene, force), mass)
 
 
 def fastest_surface(scene: Scene) -> float:

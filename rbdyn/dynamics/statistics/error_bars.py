@@ -38,36 +38,43 @@ def after_transient(scene: Scene, runs: Runs, companions: Runs) -> tuple[list[Re
     return ours, theirs, start
 
 
-def quantities(scene: Scene, runs: Runs, companions: Runs, since: int | None = None) -> dict[str, Quantity]:
+def quantities(
+    scene: Scene, runs: Runs, companions: Runs, share: float, since: int | None = None
+) -> dict[str, Quantity]:
     """Every figure with its errors, by the name it has in a record.
 
-    ``since``: batch from which the replicates show what regimes there are, that from which they count unless given.
+    ``share`` of the difference from the companions is the bias of the runs. ``since``: batch from which the replicates show what regimes there are, that from which they count unless given.
     """
     steady = scene.operation.schedule is None
     since = runs[0].first if since is None else since
-    told = {}
+    figures = {}
     for name, (figure, unit) in FIGURES.items():
         slow = slow_change(figure, TESTED.get(name, figure), runs, since, steady=steady)
-        told[name] = quantity(figure, runs, companions, scene.numerics.rtol, slow, unit)
-    return told
+        figures[name] = quantity(figure, runs, companions, share, slow, unit)
+    return figures
 
 
-def error_notes(scene: Scene, figures: dict[str, Quantity], fault: str | None) -> list[str]:
-    """Sentences on errors that are large or themselves uncertain, each with its mend."""
+def error_notes(
+    scene: Scene, figures: dict[str, Quantity], fault: str | None, tighter: float | None = None
+) -> list[str]:
+    """Sentences on errors that are large or themselves uncertain, each with its fix.
+
+    ``tighter``: the tolerance that removes a numerical error; a tenth of the scene's unless given.
+    """
     notes = [] if fault is None else [f"numerical error: not estimated; {fault}"]
     few = {name: figures[name].effective_samples for name in JUDGED if not _enough(figures[name])}
     if few:
         listed = ", ".join(f"{JUDGED[name]} {count:.1f}" for name, count in few.items())
         what = f"statistical error: uncertain where fewer than {FEW_SAMPLES:.0f} effective samples"
         notes.append(f"{what} stand behind it ({listed}); raise numerics.turns or numerics.replicates")
-    return notes + [note for name in JUDGED if (note := _numerical_note(scene, JUDGED[name], figures[name]))]
+    return notes + [note for name in JUDGED if (note := _numerical_note(scene, JUDGED[name], figures[name], tighter))]
 
 
 def _enough(figure: Quantity) -> bool:
     return figure.effective_samples >= FEW_SAMPLES or figure.statistical_error == 0.0
 
 
-def _numerical_note(scene: Scene, name: str, figure: Quantity) -> str | None:
+def _numerical_note(scene: Scene, name: str, figure: Quantity, tighter: float | None) -> str | None:
     error, size = figure.numerical_error, abs(figure.value)
     if error is None or size == 0.0:
         return None
@@ -76,5 +83,5 @@ def _numerical_note(scene: Scene, name: str, figure: Quantity) -> str | None:
         return None
     rtol = scene.numerics.rtol
     longer = "it is mostly scatter, so raise numerics.turns or numerics.replicates"
-    mend = f"tighten numerics.rtol = {rtol:g} to {0.1 * rtol:.1g}" if biased else longer
+    mend = f"tighten numerics.rtol = {rtol:g} to {tighter or 0.1 * rtol:.1g}" if biased else longer
     return f"numerical error: {name} may be off by {100.0 * error / size:.2g} %; {mend}"

@@ -178,12 +178,12 @@ def work_done(runs: Sequence[Replicate]) -> dict[str, float]:
 Runs = Sequence[Replicate]
 
 
-def quantity(figure: Figure, runs: Runs, companions: Runs, rtol: float, slow: float, unit: float = 1.0) -> Quantity:
+def quantity(figure: Figure, runs: Runs, companions: Runs, share: float, slow: float, unit: float = 1.0) -> Quantity:
     """A figure with its 95 % errors, times ``unit``.
 
     Statistical: batch means over all replicates (``rbdyn.dynamics.statistics.batch_means``) and, as root sum of squares, the
-    half-width ``slow`` of what changes slowly (``rbdyn.dynamics.statistics.drift``). Numerical: from companions of runs at
-    ``rtol``, and of the power loss what the power balance misses (``rbdyn.dynamics.statistics.bias``). None where it was not
+    half-width ``slow`` of what changes slowly (``rbdyn.dynamics.statistics.drift``). Numerical: the ``share`` of the
+    difference from companions, and of the power loss what the power balance misses (``rbdyn.dynamics.statistics.bias``). None where it was not
     estimated.
     """
     ours = estimate([figure.moments(run) for run in runs], figure.of_sums)
@@ -192,7 +192,7 @@ def quantity(figure: Figure, runs: Runs, companions: Runs, rtol: float, slow: fl
     if companions:
         sums = np.sum([figure.moments(run).sum(axis=0) for run in companions], axis=0)
         times_fewer = sum(run.duration for run in runs) / sum(run.duration for run in companions)
-        numerical = companion_error(ours, float(figure.of_sums(sums)), times_fewer, rtol)
+        numerical = companion_error(ours, float(figure.of_sums(sums)), times_fewer, share)
     if figure is POWER_LOSS:
         missing = abs(sum(run.missing_work for run in runs)) / sum(run.duration for run in runs)
         numerical = math.hypot(missing, numerical or 0.0)
