@@ -13,7 +13,11 @@ import pytest
 from rbdyn.dynamics.forces.guide_land import NoGuide
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-SCRIPTS = sorted(path.stem for path in EXAMPLES.glob("*.py") if path.stem != "in_a_notebook")
+SCRIPTS = sorted(
+    path.relative_to(EXAMPLES).with_suffix("").as_posix()
+    for path in (*EXAMPLES.glob("*.py"), *EXAMPLES.glob("benchmarks/*.py"))
+    if path.stem != "in_a_notebook"
+)
 
 
 @pytest.fixture(autouse=True)
