@@ -4,6 +4,7 @@ import copy
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -84,9 +85,9 @@ class Case:
         keys = {each.key for each in inputs}
         # What multiplies an input that varies goes with it, in the ratio that the scene has.
         tied = {
-            key: own_value / value_of(self.scene, law.times)
+            key: own_value / value_of(self.ran, law.times)
             for key, law in by_key.items()
-            if key not in keys and law.times in keys and is_number(own_value := value_of(self.scene, key))
+            if key not in keys and law.times in keys and is_number(own_value := value_of(self.ran, key))
         }
         shared = self.tables(more)
         scenes: list[Scene | str] = []
@@ -108,6 +109,11 @@ class Case:
             set_key(tables, override, f"{self.home}: uncertain.set")
         return tables
 
+    @cached_property
+    def ran(self) -> Scene:
+        """The scene as input sets run it, before any input has another value. Raises InputError."""
+        return rollers_only(Scene.from_dict(self.tables(), f"{self.home}: uncertain.set"))
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader must know of the inputs."""
@@ -116,11 +122,11 @@ class Case:
     @property
     def replicates(self) -> int:
         """Replicates of a run."""
-        return Scene.from_dict(self.tables(), self.source).numerics.replicates
+        return self.ran.numerics.replicates
 
     def unit(self, each: Input) -> float:
         """What the numbers of an input's law multiply."""
-        return 1.0 if each.law.times is None else float(value_of(self.scene, each.law.times))
+        return 1.0 if each.law.times is None else float(value_of(self.ran, each.law.times))
 
     def joint(self, inputs: Sequence[Input]) -> Joint:
         """How the inputs depend on each other. Raises InputError where correlations contradict each other."""
@@ -183,14 +189,12 @@ def case_of(
     plain = {table: keys for table, keys in data.items() if table != "uncertain"}
     case = Case(source, plain, scene, uncertain, [], tuple(outputs), sample, home=str(home))
     refuse(f"{home}: {fault}" for fault in _set_faults(uncertain, fixed, sample))
-    tables = case.tables()
-    ran = rollers_only(Scene.from_dict(tables, f"{home}: uncertain.set"))
-    every = inputs_of(ran, tables, uncertain, fixed, sampled, str(home))
+    every = inputs_of(case.ran, case.tables(), uncertain, fixed, sampled, str(home))
     if not every:
         mend = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
         raise InputError([f"{home}: uncertain: nothing is unknown; {mend}"])
     keys = {each.key for each in every}
-    stated = [each.key for each in inputs_of(ran, plain, uncertain, fixed, sampled) if each.key not in keys]
+    stated = [each.key for each in inputs_of(case.ran, plain, uncertain, fixed, sampled) if each.key not in keys]
     idle = [key for key in uncertain.estimated if key not in keys | fixed.keys() and key not in stated]
     doubt = "" if uncertain.sample is None else _doubt(home.parent / uncertain.sample)
     case = replace(case, every=every, doubt=doubt, remarks=tuple(_remarks(stated, idle)))
