@@ -115,7 +115,7 @@ def spoilt(draw: random.Random, table: dict[str, Any]) -> dict[str, Any]:
         declared = [key for key, law in table.items() if isinstance(law, dict) and "law" in law]
         one = draw.choice(declared) if declared else "cage.mass_g"
         law = table[one] if one in table else table.setdefault(one, law_of(draw, one))
-        kind = draw.randrange(8)
+        kind = draw.randrange(10)
         if kind == 0:
             names = ["low", "high", "mode", "mean", "sd", "times", "values", "weights", "measurable"]
             law[draw.choice([*(3 * [name for name in names if name in law]), *names])] = draw.choice(EXTREMES)
@@ -133,8 +133,16 @@ def spoilt(draw: random.Random, table: dict[str, Any]) -> dict[str, Any]:
             table[draw.choice(["points", "seed", "inputs", "sample", "defaults", "set"])] = draw.choice(EXTREMES)
         elif kind == 6:
             law["law"] = draw.choice(["uniform", "normal", "triangular", "log_uniform", "choices", "beta"])
-        else:
+        elif kind == 7:
             law.pop(draw.choice(sorted(law)))
+        elif kind == 8 and "values" in law:
+            law["weights"] = [draw.choice([1e308, 1.7e308]) for _ in CHOICES.get(one, [0, 1])]
+        elif kind == 8:
+            law[draw.choice(["low", "high", "mean", "sd", "sd"])] = draw.choice([-1e308, -1e13, 1e13, 1e308])
+        else:
+            stiffness = "model.pocket_bar_stiffness_N_m"
+            table[stiffness] = {"law": "choices", "values": draw.choice([["rigid", 5e7], [3e7, 5e7]])}
+            table["cage.mass_g"] = {"law": "uniform", "low": 8e-7, "high": 1e-6, "times": stiffness}
     return table
 
 
