@@ -13,7 +13,7 @@ from doe.study.rig_file import Rig, read_rig
 from rbdyn.faults import Claims, InputError, assigned, refuse
 from rbdyn.records.kept import code_version, digest_of
 from rbdyn.scene import Scene
-from rbdyn.scene.uncertain import Uncertain, documented
+from rbdyn.scene.uncertain import RUN_KEYS, Uncertain, documented
 from rbdyn.scene.unknown import Input, put
 
 
@@ -51,7 +51,8 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     known = {each.key for each in documented()}
     laid, settled = set(given.laws), Claims({assigned(each): each for each in given.set})
     refuse(
-        [
+        [f"{data}: column {key}: {why}" for key in rig.keys if (why := RUN_KEYS.on(tuple(key.split("."))))]
+        + [
             f"{data}: column {key} is sought too ({path}: uncertain or --free); take it out of one of them"
             for key in rig.keys
             if key in laid or key in free

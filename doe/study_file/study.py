@@ -17,18 +17,9 @@ from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Category, Design, Factor, Name
 from doe.study_file.front_section import Adaptive, Direct, Front, Goal, Robust, Tolerances
 from doe.study_file.table import COUNT, LABELS
-from rbdyn.faults import Claims, Consistent, InputError, Strict, assignment_faults, read_toml, validated
+from rbdyn.faults import Consistent, InputError, Strict, assignment_faults, read_toml, validated
 from rbdyn.fields import Number
-from rbdyn.scene.uncertain import DECLARATIONS, SEEDS, Uncertain
-
-NO_FACTORS = Claims(
-    {
-        ("numerics", "seed"): "every run has a seed of its own; choose another key",
-        ("numerics", "replicates"): "each kind of run has its own number of them; choose another key",
-        ("uncertain",): "no run depends on it; choose another key",
-        ("calibrate",): "no run depends on it; choose another key",
-    }
-)
+from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
 
 
 class SceneFile(Strict):
@@ -169,7 +160,7 @@ class StudyFile(Consistent):
         tables = {tuple(path[:end]) for path in (key.split(".") for key in keys) for end in range(1, len(path))}
         for key in keys:
             path = tuple(key.split("."))
-            if reason := NO_FACTORS.on(path):
+            if reason := RUN_KEYS.on(path):
                 yield f"factor.key = {key!r}: {reason}"
             elif path in tables:
                 yield f"factor.key = {key!r}: replaces the table of another factor's key; take one of them out"

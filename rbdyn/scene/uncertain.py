@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from rbdyn.faults import LONGEST_NAME, Strict, assignment_faults, one_line
+from rbdyn.faults import LONGEST_NAME, Claims, Strict, assignment_faults, one_line
 from rbdyn.fields import SMALLEST, Number, Positive, no_power_of_two, or_refuse
 
 # What each law needs beside its name, and what it may have.
@@ -41,6 +41,15 @@ NO_INPUTS = ("numerics", "uncertain", "calibrate")
 # What decides keys that ``set`` of any list must leave alone.
 SEEDS = "every run has a seed of its own; leave it out"
 DECLARATIONS = "no run depends on it; write it in its own table"
+# Keys that neither factors of a study nor conditions of a rig can be.
+RUN_KEYS = Claims(
+    {
+        ("numerics", "seed"): "every run has a seed of its own; choose another key",
+        ("numerics", "replicates"): "each kind of run has its own number of them; choose another key",
+        ("uncertain",): "no run depends on it; choose another key",
+        ("calibrate",): "no run depends on it; choose another key",
+    }
+)
 # Ends of a range that are nearer than this share of them are lost in rounding, as is a deviation of less.
 FINEST = 1e-9
 # Standard deviations from the mean beyond which an end leaves nothing of a normal law, and the narrowest cut of one.
