@@ -213,7 +213,7 @@ def put_key(data: dict[str, Any], path: str, value: Any, source: str) -> None:
     table[keys[-1]] = value
 
 
-def assigned(assignment: str) -> tuple[str, ...]:
+def key_path(assignment: str) -> tuple[str, ...]:
     """Names on the way to the key that a ``key.path=value`` assignment replaces; none where it is no assignment."""
     path, sign, _ = assignment.partition("=")
     return _parts(path) if sign else ()
@@ -246,7 +246,7 @@ def assignment_faults(name: str, assignments: Sequence[str], claims: Mapping[tup
     """
     faults, claimed, before = list[str](), Claims(claims), set[tuple[str, ...]]()
     for each in assignments:
-        path = assigned(each)
+        path = key_path(each)
         reason = claimed.on(path) if path else "write it as key.path=value"
         if path in before:
             reason = "replaces what stands before it in this list; keep one of them"

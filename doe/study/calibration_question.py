@@ -10,7 +10,7 @@ from typing import NamedTuple
 from doe import clearance
 from doe.study.input_sets import Case, case_of, check_overrides, impossible, tables_of
 from doe.study.rig_file import Rig, read_rig
-from rbdyn.faults import Claims, InputError, assigned, refuse
+from rbdyn.faults import Claims, InputError, key_path, refuse
 from rbdyn.records.kept import code_version, digest_of
 from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import RUN_KEYS, Uncertain, documented
@@ -49,7 +49,7 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     given = getattr(base, "uncertain", None) or Uncertain()
     refuse([f"{path}: uncertain.sample: is what a calibration gives; leave it out"] if given.sample else [])
     known = {each.key for each in documented()}
-    laid, settled = set(given.laws), Claims({assigned(each): each for each in given.set})
+    laid, settled = set(given.laws), Claims({key_path(each): each for each in given.set})
     refuse(
         [f"{data}: column {key}: {why}" for key in rig.keys if (why := RUN_KEYS.on(tuple(key.split("."))))]
         + [

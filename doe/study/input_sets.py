@@ -19,7 +19,7 @@ from doe.running.failure import Failure, sentence
 from doe.study_file.table import NUMBER, fields
 from doe.unknown import laws, screening
 from doe.unknown.joint import Joint
-from rbdyn.faults import Claims, InputError, RunError, assigned, assignment_faults, read_toml, refuse, set_key
+from rbdyn.faults import Claims, InputError, RunError, assignment_faults, key_path, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import shown
 from rbdyn.result import SimulationResult
@@ -163,7 +163,7 @@ def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Ma
     }
     claims |= {key: f"is {what}, whose value each run has; leave it out" for key, what in fixed.items()}
     claimed = Claims({tuple(key.split(".")): reason for key, reason in claims.items()})
-    refuse(f"--set {each}: {reason}" for each in overrides if (reason := claimed.on(assigned(each))))
+    refuse(f"--set {each}: {reason}" for each in overrides if (reason := claimed.on(key_path(each))))
 
 
 def case_of(
@@ -184,20 +184,20 @@ def case_of(
     home = stated_in if declared and stated_in else Path(source)
     sample = {} if uncertain.sample is None else read_sample(home.parent / uncertain.sample)
     ordered = ((key, [column[place] for place in np.argsort(laws.ranks(column))]) for key, column in sample.items())
-    sampled = {key: Sampled(tuple(column)) for key, column in ordered}
+    columns = {key: Sampled(tuple(column)) for key, column in ordered}
     # A run depends on no declaration; to check them all again at every input set would take long.
     plain = {table: keys for table, keys in data.items() if table != "uncertain"}
     case = Case(source, plain, scene, uncertain, [], tuple(outputs), sample, home=str(home))
     refuse(f"{home}: {fault}" for fault in _set_faults(uncertain, fixed, sample))
-    every = inputs_of(case.ran, case.tables(), uncertain, fixed, sampled, str(home))
+    every = inputs_of(case.ran, case.tables(), uncertain, fixed, columns, str(home))
     if not every:
-        mend = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
-        raise InputError([f"{home}: uncertain: nothing is unknown; {mend}"])
+        fix = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
+        raise InputError([f"{home}: uncertain: nothing is unknown; {fix}"])
     keys = {each.key for each in every}
-    stated = [each.key for each in inputs_of(case.ran, plain, uncertain, fixed, sampled) if each.key not in keys]
-    idle = [key for key in uncertain.estimated if key not in keys | fixed.keys() and key not in stated]
+    by_set = [each.key for each in inputs_of(case.ran, plain, uncertain, fixed, columns) if each.key not in keys]
+    idle = [key for key in uncertain.estimated if key not in keys | fixed.keys() and key not in by_set]
     doubt = "" if uncertain.sample is None else _doubt(home.parent / uncertain.sample)
-    case = replace(case, every=every, doubt=doubt, remarks=tuple(_remarks(stated, idle)))
+    case = replace(case, every=every, doubt=doubt, remarks=tuple(_remarks(by_set, idle)))
     case.joint(every)
     refuse(impossible(case))
     return case
@@ -211,10 +211,10 @@ def _set_faults(uncertain: Uncertain, fixed: Mapping[str, str], sample: Iterable
     return assignment_faults("uncertain.set", uncertain.set, paths)
 
 
-def _remarks(stated: Sequence[str], idle: Sequence[str]) -> Iterator[str]:
+def _remarks(by_set: Sequence[str], idle: Sequence[str]) -> Iterator[str]:
     """Which keys would vary if ``set`` gave them no value, and which are called estimates but mean nothing in the scene."""
-    if stated:
-        yield f"known by uncertain.set, so without their documented range: {', '.join(stated)}"
+    if by_set:
+        yield f"known by uncertain.set, so without their documented range: {', '.join(by_set)}"
     if idle:
         yield f"estimated, but without effect in this scene, so they do not vary: {', '.join(idle)}"
 
@@ -249,8 +249,8 @@ def impossible(case: Case) -> Iterator[str]:
     yield from faults
     if faults:
         return
-    tried = case.joint(case.every).sets(TRIED, case.uncertain.seed)
-    scenes = case.scenes(case.every, laws.table_of({each.key: each.law for each in case.every}, tried), 0)
+    sets = case.joint(case.every).sets(TRIED, case.uncertain.seed)
+    scenes = case.scenes(case.every, laws.table_of({each.key: each.law for each in case.every}, sets), 0)
     why = [each for each in scenes if isinstance(each, str)]
     if 2 * len(why) > TRIED:
         yield f"{case.home}: uncertain: inputs are impossible together: {_bare(case, why[0])}; change their laws"

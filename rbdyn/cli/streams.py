@@ -75,12 +75,12 @@ def _word_warnings() -> None:
     """Let a library's warning be one sentence, written once: the line of the library that gave it helps no user."""
     if sys.warnoptions:
         return  # whoever asks Python for warnings wants them whole
-    written = set[str]()
+    texts = set[str]()
 
     def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
         text = PATH.sub("...", " ".join(str(message).split()))[:LONGEST_WARNING]
-        if text not in written:
-            written.add(text)
+        if text not in texts:
+            texts.add(text)
             print(f"warning: {text} ({category.__name__}); check the input for extreme numbers", file=sys.stderr)
 
     warnings.showwarning = show

@@ -47,14 +47,14 @@ def inputs_of(
     ``fixed``: keys that vary otherwise, each with what it is; ``sample``: those of a posterior sample; ``source``: the file
     that declares them. Raises InputError for keys that cannot vary.
     """
-    declared = {**uncertain.laws, **sample}
+    keys = {**uncertain.laws, **sample}
     known = {each.key for each in documented()}
-    faults = _key_faults(declared)
-    varied = Claims({tuple(key.split(".")): what for key, what in fixed.items()})
+    faults = _key_faults(keys)
+    others = Claims({tuple(key.split(".")): what for key, what in fixed.items()})
     faults += [
         f'uncertain."{key}": is {what} too; take it out of one of them'
-        for key in declared
-        if (what := varied.on(tuple(key.split("."))))
+        for key in keys
+        if (what := others.on(tuple(key.split("."))))
     ]
     faults += [
         f'uncertain.correlation.keys = {pair.keys}: "{key}" is in the sample; take it out'
@@ -73,8 +73,8 @@ def inputs_of(
     inputs += [
         Input(key, each.as_law, each.reason)
         for key, each in ranges_of(scene).items()
-        if key not in declared
-        and varied.on(tuple(key.split("."))) is None
+        if key not in keys
+        and others.on(tuple(key.split("."))) is None
         and (
             key in uncertain.estimated
             or (uncertain.defaults == "documented" and not each.asked and not _given(data, key))
@@ -170,34 +170,43 @@ def with_values(
     Raises InputError where no scene has these values.
     """
     tables, times = deepcopy(dict(data)), {key: laws[key].times for key in values}
-    whole = {key: value for key, value in values.items() if times[key] is None}
-    waiting = {key: base for key, base in times.items() if base is not None}
-    _multiply(tables, whole, waiting, values)
-    # What a scene is given comes first: the rest may follow from it.
+    numbers = {key: value for key, value in values.items() if times[key] is None}
+    relative = {key: base for key, base in times.items() if base is not None}
+    _multiply(tables, numbers, relative, values)
+    # What a scene is given comes first, for the rest may follow from it, though not from each other.
     for late in (False, True):
         roots = {
             key: base
-            for key, base in waiting.items()
+            for key, base in relative.items()
             if (base == key or base not in values) and late == (base in DERIVED and not _given(tables, base))
         }
         scene = Scene.from_dict(tables, source) if roots else None
-        whole = {key: value_of(scene, base) * values[key] for key, base in roots.items()}
-        waiting = {key: base for key, base in waiting.items() if key not in roots}
-        _multiply(tables, whole, waiting, values)
+        numbers = {key: _number(scene, base, key, source) * values[key] for key, base in roots.items()}
+        relative = {key: base for key, base in relative.items() if key not in roots}
+        _multiply(tables, numbers, relative, values)
     return tables
 
 
 def _multiply(
-    tables: dict[str, Any], whole: dict[str, Any], waiting: dict[str, str], values: Mapping[str, Any]
+    tables: dict[str, Any], numbers: dict[str, Any], relative: dict[str, str], values: Mapping[str, Any]
 ) -> None:
-    """Put ``whole`` values of keys into tables, and those of keys that multiply them, which wait no more."""
-    while whole:
-        for key, value in whole.items():
+    """Put ``numbers`` of keys into tables, and those of ``relative`` keys that multiply them, which are taken out there."""
+    while numbers:
+        for key, value in numbers.items():
             put(tables, key, value)
-        ready = {key: base for key, base in waiting.items() if base != key and base in whole}
-        for key in ready:
-            del waiting[key]
-        whole = {key: values[key] * whole[base] for key, base in ready.items()}
+        products = {key: base for key, base in relative.items() if base != key and base in numbers}
+        for key in products:
+            del relative[key]
+        numbers = {key: values[key] * numbers[base] for key, base in products.items()}
+
+
+def _number(scene: Scene | None, base: str, key: str, source: str) -> float:
+    value = value_of(scene, base)
+    if not is_number(value):
+        raise InputError(
+            [f'{source}: uncertain."{key}".times = "{base}": the scene has no number there; name another key']
+        )
+    return float(value)
 
 
 def put(tables: dict[str, Any], key: str, value: Any) -> None:

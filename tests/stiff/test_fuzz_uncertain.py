@@ -21,7 +21,7 @@ from doe.study.robust import _case
 from doe.study_file import Study
 from doe.study_file.study import StudyFile
 from doe.unknown import laws
-from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, assigned, read_toml, validated
+from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, key_path, read_toml, validated
 from rbdyn.scene import Scene
 from rbdyn.scene.unknown import DERIVED, value_of
 
@@ -219,7 +219,7 @@ def check_scene(case: Case, scene: Scene, values: dict[str, Any], design: list[s
             wanted = tomllib.loads(f"x = {asked}")["x"]
         except tomllib.TOMLDecodeError:
             wanted = asked
-        assert value_of(scene, ".".join(assigned(assignment))) == wanted, assignment
+        assert value_of(scene, ".".join(key_path(assignment))) == wanted, assignment
 
 
 @pytest.mark.slow

@@ -180,6 +180,18 @@ def test_unit_what_multiplies_nothing_in_the_scene_stays_left_out() -> None:
     assert isinstance(scene, Scene) and value_of(scene, "cage.pocket_radial_clearance_mm") == pytest.approx(0.25)
 
 
+def test_unit_what_multiplies_nothing_in_some_scenes_says_so() -> None:
+    """Unit: where a choice leaves a scene without lips, their multiple is a sentence for those sets, and no exception."""
+    lips = _relative("cage.pocket_radial_clearance_mm", "cage.pocket_radial_clearance_mm")
+    guidance = {"cage.guidance": {"law": "choices", "values": ["roller", "outer"], "weights": [9.0, 1.0]}}
+    uncertain = {"defaults": "none", **lips, **guidance}
+    case = _case_with(uncertain, {"cage": {"guidance": "roller"}, "model": {"guide_land": "off"}})
+    rows = [{"cage.guidance": which, "cage.pocket_radial_clearance_mm": 1.05} for which in ("roller", "outer")]
+    scene, fault = case.scenes(case.every, rows, 0)
+    assert isinstance(scene, Scene) and scene.cage.pocket_radial_clearance_mm == pytest.approx(1.05 * 0.3)
+    assert isinstance(fault, str) and "the scene has no number there" in fault
+
+
 @pytest.mark.parametrize(
     ("laws", "sentence"),
     [
