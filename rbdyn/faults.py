@@ -181,13 +181,14 @@ def validated(model: type[Model], data: Mapping[str, Any], source: str) -> Model
     raise InputError(dict.fromkeys(faults))
 
 
-def set_key(data: dict[str, Any], assignment: str) -> None:
+def set_key(data: dict[str, Any], assignment: str, name: str = "--set") -> None:
     """Apply one ``key.path=value`` assignment (the value in TOML syntax, or a bare word) to a nested dict.
 
-    Raises InputError when the assignment has no ``=``, its path runs through a plain value, or it is not one value.
+    ``name``: of the option or key that has it. Raises InputError when the assignment has no ``=``, its path runs through a
+    plain value, or it is not one value.
     """
     path, sign, text = assignment.partition("=")
-    source = f"--set {one_line(assignment, 2 * LONGEST_NAME)}"
+    source = f"{name} {one_line(assignment, 2 * LONGEST_NAME)}"
     if not sign:
         raise InputError([f"{source}: write it as key.path=value"])
     try:
@@ -195,14 +196,14 @@ def set_key(data: dict[str, Any], assignment: str) -> None:
     except tomllib.TOMLDecodeError:
         given = {"value": text.strip()}
     if len(given) > 1:
-        raise InputError([f"{source}: more than one value; give each its own --set"])
+        raise InputError([f"{source}: more than one value; give each an assignment of its own"])
     put_key(data, path, given["value"], source)
 
 
 def put_key(data: dict[str, Any], path: str, value: Any, source: str) -> None:
     """Put a value under the dotted ``path`` of nested tables. Raises InputError when that is none, or runs through a value."""
-    keys = [key.strip().strip('"') for key in re.findall(PART, f"{path}.")]
-    if not all(keys) or len(keys) > DEEPEST or not re.fullmatch(f"({PART})+", f"{path}."):
+    keys = _parts(path)
+    if not keys:
         raise InputError([f"{source}: write it as key.path=value"])
     table = data
     for key in keys[:-1]:
@@ -210,6 +211,49 @@ def put_key(data: dict[str, Any], path: str, value: Any, source: str) -> None:
         if not isinstance(table, dict):
             raise InputError([f"{source}: {one_line(key, LONGEST_NAME)} is a value, not a table; check the key path"])
     table[keys[-1]] = value
+
+
+def key_path(assignment: str) -> tuple[str, ...]:
+    """Names on the way to the key that a ``key.path=value`` assignment replaces; none where it is no assignment."""
+    path, sign, _ = assignment.partition("=")
+    return _parts(path) if sign else ()
+
+
+def _parts(path: str) -> tuple[str, ...]:
+    """Names of a dotted path, without their quotes; none where it is no path."""
+    keys = tuple(key.strip().strip('"') for key in re.findall(PART, f"{path}."))
+    return keys if all(keys) and len(keys) <= DEEPEST and re.fullmatch(f"({PART})+", f"{path}.") else ()
+
+
+class Claims:
+    """Keys that something else decides, each with the reason; a table and a key within it claim the same."""
+
+    def __init__(self, reasons: Mapping[tuple[str, ...], str]) -> None:
+        self._reasons = reasons
+        self._within = {path[:end]: reason for path, reason in reasons.items() for end in range(1, len(path))}
+
+    def on(self, path: tuple[str, ...]) -> str | None:
+        """Why a key, a table around it or a key within it is claimed; None where none is."""
+        whole = (self._reasons[path[:end]] for end in range(1, len(path) + 1) if path[:end] in self._reasons)
+        return next(whole, self._within.get(path))
+
+
+def assignment_faults(name: str, assignments: Sequence[str], claims: Mapping[tuple[str, ...], str]) -> list[str]:
+    """What is wrong with the ``key.path=value`` assignments of the key ``name``, whatever their values.
+
+    ``claims``: keys that they must leave alone, each with the reason and the mend. An assignment that a later one undoes is a
+    fault too.
+    """
+    faults, claimed, before = list[str](), Claims(claims), set[tuple[str, ...]]()
+    for each in assignments:
+        path = key_path(each)
+        reason = claimed.on(path) if path else "write it as key.path=value"
+        if path in before:
+            reason = "replaces what stands before it in this list; keep one of them"
+        if reason:
+            faults.append(f"{name} = {_shown(each)}: {reason}")
+        before |= {path[:end] for end in range(1, len(path) + 1)}
+    return faults
 
 
 def _without(data: Any, bad: set[tuple[int | str, ...]], place: tuple[str, ...] = ()) -> Any:

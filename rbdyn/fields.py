@@ -19,6 +19,9 @@ SMALLEST, LARGEST = 1e-12, 1e12
 # A ring for rollers of half a millimetre has 7 mg.
 LIGHTEST_RING_KG = 1e-6
 NotVanishing = AfterValidator(_not_vanishing)
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+# A figure may come from any table, in any unit: its fourth power does not overflow.
+Figure = Annotated[float, Field(ge=-1e60, le=1e60)]
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST), NotVanishing]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST)]
 Share = Annotated[float, Field(gt=0.0, le=1.0), NotVanishing]

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from doe import clearance
-from doe.study.input_sets import Case, case_of, impossible, tables_of
+from doe.study.input_sets import Case, case_of, check_overrides, impossible, tables_of
 from doe.study.rig_file import Rig, read_rig
-from rbdyn.faults import InputError, refuse
+from rbdyn.faults import Claims, InputError, key_path, refuse
 from rbdyn.records.kept import code_version, digest_of
 from rbdyn.scene import Scene
-from rbdyn.scene.uncertain import Uncertain, documented
+from rbdyn.scene.uncertain import RUN_KEYS, Uncertain, documented
 from rbdyn.scene.unknown import Input, put
 
 
@@ -49,9 +49,10 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     given = getattr(base, "uncertain", None) or Uncertain()
     refuse([f"{path}: uncertain.sample: is what a calibration gives; leave it out"] if given.sample else [])
     known = {each.key for each in documented()}
-    laid = set(given.laws)
+    laid, settled = set(given.laws), Claims({key_path(each): each for each in given.set})
     refuse(
-        [
+        [f"{data}: column {key}: {why}" for key in rig.keys if (why := RUN_KEYS.on(tuple(key.split("."))))]
+        + [
             f"{data}: column {key} is sought too ({path}: uncertain or --free); take it out of one of them"
             for key in rig.keys
             if key in laid or key in free
@@ -61,14 +62,21 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
             for key in free
             if key not in laid and key not in known
         ]
+        + [
+            f"--free {key}: uncertain.set gives its value; take it out there"
+            for key in free
+            if settled.on(tuple(key.split(".")))
+        ]
     )
     asked = [key for key in free if key not in laid]
     named = {"estimated": [*given.estimated, *asked], "defaults": "documented"}
     declared = given.model_copy(update=named if free else {})
-    case = case_of(str(path), tables, rig.outputs, declared, frozenset(rig.keys))
+    fixed = {key: f"a column of {data}" for row in rig.rows for key in row.keys}
+    case = case_of(str(path), tables, rig.outputs, declared, fixed)
     sought = [each for each in case.every if each.law.kind == "unknown" and (not free or each.key in free)]
     varies = "varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the key that it multiplies"
-    notes = [*rig.notes, *(f"{each.key} {varies}" for each in case.every if each.law.kind == "varies")]
+    check_overrides(overrides, sought, fixed)
+    notes = [*rig.notes, *case.remarks, *(f"{each.key} {varies}" for each in case.every if each.law.kind == "varies")]
     refuse(
         f"--free {key}: its documented range does not count in this scene (rbdyn keys {key}); give it a law"
         for key in free
@@ -92,14 +100,15 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
 def cases_of(case: Case, rig: Rig) -> list[Case]:
     """The case at every condition. Raises InputError for conditions that no scene has."""
     cases, faults = [], dict[str, None]()
+    first = {tuple(each.keys.items()): each.number for each in reversed(rig.rows)}
     for keys in rig.conditions:
-        row = next(each.number for each in rig.rows if each.keys == keys)
-        tables = copy.deepcopy(case.data)
+        row = first[tuple(keys.items())]
+        tables, scene_of = copy.deepcopy(case.data), f"{rig.path}: row {row}"
         try:
             for key, value in keys.items():
                 put(tables, key, list(value) if isinstance(value, tuple) else value)
-            scene = Scene.from_dict(tables, f"{rig.path}: row {row}")
-            cases.append(replace(case, data=tables, scene=scene, source=f"{rig.path}: row {row}"))
+            scene = Scene.from_dict(tables, scene_of)
+            cases.append(replace(case, data=tables, scene=scene, source=scene_of, home=scene_of))
         except InputError as error:
             faults |= dict.fromkeys(error.faults)
     refuse(faults)

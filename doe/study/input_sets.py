@@ -1,9 +1,11 @@
 """Input sets of a scene whose inputs are not known: which inputs vary, the scenes at values of them, their runs."""
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,13 +18,13 @@ from doe.running.failure import Failure, sentence
 from doe.study_file.table import NUMBER, fields
 from doe.unknown import laws, screening
 from doe.unknown.joint import Joint
-from rbdyn.faults import InputError, RunError, read_toml, refuse, set_key
+from rbdyn.faults import Claims, InputError, RunError, assignment_faults, key_path, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import shown
 from rbdyn.result import SimulationResult, read_json
 from rbdyn.scene import Scene, rollers_only
 from rbdyn.scene.uncertain import Sampled, Uncertain
-from rbdyn.scene.unknown import Input, inputs_of, value_of, with_values
+from rbdyn.scene.unknown import Input, inputs_of, is_number, put, value_of, with_values
 
 # Share of input sets that may be impossible or fail.
 HOLES = 0.05
@@ -30,6 +32,9 @@ SCREENING_SEEDS = 500_000
 NORMAL = 1.96  # half-width of a 95 % interval over its standard deviation
 # Quantiles of a law at which its scenes must be possible: no plan of as many input sets as we run goes farther out.
 ENDS = np.array([1e-3, 1.0 - 1e-3])
+NOTHING: Mapping[str, str] = MappingProxyType({})
+# Input sets that are tried before anything runs.
+TRIED = 16
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ class Sets:
 @dataclass(frozen=True)
 class Case:
     """A scene file with what is not known of it: ``every`` input, ``outputs`` that are looked at, by key what stands in the
-    rows of a posterior ``sample``, and what is to be doubted of that, in a sentence."""
+    rows of a posterior ``sample``, what is to be doubted of that, in a sentence, ``remarks`` on keys that do not vary, and the file that declares all this as ``home``."""
 
     source: str
     data: dict[str, Any]
@@ -60,6 +65,8 @@ class Case:
     outputs: tuple[str, ...]
     sample: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     doubt: str = ""
+    remarks: tuple[str, ...] = ()
+    home: str = ""
 
     def scenes(
         self,
@@ -69,34 +76,56 @@ class Case:
         more: Sequence[str] = (),
         own: Sequence[Sequence[str]] = (),
     ) -> list[Scene | str]:
-        """A scene an input set, or why there is none; ``more`` overrides come last, then the set's ``own``."""
+        """A scene an input set, or why there is none; ``more`` overrides come last, then the set's ``own``.
+
+        Numbers that multiply another key's value multiply what the overrides left there.
+        """
         by_key = {each.key: each.law for each in self.every}
         keys = {each.key for each in inputs}
         # What multiplies an input that varies goes with it, in the ratio that the scene has.
         tied = {
-            key: value_of(self.scene, key) / value_of(self.scene, law.times)
+            key: own_value / value_of(self.ran, law.times)
             for key, law in by_key.items()
-            if key not in keys and law.times in keys
+            if key not in keys and law.times in keys and is_number(own_value := value_of(self.ran, key))
         }
-        found: list[Scene | str] = []
+        shared = self.tables(more)
+        scenes: list[Scene | str] = []
         for number, row in enumerate(values):
-            overrides = [*self.uncertain.set, f"numerics.seed={seed + number}", *more]
-            overrides += own[number] if own else ()
             try:
-                tables = with_values(self.data, self.source, by_key, {**row, **tied})
-                found.append(Scene.from_dict(tables, self.source, overrides))
+                tables = copy.deepcopy(shared)
+                for override in own[number] if own else ():
+                    set_key(tables, override)
+                put(tables, "numerics.seed", seed + number)
+                scenes.append(Scene.from_dict(with_values(tables, self.source, by_key, {**row, **tied}), self.source))
             except InputError as error:
-                found.append(str(error.faults[0]))
-        return found
+                scenes.append(str(error.faults[0]))
+        return scenes
+
+    def tables(self, more: Sequence[str] = ()) -> dict[str, Any]:
+        """Tables of the scene as input sets run it, with ``more`` overrides. Raises InputError."""
+        tables = copy.deepcopy(self.data)
+        for override in (*self.uncertain.set, *more):
+            set_key(tables, override, f"{self.home}: uncertain.set")
+        return tables
+
+    @cached_property
+    def ran(self) -> Scene:
+        """The scene as input sets run it, before any input has another value. Raises InputError."""
+        return rollers_only(Scene.from_dict(self.tables(), f"{self.home}: uncertain.set"))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know of the inputs."""
+        return (self.doubt, *self.remarks) if self.doubt else self.remarks
 
     @property
     def replicates(self) -> int:
         """Replicates of a run."""
-        return Scene.from_dict(self.data, self.source, self.uncertain.set).numerics.replicates
+        return self.ran.numerics.replicates
 
     def unit(self, each: Input) -> float:
         """What the numbers of an input's law multiply."""
-        return 1.0 if each.law.times is None else float(value_of(self.scene, each.law.times))
+        return 1.0 if each.law.times is None else float(value_of(self.ran, each.law.times))
 
     def joint(self, inputs: Sequence[Input]) -> Joint:
         """How the inputs depend on each other. Raises InputError where correlations contradict each other."""
@@ -104,7 +133,7 @@ class Case:
         pairs = [pair for pair in self.uncertain.correlation if set(keys).issuperset(pair.keys)]
         columns = tuple(place for place, key in enumerate(keys) if key in self.sample)
         rows = np.column_stack([laws.ranks(self.sample[keys[place]]) for place in columns]) if columns else None
-        return Joint(len(keys), laws.copula(keys, pairs), rows, columns)
+        return Joint(len(keys), laws.copula(keys, pairs, self.home), rows, columns)
 
 
 def tables_of(path: Path, overrides: Sequence[str]) -> dict[str, Any]:
@@ -117,7 +146,23 @@ def tables_of(path: Path, overrides: Sequence[str]) -> dict[str, Any]:
 
 def read_case(path: Path, outputs: Sequence[str], overrides: Sequence[str]) -> Case:
     """A scene file with what is not known of it. Raises InputError, also where all is known."""
-    return case_of(str(path), tables_of(path, overrides), outputs)
+    case = case_of(str(path), tables_of(path, overrides), outputs)
+    check_overrides(overrides, case.every)
+    return case
+
+
+def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Mapping[str, str] = NOTHING) -> None:
+    """Raises InputError for overrides of a scene that no run has: of inputs, unless their laws multiply them, and of keys
+    ``fixed`` as something else."""
+    mend = "take one of them out, or multiply the value by times"
+    claims = {
+        each.key: f"the {each.law.law} law of this unknown input replaces it; {mend}"
+        for each in inputs
+        if each.law.times != each.key
+    }
+    claims |= {key: f"is {what}, whose value each run has; leave it out" for key, what in fixed.items()}
+    claimed = Claims({tuple(key.split(".")): reason for key, reason in claims.items()})
+    refuse(f"--set {each}: {reason}" for each in overrides if (reason := claimed.on(key_path(each))))
 
 
 def case_of(
@@ -125,26 +170,52 @@ def case_of(
     data: dict[str, Any],
     outputs: Sequence[str],
     declared: Uncertain | None = None,
-    fixed: frozenset[str] = frozenset(),
-    beside: Path | None = None,
+    fixed: Mapping[str, str] = NOTHING,
+    stated_in: Path | None = None,
 ) -> Case:
-    """Tables of a scene with what is not known of it; ``declared``, in the folder ``beside``, counts instead of the scene's
-    own, keys ``fixed`` vary otherwise. Raises InputError, also where all is known."""
+    """Tables of a scene with what is not known of it.
+
+    ``declared`` counts instead of the scene's own, with paths from the folder of the file that it is ``stated_in``; keys
+    ``fixed`` vary otherwise, each as what it says. Raises InputError, also where all is known.
+    """
     scene = rollers_only(Scene.from_dict(data, source))
     uncertain = declared or scene.uncertain or Uncertain()
-    folder = beside if declared and beside else Path(source).parent
-    sample = {} if uncertain.sample is None else read_sample(folder / uncertain.sample)
+    home = stated_in if declared and stated_in else Path(source)
+    sample = {} if uncertain.sample is None else read_sample(home.parent / uncertain.sample)
     ordered = ((key, [column[place] for place in np.argsort(laws.ranks(column))]) for key, column in sample.items())
-    found = {key: Sampled(tuple(column)) for key, column in ordered}
-    every = inputs_of(scene, data, uncertain, fixed, found)
+    columns = {key: Sampled(tuple(column)) for key, column in ordered}
+    # A run depends on no declaration; to check them all again at every input set would take long.
+    plain = {table: keys for table, keys in data.items() if table != "uncertain"}
+    case = Case(source, plain, scene, uncertain, [], tuple(outputs), sample, home=str(home))
+    refuse(f"{home}: {fault}" for fault in _set_faults(uncertain, fixed, sample))
+    every = inputs_of(case.ran, case.tables(), uncertain, fixed, columns, str(home))
     if not every:
-        mend = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
-        raise InputError([f"{source}: uncertain: nothing is unknown; {mend}"])
-    doubt = "" if uncertain.sample is None else _doubt(folder / uncertain.sample)
-    case = Case(source, data, scene, uncertain, every, tuple(outputs), sample, doubt)
+        fix = "name keys as \"table.key\" = {law = ...} or leave out defaults = 'none'"
+        raise InputError([f"{home}: uncertain: nothing is unknown; {fix}"])
+    keys = {each.key for each in every}
+    by_set = [each.key for each in inputs_of(case.ran, plain, uncertain, fixed, columns) if each.key not in keys]
+    idle = [key for key in uncertain.estimated if key not in keys | fixed.keys() and key not in by_set]
+    doubt = "" if uncertain.sample is None else _doubt(home.parent / uncertain.sample)
+    case = replace(case, every=every, doubt=doubt, remarks=tuple(_remarks(by_set, idle)))
     case.joint(every)
     refuse(impossible(case))
     return case
+
+
+def _set_faults(uncertain: Uncertain, fixed: Mapping[str, str], sample: Iterable[str]) -> list[str]:
+    """What ``set`` replaces in vain, because each run or each row of the sample has a value of its own."""
+    claims = {key: f"is {what}, whose value each run has; leave it out" for key, what in fixed.items()}
+    claims |= dict.fromkeys(sample, "is a column of the sample; keep one of them")
+    paths = {tuple(key.split(".")): reason for key, reason in claims.items()}
+    return assignment_faults("uncertain.set", uncertain.set, paths)
+
+
+def _remarks(by_set: Sequence[str], idle: Sequence[str]) -> Iterator[str]:
+    """Which keys would vary if ``set`` gave them no value, and which are called estimates but mean nothing in the scene."""
+    if by_set:
+        yield f"known by uncertain.set, so without their documented range: {', '.join(by_set)}"
+    if idle:
+        yield f"estimated, but without effect in this scene, so they do not vary: {', '.join(idle)}"
 
 
 def read_sample(path: Path) -> dict[str, list[Any]]:
@@ -171,22 +242,43 @@ def _doubt(sample: Path) -> str:
 
 
 def impossible(case: Case) -> Iterator[str]:
-    """What is wrong with the scene at an end of each declared law, one by one, and at rows of a sample with an end of a column."""
+    """What is wrong with the scene at an end of each declared law and at each choice, one by one, and at rows of a sample with
+    an end of a column; where nothing is, with input sets of all of them."""
+    faults = [*_impossible_rows(case), *_impossible_values(case)]
+    yield from faults
+    if faults:
+        return
+    sets = case.joint(case.every).sets(TRIED, case.uncertain.seed)
+    scenes = case.scenes(case.every, laws.table_of({each.key: each.law for each in case.every}, sets), 0)
+    why = [each for each in scenes if isinstance(each, str)]
+    if 2 * len(why) > TRIED:
+        yield f"{case.home}: uncertain: inputs are impossible together: {_bare(case, why[0])}; change their laws"
+
+
+def _impossible_rows(case: Case) -> Iterator[str]:
     sampled = [each for each in case.every if each.key in case.sample]
     ends = {row for each in sampled for row in np.argsort(laws.ranks(case.sample[each.key]))[[0, -1]].tolist()}
     for row in sorted(ends):
-        (found,) = case.scenes(sampled, [{each.key: case.sample[each.key][row] for each in sampled}], 0)
-        if isinstance(found, str):
-            yield f"{case.source}: uncertain.sample, row {row + 2}: {found.removeprefix(f'{case.source}: ')}; take the row out"
+        (scene,) = case.scenes(sampled, [{each.key: case.sample[each.key][row] for each in sampled}], 0)
+        if isinstance(scene, str):
+            yield f"{case.home}: uncertain.sample, row {row + 2}: {_bare(case, scene)}; take the row out"
+
+
+def _impossible_values(case: Case) -> Iterator[str]:
     for each in case.every:
         if each.key in case.sample or each.reason != "declared":
             continue
-        for value in dict.fromkeys(laws.values_of(each.law, ENDS)):
-            (found,) = case.scenes([each], [{each.key: value}], 0)
-            if isinstance(found, str):
-                why = found.removeprefix(f"{case.source}: ")
-                yield f'{case.source}: uncertain."{each.key}" at {shown(value)}: {why}; mend its law'
+        choices = each.law.values if each.law.law == "choices" else None
+        for value in choices or dict.fromkeys(laws.values_of(each.law, ENDS)):
+            (scene,) = case.scenes([each], [{each.key: value}], 0)
+            if isinstance(scene, str):
+                yield f'{case.home}: uncertain."{each.key}" at {shown(value)}: {_bare(case, scene)}; change its law'
                 break
+
+
+def _bare(case: Case, fault: str) -> str:
+    """A fault without the file of the scene."""
+    return fault.removeprefix(f"{case.source}: ")
 
 
 def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[str, float]]:
@@ -222,6 +314,8 @@ def run(
     """Run input sets, with overrides ``more`` for all and its ``own`` for each. Raises RunError where too many are impossible or fail, InputError, KeyboardInterrupt."""
     values = laws.table_of({each.key: each.law for each in inputs}, quantiles)
     scenes = case.scenes(inputs, values, case.scene.numerics.seed + clearance.INPUT_SEEDS + seeds, more, own)
+    lost = [scene for scene in scenes if isinstance(scene, str)]
+    check_holes(len(lost), len(scenes), (), lost)
     ran = outcomes(scenes, [f"{title} {place + 1}" for place in range(len(scenes))], simulations, title)
     good = [(place, result) for place, result in enumerate(ran) if not isinstance(result, Failure | str)]
     failures = tuple(result for result in ran if isinstance(result, Failure))

@@ -46,7 +46,7 @@ class Robust:
     """The judgement: ``responses`` with a goal, how likely each and all gains are, deciding inputs by worth, the two
     that are worth most together, how well inputs foretell each gain, by how much the chance of all gains changes with ranges
     half as wide, the front of points that hold over the inputs, None where the study wants none, what a screening left out,
-    the cost in runs, and what is to be doubted of a posterior sample."""
+    the cost in runs, and notes: what is to be doubted of a posterior sample, which keys do not vary."""
 
     responses: list[str]
     better: Better
@@ -61,7 +61,7 @@ class Robust:
     runs: int
     doubtful: int
     failures: tuple[Failure, ...]
-    doubt: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def declared(study: Study) -> bool:
@@ -131,7 +131,7 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     judged = better(gains, variances, seed), deciders, pair, found.foretold, found.halved, front
     cost = len(gains), spent, int(in_doubt(gains, variances).size)
     wanted = [study.responses[index] for index in goals.objectives]
-    return Robust(wanted, *judged, inputs, rest, *cost, failures, case.doubt)
+    return Robust(wanted, *judged, inputs, rest, *cost, failures, case.notes)
 
 
 def _case(study: Study) -> Case:
@@ -139,9 +139,10 @@ def _case(study: Study) -> Case:
     path = study.beside(study.scene.file)
     data = clearance.read_scene(study)
     for override in study.scene.set:
-        set_key(data, override)
-    fixed = frozenset(factor.key for factor in study.file.factor)
-    return case_of(str(path), data, study.responses, study.file.uncertain, fixed, beside=study.path.parent)
+        set_key(data, override, f"{study.path}: scene.set")
+    keys = *(factor.key for factor in study.file.factor), *(each.key for each in study.file.category)
+    fixed = dict.fromkeys(keys, "a factor of the study")
+    return case_of(str(path), data, study.responses, study.file.uncertain, fixed, study.path)
 
 
 def _read(case: Case, inputs: Sequence[Input], fresh: Array, seed: int) -> Array:

@@ -84,7 +84,7 @@ def find_uncertainty(
         name: _output(_quantity(nominal, name), spread, each, joint, seed)
         for name, spread, (_, each) in zip(OUTPUTS, spreads, fitted, strict=True)
     }
-    return Uncertainty(path, inputs, rest, outputs, sets, seed, _notes(case.doubt, sets, spreads, count, target))
+    return Uncertainty(path, inputs, rest, outputs, sets, seed, _notes(case.notes, sets, spreads, count, target))
 
 
 def _emulated(sets: Sets, nominal: SimulationResult, place: int) -> tuple[Runs, Emulated]:
@@ -108,8 +108,8 @@ def _output(nominal: Quantity, spread: Spread, fitted: Emulated, joint: Joint, s
     return OutputRange(nominal, spread, Indices(found.first[:-1], found.total[:-1]), floor=found.total[-1])
 
 
-def _notes(doubt: str, sets: Sets, spreads: Sequence[Spread], count: int, target: float) -> tuple[str, ...]:
-    notes = [doubt] if doubt else []
+def _notes(of_case: Sequence[str], sets: Sets, spreads: Sequence[Spread], count: int, target: float) -> tuple[str, ...]:
+    notes = [*of_case]
     lost = len(sets.failures) + len(sets.impossible)
     if lost:
         why = (*map(str, sets.failures), *sets.impossible)[0]

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from rbdyn.faults import Consistent
-from rbdyn.fields import LARGEST, Positive
+from rbdyn.fields import Number, Positive
 
 # A name that heads a column of a table: one field whoever writes or reads it.
 Name = Annotated[str, Field(max_length=100, pattern=r"""^[^\s,;"'\p{C}]([^,;"'\p{C}]*[^\s,;"'\p{C}])?$""")]
@@ -21,7 +21,7 @@ class Factor(Consistent):
     """Name of the factor in tables and messages."""
     key: Annotated[str, Field(min_length=3)] = ""
     """Its key in the scene, such as cage.pocket_clearance_mm; needed beside [scene]."""
-    centre: Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+    centre: Number
     """Value at coded 0."""
     step: Positive
     """Change of the value per coded unit."""
@@ -31,7 +31,7 @@ class Factor(Consistent):
     """Half width of what manufacture makes of it."""
     whole: bool = False
     """Whether only whole numbers are made, such as rollers; runs and pick are rounded to them."""
-    allowed: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    allowed: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
     """Ends as far as an adaptive search may go beyond the region of the design; not at all where left out."""
 
     def faults(self) -> Iterator[str]:

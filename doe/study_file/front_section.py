@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from rbdyn.faults import Consistent, Strict
-from rbdyn.fields import no_power_of_two
+from rbdyn.fields import Figure, Positive, no_power_of_two
 
 
 class Goal(Consistent):
@@ -14,15 +14,15 @@ class Goal(Consistent):
 
     goal: Literal["min", "max", "target", "none"] = "min"
     """What is wanted: small, large, near target, or nothing (watched, or held by its limits only)."""
-    target: float | None = None
+    target: Figure | None = None
     """Value to come near to, for goal = "target"."""
-    lower: float | None = None
+    lower: Figure | None = None
     """Limit that the response must not fall below."""
-    upper: float | None = None
+    upper: Figure | None = None
     """Limit that the response must not exceed."""
-    weight: Annotated[float, Field(gt=0.0)] = 1.0
+    weight: Positive = 1.0
     """Weight in the desirability and weights picks."""
-    desired: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    desired: Annotated[list[Figure], Field(min_length=2, max_length=2)] | None = None
     """Ends of the desirability: nil at one, full at the other (for a target nil at both)."""
 
     def faults(self) -> Iterator[str]:

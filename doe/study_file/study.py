@@ -1,6 +1,7 @@
 """STUDY.toml: which scene, factors, responses, front, chains. Checked before anything runs."""
 
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -16,8 +17,9 @@ from doe.study_file.chain_section import StudyChain
 from doe.study_file.design_section import Category, Design, Factor, Name
 from doe.study_file.front_section import Adaptive, Direct, Front, Goal, Robust, Tolerances
 from doe.study_file.table import COUNT, LABELS
-from rbdyn.faults import Consistent, InputError, Strict, read_toml, validated
-from rbdyn.scene.uncertain import Uncertain
+from rbdyn.faults import Consistent, InputError, Strict, assignment_faults, read_toml, validated
+from rbdyn.fields import Number
+from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
 
 
 class SceneFile(Strict):
@@ -26,7 +28,7 @@ class SceneFile(Strict):
     file: str
     """The scene file, beside the study."""
     set: list[str] = []
-    """Keys of the scene that are replaced for the design runs, as "key=value"."""
+    """Keys of the scene that are replaced for the design runs, as "key=value"; factors and seeds are none of them."""
 
 
 class Fitted(Strict):
@@ -100,7 +102,7 @@ class StudyFile(Consistent):
     """The widest tolerances of the factors about the pick; none where left out."""
     confirmation: Confirmation = Confirmation()
     """The simulation at the baseline and at the pick."""
-    baseline: dict[str, float] = {}
+    baseline: dict[str, Number] = {}
     """Values of the original design by factor; the centre where left out."""
     chain: list[StudyChain] = []
     """Dimension chains that the pick's clearances close."""
@@ -151,6 +153,34 @@ class StudyFile(Consistent):
             for chain in self.chain
             if chain.factor not in names
         ]
+        return [*faults, *self._key_faults(keys), *self._set_faults(keys)]
+
+    def _key_faults(self, keys: Sequence[str]) -> Iterator[str]:
+        """Factors that no run would have."""
+        tables = {tuple(path[:end]) for path in (key.split(".") for key in keys) for end in range(1, len(path))}
+        for key in keys:
+            path = tuple(key.split("."))
+            if reason := RUN_KEYS.on(path):
+                yield f"factor.key = {key!r}: {reason}"
+            elif path in tables:
+                yield f"factor.key = {key!r}: replaces the table of another factor's key; take one of them out"
+
+    def _set_faults(self, keys: Sequence[str]) -> list[str]:
+        """Assignments that no run would have, in each list of them."""
+        claims = {tuple(key.split(".")): "is a factor, whose value each run has; leave it out" for key in keys}
+        claims |= {("numerics", "seed"): SEEDS, ("uncertain",): DECLARATIONS, ("calibrate",): DECLARATIONS}
+        replicates = ("numerics", "replicates")
+        own: dict[str, dict[tuple[str, ...], str]] = {
+            "confirmation": {replicates: "confirmation.replicates says it; write it there"},
+            "direct": {replicates: "direct.replicates says it; write it there"},
+            "adaptive": {replicates: "the search chooses it for each run; leave it out"},
+        }
+        for name in ("turns", "discard_turns"):
+            if getattr(self.direct, name) is not None:
+                own["direct"][("numerics", name)] = f"direct.{name} says it; keep one of them"
+        faults = assignment_faults("scene.set", self.scene.set, claims) if self.scene else []
+        for name, more in own.items():
+            faults += assignment_faults(f"{name}.set", getattr(self, name).set, claims | more)
         return faults
 
 

@@ -23,7 +23,10 @@ def values_of(law: Law | Sampled, quantiles: Array) -> list[Any]:
         choices = law.values or []
         bounds = np.cumsum(_shares(law))[:-1]
         return [choices[int(place)] for place in np.searchsorted(bounds, quantiles, side="right")]
-    return _distribution(law).ppf(np.clip(quantiles, EDGE, 1.0 - EDGE)).tolist()
+    values = _distribution(law).ppf(np.clip(quantiles, EDGE, 1.0 - EDGE))
+    # Rounding may leave the range.
+    low, high = -np.inf if law.low is None else law.low, np.inf if law.high is None else law.high
+    return np.clip(values, low, high).tolist()
 
 
 def quantiles_of(law: Law, values: Sequence[Any]) -> Array:
@@ -54,24 +57,24 @@ def _distribution(law: Law) -> Any:
     return stats.uniform(low, high - low)
 
 
-def copula(names: Sequence[str], pairs: Sequence[Correlation]) -> Array | None:
+def copula(names: Sequence[str], pairs: Sequence[Correlation], source: str = "scene") -> Array | None:
     """Cholesky factor (d, d) of the normal correlations whose rank correlations are given; None where there are none.
 
-    A rank correlation rho is one of 2 sin(pi rho/6) of the normal scores (Pearson 1907). Raises InputError where the
-    correlations contradict each other.
+    A rank correlation rho is one of 2 sin(pi rho/6) of the normal scores (Pearson 1907). Raises InputError, which names the
+    ``source``, where the correlations contradict each other.
     """
     if not pairs:
         return None
-    matrix = np.eye(len(names))
+    matrix, places = np.eye(len(names)), {name: place for place, name in enumerate(names)}
     for pair in pairs:
-        i, j = (list(names).index(key) for key in pair.keys)
+        i, j = (places[key] for key in pair.keys)
         matrix[i, j] = matrix[j, i] = 2.0 * np.sin(np.pi * pair.rank / 6.0)
     try:
         return np.asarray(np.linalg.cholesky(matrix), float)
     except np.linalg.LinAlgError:
-        told = ", ".join(f"{' and '.join(pair.keys)} {pair.rank:g}" for pair in pairs)
+        ranks_of = ", ".join(f"{' and '.join(pair.keys)} {pair.rank:g}" for pair in pairs)
         why = "contradict each other; no inputs can go together so, bring them nearer to 0"
-        raise InputError([f"uncertain.correlation: {told}: {why}"]) from None
+        raise InputError([f"{source}: uncertain.correlation: {ranks_of}: {why}"]) from None
 
 
 def dependent(quantiles: Array, factor: Array | None) -> Array:

@@ -221,7 +221,7 @@ def _plural(values: str) -> str:
 
 def _range(node: Mapping[str, Any]) -> str:
     low, high = node.get("minimum"), node.get("maximum")
-    high = None if high is not None and high >= BOUNDLESS else high
+    low, high = (None if end is not None and abs(end) >= BOUNDLESS else end for end in (low, high))
     above, below = node.get("exclusiveMinimum"), node.get("exclusiveMaximum")
     parts = [f"from {low:g}" if low is not None else f"above {above:g}" if above is not None else ""]
     parts.append(f"to {high:g}" if high is not None else f"below {below:g}" if below is not None else "")

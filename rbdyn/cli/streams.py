@@ -8,9 +8,11 @@ import codecs
 import errno
 import io
 import os
+import re
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -23,6 +25,8 @@ PLAIN = {
 }  # fmt: skip
 # Time [s] after which a swallowed Ctrl-C is raised again.
 AGAIN_S = 0.05
+# A path in the text of a warning, and characters of it that are written.
+PATH, LONGEST_WARNING = re.compile(r"(?<!\w)(?:[A-Za-z]:)?[/\\][^\s/\\]+[/\\]\S+"), 300
 
 
 class _Losing(io.FileIO):
@@ -43,6 +47,7 @@ def run(app: Callable[[], object]) -> NoReturn:
     """Run a command to its exit code, whatever its streams are."""
     code: Any = 0
     out, swallowed = _standing(), _swallowed_interrupts()
+    _word_warnings()
     try:
         try:
             app()
@@ -64,6 +69,21 @@ def run(app: Callable[[], object]) -> NoReturn:
             # An interrupt that passed through ``exec`` would have the interpreter end by the signal, not by this code.
             os._exit(code)
     sys.exit(code)
+
+
+def _word_warnings() -> None:
+    """Let a library's warning be one sentence, written once: the line of the library that gave it helps no user."""
+    if sys.warnoptions:
+        return  # whoever asks Python for warnings wants them whole
+    texts = set[str]()
+
+    def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+        text = PATH.sub("...", " ".join(str(message).split()))[:LONGEST_WARNING]
+        if text not in texts:
+            texts.add(text)
+            print(f"warning: {text} ({category.__name__}); check the input for extreme numbers", file=sys.stderr)
+
+    warnings.showwarning = show
 
 
 def _swallowed_interrupts() -> list[object]:

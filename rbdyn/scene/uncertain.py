@@ -6,15 +6,15 @@ changes a run: they tell how the scenes around it differ.
 
 import functools
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from rbdyn.faults import Strict
-from rbdyn.fields import no_power_of_two, or_refuse
+from rbdyn.faults import LONGEST_NAME, Claims, Strict, assignment_faults, one_line
+from rbdyn.fields import SMALLEST, Number, Positive, no_power_of_two, or_refuse
 
 # What each law needs beside its name, and what it may have.
 NEEDS = {
@@ -36,6 +36,24 @@ RUNS = (
     "numerics.companion=false",
 )
 LEFT_OUT = "left out"
+# Tables of a scene that say nothing of the bearing, so that nobody can fail to know them.
+NO_INPUTS = ("numerics", "uncertain", "calibrate")
+# What decides keys that ``set`` of any list must leave alone.
+SEEDS = "every run has a seed of its own; leave it out"
+DECLARATIONS = "no run depends on it; write it in its own table"
+# Keys that neither factors of a study nor conditions of a rig can be.
+RUN_KEYS = Claims(
+    {
+        ("numerics", "seed"): "every run has a seed of its own; choose another key",
+        ("numerics", "replicates"): "each kind of run has its own number of them; choose another key",
+        ("uncertain",): "no run depends on it; choose another key",
+        ("calibrate",): "no run depends on it; choose another key",
+    }
+)
+# Ends of a range that are nearer than this share of them are lost in rounding, as is a deviation of less.
+FINEST = 1e-9
+# Standard deviations from the mean beyond which an end leaves nothing of a normal law, and the narrowest cut of one.
+FARTHEST, NARROWEST = 6.0, 1e-6
 
 
 class Law(Strict):
@@ -44,25 +62,26 @@ class Law(Strict):
     law: Literal["uniform", "log_uniform", "triangular", "normal", "choices"]
     """Distribution: uniform or log_uniform between low and high, triangular about mode, normal of mean and sd (cut at low
     and high where given), or choices among values."""
-    low: float | None = None
+    low: Number | None = None
     """Lowest value."""
-    high: float | None = None
+    high: Number | None = None
     """Highest value."""
-    mode: float | None = None
+    mode: Number | None = None
     """Likeliest value, of law = "triangular"."""
-    mean: float | None = None
+    mean: Number | None = None
     """Mean, of law = "normal"."""
-    sd: Annotated[float, Field(gt=0.0)] | None = None
+    sd: Positive | None = None
     """Standard deviation, of law = "normal"."""
-    values: Annotated[list[str | bool | int | float], Field(min_length=2, max_length=MOST_CHOICES)] | None = None
+    values: Annotated[list[str | bool | int | Number], Field(min_length=2, max_length=MOST_CHOICES)] | None = None
     """What there is to choose from, of law = "choices"; laws of the model are compiled once each."""
-    weights: list[Annotated[float, Field(gt=0.0)]] | None = None
+    weights: list[Positive] | None = None
     """How likely each of the values is, in proportion; equally where left out."""
     times: str | None = None
-    """Key whose value the numbers multiply; the key itself for a range about what the scene has there."""
+    """Key whose value the numbers multiply, a number other than 0; the key itself for a range about what the scene has
+    there."""
     kind: Literal["unknown", "varies"] = "unknown"
     """unknown: one true value, worth measuring; varies: differs from bearing to bearing or from day to day."""
-    measurable: Annotated[float, Field(gt=0.0)] | None = None
+    measurable: Positive | None = None
     """Standard deviation with which the value could be measured, in its unit."""
 
     @model_validator(mode="after")
@@ -70,26 +89,50 @@ class Law(Strict):
         needed = NEEDS[self.law]
         may = (*needed, *MAY.get(self.law, ()))
         given = {name for name in NUMBERS if getattr(self, name) is not None}
-        found = [f"{name}: missing; law = '{self.law}' needs it" for name in needed if name not in given]
-        found += [
+        faults = [f"{name}: missing; law = '{self.law}' needs it" for name in needed if name not in given]
+        faults += [
             f"{name}: law = '{self.law}' has none; leave it out"
             for name in NUMBERS
             if name in given and name not in may
         ]
+        faults += self._choice_faults() if self.law == "choices" else self._range_faults()
+        return or_refuse(self, faults or self._normal_faults())
+
+    def _choice_faults(self) -> Iterator[str]:
+        values = self.values or []
+        if self.weights is not None and len(self.weights) != len(values):
+            yield f"weights = {self.weights}: not one for each of the values; give as many"
+        if any(value in values[:place] for place, value in enumerate(values)):
+            yield f"values = {values}: name each value once; weights tell how likely it is"
+        if self.times is not None:
+            yield f"times = '{self.times}': choices are no numbers to multiply; leave it out"
+        if self.measurable is not None:
+            yield f"measurable = {self.measurable:g}: a choice is not measured to a deviation; leave it out"
+
+    def _range_faults(self) -> Iterator[str]:
         low, high, mode = self.low, self.high, self.mode
-        if low is not None and high is not None and not low < high:
-            found.append(f"low = {low:g}: not below high = {high:g}; exchange them")
-        elif None not in (low, high, mode) and not low <= mode <= high:  # type: ignore[operator]
-            found.append(f"mode = {mode:g}: not between low = {low:g} and high = {high:g}; mend it")
-        if self.law == "log_uniform" and low is not None and low <= 0.0:
-            found.append(f"low = {low:g}: law = 'log_uniform' needs a positive one; raise it")
-        if self.weights is not None and len(self.weights) != len(self.values or ()):
-            found.append(f"weights = {self.weights}: not one for each of the values; mend them")
-        if self.times is not None and self.law == "choices":
-            found.append(f"times = '{self.times}': choices are no numbers to multiply; leave it out")
-        if self.measurable is not None and self.law == "choices":
-            found.append(f"measurable = {self.measurable:g}: a choice is not measured to a deviation; leave it out")
-        return or_refuse(self, found)
+        if low is not None and high is not None:
+            if not low < high:
+                yield f"low = {low:g}: not below high = {high:g}; exchange them"
+            elif high - low < FINEST * max(abs(low), abs(high)):
+                yield f"low = {low!r}: high = {high!r} is too near to it to be told from it; widen the range"
+            elif mode is not None and not low <= mode <= high:
+                yield f"mode = {mode:g}: not between low = {low:g} and high = {high:g}; put it there"
+        if self.law == "log_uniform" and low is not None and low < SMALLEST:
+            yield f"low = {low:g}: law = 'log_uniform' needs a positive one, {SMALLEST:g} at least; raise it"
+
+    def _normal_faults(self) -> Iterator[str]:
+        """Whether the ends of a normal law leave enough of it, and rounding its deviation."""
+        low, high, mean, sd = self.low, self.high, self.mean, self.sd
+        if self.law != "normal" or mean is None or sd is None:
+            return
+        if sd < FINEST * abs(mean):
+            yield f"sd = {sd:g}: is lost in rounding beside mean = {mean:g}; raise it"
+        for name, end, beyond in (("low", low, 1.0), ("high", high, -1.0)):
+            if end is not None and beyond * (end - mean) > FARTHEST * sd:
+                yield f"{name} = {end:g}: is more than {FARTHEST:g} sd beyond mean = {mean:g}, where nothing is left; move it"
+        if low is not None and high is not None and high - low < NARROWEST * sd:
+            yield f"sd = {sd:g}: is over a million times as wide as low to high; write law = 'uniform'"
 
 
 @dataclass(frozen=True)
@@ -111,7 +154,7 @@ class Correlation(Strict):
     """Inputs that go together."""
 
     keys: Annotated[list[str], Field(min_length=2, max_length=2)]
-    """The two keys."""
+    """The two keys, each pair once."""
     rank: Annotated[float, Field(gt=-1.0, lt=1.0)]
     """Their rank correlation (Spearman's)."""
 
@@ -124,9 +167,9 @@ class Uncertain(Strict):
 
     defaults: Literal["documented", "none"] = "documented"
     """documented: keys left at their default, or named in estimated, vary over their documented range where their law is
-    switched on (rbdyn keys tells the ranges); none: only what is named here."""
+    switched on (rbdyn keys tells the ranges); none: only what is named here, in estimated or with a law."""
     estimated: list[str] = []
-    """Keys of the scene whose values are estimates: they vary over their documented range."""
+    """Keys of the scene whose values are estimates: they vary over their documented range, whatever defaults says."""
     points: Annotated[int, Field(ge=16, le=4096)] = 128
     """Input sets to start from, a power of two; more are added until the spread is known."""
     seed: Annotated[int, Field(ge=0)] = 1
@@ -135,7 +178,7 @@ class Uncertain(Strict):
     """Most inputs that vary: of more documented ones a screening keeps those that matter; declared ones all stay."""
     set: list[str] = list(RUNS)
     """Keys of the scene that are otherwise in the runs of input sets, as key=value: many short runs tell more of inputs
-    than few long ones."""
+    than few long ones. A key that stands here is known: it has neither a law nor its documented range."""
     sample: str | None = None
     """CSV of a posterior sample, a row an input set, whose columns are keys; replaces their laws. Its path is from the
     folder of this file."""
@@ -147,17 +190,60 @@ class Uncertain(Strict):
         """Law by key."""
         return self.__pydantic_extra__ or {}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _quoted(cls, data: Any) -> Any:
+        """A dotted key without quotes is a table within a table in TOML."""
+        tables = data.items() if isinstance(data, Mapping) else ()
+        faults = [
+            f'{table}.{key}: write the key in quotes, "{table}.{key}" = {{law = ...}}'
+            for table, keys in tables
+            if table not in cls.model_fields and isinstance(keys, Mapping) and "law" not in keys
+            for key, law in keys.items()
+            if isinstance(law, Mapping)
+        ]
+        return or_refuse(data, map(one_line, faults))
+
     @model_validator(mode="after")
     def _known(self) -> Self:
-        found = [f'{key}: no key of a scene; write "table.key"' for key in self.laws if "." not in key]
-        found += no_power_of_two("points = ", self.points)
-        found += [
-            f"correlation.keys: {key} has no law here; give it one"
-            for pair in self.correlation
-            for key in pair.keys
-            if key not in self.laws
+        names = {key: one_line(key, LONGEST_NAME) for key in self.laws}
+        faults = [f'{name}: no key of a scene; write "table.key"' for key, name in names.items() if "." not in key]
+        faults += [
+            f'"{name}": {key.partition(".")[0]} holds nothing that can be unknown of a bearing; take its law out'
+            for key, name in names.items()
+            if "." in key and key.partition(".")[0] in NO_INPUTS
         ]
-        return or_refuse(self, found)
+        faults += no_power_of_two("points = ", self.points)
+        return or_refuse(self, [*faults, *self._overlaps(), *self._correlation_faults(), *self._set_faults()])
+
+    def _overlaps(self) -> Iterator[str]:
+        """Laws of keys of which one is a table that holds the other."""
+        laws = self.laws
+        for key in laws:
+            parts = key.split(".")
+            for end in range(1, len(parts)):
+                if (table := ".".join(parts[:end])) in laws:
+                    yield f'"{key}": {table} has a law too, which replaces it; take one of them out'
+
+    def _correlation_faults(self) -> Iterator[str]:
+        laws, pairs = self.laws, set[frozenset[str]]()
+        for keys in (pair.keys for pair in self.correlation):
+            yield from (f"correlation.keys: {key} has no law here; give it one" for key in keys if key not in laws)
+            pair = frozenset(keys)
+            if len(pair) == 1:
+                yield f"correlation.keys = {keys}: a key always goes with itself; name two"
+            elif pair in pairs:
+                yield f"correlation.keys = {keys}: this pair is given twice; keep one"
+            pairs.add(pair)
+
+    def _set_faults(self) -> list[str]:
+        laws = [path for key in self.laws if (path := tuple(key.split(".")))[0] not in NO_INPUTS]
+        claims = dict.fromkeys(laws, "is an unknown input, which has a law here; keep one of them")
+        claims |= {
+            tuple(key.split(".")): "is an unknown input, named in estimated; keep one of them" for key in self.estimated
+        }
+        claims |= {("numerics", "seed"): SEEDS, ("uncertain",): DECLARATIONS, ("calibrate",): DECLARATIONS}
+        return assignment_faults("set", self.set, claims)
 
 
 class Calibrate(Strict):

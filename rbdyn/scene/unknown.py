@@ -1,19 +1,25 @@
 """Which inputs of a scene are not known, and the scene at values of them."""
 
-from collections.abc import Callable, Mapping
+import difflib
+import functools
+import types
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
-from rbdyn.faults import InputError, refuse
+from pydantic import BaseModel
+
+from rbdyn.faults import LONGEST_NAME, MOST_FAULTS, Claims, InputError, one_line, refuse
 from rbdyn.scene import Scene
-from rbdyn.scene.uncertain import LEFT_OUT, Law, Sampled, Uncertain, documented
+from rbdyn.scene.uncertain import LEFT_OUT, NO_INPUTS, Documented, Law, Sampled, Uncertain, documented
 
 # What a key is worth that is left out and follows from the rest, in its own unit.
-DERIVED: Mapping[str, Callable[[Scene], float]] = {
+DERIVED: Mapping[str, Callable[[Scene], float | None]] = {
     "cage.land_diameter_mm": lambda scene: scene.land_diameter_mm,
     "cage.inertia_kg_mm2": lambda scene: 1e6 * scene.geometry.cage_inertia,
     "cage.pocket_contact_length_mm": lambda scene: scene.bearing.effective_length_mm,
+    "cage.pocket_radial_clearance_mm": lambda scene: scene.cage.lip_clearance_mm,
     "lubricant.viscosity_mPas": lambda scene: 1e3 * scene.lubricant.in_service.viscosity,
     "lubricant.pressure_coefficient_1_GPa": lambda scene: 1e9 * scene.lubricant.in_service.pressure_coefficient,
 }
@@ -31,45 +37,129 @@ def inputs_of(
     scene: Scene,
     data: Mapping[str, Any],
     uncertain: Uncertain,
-    fixed: frozenset[str] = frozenset(),
+    fixed: Mapping[str, str] = MappingProxyType({}),
     sample: Mapping[str, Sampled] = MappingProxyType({}),
+    source: str = "scene",
 ) -> list[Input]:
     """Inputs of a scene that are not known, sorted by key: what is declared, and what is documented of the rest.
 
     ``data``: the tables that the scene was read from: what stands there is known unless it is named as estimated.
-    ``fixed``: keys that vary otherwise; ``sample``: those of a posterior sample. Raises InputError for keys that cannot vary.
+    ``fixed``: keys that vary otherwise, each with what it is; ``sample``: those of a posterior sample; ``source``: the file
+    that declares them. Raises InputError for keys that cannot vary.
     """
-    values, faults = plain_values(scene), []
-    ranges = {each.key: each for each in documented() if each.key in values and each.counts(values)}
-    for key in {**uncertain.laws, **sample}:
-        if key in fixed:
-            faults.append(f'uncertain."{key}": is a factor of the study too; take it out of one of them')
-        elif key in sample:
-            pairs = [pair.keys for pair in uncertain.correlation if key in pair.keys]
-            faults += [f'uncertain.correlation.keys = {keys}: "{key}" is in the sample; take it out' for keys in pairs]
-        elif (times := uncertain.laws[key].times) is not None:
-            if times != key and times in uncertain.laws and uncertain.laws[times].times is not None:
-                faults.append(f'uncertain."{key}".times = "{times}": is itself relative to another key; name that one')
-            elif not isinstance(value_of(scene, times), int | float):
-                faults.append(f'uncertain."{key}".times = "{times}": the scene has no number there; name another key')
+    keys = {**uncertain.laws, **sample}
     known = {each.key for each in documented()}
+    faults = _key_faults(keys)
+    others = Claims({tuple(key.split(".")): what for key, what in fixed.items()})
+    faults += [
+        f'uncertain."{key}": is {what} too; take it out of one of them'
+        for key in keys
+        if (what := others.on(tuple(key.split("."))))
+    ]
+    faults += [
+        f'uncertain.correlation.keys = {pair.keys}: "{key}" is in the sample; take it out'
+        for pair in uncertain.correlation
+        for key in pair.keys
+        if key in sample
+    ]
     faults += [
         f'uncertain.estimated: "{key}" has no documented range; write "{key}" = {{law = ...}}'
         for key in uncertain.estimated
         if key not in known
     ]
-    refuse(faults)
-    found = [Input(key, law, "declared") for key, law in uncertain.laws.items() if key not in sample]
-    found += [Input(key, values, "posterior sample") for key, values in sample.items()]
-    if uncertain.defaults == "documented":
-        found += [
-            Input(key, each.as_law, each.reason)
-            for key, each in ranges.items()
-            if key not in {*uncertain.laws, *sample, *fixed}
-            and not each.asked
-            and (key in uncertain.estimated or not _given(data, key))
-        ]
-    return sorted(found)
+    refuse(f"{source}: {fault}" for fault in faults)
+    inputs = [Input(key, law, "declared") for key, law in uncertain.laws.items() if key not in sample]
+    inputs += [Input(key, values, "posterior sample") for key, values in sample.items()]
+    inputs += [
+        Input(key, each.as_law, each.reason)
+        for key, each in ranges_of(scene).items()
+        if key not in keys
+        and others.on(tuple(key.split("."))) is None
+        and (
+            key in uncertain.estimated
+            or (uncertain.defaults == "documented" and not each.asked and not _given(data, key))
+        )
+    ]
+    refuse(f"{source}: {fault}" for fault in _times_faults(scene, inputs))
+    return sorted(inputs)
+
+
+def ranges_of(scene: Scene) -> dict[str, Documented]:
+    """Documented ranges that count for a scene, by key."""
+    values = plain_values(scene)
+    return {each.key: each for each in documented() if each.key in values and each.counts(values)}
+
+
+@functools.cache
+def value_keys() -> Mapping[str, bool]:
+    """Keys of a scene that say something of the bearing, by dotted name: whether a single value may stand there."""
+    return {key: one for key, one in _keys_of(Scene, "") if key.partition(".")[0] not in NO_INPUTS}
+
+
+def _keys_of(table: type[BaseModel], prefix: str) -> Iterator[tuple[str, bool]]:
+    for name, field in table.model_fields.items():
+        kinds = list(_kinds(field.annotation))
+        yield prefix + name, any(kind in (float, int, bool, str, Literal) for kind in kinds)
+        for kind in kinds:
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                yield from _keys_of(kind, f"{prefix}{name}.")
+
+
+def _kinds(annotation: Any) -> Iterator[Any]:
+    """What a field may hold, one by one; Literal for any choice of texts."""
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        yield from _kinds(parts[0])
+    elif origin in (Union, types.UnionType):
+        yield from (kind for part in parts for kind in _kinds(part))
+    else:
+        yield Literal if origin is Literal else annotation
+
+
+def _key_faults(keys: Iterable[str]) -> list[str]:
+    """A sentence for each key at which no law can give a value."""
+    faults, known = list[str](), value_keys()
+    for key in (key for key in keys if not known.get(key)):
+        name, table = one_line(key, LONGEST_NAME), key.partition(".")[0]
+        if table in NO_INPUTS:
+            faults.append(f"uncertain: {name}: {table} holds nothing that can be unknown of a bearing; take it out")
+        elif key in known:
+            faults.append(f"uncertain: {name}: holds more than one value; name a key of a single one")
+        else:
+            # To look for the nearest key takes a millisecond; beyond what is told nobody reads it.
+            alike = [each for each in known if each.startswith(f"{table}.")] or known
+            near = difflib.get_close_matches(name, alike, n=1) if len(faults) < MOST_FAULTS else []
+            faults.append(f"uncertain: {name}: unknown key; {f'did you mean {near[0]}?' if near else 'take it out'}")
+    return faults
+
+
+def _times_faults(scene: Scene, inputs: Iterable[Input]) -> Iterator[str]:
+    """A sentence for each input whose law multiplies what is no number, nothing, or itself by way of others."""
+    laws = {each.key: each.law for each in inputs}
+    seen = set[str]()
+    for key, law in laws.items():
+        if law.times is None:
+            continue
+        where = f'uncertain."{key}".times = "{one_line(law.times, LONGEST_NAME)}"'
+        base, other = value_of(scene, law.times) if value_keys().get(law.times) else None, laws.get(law.times)
+        if not is_number(base):
+            yield f"{where}: the scene has no number there; name another key"
+        elif base == 0.0:
+            yield f"{where}: the scene has 0 there, of which all multiples are 0; give a law without times"
+        elif other is not None and not all(map(is_number, getattr(other, "values", None) or ())):
+            yield f"{where}: the values of that key are no numbers; name another key"
+        way, at = set[str](), key
+        while at in laws and at not in seen and (base_key := laws[at].times) not in (None, at):
+            way.add(at)
+            seen.add(at)
+            at = str(base_key)
+        if at in way:
+            yield f'{where}: leads back to "{at}"; let one of these keys multiply no other'
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of a scene is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def with_values(
@@ -79,20 +169,44 @@ def with_values(
 
     Raises InputError where no scene has these values.
     """
-    tables, later = deepcopy(dict(data)), {}
-    for key, value in values.items():
-        base = laws[key].times
-        if base is None:
-            put(tables, key, value)
-        elif base != key and base in values:
-            put(tables, key, value * values[base])
-        else:
-            later[key] = base
-    # The rest multiplies what the scene has there, which may follow from the others.
-    scene = Scene.from_dict(tables, source) if later else None
-    for key, base in later.items():
-        put(tables, key, value_of(scene, base) * values[key])
+    tables, times = deepcopy(dict(data)), {key: laws[key].times for key in values}
+    numbers = {key: value for key, value in values.items() if times[key] is None}
+    relative = {key: base for key, base in times.items() if base is not None}
+    _multiply(tables, numbers, relative, values)
+    # What a scene is given comes first, for the rest may follow from it, though not from each other.
+    for late in (False, True):
+        roots = {
+            key: base
+            for key, base in relative.items()
+            if (base == key or base not in values) and late == (base in DERIVED and not _given(tables, base))
+        }
+        scene = Scene.from_dict(tables, source) if roots else None
+        numbers = {key: _number(scene, base, key, source) * values[key] for key, base in roots.items()}
+        relative = {key: base for key, base in relative.items() if key not in roots}
+        _multiply(tables, numbers, relative, values)
     return tables
+
+
+def _multiply(
+    tables: dict[str, Any], numbers: dict[str, Any], relative: dict[str, str], values: Mapping[str, Any]
+) -> None:
+    """Put ``numbers`` of keys into tables, and those of ``relative`` keys that multiply them, which are taken out there."""
+    while numbers:
+        for key, value in numbers.items():
+            put(tables, key, value)
+        products = {key: base for key, base in relative.items() if base != key and base in numbers}
+        for key in products:
+            del relative[key]
+        numbers = {key: values[key] * numbers[base] for key, base in products.items()}
+
+
+def _number(scene: Scene | None, base: str, key: str, source: str) -> float:
+    value = value_of(scene, base)
+    if not is_number(value):
+        raise InputError(
+            [f'{source}: uncertain."{key}".times = "{base}": the scene has no number there; name another key']
+        )
+    return float(value)
 
 
 def put(tables: dict[str, Any], key: str, value: Any) -> None:
@@ -107,10 +221,10 @@ def put(tables: dict[str, Any], key: str, value: Any) -> None:
 
 def value_of(scene: Scene | None, key: str) -> Any:
     """What a scene has at a dotted key, given, by default or worked out; None where there is nothing."""
-    found: Any = scene
+    value: Any = scene
     for part in key.split("."):
-        found = getattr(found, part, None)
-    return DERIVED[key](scene) if scene and found is None and key in DERIVED else found
+        value = getattr(value, part, None)
+    return DERIVED[key](scene) if scene and value is None and key in DERIVED else value
 
 
 def plain_values(scene: Scene) -> dict[str, Any]:

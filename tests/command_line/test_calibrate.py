@@ -71,6 +71,9 @@ def _run(arguments: Sequence[str]) -> Any:
         ({"uncertain": UNCERTAIN.replace("set =", "sample = 'old.csv'\nset =")}, "is what a calibration gives; leave it out"),
         ({"uncertain": UNCERTAIN + "[calibrate.discrepancy]\nwhirl = 0.1\n"}, "discrepancy: whirl is not measured"),
         ({"uncertain": UNCERTAIN + "[calibrate]\ndiscrepancy = 'some'\n"}, "calibrate.discrepancy"),
+        ({"uncertain": UNCERTAIN.replace("set = [", "set = ['operation.inner_speed_rpm=1e4', ")}, "is a column of"),
+        ({"header": HEADER.replace("operation.inner_speed_rpm", "numerics.seed")}, "column numerics.seed: every run has a seed"),
+        ({"header": HEADER.replace("operation.inner_speed_rpm", "calibrate.waves")}, "calibrate.waves: no run depends on it"),
     ],
 )  # fmt: skip
 def test_bad_input_ends_in_a_sentence_before_anything_runs(
@@ -88,6 +91,25 @@ def test_free_keys_need_a_law(tmp_path: Path) -> None:
         found.exit_code == 2
         and "--free bearing.rollers: has neither a law in uncertain nor a documented" in found.output
     )
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--free", "cage.imbalance_um"], "--free cage.imbalance_um: uncertain.set gives its value"),
+        (["--set", "operation.inner_speed_rpm=1e4"], "--set operation.inner_speed_rpm=1e4: is a column of"),
+        (["--set", "cage.mass_g=46.0"], "--set cage.mass_g=46.0: the uniform law of this unknown input replaces it"),
+    ],
+)
+def test_options_that_no_run_would_have_are_refused(tmp_path: Path, options: list[str], sentence: str) -> None:
+    """Unit: a key that ``set``, a law or the rig's table gives is neither sought nor set beside them."""
+    files = _files(tmp_path, UNCERTAIN.replace("set = [", "set = ['cage.imbalance_um=7.0', "))
+    found = _run([*files, *options])
+    assert found.exit_code == 2 and sentence in found.output
+    # What is not sought keeps the value that is set.
+    scene, _, rig, *_ = files
+    free = ["model.drag_coefficient"]
+    assert read_question(Path(scene), Path(rig), free, ["cage.mass_g=46.0"]).case.scene.cage.mass_g == 46.0
 
 
 def _signal(folder: Path, name: str, lines: Sequence[str]) -> Path:

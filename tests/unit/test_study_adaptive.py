@@ -61,7 +61,7 @@ def test_runs_that_drift_are_lengthened_to_twice_at_most_unless_the_study_says_s
     assert limits(written(tmp_path), 2, 5) == {2.0}
     own = ("batch = 6\n", 'batch = 6\nset = ["numerics.extend_limit=5"]\n')
     assert limits(written(tmp_path / "own", own), 4) == {5.0}
-    short = ('set = ["', 'set = ["numerics.extend_limit=1.5", "')
+    short = ('toml"\nset = ["', 'toml"\nset = ["numerics.extend_limit=1.5", "')
     assert limits(written(tmp_path / "short", short), 4) == {1.5}
 
 

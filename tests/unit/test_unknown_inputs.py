@@ -131,19 +131,19 @@ def test_bad_declarations(laws: dict[str, Any], sentence: str) -> None:
 @pytest.mark.parametrize(
     ("laws", "fixed", "sentence"),
     [
-        ({"cage.mass_g": {"law": "uniform", "low": 1.0, "high": 2.0}}, {"cage.mass_g"}, "is a factor of the study too"),
+        ({"cage.mass_g": {"law": "uniform", "low": 1.0, "high": 2.0}}, {"cage.mass_g": "a factor"}, "is a factor too"),
         (
             {"cage.mass_g": {"law": "uniform", "low": 1.0, "high": 2.0, "times": "cage.guidance"}},
-            set(),
+            {},
             "has no number there",
         ),
-        ({"estimated": ["cage.guidance"]}, set(), '"cage.guidance" has no documented range'),
+        ({"estimated": ["cage.guidance"]}, {}, '"cage.guidance" has no documented range'),
     ],
 )
-def test_keys_that_cannot_vary(laws: dict[str, Any], fixed: set[str], sentence: str) -> None:
+def test_keys_that_cannot_vary(laws: dict[str, Any], fixed: dict[str, str], sentence: str) -> None:
     data = read_toml(SCENE)
     with pytest.raises(InputError) as refused:
-        inputs_of(Scene.from_dict(data), data, _uncertain(**laws), frozenset(fixed))
+        inputs_of(Scene.from_dict(data), data, _uncertain(**laws), fixed)
     assert sentence in str(refused.value)
 
 

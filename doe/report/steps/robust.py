@@ -84,7 +84,7 @@ def robust_sentences(robust: Robust, factors: Sequence[str]) -> list[str]:
         _decision(robust),
         *_of_front(robust, factors),
         f"With ranges half as wide it would be better in all in about {100.0 * _halved(robust):.0f}.",
-        *([f"{robust.doubt}."] if robust.doubt else []),
+        *(f"{note}." for note in robust.notes),
     ]
 
 
