@@ -9,12 +9,13 @@ from rbdyn.properties.catalogue import Envelope, ball_interior, radial_clearance
 from rbdyn.properties.designation import CAGES, Designation
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.properties.oils import NamedOil
+from rbdyn.scene.laws import POLYMER_BAR_STIFFNESS
 
 # Glass-filled polyamide as [materials] takes it, and its density [g/mm^3]; a bar of it has 5e5 to 1e7 N/m.
 POLYAMIDE = (
     "{ elastic_modulus_GPa = 5.0, poisson_ratio = 0.35, density_kg_m3 = 1300.0, thermal_expansion_1e_6_K = 40.0 }"
 )
-POLYAMIDE_DENSITY, POLYAMIDE_BAR = 1.3e-3, 3e6
+POLYAMIDE_DENSITY = 1.3e-3
 # Where no suffix names a cage.
 USUAL_CAGE = "MA"
 # Share of the bearing's width; clearances in roller and pitch diameters. A cage is half a roller thick, as scenes estimate it.
@@ -140,7 +141,7 @@ def _cage(named: Designation, width: float, length: float, rollers: int, diamete
         "cage_mass": 0.5 * diameter * area * density,
         "land_width": max(round(0.5 * (across - length), 2), 0.5) if landed else None,
         "cage_material": POLYAMIDE if soft else json.dumps(material),
-        "bar_stiffness": POLYAMIDE_BAR if soft else None,
+        "bar_stiffness": POLYMER_BAR_STIFFNESS if soft else None,
         "bar_stiffness_by": "assumed: polyamide, 5e5 to 1e7",
     }
 

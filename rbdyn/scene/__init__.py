@@ -5,17 +5,17 @@ is compiled: ``rbdyn.dynamics.parameters.model`` turns a scene into the SI param
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Self, cast
 
-from pydantic import Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from rbdyn.faults import InputError
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
-from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics
+from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics, with_bar_stiffness_of_cage
 from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
 from rbdyn.scene.mounting import Mounting, material_of, misfits
 from rbdyn.scene.operation import Operation, Support
@@ -80,8 +80,14 @@ class Scene(SceneFile):
 
     @model_validator(mode="before")
     @classmethod
-    def _traction_of_oil(cls, data: Any) -> Any:
-        return with_traction_of_oil(data)
+    def _defaults_by_other_tables(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        tables = {
+            name: table.model_dump(exclude_unset=True) if isinstance(table, BaseModel) else table
+            for name, table in data.items()
+        }
+        return with_bar_stiffness_of_cage(with_traction_of_oil(tables))
 
     def faults(self) -> list[str]:
         """What does not go together, each with a slip of the unit that may be its cause."""

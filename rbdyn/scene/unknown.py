@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from rbdyn.faults import InputError, refuse
 from rbdyn.scene import Scene
-from rbdyn.scene.uncertain import LEFT_OUT, Law, Sampled, Uncertain, documented
+from rbdyn.scene.uncertain import LEFT_OUT, Documented, Law, Sampled, Uncertain, documented
 
 # What a key is worth that is left out and follows from the rest, in its own unit.
 DERIVED: Mapping[str, Callable[[Scene], float]] = {
@@ -39,8 +39,7 @@ def inputs_of(
     ``data``: the tables that the scene was read from: what stands there is known unless it is named as estimated.
     ``fixed``: keys that vary otherwise; ``sample``: those of a posterior sample. Raises InputError for keys that cannot vary.
     """
-    values, faults = plain_values(scene), []
-    ranges = {each.key: each for each in documented() if each.key in values and each.counts(values)}
+    ranges, faults = {each.key: each for each in documented_of(scene)}, []
     for key in {**uncertain.laws, **sample}:
         if key in fixed:
             faults.append(f'uncertain."{key}": is a factor of the study too; take it out of one of them')
@@ -121,6 +120,16 @@ def plain_values(scene: Scene) -> dict[str, Any]:
         if isinstance(keys, dict)
         for key, value in keys.items()
     }
+
+
+def documented_of(scene: Scene) -> list[Documented]:
+    """The documented ranges that count for a scene."""
+    values = plain_values(scene)
+    moduli = {
+        f"materials.{part}.elastic_modulus_GPa": 1e-9 * scene.material(part).elastic_modulus
+        for part in type(scene.materials).model_fields
+    }
+    return [each for each in documented() if each.key in values and each.counts({**values, **moduli})]
 
 
 def _given(data: Mapping[str, Any], key: str) -> bool:
