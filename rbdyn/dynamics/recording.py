@@ -10,11 +10,12 @@ from functools import partial
 import numpy as np
 
 from rbdyn.arrays import Array
-from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
+from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, REJECTED
+from rbdyn.dynamics.pace import Notice, Pace
 from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed, speed_sums
@@ -164,17 +165,27 @@ def record(run: Run) -> Replicate:
     return Recording(run).to(run.scene.numerics.turns)
 
 
-def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> Replicate:
+def run_replicate(
+    scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop, pace: Pace | None = None
+) -> Replicate:
     """Run one replicate, the transient included. Raises RunError or CancelledError."""
-    return record(Run(scene, bearing, replicate, rtol, stop))
+    return record(Run(scene, bearing, replicate, rtol, stop, pace))
 
 
 def run_series(
-    scene: Scene, bearing: RollerBearing, rtols: Sequence[float], workers: int | None, progress: Reporter, stop: Stop
+    scene: Scene,
+    bearing: RollerBearing,
+    rtols: Sequence[float],
+    workers: int | None,
+    progress: Reporter,
+    stop: Stop,
+    notice: Notice = None,
 ) -> list[list[Replicate]]:
     """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""
     replicates = range(scene.numerics.replicates)
-    tasks = [partial(run_replicate, scene, bearing, index, rtol, stop) for rtol in rtols for index in replicates]
+    turns = scene.numerics.warm_up_turns + scene.numerics.turns
+    pace = Pace(scene, notice, len(rtols) * len(replicates), turns, threads_of(workers))
+    tasks = [partial(run_replicate, scene, bearing, index, rtol, stop, pace) for rtol in rtols for index in replicates]
     runs: dict[int, Replicate] = {}
 
     def ended(one: Ended[Replicate]) -> None:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rbdyn.cli.ranges import MOST_VALUES
-from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
+from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
+from rbdyn.dynamics.pace import Notice, Pace, log
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_replicate
 from rbdyn.dynamics.run import prepare
@@ -94,9 +95,11 @@ def slip_map(
     workers: int | None = None,
     progress: Reporter = None,
     kept_in: Path | None = None,
+    notice: Notice = log,
 ) -> SlipMap:
     """Run the scene at every pair of inner speed and radial load; what lies in the file ``kept_in`` is not run again.
 
+    ``notice``: what to do with a sentence on long runs, as in ``simulate``.
     Raises InputError where a speed or load is impossible or the scene has a schedule, KeyboardInterrupt on Ctrl-C.
     """
     if scene.operation.schedule is not None:
@@ -138,7 +141,8 @@ def slip_map(
             progress(done, len(tasks))
 
     started = time.perf_counter()
-    work = [partial(run_replicate, scenes[place], bearings[place], i, rtol, stop) for place, rtol, i in tasks]
+    pace = Pace(scene, notice, len(tasks), numerics.warm_up_turns + numerics.turns, threads_of(workers))
+    work = [partial(run_replicate, scenes[place], bearings[place], i, rtol, stop, pace) for place, rtol, i in tasks]
     run_all(work, workers, stop, ended)
     wall_s = time.perf_counter() - started
     ordered = tuple(points[place] for place in range(len(scenes)))

@@ -168,7 +168,8 @@ class Numerics(Consistent):
     companion_share: Share = 0.25
     """Share of the replicates that companion repeats."""
     step_budget_per_turn: Annotated[int, Field(ge=100)] = 100_000
-    """Steps a shaft turn after which a run gives up, with where and why."""
+    """Steps a shaft turn after which a run gives up, with where and why. The default stands for about 1 s a turn of
+    10 rollers in one slice (8 us a step on one core) and 14 s of 80 rollers in 31 slices (0.14 ms a step)."""
 
     @property
     def warm_up_turns(self) -> float:
