@@ -273,7 +273,7 @@ def attempt(scene: Scene, stop: "Stop | None" = None, workers: int = 1) -> Ran:
     started = time.perf_counter()
     result, cause = None, None
     try:
-        result = simulate(scene, workers, None, stop).as_dict()
+        result = simulate(scene, workers, None, stop, notice=None).as_dict()
     except (CancelledError, MemoryError, OSError):
         raise
     except (RunError, InputError) as error:
@@ -310,7 +310,7 @@ def histories(study: Study, points: dict[str, Array], turns: float) -> "dict[str
 
     original = study.at(())
     scenes = {name: confirmation_scene(original if name == "baseline" else study, at) for name, at in points.items()}
-    return {name: history(scene, min(turns, scene.numerics.turns)) for name, scene in scenes.items()}
+    return {name: history(scene, min(turns, scene.numerics.turns), notice=None) for name, scene in scenes.items()}
 
 
 def draw_motion(motions: "Mapping[str, History]", folder: Path) -> list[str]:

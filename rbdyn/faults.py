@@ -6,6 +6,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import date, time
+from os import PathLike
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
@@ -95,6 +96,13 @@ def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:
     return line if len(line) <= longest else f"{line[: longest - longest // 3 - 3]}...{line[-(longest // 3) :]}"
 
 
+def path_of(given: Any) -> Path:
+    """A path as it was given. Raises InputError for what is none."""
+    if isinstance(given, str | PathLike):
+        return Path(given)
+    raise InputError([f"path = {one_line(repr(given), LONGEST_NAME)}: must be the path of a file; check the call"])
+
+
 def read_text(path: Path) -> str:
     """Text of a file in UTF-8, with or without a byte order mark. Raises InputError for any other."""
     try:
@@ -117,7 +125,7 @@ def read_text(path: Path) -> str:
 
 def read_toml(path: Path | str) -> dict[str, Any]:
     """Read a TOML file. Raises InputError when it is missing, unreadable or not TOML, or as `bounded` does."""
-    path = Path(path)
+    path = path_of(path)
     try:
         return _parsed(read_text(path), str(path))
     except tomllib.TOMLDecodeError as error:

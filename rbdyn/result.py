@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
-from rbdyn.faults import InputError, bounded, read_text
+from rbdyn.faults import InputError, bounded, path_of, read_text
 from rbdyn.records.record import Record, derived, json_fields, keyed
 from rbdyn.records.words import Brief, Figure, error_alone, quantity, value_alone
 
@@ -131,7 +131,7 @@ def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[
     """A ``what`` saved as JSON in the format ``form``, as ``restore`` makes it of that. Raises InputError when the file is
     missing or holds no such, or none that is whole.
     """
-    if not Path(path).is_file():
+    if not path_of(path).is_file():
         raise InputError([f"{path}: cannot be read (no such file); check the path"])
     text = read_text(Path(path))
     try:

@@ -64,7 +64,7 @@ def simulate(
         from rbdyn.dynamics.simulate import simulate as run_scene
 
         with terminal.progress_bar("simulating", quiet or as_json) as progress:
-            result = run_scene(loaded, workers, progress, target=aim)
+            result = run_scene(loaded, workers, progress, target=aim, notice=terminal.notice(quiet or as_json))
         loaded = type(loaded).from_dict(result.scene)
         files = _write(loaded, result, folder) if folder else []
         terminal.hand_over(result.as_dict, as_json, lambda: _print(result, quiet, verbose), folder, files)
@@ -179,7 +179,8 @@ def slip_map(
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
         points = folder / study.POINTS if folder else None
         with terminal.keeping(points), terminal.progress_bar("mapping", quiet or as_json) as progress:
-            mapped = study.slip_map(loaded, *axes, workers, progress, points)
+            say = terminal.notice(quiet or as_json)
+            mapped = study.slip_map(loaded, *axes, workers, progress, points, say)
         files = _write_map(mapped, folder) if folder else []
         terminal.hand_over(mapped.as_dict, as_json, lambda: _print_map(mapped), folder, files)
         for point in mapped.failed:
@@ -235,7 +236,7 @@ def _write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str
 
     result.save(folder / "result.json")
     turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
-    shown = history(scene, turns)
+    shown = history(scene, turns, notice=None)  # the simulation has stated its pace
     shown.table().to_csv(folder / "history.csv", index=False, float_format="%.6g")
     title = f"first {turns:g} counted shaft turns"
     plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
@@ -316,7 +317,7 @@ def show(
         request = motion.request_of(result, turns, replicate)
         folder = terminal.output_folder(out or request.path.parent / "show", "rbdyn show", request.path)
         with terminal.progress_bar("showing", quiet or as_json) as progress:
-            record = motion.write(request, folder, animate, lyapunov, progress)
+            record = motion.write(request, folder, animate, lyapunov, progress, terminal.notice(quiet or as_json))
         terminal.hand_over(
             lambda: record, as_json, lambda: motion.print_record(record, quiet, verbose), folder, record["files"]
         )

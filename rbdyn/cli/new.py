@@ -1,7 +1,6 @@
 """The command ``rbdyn new``. Physics is imported inside it, so that help comes at once."""
 
 import math
-import re
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,10 +9,11 @@ import typer
 
 from rbdyn.cli.options import Json, valued
 from rbdyn.cli.terminal import guarded, print_json
-from rbdyn.faults import InputError, one_line, refuse
+from rbdyn.faults import LONGEST_NAME, InputError, one_line, refuse
 
 if TYPE_CHECKING:
-    from rbdyn.properties.catalogue import Designation, Envelope
+    from rbdyn.properties.catalogue import Envelope
+    from rbdyn.properties.designation import Designation
 
 TEMPERATURE_C, OIL, CLEARANCE = 70.0, "ISO VG 68", "CN"
 LISTED = "as listed"
@@ -42,7 +42,7 @@ def new(
         str, typer.Option(metavar="NAME", help='"ISO VG 32 PAO", "grease VG 100", 23699, "Jet Oil II".')
     ] = OIL,
     temperature: Annotated[float, typer.Option(metavar="C", help="Temperature of the oil.")] = TEMPERATURE_C,
-    clearance: Annotated[str | None, valued("CLASS", "C2, CN, C3 or C4.", "of DESIGNATION, else CN")] = None,
+    clearance: Annotated[str | None, valued("CLASS", "C2, CN, C3, C4 or C5.", "of DESIGNATION, else CN")] = None,
     bore: Annotated[float | None, valued("MM", "Bore, where the table lacks the bearing.", LISTED)] = None,
     outside: Annotated[float | None, valued("MM", "Outside diameter.", LISTED)] = None,
     width: Annotated[float | None, valued("MM", "Width.", LISTED)] = None,
@@ -52,7 +52,7 @@ def new(
     with guarded(as_json):
         from rbdyn.cli import new_scene
         from rbdyn.cli.template import filled
-        from rbdyn.properties.catalogue import read_designation
+        from rbdyn.properties.designation import read_designation
         from rbdyn.properties.oils import oil_named
         from rbdyn.scene import Scene
 
@@ -60,12 +60,12 @@ def new(
         numbers = {"--speed": speed, "--load": load, "--preload": preload, "--temperature": temperature, **sizes}
         faults = [fault for name, value in numbers.items() if value is not None and (fault := _fault(name, value))]
         lubricant, named = _read(oil_named, "--oil", oil, faults), _read(read_designation, "DESIGNATION", words, faults)
+        chosen = None if clearance is None else _read(_class_named, "--clearance", clearance, faults)
         refuse(faults)
         assert lubricant is not None and named is not None
         rollers = named.kind == "cylindrical_roller"
-        refuse(_misfits(named, speed, preload, clearance))
-        of_suffix = re.search(r"\bC[234]\b", named.suffix)
-        wanted = clearance.upper() if clearance else of_suffix.group() if of_suffix else CLEARANCE
+        refuse(_misfits(named, speed, preload, chosen))
+        wanted = chosen or named.stated("clearance") or CLEARANCE
         point = new_scene.OperatingPoint(speed, load, preload, lubricant, temperature, wanted)
         fill = new_scene.roller_values if rollers else new_scene.ball_values
         values = _read(lambda text: fill(named, _envelope(named, sizes), point), "DESIGNATION", words, faults)
@@ -73,7 +73,11 @@ def new(
         template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
         text = filled(template.read_text(encoding="utf-8"), values)
         data = tomllib.loads(text)
-        refuse(getattr(Scene.from_dict(data, "rbdyn new"), "unit_notes", ()))
+        # What is wrong with an estimate comes from the sizes that were given.
+        typed = " ".join(f"{option} {value:g}" for option, value in sizes.items() if value is not None)
+        source = f"{typed}: estimated inside" if typed else f"DESIGNATION {named.name}"
+        notes = getattr(Scene.from_dict(data, source), "unit_notes", ())
+        refuse(f"{source}: {note}" for note in notes)
         if as_json:
             print_json(data)
         else:
@@ -88,8 +92,8 @@ def _fault(option: str, value: float) -> str | None:
         return None
     kelvin = value - 273.15
     meant = unit == "C" and least <= kelvin <= largest
-    mend = f"if {value:g} K are meant, write {kelvin:.4g}" if meant else "mend it"
-    return f"{option} {value:g}: must be from {least:g} to {largest:g} {unit}; {mend}"
+    remedy = f"if {value:g} K are meant, write {kelvin:.4g}" if meant else "fix it"
+    return f"{option} {value:g}: must be from {least:g} to {largest:g} {unit}; {remedy}"
 
 
 def _read(reader: Any, name: str, text: str, faults: list[str]) -> Any:
@@ -97,19 +101,34 @@ def _read(reader: Any, name: str, text: str, faults: list[str]) -> Any:
     try:
         return reader(text)
     except ValueError as error:
-        faults.append(f"{name} {one_line(text)}: {error}")
+        faults.append(f"{name} {one_line(text, LONGEST_NAME)}: {error}")
         return None
 
 
+def _class_named(text: str) -> str:
+    """A clearance class as the tables name it. Raises ValueError."""
+    from rbdyn.properties.catalogue import CLEARANCE_CLASSES
+
+    name = text.strip().upper()
+    if name not in CLEARANCE_CLASSES:
+        raise ValueError(f"is no clearance class; choose one of {', '.join(CLEARANCE_CLASSES)}")
+    return name
+
+
 def _misfits(named: "Designation", speed: float | None, preload: float | None, clearance: str | None) -> list[str]:
-    """Options that the bearing has no use for."""
-    faults, rollers = [], named.kind == "cylindrical_roller"
+    """Options that the bearing has no use for, or that contradict its designation."""
+    faults, rollers, of_suffix = [], named.kind == "cylindrical_roller", named.stated("clearance")
     if rollers and speed is not None and abs(speed) < 0.1:
         faults.append(f"--speed {speed:g}: a run is counted in shaft turns; give at least 0.1")
     if rollers and preload is not None:
         faults.append(f"--preload {preload:g}: is one of ball bearings; leave it out")
+    angular = "an angular contact bearing has a contact angle instead; leave it out"
     if named.kind == "angular_contact_ball" and clearance is not None:
-        faults.append(f"--clearance {clearance}: an angular contact bearing has a contact angle instead; leave it out")
+        faults.append(f"--clearance {clearance}: {angular}")
+    elif clearance is not None and of_suffix not in (None, clearance):
+        faults.append(f"--clearance {clearance}: contradicts {of_suffix} of {named.name}; leave one out")
+    if named.kind == "angular_contact_ball" and of_suffix is not None:
+        faults.append(f"DESIGNATION {named.name}: suffix {of_suffix}: {angular}")
     return faults
 
 
@@ -124,5 +143,5 @@ def _envelope(named: "Designation", sizes: dict[str, float | None]) -> "Envelope
         missing = ", ".join(option for option, value in sizes.items() if value is None)
         raise InputError([f"{missing}: missing; give all of {', '.join(sizes)} in mm, or none for a listed bearing"])
     if given[0] >= given[1]:
-        raise InputError([f"--bore {given[0]:g}: not below --outside {given[1]:g}; mend them"])
+        raise InputError([f"--bore {given[0]:g}: not below --outside {given[1]:g}; fix them"])
     return Envelope(*given)

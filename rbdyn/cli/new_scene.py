@@ -2,29 +2,21 @@
 
 import json
 import math
-import re
 from typing import Any, NamedTuple
 
 from rbdyn.life.roller_capacity import REFERENCE_SPEED_FACTOR
-from rbdyn.properties.catalogue import Designation, Envelope, ball_interior, radial_clearance, roller_interior
+from rbdyn.properties.catalogue import Envelope, ball_interior, radial_clearance, roller_interior
+from rbdyn.properties.designation import CAGES, Designation
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.properties.oils import NamedOil
+from rbdyn.scene.laws import POLYMER_BAR_STIFFNESS
 
 # Glass-filled polyamide as [materials] takes it, and its density [g/mm^3]; a bar of it has 5e5 to 1e7 N/m.
 POLYAMIDE = (
     "{ elastic_modulus_GPa = 5.0, poisson_ratio = 0.35, density_kg_m3 = 1300.0, thermal_expansion_1e_6_K = 40.0 }"
 )
-POLYAMIDE_DENSITY, POLYAMIDE_BAR = 1.3e-3, 3e6
-# Suffixes of cages: what guides them, what they are made of.
-CAGES = {
-    "MA": ("outer", "brass"),
-    "ML": ("outer", "brass"),
-    "MB": ("inner", "brass"),
-    "M": ("roller", "brass"),
-    "P": ("roller", "polyamide"),
-    "TVP2": ("roller", "polyamide"),
-    "J": ("roller", "aisi_4340"),
-}
+POLYAMIDE_DENSITY = 1.3e-3
+# Where no suffix names a cage.
 USUAL_CAGE = "MA"
 # Share of the bearing's width; clearances in roller and pitch diameters. A cage is half a roller thick, as scenes estimate it.
 CAGE_WIDTH, POCKET_CLEARANCE, GUIDE_CLEARANCE, SMALLEST_CLEARANCE_MM = 0.95, 0.03, 0.004, 0.05
@@ -104,6 +96,7 @@ def _common(named: Designation, sizes: Envelope, point: OperatingPoint, referenc
     load = float(f"{USUAL_LOAD * capacity:.2g}") if load is None else load
     return {
         "name": named.name,
+        "without_effect": named.without_effect or None,
         "kind": named.kind,
         "bore": sizes.bore,
         "outside": sizes.outside,
@@ -132,8 +125,8 @@ def _clearance(bore: float, name: str, kind: str) -> Values:
 
 def _cage(named: Designation, width: float, length: float, rollers: int, diameter: float, pitch: float) -> Values:
     """A cage of the kind that the suffix names, about the pitch circle."""
-    suffix = re.sub(r"^(EC|E)", "", named.suffix.split(" ")[0])
-    guidance, material = CAGES.get(suffix, CAGES[USUAL_CAGE])
+    suffix = named.stated("cage")
+    guidance, material = CAGES[suffix or USUAL_CAGE]
     soft, landed = material == "polyamide", guidance != "roller"
     density = POLYAMIDE_DENSITY if soft else 1e-6 * MATERIALS[material].density
     pocket = max(round(POCKET_CLEARANCE * diameter, 2), SMALLEST_CLEARANCE_MM)
@@ -141,14 +134,14 @@ def _cage(named: Designation, width: float, length: float, rollers: int, diamete
     area = math.pi * pitch * across - rollers * (diameter + pocket) * length
     guide = max(round(GUIDE_CLEARANCE * pitch, 2), SMALLEST_CLEARANCE_MM)
     return {
-        "cage_by": f"{'as the suffix tells' if suffix in CAGES else 'assumed'}: {material}, guided by the {guidance}{' ring' if landed else 's'}",
+        "cage_by": f"{f'of suffix {suffix}' if suffix else 'assumed'}: {material}, guided by the {guidance}{' ring' if landed else 's'}",
         "guidance": guidance,
         "guide_clearance": guide if landed else None,
         "pocket_clearance": pocket,
         "cage_mass": 0.5 * diameter * area * density,
         "land_width": max(round(0.5 * (across - length), 2), 0.5) if landed else None,
         "cage_material": POLYAMIDE if soft else json.dumps(material),
-        "bar_stiffness": POLYAMIDE_BAR if soft else None,
+        "bar_stiffness": POLYMER_BAR_STIFFNESS if soft else None,
         "bar_stiffness_by": "assumed: polyamide, 5e5 to 1e7",
     }
 

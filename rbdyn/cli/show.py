@@ -18,6 +18,7 @@ from rbdyn.scene import Scene
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
     from rbdyn.dynamics.motion.orbit import Largest, Race, Spectrum
+    from rbdyn.dynamics.pace import Notice
 
 FORMAT = "rbdyn.orbit/1"
 SHOWN_TURNS = 20.0
@@ -74,12 +75,17 @@ def request_of(path: Path, turns: float | None, replicate: int) -> Request:
 
 
 def write(
-    request: Request, folder: Path, animate: bool, lyapunov: bool, progress: Callable[[int, int], None]
+    request: Request,
+    folder: Path,
+    animate: bool,
+    lyapunov: bool,
+    progress: Callable[[int, int], None],
+    notice: "Notice" = None,
 ) -> dict[str, Any]:
     """Compute the motion, write everything into ``folder``; returns the record that is also in orbit.json."""
     from rbdyn.dynamics.motion.history import history
 
-    motion = history(request.scene, request.turns, request.replicate)
+    motion = history(request.scene, request.turns, request.replicate, notice=notice)
     tasks: dict[str, Callable[[Path], object]] = {
         "history.csv": partial(motion.table().to_csv, index=False, float_format="%.6g"),
         **_pictures(request, motion),

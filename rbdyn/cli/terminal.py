@@ -122,6 +122,11 @@ def progress_bar(title: str, quiet: bool) -> Iterator[Callable[[int, int], None]
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
+def notice(quiet: bool) -> Callable[[str], None] | None:
+    """What prints a sentence while a command runs, to standard error; nothing where it is to be quiet."""
+    return None if quiet else lambda sentence: print(f"note: {sentence}", file=sys.stderr)
+
+
 def print_notes(notes: Iterable[str], quiet: bool) -> None:
     """A line a note, unless ``quiet``."""
     for note in () if quiet else notes:

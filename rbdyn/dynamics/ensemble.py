@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Generic, TypeVar
 
-from rbdyn.faults import RunError
+from rbdyn.faults import LONGEST_NAME, InputError, RunError, one_line
 
 T = TypeVar("T")
 # Told (done, total) as something goes on, where anybody asks.
@@ -58,6 +58,16 @@ class Ended(Generic[T]):
         return self.found
 
 
+def threads_of(workers: int | None) -> int:
+    """Number of threads: as given, else all processors. Raises InputError for what is no such number."""
+    if workers is None:
+        return os.cpu_count() or 1
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        what = f"workers = {one_line(repr(workers), LONGEST_NAME)}: must be a whole number from 1"
+        raise InputError([f"{what}; leave it out for all processors"])
+    return workers
+
+
 def run_all(
     runs: Iterable[Callable[[], T]],
     workers: int | None,
@@ -70,7 +80,7 @@ def run_all(
     the order in which they are drawn. Whatever is raised, by ``runs``, ``ended`` or Ctrl-C, stops the others
     at their next look at ``stop`` and is raised on; on Ctrl-C what has ended by then is handed over first.
     """
-    workers = workers or os.cpu_count() or 1
+    workers = threads_of(workers)
     pool = ThreadPoolExecutor(workers)
     first, rest, places = deque[Callable[[], T]](), iter(runs), count()
     pending: dict[Future[T], tuple[int, Callable[[], T]]] = {}

@@ -11,11 +11,12 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.dynamics.companions import Companions
-from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
+from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, REJECTED
+from rbdyn.dynamics.pace import Notice, Pace
 from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed, speed_sums
@@ -161,13 +162,13 @@ class Recording:
 
 
 def recording_of(
-    scene: Scene, bearing: RollerBearing, replicate: int, companions: Companions | None, stop: Stop
+    scene: Scene, bearing: RollerBearing, pace: Pace | None, replicate: int, companions: Companions | None, stop: Stop
 ) -> Recording:
     """The recording of a replicate, or of the companion of it that is integrated so."""
     if companions is None:
-        return Recording(Run(scene, bearing, replicate, scene.numerics.rtol, stop))
+        return Recording(Run(scene, bearing, replicate, scene.numerics.rtol, stop, pace))
     companion = with_numerics(scene, method=companions.method)
-    return Recording(Run(companion, bearing, replicate, companions.rtol, stop, companions.longest_step))
+    return Recording(Run(companion, bearing, replicate, companions.rtol, stop, pace, companions.longest_step))
 
 
 def record(run: Run) -> Replicate:
@@ -176,23 +177,38 @@ def record(run: Run) -> Replicate:
 
 
 def run_one(
-    scene: Scene, bearing: RollerBearing, replicate: int, companions: Companions | None, stop: Stop
+    scene: Scene,
+    bearing: RollerBearing,
+    replicate: int,
+    companions: Companions | None,
+    stop: Stop,
+    pace: Pace | None = None,
 ) -> Replicate:
     """Run a replicate, or the companion of it, the transient included. Raises RunError or CancelledError."""
-    return recording_of(scene, bearing, replicate, companions, stop).to(scene.numerics.turns)
+    return recording_of(scene, bearing, pace, replicate, companions, stop).to(scene.numerics.turns)
 
 
-def run_replicate(scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop) -> Replicate:
+def run_replicate(
+    scene: Scene, bearing: RollerBearing, replicate: int, rtol: float, stop: Stop, pace: Pace | None = None
+) -> Replicate:
     """Run one replicate, the transient included. Raises RunError or CancelledError."""
-    return record(Run(scene, bearing, replicate, rtol, stop))
+    return record(Run(scene, bearing, replicate, rtol, stop, pace))
 
 
 def run_series(
-    scene: Scene, bearing: RollerBearing, rtols: Sequence[float], workers: int | None, progress: Reporter, stop: Stop
+    scene: Scene,
+    bearing: RollerBearing,
+    rtols: Sequence[float],
+    workers: int | None,
+    progress: Reporter,
+    stop: Stop,
+    notice: Notice = None,
 ) -> list[list[Replicate]]:
     """All replicates of a scene at each tolerance, in order. Raises RunError or KeyboardInterrupt."""
     replicates = range(scene.numerics.replicates)
-    tasks = [partial(run_replicate, scene, bearing, index, rtol, stop) for rtol in rtols for index in replicates]
+    turns = scene.numerics.warm_up_turns + scene.numerics.turns
+    pace = Pace(scene, notice, len(rtols) * len(replicates), turns, threads_of(workers))
+    tasks = [partial(run_replicate, scene, bearing, index, rtol, stop, pace) for rtol in rtols for index in replicates]
     runs: dict[int, Replicate] = {}
 
     def ended(one: Ended[Replicate]) -> None:

@@ -15,6 +15,7 @@ from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators.advance import advance
 from rbdyn.dynamics.integrators.method import EXPLICIT, cheaper_method, explicit_method, method_of
 from rbdyn.dynamics.integrators.records import Control, Status, carry_from, empty_tally
+from rbdyn.dynamics.pace import Pace
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of, scales
 from rbdyn.dynamics.parameters.start import start_state
 from rbdyn.faults import RunError
@@ -30,7 +31,7 @@ class Run:
     """One replicate under way: parameters, integrator memory and where it stands.
 
     ``longest_step`` [s] bounds the steps of explicit methods. ``method``: "auto" until its first step, where the scene
-    leaves it open.
+    leaves it open; ``spent_s``: time that its steps took; ``pace``: what states the time that this and its like take.
     """
 
     def __init__(
@@ -40,9 +41,11 @@ class Run:
         replicate: int,
         rtol: float,
         stop: Stop,
+        pace: Pace | None = None,
         longest_step: float = math.inf,
     ) -> None:
         self.scene, self.bearing, self.replicate, self.stop = scene, bearing, replicate, stop
+        self.pace, self.spent_s = pace, 0.0
         self.rtol, self.longest_step = rtol, longest_step
         self.layout = layout_of(scene)
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
@@ -86,12 +89,16 @@ class Run:
 
     def to(self, turns: float) -> None:
         """Advance to a time given in shaft turns since the start. Raises RunError or CancelledError."""
+        started = time.perf_counter() - self.spent_s
         self.choose_method()
         budget, end = self.control.step_budget, turns * self.scene.turn_s
         while True:
             self.stop.check()
             short = self.control._replace(step_budget=min(self.steps + STEPS_AT_ONCE, budget))
             status = list(Status)[advance(self.bearing, short, self.carry, self.tally, end, self.sample_step)]
+            self.spent_s = time.perf_counter() - started
+            if self.pace is not None:
+                self.pace.look(self.spent_s, self.carry.clock[at.NOW] / self.scene.turn_s, self.steps, budget)
             if status is Status.FINISHED:
                 return
             if status is not Status.STEP_BUDGET or self.steps >= budget:
@@ -119,7 +126,7 @@ class Run:
         time_s = self.carry.clock[at.NOW]
         message, remedy = status.value
         component, step = name(int(self.carry.counts[at.WORST]), self.layout), self.carry.clock[at.STEP]
-        message = message.format(component=component, step=step, **self.control._asdict())
+        message = message.format(component=component, step=step, spent_s=self.spent_s, **self.control._asdict())
         explicit = status is Status.STEP_BUDGET and self.scene.numerics.method in EXPLICIT
         where = f"replicate {self.replicate + 1} (seed {self.scene.numerics.seed}) stopped at t = {time_s:.6g} s"
         why = f"shaft turn {time_s / self.scene.turn_s:.4g}: {message}"

@@ -2,24 +2,26 @@
 
 import time
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rbdyn.dynamics.companions import TIGHT
-from rbdyn.dynamics.ensemble import Reporter, Stop
+from rbdyn.dynamics.ensemble import Reporter, Stop, threads_of
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
 from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
+from rbdyn.dynamics.pace import Notice, Pace, log
 from rbdyn.dynamics.parameters.left_out import heat_notes, left_out_notes, light_load_notes
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.race_report import race_notes, race_report
 from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import prepare
-from rbdyn.dynamics.settling import Ensemble, run_until_settled
+from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.metrics import work_done
 from rbdyn.result import SimulationResult, versions
-from rbdyn.scene import Scene
+from rbdyn.scene import Scene, rollers_only
 
 # Beyond this relative gap of the power balance a result warns of its tolerance.
 LARGEST_POWER_GAP = 0.005
@@ -36,23 +38,26 @@ def _types(parameters: Any) -> Any:
 
 
 def simulate(
-    scene: Scene,
+    scene: Scene | Path | str,
     workers: int | None = None,
     progress: Reporter = None,
     stop: Stop | None = None,
     target: float | None = None,
+    notice: Notice = log,
 ) -> SimulationResult:
-    """Simulate all replicates of a scene.
+    """Simulate all replicates of a scene, which may be the path of its file.
 
     ``workers``: threads, all processors by default; the result does not depend on it. ``progress(done, total)`` is
     called after every run. ``target``: relative error to reach, for which tolerance, turns and replicates are chosen
-    (``rbdyn.dynamics.target``). Raises RunError when a replicate cannot go on, InputError for an impossible target,
-    KeyboardInterrupt on Ctrl-C.
+    (``rbdyn.dynamics.target``). ``notice(sentence)`` is called early where the runs take minutes at their pace; a warning of
+    the logger "rbdyn" unless given, None for silence. Raises RunError when a replicate cannot go on, InputError for what is
+    no roller bearing and for an impossible target or number of workers, KeyboardInterrupt on Ctrl-C.
     """
+    scene = rollers_only(scene)
     if target is not None:
         from rbdyn.dynamics.target import reach
 
-        return reach(scene, target, simulate, workers, progress, stop)
+        return reach(scene, target, partial(simulate, notice=notice), workers, progress, stop, notice)
     stop = Stop(outer=stop)
     bearing = roller_bearing(scene)
     compile_s = 0.0
@@ -61,8 +66,13 @@ def simulate(
         compile_s = prepare(scene, bearing)
         _prepared.add(laws)
     started = time.perf_counter()
+    numerics = scene.numerics
+    extends = numerics.extend and scene.operation.schedule is None
+    turns = numerics.warm_up_turns + (whole_windows(scene) if extends else numerics.turns)
+    growth = numerics.extend_limit if extends else 1.0
+    pace = Pace(scene, notice, numerics.replicates + numerics.companions, turns, threads_of(workers), growth)
 
-    ensemble = run_until_settled(scene, partial(recording_of, scene, bearing), workers, progress, stop)
+    ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, stop)
     wall_s = time.perf_counter() - started
     return _gather(scene, ensemble, wall_s, compile_s)
 

@@ -14,8 +14,9 @@ import numpy as np
 
 from rbdyn.cli.ranges import MOST_VALUES
 from rbdyn.dynamics.companions import Companions, companions_of
-from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
+from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing
+from rbdyn.dynamics.pace import Notice, Pace, log
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare
@@ -98,7 +99,7 @@ class Job:
     def __call__(self) -> Replicate:
         """Make it. Raises RunError or CancelledError."""
         point = self.series
-        return run_one(point.scene, point.bearing, self.replicate, self.companions, point.stop)
+        return run_one(point.scene, point.bearing, self.replicate, self.companions, point.stop, point.pace)
 
 
 class Series:
@@ -107,8 +108,8 @@ class Series:
     ``waiting``: how many of those begun have not ended; ``left_out``: companions that were not begun.
     """
 
-    def __init__(self, place: int, scene: Scene, bearing: RollerBearing, stop: Stop) -> None:
-        self.place, self.scene, self.bearing, self.stop = place, scene, bearing, stop
+    def __init__(self, place: int, scene: Scene, bearing: RollerBearing, stop: Stop, pace: Pace) -> None:
+        self.place, self.scene, self.bearing, self.stop, self.pace = place, scene, bearing, stop, pace
         self.waiting, self.left_out = scene.numerics.replicates, scene.numerics.companions
         self.plan: Companions | None = None
         self.runs: dict[tuple[Companions | None, int], Replicate] = {}
@@ -156,9 +157,11 @@ def slip_map(
     workers: int | None = None,
     progress: Reporter = None,
     kept_in: Path | None = None,
+    notice: Notice = log,
 ) -> SlipMap:
     """Run the scene at every pair of inner speed and radial load; what lies in the file ``kept_in`` is not run again.
 
+    ``notice``: what to do with a sentence on long runs, as in ``simulate``.
     Raises InputError where a speed or load is impossible or the scene has a schedule, KeyboardInterrupt on Ctrl-C.
     """
     if scene.operation.schedule is not None:
@@ -173,8 +176,9 @@ def slip_map(
     for place in list(bearings)[:1]:
         prepare(scenes[place], bearings[place])
     numerics, stop = scene.numerics, Stop()
-    series = [Series(place, scenes[place], bearings[place], stop) for place in bearings]
-    total, done = len(series) * (numerics.replicates + numerics.companions), 0
+    total, done = len(bearings) * (numerics.replicates + numerics.companions), 0
+    pace = Pace(scene, notice, total, numerics.warm_up_turns + numerics.turns, threads_of(workers))
+    series = [Series(place, scenes[place], bearings[place], stop, pace) for place in bearings]
 
     def ended(one: Ended[Replicate]) -> list[Job]:
         nonlocal done

@@ -19,6 +19,7 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Reporter, Stop
+from rbdyn.dynamics.pace import Notice
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
@@ -26,7 +27,7 @@ from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.bias import bias_scale, companion_tolerance
 from rbdyn.dynamics.statistics.error_bars import FIGURES, after_transient
 from rbdyn.dynamics.statistics.metrics import Replicate, mean_gap, work_done
-from rbdyn.faults import InputError
+from rbdyn.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
@@ -65,6 +66,8 @@ def target_of(text: str) -> float:
 
 def checked(target: float, shown: str | None = None) -> float:
     """The target. Raises InputError unless it is a fraction above 0 and at most a half."""
+    if isinstance(target, bool) or not isinstance(target, int | float):
+        raise InputError([f"target = {one_line(repr(target), LONGEST_NAME)}: must be a number such as 0.02"])
     if not 0.0 < target <= LARGEST_TARGET:
         what = f"--target {shown or f'{target:g}'}: must be above 0 and at most {100.0 * LARGEST_TARGET:g} %"
         raise InputError([f"{what}; write it as 2% or 0.02"])
@@ -114,6 +117,7 @@ def reach(
     workers: int | None = None,
     progress: Reporter = None,
     stop: Stop | None = None,
+    notice: Notice = None,
 ) -> SimulationResult:
     """``simulate`` until the total relative 95 % error of impact force, whirl ratio and power loss is at most ``target``.
 
@@ -122,7 +126,7 @@ def reach(
     InputError, RunError, KeyboardInterrupt.
     """
     checked(target)
-    model, pilots = measure(scene, workers, progress, stop)
+    model, pilots = measure(scene, workers, progress, stop, notice)
     spent = Counter(pilots)
     shortest, longest = 0.0, MOST_TURNS
     runs, met = 0, False
@@ -166,14 +170,16 @@ def quantities_of(result: SimulationResult) -> dict[str, Quantity]:
     return dict(zip(AIMED, figures, strict=True))
 
 
-def measure(scene: Scene, workers: int | None, progress: Reporter, stop: Stop | None) -> tuple[Model, dict[str, float]]:
+def measure(
+    scene: Scene, workers: int | None, progress: Reporter, stop: Stop | None, notice: Notice = None
+) -> tuple[Model, dict[str, float]]:
     """Pilots over the ladder of tolerances: what they tell, and what they cost (``ADDED``). Raises RunError."""
     turns = max(PILOT_WINDOWS * scene.numerics.impact_window_turns, PILOT_TURNS)
     pilot = with_numerics(scene, turns=turns, replicates=PILOT_REPLICATES)
     bearing = roller_bearing(pilot)
     compile_s = prepare(pilot, bearing)
     started = time.perf_counter()
-    series = run_series(pilot, bearing, LADDER, workers, progress, Stop(outer=stop))
+    series = run_series(pilot, bearing, LADDER, workers, progress, Stop(outer=stop), notice)
     wall_s = time.perf_counter() - started
     per_turn = PILOT_REPLICATES * (turns + scene.numerics.warm_up_turns)
     derivatives = [sum(run.derivatives for run in runs) for runs in series]

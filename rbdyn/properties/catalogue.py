@@ -13,12 +13,12 @@ from BSF) and from C and C0 of NSK's 72 and 73 with 40 degrees (11 sizes, by ISO
 """
 
 import math
-import re
 from typing import NamedTuple
 
+from rbdyn.properties.designation import ANGLES, Designation
 from rbdyn.properties.tables import table
 
-SHAPE = re.compile(r"\s*(NUP|NU|NJ|NF|N)?[\s-]*(\d{2,5})?[\s/.-]*(.*?)\s*", re.IGNORECASE)
+CLEARANCE_CLASSES = ("C2", "CN", "C3", "C4", "C5")
 BORES = {"00": 10.0, "01": 12.0, "02": 15.0, "03": 17.0}
 SPACING = 1.22  # of rollers, in diameters
 # D_w over (D - d)/2; the effective length over the width, series 10 and the others.
@@ -36,27 +36,6 @@ BALL_STEP = 25.4 / 64.0
 FILLING_ANGLE = math.radians(201.0)
 # Share of a full circle of balls in angular contact bearings: of 40 degrees, and of spindles.
 GENERAL_FILLING, SPINDLE_FILLING = 0.87, 0.80
-ANGLES = {"AC": 25.0, "A": 30.0, "B": 40.0, "C": 15.0}
-
-
-class Designation(NamedTuple):
-    """A designation taken apart: kind of the scene, its letters, series, bore code and what follows."""
-
-    kind: str
-    letters: str
-    series: str
-    code: str
-    suffix: str
-
-    @property
-    def name(self) -> str:
-        """As catalogues print it."""
-        return f"{self.letters} {self.series}{self.code}".strip() + (f" {self.suffix}" if self.suffix else "")
-
-    @property
-    def diameter_series(self) -> str:
-        """Of ISO 15: "8", "9", "0", "2" or "3"."""
-        return self.series[-1]
 
 
 class Envelope(NamedTuple):
@@ -96,24 +75,6 @@ class BallInterior(NamedTuple):
     contact_angle_by: str
 
 
-def read_designation(text: str) -> Designation:
-    """Take a designation apart. Raises ValueError for what is none of the kinds known here."""
-    shape = SHAPE.fullmatch(text)
-    letters, digits, suffix = ((shape.group(k) or "").upper() for k in (1, 2, 3)) if shape else ("", "", "")
-    series, code = digits[:-2], digits[-2:]
-    if letters and series in ("10", "2", "22", "3", "23"):
-        return Designation("cylindrical_roller", letters, series, code, suffix)
-    for kind, known in (
-        ("deep_groove_ball", ("618", "619", "60", "62", "63")),
-        ("angular_contact_ball", ("718", "719", "70", "72", "73")),
-    ):
-        if not letters and series in known:
-            return Designation(kind, letters, series, code, suffix)
-    rollers = "NU, NJ, NUP, N or NF with series 10, 2, 22, 3 or 23 (NU210)"
-    balls = "a deep groove ball bearing of series 60, 62, 63, 618, 619 (6208) or an angular contact one"
-    raise ValueError(f"is no designation known here; write {rollers}, {balls} of 70, 72, 73, 718, 719 (7208B)")
-
-
 def envelope(named: Designation) -> Envelope:
     """What the catalogue lists of a designation. Raises ValueError where it does not."""
     size, bore = named.series + named.code, BORES.get(named.code, 5.0 * int(named.code))
@@ -131,12 +92,14 @@ def envelope(named: Designation) -> Envelope:
 
 def radial_clearance(bore: float, name: str, kind: str) -> tuple[float, float]:
     """Limits of a class of ISO 5753-1 [um] of a cylindrical roller or a deep groove ball bearing. Raises ValueError."""
-    for row in table("clearance_classes"):
-        if f"{name}_min" not in row:
-            raise ValueError(f"{name} is no clearance class; choose one of C2, CN, C3, C4")
-        if row["kind"] == kind and bore <= float(row["bore"]):
+    if name not in CLEARANCE_CLASSES:
+        raise ValueError(f"{name} is no clearance class here; choose one of {', '.join(CLEARANCE_CLASSES)}")
+    listed = [row for row in table("clearance_classes") if row["kind"] == kind and row[f"{name}_min"]]
+    for row in listed:
+        if bore <= float(row["bore"]):
             return float(row[f"{name}_min"]), float(row[f"{name}_max"])
-    raise ValueError(f"no clearance class is listed for a bore of {bore:g} mm; take a smaller bearing")
+    reach = f"{name} is listed to a bore of {listed[-1]['bore']} mm, not of {bore:g} mm"
+    raise ValueError(f"{reach}; take a smaller bearing or another class")
 
 
 def roller_interior(sizes: Envelope, narrow: bool) -> RollerInterior:
@@ -155,7 +118,7 @@ def roller_interior(sizes: Envelope, narrow: bool) -> RollerInterior:
             pitch, around = sizes.inner_raceway + diameter, "inner raceway of the catalogue plus one roller"
         else:
             pitch, around = 0.5 * PITCH_SHARE * (sizes.outside + sizes.bore), "estimated: 1.01 (d + D)/2, +-0.3 %"
-    rollers = round(math.pi * pitch / (SPACING * diameter))
+    rollers = round(math.pi * pitch / (SPACING * diameter)) if diameter > 0.0 else 0
     if rollers < 3 or not sizes.bore < pitch - diameter < pitch + diameter < sizes.outside:
         raise ValueError("leaves no room for rings and rollers; check --bore and --outside")
     if sizes.static_capacity is not None:
@@ -185,10 +148,11 @@ def ball_interior(sizes: Envelope, named: Designation) -> BallInterior:
     if deep:
         many = "estimated: what can be filled in between eccentric rings, over 201 degrees, +-1"
         return BallInterior(1 + int(FILLING_ANGLE / apart), diameter, pitch, None, many, by, "")
-    lead = next((letters for letters in ANGLES if named.suffix.startswith(letters)), "B" if usual else "C")
+    suffix = named.stated("angle")
+    lead = suffix or ("B" if usual else "C")
     filling = GENERAL_FILLING if usual else SPINDLE_FILLING
     many = f"estimated: {filling:g} of a full circle, {'+-1' if usual else '+-2, and fewer where it is made for speed'}"
-    turned = f"of suffix {lead}" if named.suffix.startswith(lead) else f"no suffix told; usual ({lead})"
+    turned = f"of suffix {lead}" if suffix else f"no suffix given; usual ({lead})"
     return BallInterior(round(filling * 2.0 * math.pi / apart), diameter, pitch, ANGLES[lead], many, by, turned)
 
 

@@ -27,6 +27,8 @@ MATERIALS = {
     "peek": Material(3.9e9, 0.40, 1320.0, 47.0e-6),
     "phenolic_cotton": Material(8e9, 0.30, 1350.0, 30.0e-6),
 }
+# Elastic modulus [Pa] between metals (cages of bronze and steel have 100 GPa and more) and polymers, laminates included.
+SOFTEST_METAL = 20e9
 
 
 def equivalent_modulus(first: Material, second: Material) -> float:

@@ -154,7 +154,7 @@ class NamedOil(NamedTuple):
     grease: bool = False
 
 
-NAMED = re.compile(r"(grease\s+)?(?:iso\s*)?vg\s*-?(\d+)\s*([a-z]*)", re.IGNORECASE)
+NAMED = re.compile(r"(grease\s+)?(?:iso\s*)?vg\s*-?(\d{1,4})\s*([a-z]*)", re.IGNORECASE | re.ASCII)
 NUMBERS = {"7808": "MIL-L-7808", "23699": "MIL-L-23699", "85734": "MIL-L-85734"}
 
 

@@ -6,11 +6,13 @@ A raceway control other than outer may have several under the same load: others 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.mounting.ball_rings import growth_record, row_change
 from rbdyn.quasistatic import result as told
 from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
@@ -42,14 +44,17 @@ SPEEDS = (0.7, 1.4)
 SAME = 1e-4
 
 
-def equilibrium(scene: BallScene | Scene, start: BallResult | tuple[Solution, ...] | None = None) -> BallResult:
+def equilibrium(
+    scene: BallScene | Scene | Path | str, start: BallResult | tuple[Solution, ...] | None = None
+) -> BallResult:
     """Equilibrium of a ball bearing under its load: angles, loads, stiffness, stress and life.
 
-    ``start``: a result nearby, or the solutions of its rows, which saves time. The result's ``status`` tells where there is none; nothing is raised for it.
-    Raises InputError for a scene of rollers.
+    ``scene``: also the path of its file. ``start``: a result nearby, or the solutions of its rows, which saves time. The
+    result's ``status`` tells where there is none; nothing is raised for it. Raises InputError for what is no scene of balls
+    and no start of such a bearing.
     """
     scene = balls_only(scene)
-    before = start.rows if isinstance(start, BallResult) else start or ()
+    before = _solutions(start, 2 if isinstance(scene, DoubleDeckerScene) else 1)
     if isinstance(scene, DoubleDeckerScene):
         return _double_decker(scene, before)
     assert isinstance(scene, SingleRowScene)
@@ -85,6 +90,16 @@ def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> 
         return None
     roots = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
     return [{**told.displacement_record(root.displacement), "balls": told.ball_records(root.figures)} for root in roots]
+
+
+def _solutions(start: Any, rows: int) -> tuple[Solution, ...]:
+    """Solutions of the rows to start from, none where there are none. Raises InputError."""
+    before = start.rows if isinstance(start, BallResult) else () if start is None else start
+    whole = isinstance(before, tuple) and all(isinstance(row, Solution) for row in before)
+    if not whole or len(before) not in (0, rows):
+        what = f"start = {one_line(repr(start), LONGEST_NAME)}: must be a result of equilibrium of such a bearing"
+        raise InputError([f"{what}, or the solution of each of its {rows} row{'s' if rows > 1 else ''}"])
+    return before
 
 
 def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> BallResult:

@@ -18,7 +18,7 @@ from rbdyn.arrays import Array
 from rbdyn.faults import validated
 from rbdyn.life.turns import turning_rings
 from rbdyn.quasistatic.fatigue import reference_capacities, solution_life
-from rbdyn.quasistatic.remarks import Rating, pressures
+from rbdyn.quasistatic.remarks import Rating, overloads, pressures
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 from rbdyn.scene.ball import SingleRowScene
@@ -68,9 +68,12 @@ def solved(value: float, case: Case, start: Solution | None = None) -> Point:
     solution = solve(case.rating.model.row, case.rating.model.control, case.load, case.given, start)
     if not solution.found and start is not None:
         solution = solve(case.rating.model.row, case.rating.model.control, case.load, case.given)
+    table = solution.figures[np.newaxis]
+    if solution.found and (why := overloads(table, [case.rating])):
+        solution = solution._replace(status=why[0])
     if not solution.found:
         return Point(value, solution, case.rating)
-    peak = np.max(list(pressures(solution.figures[np.newaxis], [case.rating]).values()))
+    peak = np.max(list(pressures(table, [case.rating]).values()))
     life = solution_life(solution, case.rating.capacities, turning_rings(*case.rating.speeds))
     return Point(value, solution, case.rating, float(peak), life.million_turns)
 
@@ -138,10 +141,10 @@ def _notes(
 def over_preload(
     scene: SingleRowScene, preloads: Sequence[float], capacities: Capacities = reference_capacities
 ) -> Sweep:
-    """Sweep of the axial force of a preload spring [N], on top of the scene's load.
+    """Sweep of ``operation.preload_N`` [N], which replaces the scene's own; the rest of its load stays.
 
     ``capacities``: how races are rated, ``fatigue.reference_capacities`` or another. Raises ValueError as ``sweep``, or where the
-    scene prescribes the axial displacement, which no force can change.
+    scene prescribes the axial displacement, which no force can change; InputError for a preload that no scene may have.
     """
     at = _case(scene, capacities)
     if not math.isnan(at.given[2]):
@@ -149,7 +152,7 @@ def over_preload(
         raise ValueError(f"{what}, so a preload by force has no effect; leave it out")
 
     def case_at(preload: float) -> Case:
-        return at._replace(load=at.load + np.array([0.0, 0.0, preload, 0.0, 0.0]))
+        return at._replace(load=load_of(scene.changed({"operation.preload_N": preload})))
 
     return sweep(case_at, preloads, "a preload of", "N")
 

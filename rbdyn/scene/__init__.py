@@ -5,17 +5,19 @@ is compiled: ``rbdyn.dynamics.parameters.model`` turns a scene into the SI param
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self, cast
 
-from pydantic import Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
-from rbdyn.faults import InputError
+from rbdyn.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
-from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics
+from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics, with_bar_stiffness_of_cage
 from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
 from rbdyn.scene.mounting import Mounting, material_of, misfits
 from rbdyn.scene.operation import Operation, Support
@@ -38,7 +40,7 @@ class Scene(SceneFile):
     TOML gives them, ``scene.changed({"cage.mass_g": 50.0})`` is the scene with other values. Of a ball bearing all of them give a
     BallScene. A scene never changes; ``scene.cage.mass_g`` reads a key. What is wrong is an InputError that names every key,
     value and mend at once; ``rbdyn keys`` lists all keys. ``rbdyn.simulate(scene)`` runs it, ``rbdyn.history(scene, turns)`` gives
-    its motion, ``rbdyn.equilibrium(scene)`` is for balls.
+    its motion, ``rbdyn.equilibrium(scene)`` is for balls; each takes the path of a file too.
 
     bearing, cage, lubricant, operation : drawings, oil, speeds and loads; needed.
     mounting, support : fits and temperatures, a flexible housing; none unless given.
@@ -80,8 +82,14 @@ class Scene(SceneFile):
 
     @model_validator(mode="before")
     @classmethod
-    def _traction_of_oil(cls, data: Any) -> Any:
-        return with_traction_of_oil(data)
+    def _defaults_by_other_tables(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        tables = {
+            name: table.model_dump(exclude_unset=True) if isinstance(table, BaseModel) else table
+            for name, table in data.items()
+        }
+        return with_bar_stiffness_of_cage(with_traction_of_oil(tables))
 
     def faults(self) -> list[str]:
         """What does not go together, each with a slip of the unit that may be its cause."""
@@ -261,15 +269,27 @@ class Scene(SceneFile):
         return material_of(getattr(self.materials, part))
 
 
-def rollers_only(scene: Scene | BallScene) -> Scene:
-    """The scene, where it is one of rollers. Raises InputError for a ball bearing."""
+def scene_of(given: Scene | BallScene | Path | str) -> Scene | BallScene:
+    """The scene itself, or that of a file. Raises InputError for anything else and for the faults of the file."""
+    if isinstance(given, Scene | BallScene):
+        return given
+    if isinstance(given, str | PathLike):
+        return Scene.load(Path(given))
+    what = f"scene = {one_line(repr(given), LONGEST_NAME)}: must be a Scene or the path of a scene file"
+    raise InputError([f"{what}; Scene.from_dict makes one of tables"])
+
+
+def rollers_only(given: Scene | BallScene | Path | str) -> Scene:
+    """The scene, as ``scene_of``, where it is one of rollers. Raises InputError for a ball bearing."""
+    scene = scene_of(given)
     if isinstance(scene, Scene):
         return scene
     raise InputError([f"bearing.kind = {scene.bearing.kind!r}: is not simulated in time; use rbdyn ball"])
 
 
-def balls_only(scene: Scene | BallScene) -> BallScene:
-    """The scene, where it is one of balls. Raises InputError for a roller bearing."""
+def balls_only(given: Scene | BallScene | Path | str) -> BallScene:
+    """The scene, as ``scene_of``, where it is one of balls. Raises InputError for a roller bearing."""
+    scene = scene_of(given)
     if isinstance(scene, BallScene):
         return scene
     raise InputError([f"bearing.kind = {scene.bearing.kind!r}: has no balls; use rbdyn simulate"])

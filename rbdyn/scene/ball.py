@@ -70,7 +70,7 @@ class BallOperation(Consistent):
     prescribed: Prescribed = Prescribed()
     """Displacements of the inner ring instead of loads."""
     preload_N: Force = 0.0  # noqa: N815
-    """A spring's axial force, on top of the load."""
+    """Axial force of a spring, on top of the load; a sweep of it replaces it."""
     preload_um: Annotated[float, Field(ge=-2000.0, le=2000.0)] | None = None
     """How far nut and spacer push the inner ring in after it touches; instead of preload_N."""
     inner_speed, outer_speed = SI("rpm"), SI("rpm")

@@ -147,15 +147,13 @@ class Lubricant(Consistent):
         return oil
 
 
-def with_traction_of_oil(scene: Any) -> Any:
+def with_traction_of_oil(scene: Mapping[str, Any]) -> Mapping[str, Any]:
     """Tables of a scene, with the traction that goes with its oil where [traction] leaves it out.
 
     MIL-L-7808 and MIL-L-23699 keep the defaults of ``Traction``. Oils that are told by a grade or a data sheet yield at the
     limit of their base oil; other turbine oils are taken as MIL-L-23699 in a thermal film, of which they are the class.
     """
-    oil, traction = (
-        scene.get(table, {}) if isinstance(scene, Mapping) else None for table in ("lubricant", "traction")
-    )
+    oil, traction = (scene.get(table, {}) for table in ("lubricant", "traction"))
     if not isinstance(oil, Mapping) or not isinstance(traction, Mapping):
         return scene
     name, base = oil.get("oil"), oil.get("base_oil") or "mineral"

@@ -5,7 +5,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
-from rbdyn.faults import Consistent, put_key, read_toml, set_key, validated
+from rbdyn.faults import LONGEST_NAME, Consistent, InputError, one_line, put_key, read_toml, set_key, validated
 from rbdyn.records.record import plain
 from rbdyn.records.words import html_table
 
@@ -21,8 +21,11 @@ else:
 class Checked(ModelMetaclass):
     """Tables given by keyword are checked as those of a file are, with the same messages."""
 
-    def __call__(self, **tables: Any) -> Any:
+    def __call__(self, *given: Any, **tables: Any) -> Any:
         """The scene of these tables. Raises InputError with all faults at once."""
+        if given:
+            what = f"{self.__name__}({one_line(repr(given[0]), LONGEST_NAME)}): takes tables by keyword"
+            raise InputError([f"{what}; {self.__name__}.load reads a file, {self.__name__}.from_dict a dict"])
         return cast(type[SceneFile], self).from_dict(tables, self.__name__)
 
 
@@ -37,8 +40,15 @@ class SceneFile(Consistent, metaclass=Checked):
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str = "scene", overrides: Iterable[str] = ()) -> Self:
         """Validate nested tables as TOML gives them; ``source`` stands in the messages. Raises InputError."""
+        if not isinstance(data, Mapping):
+            what = f"{source} = {one_line(repr(data), LONGEST_NAME)}: must be a dict of tables"
+            raise InputError([f"{what}; {cls.__name__}.load reads a file"])
+        listed = [overrides] if isinstance(overrides, str) or not isinstance(overrides, Iterable) else list(overrides)
+        if listed == [overrides] or not all(isinstance(each, str) for each in listed):
+            what = f"overrides = {one_line(repr(overrides), LONGEST_NAME)}"
+            raise InputError([f'{what}: must be a list such as ["cage.mass_g=50"]'])
         data = deepcopy(data)
-        for override in overrides:
+        for override in listed:
             set_key(data, override)
         scene = validated(cls._of_kind(data), data, source)
         scene.once("_given", lambda: data)
@@ -50,6 +60,9 @@ class SceneFile(Consistent, metaclass=Checked):
         What was left out is worked out anew, as of a file with these values. Raises InputError with all faults at once, as a
         file does.
         """
+        if not isinstance(changes, Mapping) or not all(isinstance(key, str) for key in changes):
+            what = f"changes = {one_line(repr(changes), LONGEST_NAME)}"
+            raise InputError([f'{what}: must be a dict such as {{"cage.mass_g": 50.0}}'])
         data = deepcopy(self._tables)
         for key, value in changes.items():
             put_key(data, key, plain(value), f"changed {key!r}")

@@ -270,6 +270,8 @@ class Documented(Strict):
     times: str | None = None
     when: dict[str, list[str | bool | float]] = {}
     unless: dict[str, list[str | bool | float]] = {}
+    at_least: dict[str, float] = Field({}, alias="from")
+    below: dict[str, float] = {}
     asked: bool = False
     reason: str
 
@@ -288,8 +290,10 @@ class Documented(Strict):
         return f"{self.law.replace('_', '-')} from {self.low:g} to {self.high:g}{of}"
 
     def counts(self, values: Mapping[str, Any]) -> bool:
-        """Whether the range counts for a scene of these values by dotted key."""
+        """Whether the range counts for a scene of these values by dotted key, with the elastic moduli of its parts."""
         on = all(values.get(key, LEFT_OUT) in allowed for key, allowed in self.when.items())
+        on = on and all(values[key] >= least for key, least in self.at_least.items())
+        on = on and all(values[key] < limit for key, limit in self.below.items())
         return on and not any(values.get(key, LEFT_OUT) in barred for key, barred in self.unless.items())
 
 

@@ -72,7 +72,7 @@ def inputs_of(
     inputs += [Input(key, values, "posterior sample") for key, values in sample.items()]
     inputs += [
         Input(key, each.as_law, each.reason)
-        for key, each in ranges_of(scene).items()
+        for key, each in ((each.key, each) for each in documented_of(scene))
         if key not in keys
         and others.on(tuple(key.split("."))) is None
         and (
@@ -82,12 +82,6 @@ def inputs_of(
     ]
     refuse(f"{source}: {fault}" for fault in _times_faults(scene, inputs))
     return sorted(inputs)
-
-
-def ranges_of(scene: Scene) -> dict[str, Documented]:
-    """Documented ranges that count for a scene, by key."""
-    values = plain_values(scene)
-    return {each.key: each for each in documented() if each.key in values and each.counts(values)}
 
 
 @functools.cache
@@ -235,6 +229,16 @@ def plain_values(scene: Scene) -> dict[str, Any]:
         if isinstance(keys, dict)
         for key, value in keys.items()
     }
+
+
+def documented_of(scene: Scene) -> list[Documented]:
+    """The documented ranges that count for a scene."""
+    values = plain_values(scene)
+    moduli = {
+        f"materials.{part}.elastic_modulus_GPa": 1e-9 * scene.material(part).elastic_modulus
+        for part in type(scene.materials).model_fields
+    }
+    return [each for each in documented() if each.key in values and each.counts({**values, **moduli})]
 
 
 def _given(data: Mapping[str, Any], key: str) -> bool:

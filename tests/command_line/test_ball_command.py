@@ -115,7 +115,7 @@ def test_command_line_refuses_pairs_and_contradictions(arguments, sentence):
 
 def test_command_line_studies_write_tables_and_pictures(tmp_path):
     """Command line: a preload study leaves its record, a table with the same figures and notes, and four pictures."""
-    axial = "operation.axial_load_N=100000.0"
+    axial = "operation.axial_load_N=50000.0"
     done = CliRunner().invoke(
         app, ["ball", str(SINGLE), "--preload", "0:200:3", "--set", axial, "--out", str(tmp_path)]
     )

@@ -8,6 +8,9 @@ import sys
 import tomllib
 
 import pytest
+from typer.testing import CliRunner
+
+from rbdyn.cli.app import app
 
 QUICK = ("turns=3", "discard_turns=2", "replicates=2", "impact_window_turns=1", "companion=false", "extend=false")
 SET = [part for assignment in QUICK for part in ("--set", f"numerics.{assignment}")]
@@ -69,7 +72,7 @@ def test_command_line_suffixes_and_grease(command):
 
     soft = scene("NU", "315", "TVP2", "C3", "--oil", "grease VG 100")
     assert soft["cage"]["guidance"] == "roller" and "guide_clearance_mm" not in soft["cage"]
-    assert soft["materials"]["cage"]["density_kg_m3"] == 1300.0 and soft["model"]["pocket_bar_stiffness_N_m"] == 3e6
+    assert soft["materials"]["cage"]["density_kg_m3"] == 1300.0 and soft["model"]["pocket_bar_stiffness_N_m"] == 2.5e6
     assert 0.3 < soft["model"]["rolling_resistance_factor"] < 1.0 and soft["lubricant"]["oil_fraction"] == 0.005
     assert soft["bearing"]["radial_clearance_mm"] == pytest.approx(0.5e-3 * (65 + 100))
     own = scene("NU2210", "--bore", "51", "--outside", "91", "--width", "24", "--clearance", "c2")
@@ -86,13 +89,14 @@ def test_command_line_suffixes_and_grease(command):
         (("NU210", "--oil", "castor"), ["--oil castor: is no oil known here; write ISO VG 10"]),
         (("NU210", "--load", "-5"), ["--load -5: must be from 0"]),
         (("NU210", "--load", "nan", "--temperature", "343"), ["--load nan", "if 343 K are meant, write 69.85"]),
-        (("NU210", "--clearance", "C9"), ["C9 is no clearance class; choose one of C2, CN, C3, C4"]),
+        (("NU210", "--clearance", "C9"), ["--clearance C9: is no clearance class; choose one of C2, CN, C3, C4, C5"]),
         (("7208", "--clearance", "C3"), ["has a contact angle instead"]),
         (("NU210", "--speed", "0"), ["--speed 0: a run is counted in shaft turns"]),
         (("NU210", "--preload", "5"), ["--preload 5: is one of ball bearings"]),
         (("NU210", "--bore", "50"), ["--outside, --width: missing; give all of"]),
         (("NU210", "--bore", "50", "--outside", "40", "--width", "10"), ["--bore 50: not below --outside 40"]),
         (("NU210", "--bore", "50", "--outside", "52", "--width", "10"), ["leaves no room for rings and rollers"]),
+        (("NU210 C1",), ["NU210 C1: C1 is no clearance class here; choose one of C2, CN, C3, C4, C5"]),
     ],
 )
 def test_command_line_bad_input(command, arguments, words):
@@ -103,6 +107,36 @@ def test_command_line_bad_input(command, arguments, words):
     assert all(word in refused.stderr for word in words), refused.stderr
     told = command("new", *arguments, "--json")
     assert told.returncode == 2 and json.loads(told.stdout)["faults"] == refused.stderr.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("NU210", "--bore", "50", "--outside", "50.001", "--width", "20"), "NU210: leaves no room for rings and rollers; check"),
+        (("6208", "--bore", "50", "--outside", "50.001", "--width", "20"), "6208: leaves no room for rings and balls; check"),
+        (("7208", "--bore", "330.2", "--outside", "331.1", "--width", "480"), "--width 480: estimated inside: bearing.balls = "),
+        (("NU210 \x01",), r"DESIGNATION NU210 \x01: suffix \x01 is not known"),
+        (("NU210", "C3", "--clearance", "C4"), "--clearance C4: contradicts C3 of NU 210 C3; leave one out"),
+        (("7208B", "C3"), "suffix C3: an angular contact bearing has a contact angle instead"),
+        (("NU210", "--oil", "VG " + "9" * 5000), "is no oil known here"),
+        (("NU210", "--speed", "1e400"), "--speed inf: is not a finite number"),
+        (("NU210", "--temperature", "-300"), "--temperature -300: must be from -60 to 220 C; fix it"),
+    ],
+)  # fmt: skip
+def test_unit_nonsense_is_one_sentence(arguments, sentence):
+    """Unit: what no bearing is ends in one printable line, with exit code 2 and no traceback."""
+    refused = CliRunner().invoke(app, ["new", *arguments])
+    assert isinstance(refused.exception, SystemExit) and refused.exit_code == 2 and refused.stdout == ""
+    (line,) = refused.stderr.splitlines()
+    assert sentence in line and line.isprintable() and len(line) < 400
+
+
+def test_unit_a_scene_says_which_suffixes_change_nothing():
+    """Unit: seals and tolerance classes stand in the heading with the reason why nothing follows from them."""
+    head = CliRunner().invoke(app, ["new", "6208-2RS", "P5", "C3"]).stdout.splitlines()[:2]
+    assert head[0].startswith("# 6208 2RS P5 C3, 40 x 80 x 18 mm")
+    assert "2RS, seals or shields, whose friction is not modelled; P5, tolerance class" in head[1]
+    assert "Suffixes" not in CliRunner().invoke(app, ["new", "NU210", "MA", "C3", "--clearance", "c3"]).stdout
 
 
 @pytest.mark.parametrize(("designation", "factors"), [("NU210", 3), ("NU 210 M", 2)])

@@ -10,14 +10,8 @@ from conftest import ROOT
 
 from rbdyn.cli.new_scene import OperatingPoint, ball_values, roller_values
 from rbdyn.life.roller_capacity import dynamic_capacity, static_capacity
-from rbdyn.properties.catalogue import (
-    Envelope,
-    ball_interior,
-    envelope,
-    radial_clearance,
-    read_designation,
-    roller_interior,
-)
+from rbdyn.properties.catalogue import Envelope, ball_interior, envelope, radial_clearance, roller_interior
+from rbdyn.properties.designation import read_designation
 from rbdyn.properties.oils import oil_named
 from rbdyn.properties.tables import table
 from rbdyn.scene import Scene
@@ -156,6 +150,12 @@ def test_literature_clearance_classes():
     assert len(rows) == 10
     assert radial_clearance(40.0, "C3", "deep_groove_ball") == (15.0, 33.0)
     assert radial_clearance(75.0, "C4", "cylindrical_roller") == (90.0, 125.0)
+    assert radial_clearance(50.0, "C5", "cylindrical_roller") == (95.0, 125.0)
+    assert radial_clearance(40.0, "C5", "deep_groove_ball") == (40.0, 64.0)
+    with pytest.raises(ValueError, match="C5 is listed to a bore of 100 mm, not of 120 mm"):
+        radial_clearance(120.0, "C5", "deep_groove_ball")
+    with pytest.raises(ValueError, match="C1 is no clearance class here; choose one of C2, CN, C3, C4, C5"):
+        radial_clearance(50.0, "C1", "cylindrical_roller")
     with pytest.raises(ValueError, match="take a smaller bearing"):
         radial_clearance(500.0, "CN", "cylindrical_roller")
 
@@ -164,7 +164,8 @@ def test_literature_clearance_classes():
     ("text", "name"),
     [
         ("nu210", "NU 210"), ("NU-210 ECP", "NU 210 ECP"), ("n 1010/c3", "N 1010 C3"), ("7208 BEP", "7208 BEP"),
-        ("6208-2RS", "6208 2RS"), ("71908ACD", "71908 ACD"), ("NUP2315", "NUP 2315"),
+        ("6208-2RS", "6208 2RS"), ("71908ACD", "71908 ACD"), ("NUP2315", "NUP 2315"), ("6208ZZC3P6", "6208 ZZ C3 P6"),
+        ("NU 210 ETVP2C3", "NU 210 ETVP2 C3"), ("71908-C-T-P4S-UL", "71908 C T P4S UL"),
     ],
 )  # fmt: skip
 def test_unit_designations(text, name):
@@ -176,4 +177,37 @@ def test_unit_designations(text, name):
 def test_unit_unknown_designations(text):
     """Unit: what is no designation of these kinds is refused with what may be written."""
     with pytest.raises(ValueError, match="is no designation known here; write NU"):
+        read_designation(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "stated"),
+    [
+        ("NU210 C5", {"clearance": "C5"}), ("NU210 ECP/C3", {"design": "EC", "cage": "P", "clearance": "C3"}),
+        ("NU 210 E.TVP2.C3", {"design": "E", "cage": "TVP2", "clearance": "C3"}), ("NU210 P6", {"tolerance": "P6", "cage": None}),
+        ("6205 P63", {"tolerance": "P6", "clearance": "C3"}), ("6208-2RS1/CN S1", {"seal": "2RS1", "clearance": "CN"}),
+        ("7208 BECBP", {"angle": "B", "design": "E", "pairing": "CB", "ball_cage": "P"}), ("7010 A5", {"angle": "A5"}),
+        ("71908 CB", {"angle": "C", "design": "B", "pairing": None}), ("71908 ACD/P4A", {"angle": "AC", "tolerance": "P4A"}),
+    ],
+)  # fmt: skip
+def test_unit_every_suffix_is_read(text, stated):
+    """Unit: what each suffix states, alone, joined and glued."""
+    named = read_designation(text)
+    assert {group: named.stated(group) for group in stated} == stated
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("NU210 SECRET", "suffix SECRET is not known; leave it out, or write a cage"), ("NU210 \x01", "suffix \x01 is not known"),
+        ("NU210 C4 C2", "suffixes C4 and C2 both state the clearance class; leave one out"), ("6208 C3 P63", "C3 and P63 both state"),
+        ("NU210 MA ECP", "suffixes MA and ECP both state the cage"), ("7208 B AC", "both state the contact angle"),
+        ("NU210 K", "suffix K is a tapered bore"), ("NU210 HC5", "HC5 is a bearing with ceramic parts"), ("6208 MT33", "is a grease"),
+        ("7208 DB", "DB is a set of bearings"), ("NU210 V", "without a cage"), ("6208 C3H", "is a clearance range of its own"),
+        ("71908 CC", "suffix CC is not known"), ("NU210 2RS", "suffix 2RS is not known"),
+    ],
+)  # fmt: skip
+def test_unit_suffixes_are_refused(text, sentence):
+    """Unit: suffixes that are unknown, contradict each other or change what is not modelled."""
+    with pytest.raises(ValueError, match=sentence):
         read_designation(text)

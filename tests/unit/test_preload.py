@@ -12,9 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn import BallScene
+from rbdyn.cli.ball_studies import optimum_study
+from rbdyn.faults import InputError
 from rbdyn.life import balls as life
 from rbdyn.life.turns import turning_rings
 from rbdyn.quasistatic import fatigue, preload
+from rbdyn.quasistatic.bearing import equilibrium
+from rbdyn.quasistatic.sweep.run import sweep
+from rbdyn.scene import Scene
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def scene(radial=150.0, axial=40.0, clearance=None, **operation):
@@ -137,3 +144,92 @@ def test_unit_bad_sweeps_are_named():
         preload.worn(scene(), -1e-6)
     with pytest.raises(ValueError, match="wear"):
         preload.worn(scene(), 5e-3)
+
+
+SINGLE = EXAMPLES / "angular_contact_ball.toml", ("bearing.bore_mm=40.0", "bearing.outside_diameter_mm=52.0")
+DOUBLE = EXAMPLES / "double_decker.toml", ()
+DEEP = EXAMPLES / "deep_groove_ball.toml", ()
+SWEPT = [
+    (SINGLE, "operation.preload_N", (0.0, 150.0, 900.0)),
+    (SINGLE, "operation.axial_load_N", (0.0, 900.0)),
+    (SINGLE, "operation.inner_speed_rpm", (0.0, 9000.0)),
+    (SINGLE, "operation.prescribed.y_mm", (0.001, 0.002)),
+    (SINGLE, "bearing.contact_angle_deg", (20.0, 30.0)),
+    (SINGLE, "bearing.clearance_change_um", (-2.0, 2.0)),
+    (SINGLE, "bearing.inner_groove_factor", (0.515, 0.53)),
+    (SINGLE, "bearing.balls", (20.0, 22.0)),
+    (SINGLE, "model.light_load_share", (0.3, 1.0)),
+    (DEEP, "operation.preload_um", (5.0, 10.0)),
+    (DEEP, "bearing.radial_clearance_mm", (-0.002, 0.0, 0.02)),
+    (DEEP, "bearing.dynamic_capacity_N", (2e4, 4e4)),
+    (DOUBLE, "operation.preload_N", (0.0, 400.0)),
+    (DOUBLE, "bearing.inner.contact_angle_deg", (15.0, 25.0)),
+    (DOUBLE, "bearing.middle.speed_rpm", (3000.0, 5000.0)),
+]
+
+
+def sweep_figures(table, place):
+    """Figures of a row of a sweep's table that one equilibrium has too."""
+    names = ["x_mm", "z_mm", "force_x_N", "force_z_N"]
+    names += [name for name in ("inner_pressure_MPa", "outer_pressure_MPa", "L10_Mrev") if name in table.columns]
+    return {name: float(table.columns[name][place]) for name in names}
+
+
+def equilibrium_figures(scene):
+    """The same of the equilibrium of a scene."""
+    record = equilibrium(scene).as_dict()
+    figures = {f"{axis}_mm": record["displacement_mm"][axis] for axis in "xz"}
+    figures |= {f"force_{axis}_N": record["reaction"]["load_N"][axis] for axis in "xz"}
+    if "balls" in record:
+        figures |= {f"{race}_pressure_MPa": record["max_stress_MPa"][race] for race in ("inner", "outer")}
+        figures["L10_Mrev"] = record["life"]["L10_Mrev"]
+    return figures
+
+
+@pytest.mark.parametrize(("source", "key", "values"), SWEPT, ids=lambda part: part if isinstance(part, str) else "")
+def test_invariant_a_row_of_a_sweep_is_the_equilibrium_at_its_value(source, key, values):
+    """Invariant: of a scene with values of its own, each row is the equilibrium of the scene with the swept key replaced."""
+    path, changes = source
+    own = () if key in ("operation.preload_um",) else ("operation.preload_N=300.0",)
+    own = (*own, f"{key}={values[0]!r}") if "balls" not in key else own
+    whole = Scene.load(path, (*changes, *own))
+    table = sweep(whole, {key: values})
+    for place, value in enumerate(values):
+        alone = whole.changed({key: int(value) if key == "bearing.balls" else value})
+        assert sweep_figures(table, place) == pytest.approx(equilibrium_figures(alone), rel=1e-7, abs=1e-9)
+
+
+@pytest.mark.parametrize(("study", "file", "values"), [
+    ("preload", SINGLE[0], (0.0, 150.0, 900.0)), ("clearance", DEEP[0], (-2.0, 0.0, 20.0)), ("wear", SINGLE[0], (0.0, 1.0, 2.0)),
+])  # fmt: skip
+def test_invariant_a_row_of_a_study_is_the_equilibrium_at_its_value(study, file, values):
+    """Invariant: rows of --preload, --clearance and --wear are equilibria of the scene with that value and no other's."""
+    whole = Scene.load(file, ["operation.preload_N=300.0"])
+    _, table = optimum_study(whole, study, values)
+    for place, value in enumerate(values):
+        alone = {
+            "preload": lambda force: whole.changed({"operation.preload_N": force}),
+            "clearance": lambda gap: whole.changed({"bearing.radial_clearance_mm": 1e-3 * gap}),
+            "wear": lambda loss: preload.worn(whole, 1e-6 * loss),
+        }[study](value)
+        assert sweep_figures(table, place) == pytest.approx(equilibrium_figures(alone), rel=1e-7, abs=1e-9)
+
+
+def test_unit_a_sweep_of_preload_replaces_that_of_the_scene():
+    """Unit: a preload of the scene's own of 30 N changes no row of a sweep of preload and neither of its optima."""
+    values = [0.0, 20.0, 60.0, 130.0]
+    plain, preloaded = (preload.over_preload(scene(preload_N=force), values) for force in (0.0, 30.0))
+    assert list(of(plain, "peak_pressure")) == list(of(preloaded, "peak_pressure"))
+    assert plain.least_stress.value == preloaded.least_stress.value
+    assert plain.longest_life.value == preloaded.longest_life.value and plain.notes == preloaded.notes
+
+
+def test_unit_a_study_refuses_what_a_scene_refuses():
+    """Unit: a preload beyond its range is a sentence; a load that no contact carries is a row without figures."""
+    with pytest.raises(InputError, match=r"operation\.preload_N = 1e\+300: must be at most"):
+        preload.over_preload(scene(), [0.0, 1.0, 1e300])
+    points = preload.over_preload(scene(), [0.0, 10.0, 20.0, 1e7]).points
+    assert points[-1].solution.status == equilibrium(scene(preload_N=1e7)).status and math.isnan(
+        points[-1].peak_pressure
+    )
+    assert points[-1].solution.status.startswith("overloaded")

@@ -12,10 +12,12 @@ from doe.unknown.laws import copula, dependent, quantiles_of, table_of, values_o
 from doe.unknown.screening import two_levels
 from rbdyn.cli.keys import keys
 from rbdyn.faults import InputError, read_toml, validated
+from rbdyn.properties.materials import MATERIALS
 from rbdyn.scene import Scene
 from rbdyn.scene.ball import SingleRowScene
+from rbdyn.scene.bearing import Materials
 from rbdyn.scene.uncertain import Law, Uncertain, documented, exact
-from rbdyn.scene.unknown import inputs_of, plain_values, with_values
+from rbdyn.scene.unknown import documented_of, inputs_of, plain_values, value_of, with_values
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCENE = EXAMPLES / "cylindrical_roller.toml"
@@ -47,7 +49,7 @@ def test_every_range_is_of_a_key_that_exists_and_says_why() -> None:
     names = {key.key for key in keys({"roller": Scene, "ball": SingleRowScene})}
     for each in documented():
         assert each.key in names
-        assert {*each.when, *each.unless} <= names
+        assert {*each.when, *each.unless, *each.at_least, *each.below} <= names
         assert len(each.reason) > 15
 
 
@@ -59,6 +61,60 @@ def test_documented_ranges_give_scenes(name: str) -> None:
     assert len(inputs) > 15
     for values in table_of(laws, nested(len(laws), 64, 3)):
         Scene.from_dict(with_values(data, name, laws, values))
+
+
+PARTS = [(part, name) for part in Materials.model_fields for name in MATERIALS]
+SOFT = {"elastic_modulus_GPa": 5.0, "poisson_ratio": 0.35, "density_kg_m3": 1300.0}
+SWITCHED = (
+    "model.pocket_film=true", "traction.friction=mixed", "traction.model=eyring", "traction.model=limiting_shear", "traction.model=coulomb",
+    "traction.model=thermal_newtonian", "model.race_damping=hunt_crossley", "cage.guidance=roller", "bearing.tilt_mrad=0.1",
+    "lubricant.oil=ISO VG 32", 'lubricant={oil="ISO VG 68", base_oil="PAG", temperature_C=70.0}',
+)  # fmt: skip
+
+
+def defaults_outside(scene: Scene) -> dict[str, Any]:
+    """Values of a scene that lie outside the documented range that counts for it."""
+    outside = {}
+    for each in documented_of(scene):
+        value, base = value_of(scene, each.key), 1.0 if each.times is None else value_of(scene, each.times)
+        chosen = each.law == "choices" and (each.asked or value in (each.values or ()))
+        perfect = value == 0.0 and each.law == "log_uniform"  # a part without the error that the range is of
+        if value is None or chosen or perfect:
+            continue
+        if isinstance(value, str) or not each.low <= value / base <= each.high:
+            outside[each.key] = value
+    return outside
+
+
+@pytest.mark.parametrize(
+    ("part", "material"), [*PARTS, ("cage", SOFT), ("cage", {**SOFT, "elastic_modulus_GPa": 45.0})]
+)
+def test_invariant_defaults_of_every_material_lie_in_their_documented_ranges(part: str, material: Any) -> None:
+    """Invariant: whatever a part is made of, each default lies in the range that counts for it, and one range counts a key."""
+    data = read_toml(SCENE)
+    scene = Scene.from_dict({**data, "materials": {part: material}})
+    assert defaults_outside(scene) == {}
+    ranges = [each.key for each in documented_of(scene)]
+    assert len(ranges) == len(set(ranges)) and "model.pocket_bar_stiffness_N_m" in ranges
+    assert Scene(**{**data, "materials": Materials.model_validate({part: material})}).model == scene.model
+
+
+@pytest.mark.parametrize("switch", SWITCHED)
+def test_invariant_defaults_of_every_law_lie_in_their_documented_ranges(switch: str) -> None:
+    """Invariant: the same of what each law and oil switches on, in the plain example."""
+    assert defaults_outside(Scene.load(SCENE, [switch])) == {}
+
+
+def test_unit_a_bar_is_as_stiff_as_its_cage_unless_given() -> None:
+    """Unit: metal cages keep 5e7 N/m, polymers have 2.5e6; what is given stays, and a changed material works it out anew."""
+    scene = Scene.load(SCENE)
+    peek = scene.changed({"materials.cage": "peek"})
+    assert scene.model.pocket_bar_stiffness_N_m == 5e7 and peek.model.pocket_bar_stiffness_N_m == 2.5e6
+    assert peek.changed({"materials.cage": "brass"}).model.pocket_bar_stiffness_N_m == 5e7
+    assert peek.changed({"model.pocket_bar_stiffness_N_m": 5e7}).model.pocket_bar_stiffness_N_m == 5e7
+    assert scene.changed({"materials.cage": SOFT}).model.pocket_bar_stiffness_N_m == 2.5e6
+    with pytest.raises(InputError, match=r"materials\.cage = 'wood': choose one of"):
+        scene.changed({"materials.cage": "wood"})
 
 
 def test_what_is_given_is_known_unless_estimated() -> None:

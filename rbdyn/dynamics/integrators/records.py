@@ -33,7 +33,7 @@ class Status(Enum):
     )
     NOT_FINITE = "{component} is not finite at any step size", "check the laws that act on it"
     STEP_BUDGET = (
-        "step budget of {step_budget} used up (last step {step:.2g} s)",
+        "step budget of {step_budget} used up after {spent_s:.3g} s of running (last step {step:.2g} s)",
         "raise numerics.step_budget_per_turn, loosen numerics.rtol, or soften the stiffest law",
     )
 

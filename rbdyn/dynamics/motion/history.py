@@ -1,6 +1,9 @@
 """A time history of one replicate, on request: motions, and every contact's load, slip and heat, at uniform samples."""
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -8,11 +11,13 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.observe import OBSERVED, observe
+from rbdyn.dynamics.pace import Notice, Pace, log
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.dynamics.run import Run
+from rbdyn.faults import LONGEST_NAME, one_line, refuse
 from rbdyn.records.words import Brief, Figure
-from rbdyn.scene import Scene
+from rbdyn.scene import Scene, rollers_only
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -111,16 +116,48 @@ def most_turns(scene: Scene) -> float:
     return MOST_NUMBERS / (sample * scene.numerics.samples_per_turn)
 
 
+def _request_faults(scene: Scene, turns: Any, replicate: Any, per_turn: Any) -> Iterator[str]:
+    """Why there is no such history."""
+    counts = {"replicate": (replicate, 0), "samples_per_turn": (per_turn, 1)}
+    for name, (value, least) in counts.items():
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+            yield f"{name} = {one_line(repr(value), LONGEST_NAME)}: must be a whole number from {least}"
+    if (
+        isinstance(turns, bool)
+        or not isinstance(turns, int | float | np.integer | np.floating)
+        or not math.isfinite(turns)
+    ):
+        yield f"turns = {one_line(repr(turns), LONGEST_NAME)}: must be a number of shaft turns"
+    elif isinstance(per_turn, int | np.integer) and per_turn >= 1:
+        most = most_turns(scene) * scene.numerics.samples_per_turn / float(per_turn)
+        if turns * per_turn < 1.0:
+            yield f"turns = {turns:g}: shorter than one of {per_turn} samples a turn; take more turns"
+        elif turns > most:
+            yield f"turns = {turns:g}: there is memory for {most:.4g} turns; take fewer turns or samples_per_turn"
+
+
 def history(
-    scene: Scene, turns: float, replicate: int = 0, samples_per_turn: int | None = None, stop: Stop | None = None
+    scene: Scene | Path | str,
+    turns: float,
+    replicate: int = 0,
+    samples_per_turn: int | None = None,
+    stop: Stop | None = None,
+    notice: Notice = log,
 ) -> History:
-    """History of one replicate over the first ``turns`` counted turns. Raises RunError."""
+    """History of one replicate, counted from 0, over the first ``turns`` counted turns.
+
+    ``scene``: also the path of its file; ``notice``: what to do with a sentence on a long run, as in ``simulate``. Raises
+    RunError, InputError for what is no roller bearing and for turns, replicates or samples that there cannot be.
+    """
+    scene = rollers_only(scene)
+    per_turn = scene.numerics.samples_per_turn if samples_per_turn is None else samples_per_turn
+    refuse(_request_faults(scene, turns, replicate, per_turn))
     bearing = roller_bearing(scene)
     z = bearing.rollers
-    run = Run(scene, bearing, replicate, scene.numerics.rtol, stop or Stop())
+    pace = Pace(scene, notice, 1, scene.numerics.warm_up_turns + turns, 1)
+    run = Run(scene, bearing, replicate, scene.numerics.rtol, stop or Stop(), pace)
     run.to(scene.numerics.warm_up_turns)
     run.forget()
-    per_turn = samples_per_turn or scene.numerics.samples_per_turn
     states = np.empty((int(turns * per_turn), run.carry.y.size))
     clock = np.empty((len(states), 2))
     for sample, state in enumerate(states):

@@ -9,13 +9,11 @@ import numpy as np
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.dynamics.forces.drag import AIR_DENSITY
 from rbdyn.life.roller_capacity import dynamic_capacity, minimum_loads, static_capacity
-from rbdyn.properties.materials import equivalent_modulus
+from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
 
 # Share of the power loss from which a result speaks of power that was left out.
 NOTED_SHARE = 0.03
-# Bronze and steel cages have 100 GPa and more, polymers and laminates up to 20.
-SOFT_CAGE = 20e9  # [Pa]
 # An oil jet carried 1.4 kW off a 35 mm ball bearing at 72 000 rpm with seats, pi B (D + d), of 4270 mm^2 (NASA TP-2275) [W/m^2];
 # some times as much is beyond any cooling. Oil takes up 27 W/K a litre a minute (SKF), over at most some 100 K [W min/L].
 JET_COOLED, TOO_HOT, OIL_HEAT = 0.33e6, 10.0, 2700.0
@@ -140,8 +138,8 @@ LEFT_OUT = (
     LeftOut(
         "elastic deformation of the cage ring",
         "lower impacts and load shared by several pockets; bars bend by model.pocket_bar_stiffness_N_m, the ring does not",
-        f"none: it counts in cages below {SOFT_CAGE * 1e-9:g} GPa",
-        matters=lambda scene: scene.material("cage").elastic_modulus < SOFT_CAGE,
+        f"none: it counts in cages below {SOFTEST_METAL * 1e-9:g} GPa",
+        matters=lambda scene: scene.material("cage").elastic_modulus < SOFTEST_METAL,
     ),
 )
 

@@ -59,7 +59,7 @@ class Walked(NamedTuple):
 
 
 def sweep(
-    scene: BallScene | Scene,
+    scene: BallScene | Scene | Path | str,
     keys: Mapping[str, Sequence[float]],
     progress: Reporter = None,
     kept_in: Path | None = None,
