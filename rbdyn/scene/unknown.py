@@ -71,13 +71,13 @@ def inputs_of(
     inputs = [Input(key, law, "declared") for key, law in uncertain.laws.items() if key not in sample]
     inputs += [Input(key, values, "posterior sample") for key, values in sample.items()]
     inputs += [
-        Input(key, each.as_law, each.reason)
-        for key, each in ((each.key, each) for each in documented_of(scene))
-        if key not in keys
-        and others.on(tuple(key.split("."))) is None
+        Input(each.key, each.as_law, each.reason)
+        for each in documented_of(scene)
+        if each.key not in keys
+        and others.on(tuple(each.key.split("."))) is None
         and (
-            key in uncertain.estimated
-            or (uncertain.defaults == "documented" and not each.asked and not _given(data, key))
+            each.key in uncertain.estimated
+            or (uncertain.defaults == "documented" and not each.asked and not _given(data, each.key))
         )
     ]
     refuse(f"{source}: {fault}" for fault in _times_faults(scene, inputs))
