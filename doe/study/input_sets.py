@@ -14,15 +14,16 @@ from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.running.failure import Failure, sentence
-from doe.study_file.table import NUMBER, fields
+from doe.study.scene_columns import key_values, unknown_keys
+from doe.study_file.cells import read_sheet
 from doe.unknown import laws, screening
 from doe.unknown.joint import Joint
-from rbdyn.faults import InputError, RunError, read_toml, refuse, set_key
+from rbdyn.faults import InputError, RunError, one_line, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import shown
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene, rollers_only
-from rbdyn.scene.uncertain import Sampled, Uncertain
+from rbdyn.scene.uncertain import Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, value_of, with_values
 
 # Share of input sets that may be impossible or fail.
@@ -134,7 +135,7 @@ def case_of(
     scene = rollers_only(Scene.from_dict(data, source))
     uncertain = declared or scene.uncertain or Uncertain()
     folder = beside if declared and beside else Path(source).parent
-    sample = {} if uncertain.sample is None else read_sample(folder / uncertain.sample)
+    sample = {} if uncertain.sample is None else read_sample(folder / uncertain.sample, uncertain.laws)
     ordered = ((key, [column[place] for place in np.argsort(laws.ranks(column))]) for key, column in sample.items())
     found = {key: Sampled(tuple(column)) for key, column in ordered}
     every = inputs_of(scene, data, uncertain, fixed, found)
@@ -148,15 +149,22 @@ def case_of(
     return case
 
 
-def read_sample(path: Path) -> dict[str, list[Any]]:
-    """Columns of a posterior sample by key: numbers, or choices. Raises InputError, also for fewer than two rows."""
-    header, rows = fields(path)
-    if len(rows) < 2:
+def read_sample(path: Path, declared: Mapping[str, Law]) -> dict[str, list[Any]]:
+    """Columns of a posterior sample by key; of a choice, what its ``declared`` law or else the key in a scene has there.
+
+    Raises InputError for cells that are no values of their key, and for fewer than two rows.
+    """
+    sheet = read_sheet(path)
+    sheet.refuse_nameless()
+    refuse(f"{path}: {fault}" for fault in unknown_keys(sheet.places))
+    if len(sheet.rows) < 2:
         raise InputError([f"{path}: has one row; a sample needs two at least"])
-    columns: dict[str, list[Any]] = {}
-    for key, *texts in zip(header, *rows, strict=True):
-        numbers = all(NUMBER.fullmatch(text.strip()) for text in texts)
-        columns[key] = [float(text) if numbers else text.strip() for text in texts]
+    columns, faults = dict[str, list[Any]](), list[str]()
+    for key in sheet.places:
+        choices = declared[key].values if key in declared else None
+        columns[key], slips = key_values(sheet.column(key), choices or ())
+        faults += slips
+    refuse(faults)
     return columns
 
 
@@ -164,11 +172,12 @@ def _doubt(sample: Path) -> str:
     """What the record beside a posterior sample says of its calibration, unless that succeeded; empty without a record."""
     try:
         record = json.loads(sample.with_suffix(".json").read_text(encoding="utf-8"))
-        verdict, same = record["verdict"], record["sha256"] == digest_of(sample.read_bytes())
+        verdict, same = str(record["verdict"]), record["sha256"] == digest_of(sample.read_bytes())
         reason = next(iter(record["reasons"]), "")
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return ""
-    return f"{sample.name} is of a rig that ended {verdict}: {reason}" if same and verdict != "calibrated" else ""
+    doubt = one_line(f"{sample.name} is of a rig that ended {verdict}: {reason}")
+    return doubt if same and verdict != "calibrated" else ""
 
 
 def impossible(case: Case) -> Iterator[str]:

@@ -19,6 +19,8 @@ from doe.study_file.table import COUNT, LABELS
 from rbdyn.faults import Consistent, InputError, Strict, read_toml, validated
 from rbdyn.scene.uncertain import Uncertain
 
+MOST_FACTORS = 8
+
 
 class SceneFile(Strict):
     """Scene that every run starts from; ``set`` replaces keys of it for the design runs."""
@@ -78,7 +80,7 @@ class StudyFile(Consistent):
 
     scene: SceneFile | None = None
     """The scene that every run starts from; none where all runs come from a table."""
-    factor: Annotated[list[Factor], Field(min_length=1, max_length=8)]
+    factor: Annotated[list[Factor], Field(min_length=1, max_length=MOST_FACTORS)]
     """The factors."""
     category: Annotated[list[Category], Field(max_length=3)] = []
     """Factors without numbers; a [[factor]] that has "categories" is one of these."""
