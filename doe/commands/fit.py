@@ -49,11 +49,12 @@ def fit(
         loaded, notes = _study(path, data, {"factor": factor, "response": response, "model": model})
         kept.enter_context(keeping_runs(out, loaded.path))
         from doe.report.steps.fit import fit_record, fit_tables, print_fit
-        from doe.study.surfaces import with_rivals
+        from doe.study.surfaces import unrivalled, with_rivals
 
         surfaces = fitted(loaded, data, Effort(out, workers, scheduler, retry, quiet or as_json))
         surfaces = with_rivals(surfaces)
-        record = fit_record(surfaces) | ({"notes": list(notes)} if notes else {})
+        remarks = [*notes, *unrivalled(surfaces)]
+        record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
         save(out, loaded.path, "fit.json", record)
         if out is not None:
             import pandas as pd
@@ -63,8 +64,8 @@ def fit(
         if path is None and not as_json:
             named = f"factors {', '.join(loaded.factors)}; responses {', '.join(loaded.responses)}"
             print(f"{data}: {named}; coded -1 and +1 are the ends of a factor's range")
-            for note in notes:
-                print(f"note: {note}")
+        for remark in [] if as_json else remarks:
+            print(f"note: {remark}")
         hand_over(lambda: record, as_json, lambda: print_fit(surfaces, quiet, verbose, loaded.factors))
 
 

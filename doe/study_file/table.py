@@ -7,12 +7,14 @@ import numpy as np
 
 from doe.arrays import Array, Whole
 from doe.study_file.cells import UNKNOWN, Limits, Sheet, listed, quoted, read_sheet
-from rbdyn.faults import refuse
+from rbdyn.faults import InputError, refuse
 
 # Fourth powers of larger values overflow; larger labels and counts are no whole numbers in floating point.
 RUN, ERROR = Limits(1e50, 1e-50), Limits(1e50, 1e-50, "not negative")
 NUMBERED, COUNTED = Limits(1e9, whole=True), Limits(1e9, sign="not negative", whole=True)
 COUNT, LABELS = "replicates", ("block", "run")
+# Runs of which statistics in pairs take seconds and half a gigabyte, and a test of normality is still exact.
+MOST_RUNS = 5000
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,8 @@ def read_table(path: Path, factors: list[str], responses: list[str], named_in: P
     column "run" are replicates: their mean is one run, with the half width that their scatter tells.
 
     Raises InputError, with all faults, when the file, a column or a number is missing, a row has more or fewer fields
-    than the header, a column comes twice, a number is not finite or impossible, or replicates have different factors.
+    than the header, a column comes twice, a number is not finite or impossible, replicates have different factors, or there
+    are more than `MOST_RUNS` runs.
     """
     return table_of(read_sheet(path), factors, responses, named_in)
 
@@ -63,6 +66,9 @@ def table_of(sheet: Sheet, factors: list[str], responses: list[str], named_in: P
         refuse(f"{path}: column {name}: {twice}" for name in (*errors, COUNT) if name in columns)
         columns = _means_of_replicates(path, columns, factors, responses)
     size = len(columns[factors[0]])
+    if size > MOST_RUNS:
+        fix = f"give {MOST_RUNS} at most, or number replicates alike in a column run"
+        raise InputError([f"{path}: has {size} runs; {fix}"])
     return Table(
         actual=np.column_stack([columns[name] for name in factors]),
         values=np.column_stack([np.empty((size, 0)), *(columns[name] for name in responses)]),

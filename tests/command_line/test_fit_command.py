@@ -18,6 +18,7 @@ from doe.running.failure import StoppedError
 from doe.study.runs import read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
+from doe.study_file.table import read_table
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TABLE = pd.read_csv(EXAMPLES / "ccd_table4.csv")
@@ -236,6 +237,41 @@ def test_unit_a_cell_that_is_no_number_leaves_no_column_out(tmp_path, named, cel
     )
     assert shown.exit_code == 2 and len(shown.stderr.splitlines()) == 1
     assert shown.stderr.startswith(f"{tmp_path / 'mine.csv'}: b in row 7 = ")
+
+
+def test_unit_runs_too_many_for_a_rival_are_fitted_with_a_note(tmp_path, monkeypatch):
+    """Unit: a Gaussian process costs the cube of the runs; without it the surface stands and a note says so."""
+    monkeypatch.setattr("doe.study.surfaces.MOST_RIVALLED", 11)
+    shown = fit_table(tmp_path, OWN, "--factor=a", "--factor=b", "--response=y", "--model=linear", "-q")
+    assert (
+        shown.exit_code == 0
+        and "note: 12 runs are not compared with a rival: a Gaussian process of more than 11" in shown.stdout
+    )
+    assert "left out in turn" not in shown.stdout
+
+
+def test_unit_a_block_a_run_is_refused_before_its_columns_are_made(tmp_path):
+    """Unit: thousands of blocks of a run each are counted before their columns are made, which is quick."""
+    table = pd.DataFrame({"a": np.arange(5000) % 7, "y": np.arange(5000), "block": np.arange(5000)})
+    shown = fit_table(tmp_path, table, "--factor=a", "--response=y")
+    assert shown.exit_code == 2 and "5000 runs are too few for the quadratic model; give at least 5003" in shown.stderr
+
+
+def test_unit_more_runs_than_statistics_in_pairs_can_take_are_refused(tmp_path):
+    """Unit: 5001 runs are too many, twice 2501 replicates of 2501 runs are not."""
+    table = pd.DataFrame({"a": np.arange(5002) % 7, "y": np.arange(5002) % 11, "run": np.arange(5002)})
+    shown = fit_table(tmp_path, table, "--factor=a", "--response=y")
+    assert (
+        shown.exit_code == 2
+        and "has 5002 runs; give 5000 at most, or number replicates alike in a column run" in shown.stderr
+    )
+    table = pd.concat([table[:2501]] * 2)
+    assert len(read_table(_written(tmp_path, table), ["a"], ["y"], tmp_path).actual) == 2501
+
+
+def _written(folder: Path, table: pd.DataFrame) -> Path:
+    table.to_csv(folder / "table.csv", index=False)
+    return folder / "table.csv"
 
 
 @pytest.mark.parametrize("text", ["1O", "2 N", "1.5.2", "１"])
