@@ -48,6 +48,10 @@ class Limits(NamedTuple):
             return "is not above 0; check the sign"
         return f"is nearer to 0 than {self.least:g}; check the unit"
 
+    def contains(self, value: float) -> bool:
+        """Whether a value is within the limits."""
+        return not self.broken(np.array([value]))
+
     def broken(self, values: Array) -> list[int]:
         """Places of the values (n,) that are not within the limits."""
         size = np.abs(values)
