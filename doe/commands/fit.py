@@ -46,14 +46,15 @@ def fit(
 ) -> None:
     """Fit the response surfaces and print their analysis of variance."""
     with guarded(as_json), ExitStack() as kept:
-        loaded = _study(path, data, {"factor": factor, "response": response, "model": model})
+        loaded, notes = _study(path, data, {"factor": factor, "response": response, "model": model})
         kept.enter_context(keeping_runs(out, loaded.path))
         from doe.report.steps.fit import fit_record, fit_tables, print_fit
-        from doe.study.surfaces import with_rivals
+        from doe.study.surfaces import unrivalled, with_rivals
 
         surfaces = fitted(loaded, data, Effort(out, workers, scheduler, retry, quiet or as_json))
         surfaces = with_rivals(surfaces)
-        record = fit_record(surfaces)
+        remarks = [*notes, *unrivalled(surfaces)]
+        record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
         save(out, loaded.path, "fit.json", record)
         if out is not None:
             import pandas as pd
@@ -63,18 +64,20 @@ def fit(
         if path is None and not as_json:
             named = f"factors {', '.join(loaded.factors)}; responses {', '.join(loaded.responses)}"
             print(f"{data}: {named}; coded -1 and +1 are the ends of a factor's range")
+        for remark in [] if as_json else remarks:
+            print(f"note: {remark}")
         hand_over(lambda: record, as_json, lambda: print_fit(surfaces, quiet, verbose, loaded.factors))
 
 
-def _study(path: Path | None, data: Path | None, named: Mapping[str, Any]) -> "Study":
-    """The study of the file; without one, of the table and what the command names of it. Raises InputError."""
+def _study(path: Path | None, data: Path | None, named: Mapping[str, Any]) -> "tuple[Study, tuple[str, ...]]":
+    """The study of the file; without one, of the table and what the command names of it, with notes. Raises InputError."""
     from doe.study_file import Study
     from doe.study_file.of_table import study_of_table
 
     if path is not None:
         refuse(f"--{option}: {path} says it; leave out one or the other" for option, given in named.items() if given)
-        return Study.load(path)
+        return Study.load(path), ()
     if data is None:
         mend = "give STUDY.toml, or --data TABLE.csv with --factor NAME or --response NAME"
         raise InputError([f"fit: nothing to fit; {mend}"])
-    return study_of_table(data, named["factor"] or (), named["response"] or (), named["model"] or "quadratic")
+    return study_of_table(data, named["factor"] or [], named["response"] or [], named["model"] or "quadratic")

@@ -62,25 +62,29 @@ def front(
 
 def _point(study: "Study", text: str) -> list[float]:
     """Factor values that ``--point`` names. Raises InputError with every fault."""
-    from math import isfinite
+    from collections import Counter
+    from math import nan
+
+    from doe.study_file.cells import is_number
+    from doe.study_file.table import RUN
 
     values = study.by_factor(study.baseline)
     parts = [part.strip() for part in text.split(",")]
     named = any("=" in part for part in parts)
     if not named and len(parts) != len(study.factors):
         raise InputError([f"--point {text}: give one value a factor ({', '.join(study.factors)}), or name=value"])
-    pairs = [part.partition("=")[::2] for part in parts] if named else zip(study.factors, parts, strict=True)
-    faults = []
-    for name, number in ((name.strip(), number.strip()) for name, number in pairs):
+    pairs = [part.partition("=")[::2] for part in parts] if named else list(zip(study.factors, parts, strict=True))
+    stripped = [(name.strip(), number.strip()) for name, number in pairs]
+    counts = Counter(name for name, _ in stripped)
+    faults = [f"--point {name}: given {count} times; give it once" for name, count in counts.items() if count > 1]
+    for name, number in stripped:
         if name not in values:
             faults.append(f"--point {name}: no such factor; name one of {', '.join(values)}")
             continue
-        try:
-            values[name] = float(number)
-        except ValueError:
-            faults.append(f"--point {name} = {number}: is not a number; write a plain number")
-            continue
-        if not isfinite(values[name]):
-            faults.append(f"--point {name} = {number}: is not a finite number; write a plain number")
+        value = float(number) if is_number(number) else nan
+        if RUN.contains(value):
+            values[name] = value
+        else:
+            faults.append(f"--point {name} = {number}: {RUN.fault(value)}")
     refuse(faults)
     return list(values.values())

@@ -94,16 +94,21 @@ def check_errors(name: str, standard_errors: ArrayLike | None) -> None:
         raise ValueError(f'{name}: {given}, but weighting = "replicates" needs positive ones; {mend}')
 
 
+def check_size(name: str, model: str, terms: Terms, block: Whole) -> None:
+    """Raises ValueError when runs, by the ``block`` (n,) of each, are too few for the terms and the blocks."""
+    runs, more = len(block), len(np.unique(block)) - 1
+    size = len(terms) + more
+    if runs <= size:
+        blocks = f", {more} for the blocks" if more else ""
+        least = f"{size + 1} ({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
+        raise ValueError(f"{name}: {runs} runs are too few for the {model} model; give at least {least}")
+
+
 def check_matrix(name: str, model: str, terms: Terms, matrix: Array) -> None:
-    """Raises ValueError when runs are too few for the columns, or cannot tell them apart.
+    """Raises ValueError when runs cannot tell the columns apart.
 
     ``matrix`` (n, p) holds the columns of ``terms``, then those of the blocks.
     """
-    runs, size = matrix.shape
-    if runs <= size:
-        blocks = f", {size - len(terms)} for the blocks" if size > len(terms) else ""
-        least = f"{size + 1} ({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
-        raise ValueError(f"{name}: {runs} runs are too few for the {model} model; give at least {least}")
     if dependent := dependent_columns(matrix):
         names = dict.fromkeys(terms[column] if column < len(terms) else "the blocks" for column in dependent)
         what = f"{', '.join(sorted(names))} from the other terms of the {model} model (its matrix is singular)"

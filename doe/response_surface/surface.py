@@ -21,7 +21,7 @@ from doe.designs.model import MODELS, Model, Terms, in_actual_units, model_matri
 from doe.response_surface.anova import AnovaRow, Removal, anova, eliminate, find, goodness, observation_variance
 from doe.response_surface.box_cox import BoxCox, backward, box_cox, check_positive, forward, slope
 from doe.response_surface.canonical import Canonical, StationaryPoint, canonical
-from doe.response_surface.data import Data, check_errors, check_matrix, checked
+from doe.response_surface.data import Data, check_errors, check_matrix, check_size, checked
 from doe.response_surface.diagnostics import Diagnostics, diagnose
 from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import KnownVariance, ModelError, compare, model_error
@@ -210,6 +210,7 @@ def _figures(surface: Surface, source: str, *keys: str) -> dict[str, Any]:
 
 def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: Transform, advised: bool) -> Surface:
     terms = model_terms(data.points.shape[1], model, data.without)
+    check_size(name, model, terms, data.block)
     check_matrix(name, model, terms, _columns(data, terms))
     if not np.ptp(data.values):
         alike = f"all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit"

@@ -15,15 +15,16 @@ from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.running.failure import Failure, sentence
-from doe.study_file.table import NUMBER, fields
+from doe.study.scene_columns import key_values, unknown_keys
+from doe.study_file.cells import read_sheet
 from doe.unknown import laws, screening
 from doe.unknown.joint import Joint
-from rbdyn.faults import Claims, InputError, RunError, assignment_faults, key_path, read_toml, refuse, set_key
+from rbdyn.faults import Claims, InputError, RunError, assignment_faults, key_path, one_line, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import shown
 from rbdyn.result import SimulationResult, read_json
 from rbdyn.scene import Scene, rollers_only
-from rbdyn.scene.uncertain import Sampled, Uncertain
+from rbdyn.scene.uncertain import Law, Sampled, Uncertain
 from rbdyn.scene.unknown import Input, inputs_of, is_number, put, value_of, with_values
 
 # Share of input sets that may be impossible or fail.
@@ -181,7 +182,7 @@ def case_of(
     scene = rollers_only(Scene.from_dict(data, source))
     uncertain = declared or scene.uncertain or Uncertain()
     home = stated_in if declared and stated_in else Path(source)
-    sample = {} if uncertain.sample is None else read_sample(home.parent / uncertain.sample)
+    sample = {} if uncertain.sample is None else read_sample(home.parent / uncertain.sample, uncertain.laws)
     ordered = ((key, [column[place] for place in np.argsort(laws.ranks(column))]) for key, column in sample.items())
     columns = {key: Sampled(tuple(column)) for key, column in ordered}
     # A run depends on no declaration; to check them all again at every input set would take long.
@@ -218,15 +219,22 @@ def _remarks(by_set: Sequence[str], idle: Sequence[str]) -> Iterator[str]:
         yield f"estimated, but without effect in this scene, so they do not vary: {', '.join(idle)}"
 
 
-def read_sample(path: Path) -> dict[str, list[Any]]:
-    """Columns of a posterior sample by key: numbers, or choices. Raises InputError, also for fewer than two rows."""
-    header, rows = fields(path)
-    if len(rows) < 2:
+def read_sample(path: Path, declared: Mapping[str, Law]) -> dict[str, list[Any]]:
+    """Columns of a posterior sample by key; of a choice, what its ``declared`` law or else the key in a scene has there.
+
+    Raises InputError for cells that are no values of their key, and for fewer than two rows.
+    """
+    sheet = read_sheet(path)
+    sheet.refuse_nameless()
+    refuse(f"{path}: {fault}" for fault in unknown_keys(sheet.places))
+    if len(sheet.rows) < 2:
         raise InputError([f"{path}: has one row; a sample needs two at least"])
-    columns: dict[str, list[Any]] = {}
-    for key, *texts in zip(header, *rows, strict=True):
-        numbers = all(NUMBER.fullmatch(text.strip()) for text in texts)
-        columns[key] = [float(text) if numbers else text.strip() for text in texts]
+    columns, faults = dict[str, list[Any]](), list[str]()
+    for key in sheet.places:
+        choices = declared[key].values if key in declared else None
+        columns[key], slips = key_values(sheet.column(key), choices or ())
+        faults += slips
+    refuse(faults)
     return columns
 
 
@@ -234,11 +242,12 @@ def _doubt(sample: Path) -> str:
     """What the record beside a posterior sample says of its calibration, unless that succeeded; empty without a record."""
     try:
         record = read_json(sample.with_suffix(".json"))
-        verdict, same = record["verdict"], record["sha256"] == digest_of(sample.read_bytes())
+        verdict, same = str(record["verdict"]), record["sha256"] == digest_of(sample.read_bytes())
         reason = next(iter(record["reasons"]), "")
     except (OSError, ValueError, KeyError, TypeError):
         return ""
-    return f"{sample.name} is of a rig that ended {verdict}: {reason}" if same and verdict != "calibrated" else ""
+    doubt = one_line(f"{sample.name} is of a rig that ended {verdict}: {reason}")
+    return doubt if same and verdict != "calibrated" else ""
 
 
 def impossible(case: Case) -> Iterator[str]:

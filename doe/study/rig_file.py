@@ -1,12 +1,15 @@
 """Measurements on a rig: a CSV table, a row an operating condition with what was measured there."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from doe.arrays import Array
 from doe.study.rig_signals import KINDS, cage_speed, whirl
-from doe.study_file.table import NUMBER, fields, listed
+from doe.study.scene_columns import key_values, unknown_keys
+from doe.study_file.cells import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
 from rbdyn.faults import InputError, refuse
 
 # What can be measured, by its name in the results of a simulation; the others of these are no positive numbers.
@@ -18,8 +21,10 @@ ORBIT, CUTOFF, STILL, WHIRL = "orbit", "cutoff_hz", "still_file", "whirl_deviati
 SHAFTS = "operation.inner_speed_rpm", "operation.outer_speed_rpm"
 FILTER = "numerics.whirl_cutoff_hz", "numerics.whirl_notches_hz"
 YES, NO = ("1", "yes", "true"), ("", "0", "no", "false")
-# Rows that teach.
-FEWEST = 3
+# Any unit in use; pulses of the finest encoders.
+MEASURED, COUNTED = Limits(1e12, 1e-12, "positive"), Limits(1e6, sign="positive", whole=True)
+# Rows that teach; rows whose joint covariance is quickly solved; conditions, each of which has seeds of its own.
+FEWEST, MOST_ROWS, MOST_CONDITIONS = 3, 1000, 200
 
 
 @dataclass(frozen=True)
@@ -52,34 +57,82 @@ class Rig:
 
 
 def read_rig(path: Path) -> Rig:
-    """Read a rig's table. Raises InputError with all faults."""
-    header, rows = fields(path)
-    header = [name.strip() for name in header]
-    keys = tuple(name for name in header if "." in name)
-    outputs = tuple(name for name in header if name in OUTPUTS)
-    if FILE in header:
-        signals = [row for row in rows if row[header.index(FILE)].strip()]
-        kinds = [row[header.index(KIND)].strip() if KIND in header else "" for row in signals]
-        outputs = tuple(dict.fromkeys([*outputs, *(WHIRL if kind == ORBIT else SPEED for kind in kinds)]))
-    known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES, CUTOFF, STILL}
-    faults = [f"{path}: {_unknown(name, outputs)}" for name in header if name not in known]
-    twice = [name for name in dict.fromkeys(header) if header.count(name) > 1]
-    faults += [f"{path}: column {name} comes twice; remove one" for name in twice]
-    if not outputs:
-        faults.append(f"{path}: no measured output; add a column of {listed(OUTPUTS)}")
-    if not keys:
-        faults.append(f"{path}: no operating condition; add a column of a scene key such as operation.inner_speed_rpm")
-    refuse(faults)
-    notes = list[str]()
-    found = [
-        _row(dict(zip(header, map(str.strip, row), strict=True)), number, keys, outputs, path, faults, notes)
-        for number, row in enumerate(rows, 1)
-    ]
-    teaching = sum(not row.held for row in found)
+    """Read a rig's table with the signals that it names. Raises InputError with all faults of the table, or of the signals."""
+    sheet = read_sheet(path)
+    keys, outputs = _named(sheet)
+    if len(sheet.rows) > MOST_ROWS:
+        raise InputError([f"{path}: has {len(sheet.rows)} rows; give {MOST_ROWS} at most, such as means of alike ones"])
+    cells, faults = _cells(sheet, keys)
+    faults += [fault for place in range(len(sheet.rows)) for fault in _faults(cells, place, outputs)]
+    teaching = sum(cells.text(HOLD, place).lower() not in YES for place in range(len(sheet.rows)))
     if teaching < FEWEST:
         faults.append(f"{path}: {teaching} rows to learn from; give {FEWEST} at least that are not on hold")
     refuse(faults)
-    return Rig(path, found, keys, outputs, tuple(notes))
+    rows, notes = [], []
+    for place in range(len(sheet.rows)):
+        try:
+            row, note = _row(cells, place, outputs)
+        except InputError as error:
+            faults += error.faults
+            continue
+        rows.append(row)
+        notes += [note] if note else []
+    refuse(faults)
+    rig = Rig(path, rows, keys, outputs, tuple(dict.fromkeys(notes)))
+    if len(rig.conditions) > MOST_CONDITIONS:
+        raise InputError([f"{path}: has {len(rig.conditions)} operating conditions; give {MOST_CONDITIONS} at most"])
+    return rig
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """Columns of a rig's table: all of them as texts, ``numbers`` (NaN where unknown), and values of scene ``keys``."""
+
+    path: Path
+    columns: Mapping[str, Column]
+    numbers: Mapping[str, Array]
+    keys: Mapping[str, Sequence[Any]]
+
+    def text(self, name: str, place: int) -> str:
+        """The text in a row, empty where there is no such column."""
+        return self.columns[name].texts[place] if name in self.columns else ""
+
+    def number(self, name: str, place: int) -> float | None:
+        """The number in a row; None where it is unknown."""
+        value = float(self.numbers[name][place]) if name in self.numbers else math.nan
+        return None if math.isnan(value) else value
+
+    def states(self, name: str, place: int) -> bool:
+        """Whether there is anything in a row."""
+        return self.text(name, place).lower() not in (UNKNOWN if name in self.numbers else ("",))
+
+    def fault(self, name: str, place: int, words: str) -> str:
+        """A sentence on the cell of a row."""
+        if self.states(name, place):
+            return self.columns[name].fault(place, words)
+        return f"{self.path}: {name} in row {place + 1}: {words}"
+
+
+def _named(sheet: Sheet) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Scene keys and outputs that are columns, or come from signals. Raises InputError for any other column."""
+    sheet.refuse_nameless()
+    names = [name for name in sheet.header if name]
+    keys = tuple(name for name in names if "." in name)
+    kinds = sheet.column(KIND).texts if KIND in sheet else ()
+    signals = [WHIRL if kind == ORBIT else SPEED for kind in kinds if kind in KINDS]
+    outputs = tuple(dict.fromkeys([*(name for name in names if name in OUTPUTS), *signals]))
+    known = {*keys, *outputs, *(name + SD for name in outputs), TURNS, HOLD, FILE, KIND, PULSES, CUTOFF, STILL}
+    faults = [f"{sheet.path}: {fault}" for fault in unknown_keys(keys)]
+    faults += [f"{sheet.path}: {_unknown(name, outputs)}" for name in names if name not in known]
+    if not outputs:
+        faults.append(f"{sheet.path}: no measured output; add a column of {listed(OUTPUTS)}")
+    if not keys:
+        fix = "add a column of a scene key such as operation.inner_speed_rpm"
+        faults.append(f"{sheet.path}: no operating condition; {fix}")
+    if CUTOFF in sheet:
+        faults += [f"{sheet.path}: column {key}: {CUTOFF} sets that key; remove one" for key in FILTER if key in sheet]
+    refuse(faults)
+    return keys, outputs
 
 
 def _unknown(name: str, outputs: Sequence[str]) -> str:
@@ -93,78 +146,72 @@ def _unknown(name: str, outputs: Sequence[str]) -> str:
     )
 
 
-def _row(
-    cells: Mapping[str, str], place: int, keys: Sequence[str], outputs: Sequence[str], path: Path, faults: list[str],
-    notes: list[str],
-) -> Row:  # fmt: skip
-    where = f"{path}: row {place}"
+def _cells(sheet: Sheet, keys: Sequence[str]) -> tuple[_Cells, list[str]]:
+    """The columns of the table, and a sentence for each cell that is no value of its column."""
+    columns = {name: sheet.column(name) for name in sheet.places}
+    numbers, values, faults = dict[str, Array](), dict[str, list[Any]](), list[str]()
+    for name, column in columns.items():
+        if name in keys:
+            values[name], slips = key_values(column)
+        elif name in (HOLD, FILE, KIND, STILL):
+            continue
+        else:
+            numbers[name], slips = column.numbers(COUNTED if name == PULSES else MEASURED, UNKNOWN)
+        faults += slips
+    return _Cells(sheet.path, columns, numbers, values), faults
 
-    def number(name: str) -> float | None:
-        text = cells.get(name, "")
-        if text in ("", "nan"):
-            return None
-        if NUMBER.fullmatch(text) and float(text) > 0.0:
-            return float(text)
-        faults.append(f"{where}: {name} = {text!r}: not a positive number; mend it")
-        return 1.0
 
-    before = len(faults)
-    values = {name: value for name in outputs if (value := number(name)) is not None}
-    sds, turns, cutoff = {name: number(name + SD) for name in values}, number(TURNS), number(CUTOFF)
-    scene_keys, notches = {key: _value(cells[key]) for key in keys}, tuple[float, ...]()
-    if cells.get(FILE) and len(faults) == before:
-        try:
-            if cells.get(KIND) == ORBIT:
-                notches = _runout(scene_keys, values.get(SPEED))
-                values[WHIRL], sds[WHIRL], told = _orbit(cells, path, where, cutoff, notches)
-            else:
-                values[SPEED], sds[SPEED], told = _signal(cells, path, where)
-            notes += [told] if told else []
-        except InputError as error:
-            faults += error.faults
-    elif not values and not cells.get(FILE):
-        faults.append(f"{where}: nothing measured; remove it")
-    if cutoff is not None and WHIRL in values:
+def _faults(cells: _Cells, place: int, outputs: Sequence[str]) -> Iterator[str]:
+    """What is missing in a row, is there twice, or serves nothing."""
+    kind = cells.text(KIND, place) if cells.states(FILE, place) else ""
+    signal = WHIRL if kind == ORBIT else SPEED if kind in KINDS else None
+    if cells.states(FILE, place) and signal is None:
+        yield cells.fault(KIND, place, f"is no kind of signal; choose {', '.join(KINDS)}")
+        return
+    measured = [name for name in outputs if cells.states(name, place)]
+    used = {PULSES: kind == "cage_pulses", STILL: kind == ORBIT, CUTOFF: WHIRL in (signal, *measured)}
+    used |= {KIND: cells.states(FILE, place)} | {name + SD: name in measured for name in outputs}
+    for name, serves in used.items():
+        if cells.states(name, place) and not serves:
+            yield cells.fault(name, place, "belongs to nothing in this row; leave it out, or add what it belongs to")
+    for name in measured:
+        if not (cells.states(name + SD, place) or cells.states(TURNS, place)):
+            fix = f"give it, or {TURNS} for the scatter of a run of so many shaft turns"
+            yield cells.fault(name + SD, place, f"is missing; {fix}")
+    if signal in measured:
+        yield cells.fault(str(signal), place, f"comes from {FILE} too; leave out one")
+    if kind == ORBIT and not cells.states(CUTOFF, place):
+        yield cells.fault(CUTOFF, place, "is missing; give the frequency below which the orbit counts")
+    if not measured and not cells.states(FILE, place):
+        yield f"{cells.path}: row {place + 1}: nothing measured; remove it"
+    if cells.text(HOLD, place).lower() not in (*YES, *NO):
+        yield cells.fault(HOLD, place, "is neither yes nor no; write 1 for a row that is held out, else 0")
+
+
+def _row(cells: _Cells, place: int, outputs: Sequence[str]) -> tuple[Row, str | None]:
+    """A row without faults, and a note on its signal. Raises InputError for a signal that cannot be read."""
+    keys = {key: values[place] for key, values in cells.keys.items()}
+    values = {name: value for name in outputs if (value := cells.number(name, place)) is not None}
+    sds = {name: cells.number(name + SD, place) for name in values}
+    cutoff, turns, notches, note = cells.number(CUTOFF, place), cells.number(TURNS, place), tuple[float, ...](), None
+    if cells.states(FILE, place):
+        signal, kind = cells.path.parent / cells.text(FILE, place), cells.text(KIND, place)
+        if kind == ORBIT:
+            assert cutoff is not None
+            notches = _runout(keys, values.get(SPEED))
+            still = cells.path.parent / cells.text(STILL, place) if cells.states(STILL, place) else None
+            mean = whirl(signal, cutoff, notches, still)
+        else:
+            mean = cage_speed(signal, kind, int(cells.number(PULSES, place) or 1))
+        name = WHIRL if kind == ORBIT else SPEED
+        values[name], sds[name], note = mean
+    if cutoff is not None:
         # The simulated whirl is filtered alike.
-        scene_keys |= dict(zip(FILTER, (cutoff, notches), strict=True))
-    faults += [
-        f"{where}: {name}{SD} is missing; give it, or {TURNS} for the scatter of a run of so many shaft turns"
-        for name, sd in sds.items()
-        if sd is None and turns is None
-    ]
-    faults += [f"{where}: {key} is missing; every row needs a value" for key in keys if not cells[key]]
-    hold = cells.get(HOLD, "").lower()
-    if hold not in (*YES, *NO):
-        faults.append(f"{where}: {HOLD} = {hold!r}: write 1 for a row that is held out, else 0")
-    return Row(place, scene_keys, values, sds, turns, hold in YES)
-
-
-def _signal(cells: Mapping[str, str], path: Path, where: str) -> tuple[float, float, str | None]:
-    kind, pulses = cells.get(KIND, ""), cells.get(PULSES, "") or "1"
-    if kind not in KINDS:
-        raise InputError([f"{where}: {KIND} = {kind!r}: unknown; choose {' or '.join(KINDS)}"])
-    if not pulses.isdecimal() or int(pulses) < 1:
-        raise InputError([f"{where}: {PULSES} = {pulses!r}: not a whole number of pulses a cage turn; mend it"])
-    return cage_speed(path.parent / cells[FILE], kind, int(pulses))
-
-
-def _orbit(
-    cells: Mapping[str, str], path: Path, where: str, cutoff: float | None, notches: tuple[float, ...]
-) -> tuple[float, float, str | None]:
-    if cutoff is None:
-        raise InputError([f"{where}: {CUTOFF} is missing; give the frequency below which the orbit counts"])
-    still = cells.get(STILL)
-    return whirl(path.parent / cells[FILE], cutoff, notches, path.parent / still if still else None)
+        keys |= dict(zip(FILTER, (cutoff, notches), strict=True))
+    return Row(place + 1, keys, values, sds, turns, cells.text(HOLD, place).lower() in YES), note
 
 
 def _runout(keys: Mapping[str, Any], cage: float | None) -> tuple[float, ...]:
     """Frequencies [Hz] of the row's shaft and cage, as far as it tells them."""
     speeds = [abs(speed) for key in SHAFTS if isinstance(speed := keys.get(key), int | float)]
     return tuple(speed / 60.0 for speed in dict.fromkeys([*speeds, cage or 0.0]) if speed > 0.0)
-
-
-def _value(text: str) -> Any:
-    """A field as TOML would give it."""
-    if NUMBER.fullmatch(text):
-        return int(text) if text.lstrip("+-").isdigit() else float(text)
-    return {"true": True, "false": False}.get(text.lower(), text)

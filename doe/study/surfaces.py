@@ -16,6 +16,9 @@ from doe.study_file.study import Fitted
 from doe.threads import one_thread
 from rbdyn.faults import refuse
 
+# Runs of which a Gaussian process takes a minute and a gigabyte; both go with a power of their number.
+MOST_RIVALLED = 3000
+
 
 @one_thread
 def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
@@ -40,12 +43,15 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
 def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
     """The surfaces, each compared with a Gaussian process by leaving out every point in turn.
 
-    It takes of the order of a second a response. ``rival`` stays None where too few points can be left out.
+    It takes of the order of a second a response. ``rival`` stays None where too few points can be left out, or there are
+    too many runs (`unrivalled` says so).
     """
     from doe.response_surface.comparison import compare
 
     found = list(surfaces)
     for place, surface in enumerate(surfaces):
+        if len(surface.data.values) > MOST_RIVALLED:
+            continue
         data, matrix = surface.data, model_matrix(surface.data.points, surface.terms)
         errors = data.standard_errors if surface.weighting == "replicates" else None
         with suppress(ValueError):
@@ -53,6 +59,13 @@ def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
             rival = compare(*runs, name=surface.name, matrix=matrix, standard_errors=errors)
             found[place] = replace(surface, rival=rival)
     return found
+
+
+def unrivalled(surfaces: Sequence[Surface]) -> list[str]:
+    """A note where surfaces have too many runs to be compared with a Gaussian process; else none."""
+    runs = max(len(surface.data.values) for surface in surfaces)
+    why = f"a Gaussian process of more than {MOST_RIVALLED} takes too long"
+    return [f"{runs} runs are not compared with a rival: {why}"] if runs > MOST_RIVALLED else []
 
 
 def independent_values(runs: Runs) -> Whole:

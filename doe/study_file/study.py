@@ -21,6 +21,8 @@ from rbdyn.faults import Consistent, InputError, Strict, assignment_faults, read
 from rbdyn.fields import Number
 from rbdyn.scene.uncertain import DECLARATIONS, RUN_KEYS, SEEDS, Uncertain
 
+MOST_FACTORS = 8
+
 
 class SceneFile(Strict):
     """Scene that every run starts from; ``set`` replaces keys of it for the design runs."""
@@ -80,7 +82,7 @@ class StudyFile(Consistent):
 
     scene: SceneFile | None = None
     """The scene that every run starts from; none where all runs come from a table."""
-    factor: Annotated[list[Factor], Field(min_length=1, max_length=8)]
+    factor: Annotated[list[Factor], Field(min_length=1, max_length=MOST_FACTORS)]
     """The factors."""
     category: Annotated[list[Category], Field(max_length=3)] = []
     """Factors without numbers; a [[factor]] that has "categories" is one of these."""

@@ -147,6 +147,12 @@ class Scene(SceneFile):
         numerics = self.numerics
         if numerics.turns * numerics.samples_per_turn < 2:
             yield f"numerics.turns = {numerics.turns:g}: shorter than two samples; lengthen the run"
+        seconds = self.turn_s * (numerics.turns + numerics.warm_up_turns)
+        if numerics.whirl_cutoff_hz is not None and numerics.whirl_cutoff_hz * seconds < 1.0:
+            yield (
+                f"numerics.whirl_cutoff_hz = {numerics.whirl_cutoff_hz:g}: a period of it is longer than the run of "
+                f"{seconds:.3g} s; raise it or lengthen numerics.turns"
+            )
         samples = self.whirl_samples_per_turn * (numerics.turns + numerics.warm_up_turns)
         if samples * (numerics.replicates + numerics.companions) > MOST_SAMPLES:
             yield (

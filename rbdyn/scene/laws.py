@@ -162,7 +162,8 @@ class Numerics(Consistent):
     """Low pass for the whirl deviation ratio, as a rig's signal has one: the cage's centre is sampled ten times a period
     of it and filtered, forward and backward. None: the velocities as integrated, as they have no noise."""
     whirl_notches_hz: list[Positive] = []
-    """Frequencies taken out of the filtered whirl, as a rig's runout at cage and shaft rotation is."""
+    """Frequencies taken out of the filtered whirl, as a rig's runout at cage and shaft rotation is; each where a run has
+    ten periods of it."""
     companion: bool = True
     """Repeat a share of the replicates at ten times the tolerance to estimate the numerical error. Where stability holds the
     steps of a slow bearing, they are repeated with steps that resolve its light contacts instead."""

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -54,15 +55,34 @@ def _run(arguments: Sequence[str]) -> Any:
         ({"header": HEADER.replace("impact_force_N", "impact")}, "column impact: neither a key of a scene"),
         ({"header": HEADER.replace("power_loss_W_sd", "cage_slip")}, "give cage_speed_rpm, which tells the same"),
         ({"header": HEADER.replace("power_loss_W_sd", "cutof_hz")}, "column cutof_hz: neither a key of a scene"),
-        ({"header": HEADER + ",signal_file,signal_kind", "rows": [f"{row},a.csv,orbit" for row in ROWS]}, "row 1: cutoff_hz is missing; give"),
-        ({"header": HEADER + ",signal_file,signal_kind", "rows": [f"{row},a.csv,x" for row in ROWS]}, "signal_kind = 'x': unknown"),
+        ({"header": HEADER + ",signal_file,signal_kind", "rows": [f"{row},a.csv,orbit" for row in ROWS]}, "cutoff_hz in row 1: is missing; give"),
+        ({"header": HEADER + ",signal_file,signal_kind", "rows": [f"{row},a.csv,x" for row in ROWS]}, "signal_kind in row 1 = 'x': is no kind of signal; choose"),
         ({"header": HEADER + ",signal_file,signal_kind", "rows": [f"{row},a.csv,cage_speed" for row in ROWS]}, "a.csv: no such file"),
         ({"header": HEADER.replace("power_loss_W", "torque_sd", 1)}, "no output torque is measured here"),
         ({"header": "impact_force_N,impact_force_N_sd", "rows": ["40,1"] * 3}, "no operating condition"),
         ({"header": "operation.inner_speed_rpm,turns", "rows": ["12000,9"] * 3}, "no measured output"),
-        ({"rows": [*ROWS[:2], "24000,80,,180,3"]}, "row 3: impact_force_N_sd is missing; give it, or turns"),
-        ({"rows": [*ROWS[:2], "24000,-80,2,180,3"]}, "row 3: impact_force_N = '-80': not a positive number"),
-        ({"rows": [*ROWS[:2], "1e12,80,2,180,3"]}, "row 3: operation.inner_speed_rpm"),
+        ({"rows": [*ROWS[:2], "24000,80,,180,3"]}, "impact_force_N_sd in row 3: is missing; give it, or turns"),
+        ({"rows": [*ROWS[:2], "24000,-80,2,180,3"]}, "impact_force_N in row 3 = -80: is not above 0; check the sign"),
+        ({"rows": [*ROWS[:2], "1e12,80,2,180,3"]}, "operation.inner_speed_rpm in row 3 = 1e12: is no value of that key"),
+        ({"rows": [*ROWS[:2], f"{'9' * 5000},80,2,180,3"]}, "is longer than 400 characters; write a shorter value"),
+        ({"rows": [*ROWS[:2], "1e400,80,2,180,3"]}, "operation.inner_speed_rpm in row 3 = 1e400: is no value of that key"),
+        ({"rows": [*ROWS[:2], "24OOO,80,2,180,3"]}, "operation.inner_speed_rpm in row 3 = '24OOO': is no value of that key"),
+        ({"rows": [*ROWS[:2], ",80,2,180,3"]}, "operation.inner_speed_rpm in row 3 = '': is empty; fill it in"),
+        ({"rows": [*ROWS[:2], "24000,80,0,180,3"]}, "impact_force_N_sd in row 3 = 0: is not above 0; check the sign"),
+        ({"rows": [*ROWS[:2], "24000,8e1_0,2,180,3"]}, "impact_force_N in row 3 = '8e1_0': is not a finite number"),
+        ({"rows": [*ROWS[:2], "24000,,2,180,3"]}, "impact_force_N_sd in row 3 = 2: belongs to nothing in this row"),
+        ({"header": HEADER + ",cutoff_hz", "rows": [f"{row},9" for row in ROWS]}, "cutoff_hz in row 1 = 9: belongs to nothing"),
+        ({"header": HEADER + ",cage_speed_rpm,signal_file,signal_kind", "rows": [f"{row},4700,a.csv,cage_speed" for row in ROWS]},
+         "cage_speed_rpm in row 1 = 4700: comes from signal_file too; leave out one"),
+        ({"header": HEADER + ",signal_file,signal_kind,pulses_per_turn", "rows": [f"{row},a.csv,cage_pulses,{'9' * 5000}" for row in ROWS]},
+         "is longer than 400 characters; write a shorter number"),
+        ({"header": HEADER + ",signal_file,signal_kind,pulses_per_turn", "rows": [f"{row},a.csv,cage_pulses,1.5" for row in ROWS]},
+         "pulses_per_turn in row 1 = 1.5: is not a whole number"),
+        ({"header": HEADER + ",cutoff_hz,numerics.whirl_cutoff_hz", "rows": [f"{row},9,9" for row in ROWS]},
+         "column numerics.whirl_cutoff_hz: cutoff_hz sets that key; remove one"),
+        ({"header": HEADER + ",", "rows": [f"{row},9" for row in ROWS]}, "column 6 has no name; name it or remove it"),
+        ({"rows": [f"{row},40,1,40,1" for row in range(1, 1002)]}, "has 1001 rows; give 1000 at most"),
+        ({"rows": [f"{row},40,1,40,1" for row in range(1, 202)]}, "has 201 operating conditions; give 200 at most"),
         ({"rows": ROWS[:2]}, "2 rows to learn from; give 3 at least"),
         ({"header": HEADER + ",hold", "rows": [f"{row},1" for row in ROWS]}, "0 rows to learn from"),
         ({"header": HEADER + ",hold", "rows": [f"{row},perhaps" for row in ROWS]}, "write 1 for a row that is held out"),
@@ -83,6 +103,33 @@ def test_bad_input_ends_in_a_sentence_before_anything_runs(
     assert found.exit_code == 2, found.output
     assert sentence in found.output and "Traceback" not in found.output
     assert not (tmp_path / "out" / "study.sqlite").exists()
+
+
+def test_unit_keys_of_a_rig_have_the_types_of_the_scene(tmp_path: Path) -> None:
+    """Unit: whole numbers, booleans, text and numbers of a row are what a scene file would give."""
+    header = HEADER + ",bearing.rollers,model.pocket_film,model.pocket_bar_stiffness_N_m,lubricant.oil"
+    more = ["10,true,rigid,ISO VG 32", "+11,False,50000000,ISO VG 46", "12,TRUE,5e7,data_sheet"]
+    _files(tmp_path, header=header, rows=[f"{row},{rest}" for row, rest in zip(ROWS, more, strict=True)])
+    values = [list(row.keys.values()) for row in read_rig(tmp_path / "rig.csv").rows]
+    expected = [
+        [12e3, 10, True, "rigid", "ISO VG 32"],
+        [18e3, 11, False, 5e7, "ISO VG 46"],
+        [24e3, 12, True, 5e7, "data_sheet"],
+    ]
+    assert values == expected
+    assert [[type(value) for value in row] for row in values] == [[type(value) for value in row] for row in expected]
+
+
+def test_unit_a_rig_of_many_columns_is_read_in_linear_time(tmp_path: Path) -> None:
+    """Unit: 100 000 columns, of which a comparison of each with all takes minutes, are refused within seconds."""
+    names = [f"cage.key_{number}" for number in range(100_000)]
+    arguments = _files(
+        tmp_path, header=",".join([*HEADER.split(","), *names]), rows=[row + ",1" * len(names) for row in ROWS]
+    )
+    start = time.process_time()
+    refused = _run(arguments)
+    assert refused.exit_code == 2 and "cage.key_0: unknown key" in refused.output
+    assert time.process_time() - start < 10.0
 
 
 def test_free_keys_need_a_law(tmp_path: Path) -> None:

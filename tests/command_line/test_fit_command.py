@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import time
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ from doe.running.failure import StoppedError
 from doe.study.runs import read_runs
 from doe.study.surfaces import fit_surfaces
 from doe.study_file import Study
+from doe.study_file.table import read_table
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TABLE = pd.read_csv(EXAMPLES / "ccd_table4.csv")
@@ -134,7 +137,7 @@ HEADER = ",".join(TABLE.columns)
         (
             with_errors().assign(impact_force_N_error=-1.0),
             (MODEL, f"weighting = 'replicates'\n{MODEL}"),
-            "the error of run 1 is -",
+            "impact_force_N_error in row 1 = -1.0: is below 0",
         ),
         (
             TABLE.assign(impact_force_N=TABLE["impact_force_N"] - 200),
@@ -143,7 +146,7 @@ HEADER = ",".join(TABLE.columns)
         ),
         (TABLE, (MODEL, f"transform = 'log'\n{MODEL}"), "transform = 'log': choose one of 'none' or 'box_cox', or"),
         (TABLE, (MODEL, f"weighting = 'none'\n{MODEL}"), "choose one of 'equal' or 'replicates'"),
-        (TABLE.assign(block=0.5), ("", ""), "block in row 1 = 0.5: is not a whole number; mend it"),
+        (TABLE.assign(block=0.5), ("", ""), "block in row 1 = 0.5: is not a whole number; write a plain one"),
         (TABLE.assign(power_loss_W_error="wide"), ("", ""), "power_loss_W_error in row 1 = 'wide': is not a finite"),
         (
             TABLE.to_csv(index=False).replace(HEADER, HEADER.replace("power_loss_W", "impact_force_N"), 1),
@@ -216,6 +219,112 @@ def test_a_table_of_ones_own_is_fitted_without_a_study(tmp_path):
     assert json.loads((tmp_path / "out" / "fit.json").read_text())["responses"].keys() == {"y"}
     one = fit_table(tmp_path, table, "--factor", "a", "--response", "y", "--model", "linear", "-q")
     assert "factors a; responses y; coded -1 and +1 are the ends" in one.stdout
+
+
+OWN = pd.DataFrame(
+    {"a": [-1.0, 0.0, 1.0] * 4, "b": [-1.0] * 6 + [1.0] * 6, "y": np.arange(12.0) ** 1.5, "z": np.arange(12.0)}
+)
+
+
+@pytest.mark.parametrize("named", ["--response=y", "--factor=a"])
+@pytest.mark.parametrize(
+    "cell", ["25O", "", "nan", "inf", "1_000", "0x10", "1e400", "1e200", "１２", "3,5", "9" * 500, "reference"]
+)
+def test_unit_a_cell_that_is_no_number_leaves_no_column_out(tmp_path, named, cell):
+    """Unit: without a study too, a bad cell of a factor or response is refused with its row, never the column dropped."""
+    shown = fit_table(
+        tmp_path, OWN.astype({"b": object}).assign(b=[*OWN["b"][:6], cell, *OWN["b"][7:]]), named, "--model=linear"
+    )
+    assert shown.exit_code == 2 and len(shown.stderr.splitlines()) == 1
+    assert shown.stderr.startswith(f"{tmp_path / 'mine.csv'}: b in row 7 = ")
+
+
+def test_unit_runs_too_many_for_a_rival_are_fitted_with_a_note(tmp_path, monkeypatch):
+    """Unit: a Gaussian process costs the cube of the runs; without it the surface stands and a note says so."""
+    monkeypatch.setattr("doe.study.surfaces.MOST_RIVALLED", 11)
+    shown = fit_table(tmp_path, OWN, "--factor=a", "--factor=b", "--response=y", "--model=linear", "-q")
+    assert (
+        shown.exit_code == 0
+        and "note: 12 runs are not compared with a rival: a Gaussian process of more than 11" in shown.stdout
+    )
+    assert "left out in turn" not in shown.stdout
+
+
+def test_unit_a_block_a_run_is_refused_before_its_columns_are_made(tmp_path):
+    """Unit: thousands of blocks of a run each are counted before their columns are made, which is quick."""
+    table = pd.DataFrame({"a": np.arange(5000) % 7, "y": np.arange(5000), "block": np.arange(5000)})
+    shown = fit_table(tmp_path, table, "--factor=a", "--response=y")
+    assert shown.exit_code == 2 and "5000 runs are too few for the quadratic model; give at least 5003" in shown.stderr
+
+
+def test_unit_more_runs_than_statistics_in_pairs_can_take_are_refused(tmp_path):
+    """Unit: 5001 runs are too many, twice 2501 replicates of 2501 runs are not."""
+    table = pd.DataFrame({"a": np.arange(5002) % 7, "y": np.arange(5002) % 11, "run": np.arange(5002)})
+    shown = fit_table(tmp_path, table, "--factor=a", "--response=y")
+    assert (
+        shown.exit_code == 2
+        and "has 5002 runs; give 5000 at most, or number replicates alike in a column run" in shown.stderr
+    )
+    table = pd.concat([table[:2501]] * 2)
+    assert len(read_table(_written(tmp_path, table), ["a"], ["y"], tmp_path).actual) == 2501
+
+
+def _written(folder: Path, table: pd.DataFrame) -> Path:
+    table.to_csv(folder / "table.csv", index=False)
+    return folder / "table.csv"
+
+
+@pytest.mark.parametrize("text", ["1O", "2 N", "1.5.2", "１"])
+def test_unit_a_column_of_slips_is_no_column_of_labels(tmp_path, text):
+    """Unit: what was meant as a number in every row is refused as such, and not left out as text."""
+    shown = fit_table(tmp_path, OWN.assign(b=text), "--response=y", "--model=linear")
+    wanted = "left out as no numbers: b ('1.5.2')" if text == "1.5.2" else "b in row 1 = "
+    assert wanted in shown.output and shown.exit_code == (0 if text == "1.5.2" else 2)
+
+
+def test_unit_columns_that_are_left_out_are_named_with_the_reason(tmp_path):
+    """Unit: labels, dates, empty columns, errors of factors and columns without a name stand in notes; JSON has them too."""
+    table = OWN.assign(who="me", date="2024-01-01", none="", a_error=0.1, y_error=0.2)
+    table.insert(0, "", np.arange(12))
+    notes = [
+        "left out as no numbers: who ('me'), date ('2024-01-01'), none (empty)",
+        "left out as errors of no response: a_error",
+        "left out as without a name: column 1",
+    ]
+    shown = fit_table(tmp_path, table, "--factor=a", "--factor=b", "--model=linear", "-q")
+    assert shown.exit_code == 0, shown.output
+    assert [line for line in shown.stdout.splitlines() if line.startswith("note: ")] == [
+        f"note: {tmp_path / 'mine.csv'}: {note}" for note in notes
+    ]
+    record = json.loads(fit_table(tmp_path, table, "--factor=a", "--factor=b", "--model=linear", "--json").stdout)
+    assert record["notes"] == [f"{tmp_path / 'mine.csv'}: {note}" for note in notes] and set(record["responses"]) == {
+        "y",
+        "z",
+    }
+
+
+@pytest.mark.parametrize(("named", "words"), [
+    ("--factor=c0", "has 49999 columns for responses; name 100 at most by --response NAME"),
+    ("--response=c0", "has 49999 columns for factors; name 8 at most by --factor NAME"),
+])  # fmt: skip
+def test_unit_a_wide_table_is_read_in_linear_time(tmp_path, named, words):
+    """Unit: 50 000 columns, of which a comparison of each with all takes minutes, are refused within seconds."""
+    rows = [",".join(f"c{column}" for column in range(50_000)), *(",".join([str(row)] * 50_000) for row in range(3))]
+    (tmp_path / "mine.csv").write_text("\n".join(rows), encoding="utf-8")
+    start = time.process_time()
+    shown = CliRunner().invoke(app, ["fit", "--data", str(tmp_path / "mine.csv"), named])
+    assert shown.exit_code == 2 and words in shown.stderr and len(shown.stderr) < 1000
+    assert time.process_time() - start < 5.0
+
+
+def test_unit_runs_as_large_as_a_table_may_have_are_fitted_without_a_warning(tmp_path):
+    """Unit: responses near the largest magnitude, whose fourth powers are taken, overflow nothing."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for scale in (9e49, 3e-50):
+            values = OWN.assign(y=scale * (0.5 + 0.1 * np.sin(OWN["y"])) + 0.0)[["a", "b", "y"]]
+            shown = fit_table(tmp_path, values, "--response=y", "--model=interaction", "-q")
+            assert shown.exit_code == 0, shown.output
 
 
 @pytest.mark.parametrize(

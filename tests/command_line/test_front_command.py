@@ -45,13 +45,25 @@ def test_point_is_judged_beside_the_front(tmp_path):
     assert far["point"]["beyond_runs"] and "extrapolate there" in far["point"]["statement"]
 
 
+def test_unit_a_cell_of_the_table_that_is_no_number_is_refused(tmp_path):
+    """Unit: the front is never found on fewer factors or runs than the table has."""
+    table = tmp_path / "runs.csv"
+    table.write_text(TABLE.read_text("utf-8").replace("0.15,", "O.15,", 1), "utf-8")
+    shown = CliRunner().invoke(app, ["front", str(edited_study(tmp_path).path), "--data", str(table)])
+    assert shown.exit_code == 2 and " in row " in shown.stderr and "= 'O.15': is not a finite number" in shown.stderr
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("0.017,0.187", "give one value a factor"),
         ("radial=0.1", "no such factor; name one of"),
-        ("0.017,wide,0.3", "is not a number"),
+        ("0.017,wide,0.3", "guide_clearance_mm = wide: is not a finite number"),
         ("0.017,nan,0.3", "is not a finite number"),
+        ("0.017,0.1_8,0.3", "is not a finite number"),
+        ("0.017,１,0.3", "is not a finite number"),
+        ("0.017,1e60,0.3", "is beyond 1e+50; check the unit"),
+        ("guide_clearance_mm=0.1,guide_clearance_mm=0.2", "--point guide_clearance_mm: given 2 times; give it once"),
     ],
 )
 def test_bad_point_is_one_sentence(tmp_path, text, words):

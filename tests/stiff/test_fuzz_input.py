@@ -6,18 +6,16 @@ import json
 import random
 import re
 import shutil
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from mutations import mutated, outcome
 
 from doe.dimension_chain import read_chains
 from doe.study.checked import check_study
 from doe.study.design import design_of
 from doe.study_file import Study
 from doe.study_file.table import read_table as read_runs_table
-from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError
 from rbdyn.quasistatic.sweep.result import FORMAT as SWEEP_FORMAT
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.result import SimulationResult
@@ -27,48 +25,8 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 SCENES = ("cylindrical_roller", "all_options", "angular_contact_ball", "angular_contact_7014", "deep_groove_ball",
           "double_decker", "published/nu215")  # fmt: skip
 CHAINS = ("pocket_chain", "bearing_chains", "pocket_chain_as_printed", "guide_chain_options")
-SECONDS = 2.0
 # A function of a chain's links is written in a language of its own, with tests of its own.
 EXPRESSION = re.compile(rb"expression[^\n]*")
-TOKEN = re.compile(rb"\"[^\"\n]*\"|[\w.+-]+|[^\w\s]|\n")
-EXTREMES = [
-    b"0", b"-1", b"1e300", b"-1e-300", b"1e400", b"inf", b"nan", b"9" * 25, b"9" * 5000, b"true", b"2020-01-01", b"1e-12",
-    b'""', b"'x'", b"[]", b"{}", b"[" * 150, b"\\u0000", b'"' + b"y" * 5000 + b'"', b"0x" + b"f" * 40, b"07:00:00", b"null",
-    b"1,5", b";", b"Key", b".a" * 40, b"\xef\xbb\xbf", b"\xe9", b"\x00", b'"""', b"1_000", b"1e154", b"2147483648", b"5e-324",
-]  # fmt: skip
-
-
-def mutated(random: random.Random, data: bytes) -> bytes:
-    """The bytes with one to three changes: of tokens, numbers, keys, lines or bytes."""
-    for _ in range(random.choice((1, 1, 2, 3))):
-        tokens = list(TOKEN.finditer(data))
-        if not tokens:
-            return data
-        start, end = random.choice(tokens).span()
-        other = random.choice(tokens)
-        numbers = [each for each in tokens if each[0][:1].isdigit()]
-        lines = data.splitlines(keepends=True)
-        line = random.randrange(len(lines))
-        kind = random.randrange(10)
-        if kind == 0:
-            data = data[:start] + data[end:]
-        elif kind == 1:
-            data = data[:start] + other[0] + data[start:]
-        elif kind == 2:
-            data = data[:start] + other[0] + data[end:]
-        elif kind in (3, 4, 5) and numbers:
-            start, end = random.choice(numbers).span()
-            data = data[:start] + random.choice(EXTREMES) + data[end:]
-        elif kind == 6:
-            data = data[: random.randrange(len(data))]
-        elif kind == 7:
-            data = b"".join([*lines[:line], lines[line], *lines[line:]])
-        elif kind == 8:
-            at = random.randrange(len(data))
-            data = data[:at] + random.randbytes(random.randrange(1, 5)) + data[at + random.randrange(3) :]
-        else:
-            data = data[:start] + data[start:end].swapcase() + b"_" * random.randrange(2) + data[end:]
-    return data
 
 
 @pytest.fixture(scope="module")
@@ -119,20 +77,6 @@ def read_table(path: Path) -> object:
     """A table, as ``doe fit --data`` reads it."""
     study = Study.load(EXAMPLES / "clearance_study.toml")
     return read_runs_table(path, study.factors, study.responses, study.path)
-
-
-def outcome(read: Callable[[Path], object], path: Path) -> str:
-    """Whether the file is read or refused; anything else fails."""
-    start = time.perf_counter()
-    try:
-        found = "read" if read(path) is not None else "nothing"
-    except InputError as error:
-        found = "refused"
-        assert 1 <= len(error.faults) <= MOST_FAULTS
-        for fault in error.faults:
-            assert fault.isprintable() and 10 < len(fault) <= LONGEST_SENTENCE, fault
-    assert time.perf_counter() - start < SECONDS
-    return found
 
 
 @pytest.mark.slow

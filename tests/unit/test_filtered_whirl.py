@@ -76,6 +76,22 @@ def test_the_sampling_rate_hardly_matters() -> None:
     assert ratios[0] == pytest.approx(ratios[1], rel=2e-3) and ratios[0] == pytest.approx(expected, rel=0.02)
 
 
+def test_unit_a_notch_that_a_record_cannot_tell_takes_nothing_out() -> None:
+    """Unit: a frequency of fewer than ten periods in the record leaves the speed as it is, to the last bit."""
+    _, place = _orbit(0.3, [SLOW, FAST])
+    for slow in (1e-12, 1e-3, 33.0):
+        assert (filtered_speed(place, RATE, CUTOFF, (slow,)) == filtered_speed(place, RATE, CUTOFF, ())).all()
+    assert (filtered_speed(place, RATE, CUTOFF, (34.0,)) != filtered_speed(place, RATE, CUTOFF, ())).any()
+
+
+def test_unit_a_cutoff_has_a_period_in_the_run(filtered: Scene) -> None:
+    """Unit: a low pass slower than the whole run has no filter; the scene says so before anything runs."""
+    with pytest.raises(
+        InputError, match=r"whirl_cutoff_hz = 1e-09: a period of it is longer than the run of 0\.35 s; raise it"
+    ):
+        filtered.changed({"numerics.whirl_cutoff_hz": 1e-9})
+
+
 def test_nothing_fast_comes_through_at_the_ends() -> None:
     _, place = _orbit(0.3, [SLOW, FAST])
     _, noisy = _orbit(0.3, [SLOW, FAST, (1700.0, 0.15)])
@@ -97,6 +113,16 @@ def test_a_still_record_takes_the_noise_out(tmp_path: Path) -> None:
     assert value == pytest.approx(expected, rel=0.015) and abs(value - expected) < 4.0 * sd and told is None
     with pytest.raises(InputError, match=r"still\.csv: has more than 25 % of the mean square speed of orbit\.csv"):
         whirl(path, CUTOFF, (), _file(tmp_path, time, 4.0 * noise[1], "still.csv"))
+
+
+def test_unit_runout_that_stays_in_is_noted(tmp_path: Path) -> None:
+    """Unit: a shaft that turns fewer than ten times in the orbit is named with its frequency."""
+    path = _file(tmp_path, *_orbit(3.0, [SLOW, FAST]))
+    whole, slow = (whirl(path, CUTOFF, notches, None) for notches in ((), (1.0 / 60.0,)))
+    assert slow[:2] == whole[:2]
+    assert (
+        slow.note is not None and "runout at 0.0166667 Hz counts as whirl, of which it has fewer than 10" in slow.note
+    )
 
 
 @pytest.fixture
@@ -162,6 +188,11 @@ def test_rows_with_an_orbit_are_conditions_of_which_the_run_filters_alike(tmp_pa
         ({"cutoff": 2001.0}, "fewer than 10 a period of cutoff_hz = 2001; sample faster or give 2000 at most"),
         ({"cutoff": 15_000.0}, "fewer than 10 a period of cutoff_hz = 15000"),
         ({"cutoff": 50.0}, "shorter than 200 periods of cutoff_hz = 50"),
+        ({"cutoff": 1e-9}, "shorter than 200 periods of cutoff_hz = 1e-09; measure longer or raise it"),
+        ({"header": "t_s,x_um,x_m"}, "column x_um and x_m are both there; keep one"),
+        ({"cell": "1e200"}, "x_um in row 2 = 1e200: is beyond 1e+12; check the unit"),
+        ({"cell": "1e400"}, "x_um in row 2 = 1e400: is not a finite number"),
+        ({"cell": "9" * 5000}, "is longer than 400 characters; write a shorter number"),
         ({"circles": [(40.0, 0.0)]}, "varies no more than noise"),
     ],
 )
@@ -169,20 +200,27 @@ def test_bad_orbits_end_in_a_sentence(tmp_path: Path, change: dict[str, Any], se
     time, place = _orbit(2.0, change.get("circles", [SLOW, FAST]))
     kept = np.delete(np.arange(len(time)), 700 if change.get("uneven") else [])
     path = _file(tmp_path, time[kept], place[:, kept], header=change.get("header", "t_s,x_um,y_um"))
+    if "cell" in change:
+        lines = path.read_text("utf-8").splitlines()
+        lines[2] = ",".join([lines[2].split(",")[0], change["cell"], lines[2].split(",")[2]])
+        path.write_text("\n".join(lines), "utf-8")
     with pytest.raises(InputError) as error:
         whirl(path, change.get("cutoff", CUTOFF), (), None)
-    assert len(error.value.faults) == 1 and sentence in error.value.faults[0]
+    assert sentence in error.value.faults[0] and len(error.value.faults) <= 2
 
 
 def test_an_orbit_needs_a_cutoff_and_notches_a_filter(tmp_path: Path, filtered: Scene) -> None:
     rows = [f"{speed},40,1,,,orbit.csv,orbit," for speed in (12000, 18000, 24000)]
     (tmp_path / "rig.csv").write_text("\n".join([HEADER, *rows]), "utf-8")
-    with pytest.raises(InputError, match="row 1: cutoff_hz is missing"):
+    with pytest.raises(InputError, match="cutoff_hz in row 1: is missing"):
         read_rig(tmp_path / "rig.csv")
     (tmp_path / "rig.csv").write_text("\n".join([HEADER, *(f"{row}-5" for row in rows)]), "utf-8")
     with pytest.raises(InputError) as error:
         read_rig(tmp_path / "rig.csv")
-    assert len(error.value.faults) == 3 and "cutoff_hz = '-5': not a positive number" in error.value.faults[0]
+    assert (
+        len(error.value.faults) == 3
+        and "cutoff_hz in row 1 = -5: is not above 0; check the sign" in error.value.faults[0]
+    )
     with pytest.raises(InputError, match=r"without numerics\.whirl_cutoff_hz nothing is filtered"):
         filtered.changed({"numerics.whirl_cutoff_hz": None, "numerics.whirl_notches_hz": [9.0]})
     with pytest.raises(InputError, match=r"whirl_cutoff_hz = 1e\+08: needs 3\.5e\+08 samples a replicate"):

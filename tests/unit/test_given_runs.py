@@ -90,7 +90,7 @@ def test_blocks_of_the_table_stay_and_the_new_runs_make_another(tmp_path):
     [
         ("guide_clearance_mm", "guide", "column 'guide_clearance_mm' is missing; add it, or rename the factor"),
         ("0.02,", "20.0,", "radial_clearance_mm in row 3 = 20: lies 3996 steps from the centre, outside any region of a design"),
-        ("0.15", "wide", "guide_clearance_mm in row 1 = 'wide': is not a finite number; mend it"),
+        ("0.15", "wide", "guide_clearance_mm in row 1 = 'wide': is not a finite number; write a plain one"),
     ],
 )  # fmt: skip
 def test_impossible_tables_are_named(tmp_path, old, new, words):

@@ -2,6 +2,7 @@
 
 import csv
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from doe.arrays import Array
 from doe.study.calibration import Calibration
 from doe.study.input_sets import NORMAL
+from doe.study_file.cells import text_of
 from doe.unknown import laws
 from doe.unknown.posterior import seen
 from rbdyn.cli.terminal import print_table
@@ -165,11 +167,7 @@ def write(found: Calibration, record: dict[str, Any], folder: Path) -> None:
     """calibration.json, the posterior sample with its verdict, and the pictures."""
     draw_compared(record, folder / COMPARED)
     if found.found.sampled is not None:
-        rows = found.sample
-        with (folder / SAMPLE).open("w", newline="", encoding="utf-8") as file:
-            table = csv.DictWriter(file, list(rows[0]))
-            table.writeheader()
-            table.writerows(rows)
+        write_sample(found.sample, folder / SAMPLE)
         told = {name: record[name] for name in ("verdict", "reasons", "scene", "data", "made_of")}
         sha256 = digest_of((folder / SAMPLE).read_bytes())
         write_json(folder / OF_SAMPLE, {"format": POSTERIOR, "sample": SAMPLE, "sha256": sha256, **told})
@@ -177,6 +175,14 @@ def write(found: Calibration, record: dict[str, Any], folder: Path) -> None:
     # Last, for it says that all is there.
     sign(record)
     write_json(folder / RECORD, record)
+
+
+def write_sample(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """A posterior sample as CSV, a row an input set by key, which reads as the same values."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, list(rows[0]))
+        table.writeheader()
+        table.writerows({key: text_of(value) for key, value in row.items()} for row in rows)
 
 
 def files_of(record: dict[str, Any]) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from doe.report.words import of_hundred
 from doe.study.uncertainty import OutputRange, Uncertainty
+from doe.study_file.cells import text_of
 from doe.unknown.sensitivity import CONFIDENCE
 from doe.unknown.spread import Share
 from rbdyn.cli.terminal import print_table
@@ -120,7 +121,7 @@ def write(found: Uncertainty, folder: Path) -> list[str]:
         table = csv.writer(file)
         table.writerow([*keys, *found.outputs])
         for values, outputs in zip(found.sets.inputs, found.sets.outputs.tolist(), strict=True):
-            table.writerow([*(values[key] for key in keys), *outputs])
+            table.writerow([*(text_of(values[key]) for key in keys), *outputs])
     draw(found, folder / "uncertainty.png")
     return ["uncertainty.json", "input_sets.csv", "uncertainty.png"]
 

@@ -17,6 +17,8 @@ ORDER = 4
 NOTCH_QUALITY = 10.0
 # A notch this many times above the cutoff has nothing left to take out.
 NOTCHED = 2.0
+# Periods of a notch in a record below which it cannot be told from slow motion, and its filter rings to the end.
+NOTCH_PERIODS = 10.0
 # Periods of the cutoff at either end where the filter, which sees one side, lets through what is fast: three times the
 # speed of the bearing of Chen et al. 2022 at 1 kHz in the last sample, less than a hundredth two periods before.
 ENDS = 2.0
@@ -24,7 +26,7 @@ ENDS = 2.0
 
 def filtered_speed(place: Array, rate: float, cutoff: float, notches: Sequence[float]) -> Array:
     """Speed (samples,) [m/s] of what is at ``place`` (2, samples) [m], sampled at ``rate``, below ``cutoff`` and without
-    the frequencies ``notches`` [Hz]. Nothing of fewer than two samples.
+    the frequencies ``notches`` [Hz] that have ``NOTCH_PERIODS`` in the record. Nothing of fewer than two samples.
 
     The ends are given the speeds beside them, mirrored.
     """
@@ -34,14 +36,15 @@ def filtered_speed(place: Array, rate: float, cutoff: float, notches: Sequence[f
     samples = place.shape[1]
     if samples < 2:
         return np.zeros(samples)
-    notched = [frequency for frequency in notches if frequency < NOTCHED * cutoff]
+    slowest = NOTCH_PERIODS * rate / samples
+    notched = [frequency for frequency in notches if slowest <= frequency < NOTCHED * cutoff]
     sections = [
         butter(ORDER, cutoff, fs=rate, output="sos"),
         *(tf2sos(*iirnotch(frequency, NOTCH_QUALITY, fs=rate)) for frequency in notched),
     ]
     # Reflected at the ends as far as the slowest part remembers: velocities, since places would step there by what is fast.
-    slowest = min([cutoff, *(frequency / NOTCH_QUALITY for frequency in notched)])
-    reflected = min(samples - 1, int(rate / slowest))
+    memory = rate / min([cutoff, *(frequency / NOTCH_QUALITY for frequency in notched)])
+    reflected = min(samples - 1, int(memory))
     times = np.arange(samples) / rate
     velocity = CubicSpline(times, place, axis=1)(times, 1)
     speed = np.hypot(*sosfiltfilt(np.concatenate(sections), velocity, axis=1, padtype="even", padlen=reflected))

@@ -1,0 +1,295 @@
+"""Fuzz: rig tables, signals, samples and tables without a study are read as they are written, or refused in sentences; nothing is simulated."""
+
+from __future__ import annotations
+
+import csv
+import io
+import random
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mutations import EXTREMES, mutated, outcome
+
+from doe.study.input_sets import read_sample
+from doe.study.rig_file import OUTPUTS, Rig, read_rig
+from doe.study.rig_signals import Mean, cage_speed, whirl
+from doe.study.runs import read_runs
+from doe.study_file.of_table import study_of_table
+from rbdyn.scene.uncertain import Law
+
+# What a hand or another program writes for a number.
+SLIPS = ["", " ", "nan", "inf", "-1", "0", "-0", "1e400", "-1e-300", "1e13", "1e-13", "5000", "2", "0x10", "1_000", "１２", "3,5", "25O",
+         "2024-01-01", "10:30", "true", "False", "yes", "no", "hold", "1.", ".5", "+7", "1e3", "9" * 399, "9" * 401, "9" * 5000, "1e-9",
+         "auto", "rigid", "outer", "\0", "a\nb", '"', ";", "orbit", "signal.csv", "none.csv", "\ufeff1", "12 N", "1e", "--1", "4e", "007"]  # fmt: skip
+KEYS: dict[str, list[str]] = {
+    "operation.inner_speed_rpm": ["12000", "18000.0", "2.4e4", "-9000"], "operation.radial_load_N": ["600", "1300.5", "2000"],
+    "bearing.rollers": ["9", "10", "+11"], "model.pocket_film": ["true", "False"], "cage.guidance": ["outer", "inner"],
+    "model.pocket_bar_stiffness_N_m": ["rigid", "5e7"], "lubricant.temperature_C": ["70", "99.5"],
+}  # fmt: skip
+CHOICES = {
+    "cage.guidance": ["outer", "inner", "1"],
+    "model.pocket_film": [True, False, "x"],
+    "bearing.rollers": [9, 10, 11.5],
+}
+
+
+def written(rows: Sequence[Sequence[str]]) -> bytes:
+    """Rows as CSV."""
+    text = io.StringIO()
+    csv.writer(text).writerows(rows)
+    return text.getvalue().encode("utf-8", "surrogatepass")
+
+
+def cells(data: bytes) -> tuple[list[str], list[list[str]]]:
+    """Header and rows as a CSV reader of one's own has them; lines of blanks are none."""
+    rows = [row for row in csv.reader(io.StringIO(data.decode("utf-8-sig"), newline="")) if row not in ([], [" "])]
+    rows = [[field.strip() for field in row] for row in rows if len(row) > 1 or row == [""] or row[0].strip()]
+    return rows[0], rows[1:]
+
+
+def changed(draw: random.Random, rows: list[list[str]]) -> bytes:
+    """A table with nothing, some cells, a column's unit, the structure or any bytes changed."""
+    kind = draw.randrange(9)
+    if kind < 4:
+        for _ in range(kind):
+            row = draw.randrange(1, len(rows)) if draw.random() < 0.9 else 0
+            extreme = draw.choice(EXTREMES).decode("utf-8", "replace")
+            rows[row][draw.randrange(len(rows[row]))] = extreme if draw.random() < 0.3 else draw.choice(SLIPS)
+    elif kind == 4:
+        place = draw.randrange(len(rows[0]))
+        again = draw.random() < 0.5
+        rows = [[*row, row[place]] if again else row[:place] + row[place + 1 :] for row in rows]
+    elif kind == 5:
+        data = written(rows)
+        return draw.choice(
+            [
+                b"\xef\xbb\xbf" + data,
+                data.replace(b",", b";"),
+                data.replace(b"\r\n", b"\n\n"),
+                data.replace(b",", b" , "),
+            ]
+        )
+    elif kind == 6:
+        place, power = draw.randrange(len(rows[0])), draw.choice((-320, -40, -14, -9, -3, 3, 9, 12, 40, 300))
+        rows = [rows[0], *([*row[:place], f"{row[place]}e{power}", *row[place + 1 :]] for row in rows[1:])]
+    data = written(rows)
+    return mutated(draw, data) if kind > 6 else data
+
+
+def rig_rows(draw: random.Random) -> list[list[str]]:
+    """A rig's table: some keys, outputs, deviations or turns, rows on hold, and signals in some of the rows."""
+    keys = draw.sample(list(KEYS), draw.randrange(1, 5))
+    outputs = draw.sample(OUTPUTS, draw.randrange(1, 4))
+    signal = ["signal_file", "signal_kind"] if "cage_speed_rpm" not in outputs and draw.random() < 0.4 else []
+    header = [*keys, *outputs, *(f"{name}_sd" for name in outputs), "turns", "hold", *signal]
+    rows = [header]
+    for _ in range(draw.randrange(3, 9)):
+        measured = [f"{draw.lognormvariate(3.0, 2.0):.{draw.randrange(1, 17)}g}" for _ in outputs]
+        sds = [draw.choice(["", "0.1", "2", "1e-3"]) for _ in outputs]
+        turns = draw.choice(["40", "1e3"]) if "" in sds else ""
+        raw = draw.choice([["", ""], ["signal.csv", "cage_speed"]]) if signal else []
+        rows.append(
+            [*(draw.choice(KEYS[key]) for key in keys), *measured, *sds, turns, draw.choice(["", "0", "no"]), *raw]
+        )
+    return rows
+
+
+def check_rig(data: bytes, rig: Rig) -> None:
+    """Every cell is where it belongs, as it is written."""
+    header, rows = cells(data)
+    assert len(rig.rows) == len(rows)
+    for fields, row in zip(rows, rig.rows, strict=True):
+        texts = {name: text for name, text in zip(header, fields, strict=True) if text}
+        for name, text in texts.items():
+            blank = text.lower() == "nan"
+            if "." in name:
+                check_value(name, text, row.keys[name])
+            elif name in OUTPUTS:
+                assert (name in row.values and row.values[name] == float(text)) or blank
+            elif name.removesuffix("_sd") in OUTPUTS:
+                assert (row.sds.get(name.removesuffix("_sd")) == float(text)) or blank
+            elif name == "turns":
+                assert row.turns == float(text) or (blank and row.turns is None)
+            elif name == "hold":
+                assert row.held == (text.lower() in ("1", "yes", "true"))
+            elif name == "signal_kind":
+                assert "cage_speed_rpm" in row.values and texts["signal_file"]
+            else:
+                assert name == "signal_file", f"{name} = {text!r} is ignored"
+        signal = {"cage_speed_rpm"} if "signal_file" in texts else set()
+        assert set(row.values) == signal | {name for name in texts if name in OUTPUTS and texts[name].lower() != "nan"}
+
+
+def check_value(name: str, text: str, value: Any) -> None:
+    """A value of a key is what a text says."""
+    if isinstance(value, bool):
+        assert text.lower() == str(value).lower()
+    elif isinstance(value, str):
+        assert text == value
+    else:
+        assert float(text) == value
+        assert name != "bearing.rollers" or isinstance(value, int) or not value.is_integer()
+
+
+def read_and_check(
+    path: Path, read: Callable[[Path], Any], check: Callable[[bytes, Any], None]
+) -> Callable[[Path], Any]:
+    """Reads a file with all warnings as errors, and checks what comes of it."""
+
+    def both(_: Path) -> Any:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            result = read(path)
+        check(path.read_bytes(), result)
+        return result
+
+    return both
+
+
+def run_cases(
+    path: Path, count: int, seed: int, make: Callable[[random.Random], list[list[str]]], read: Callable[[Path], Any], check: Callable[[bytes, Any], None]
+) -> None:  # fmt: skip
+    """Draw cases; neither what is read nor what is refused is nearly all."""
+    draw, ends, start = random.Random(seed), [], time.perf_counter()
+    for number in range(count):
+        path.write_bytes(changed(draw, make(draw)))
+        try:
+            ends.append(outcome(read_and_check(path, read, check), path))
+        except BaseException as error:
+            error.add_note(f"case {number} is left in {path}")
+            raise
+    print(
+        f"{path.name}: {ends.count('read')} read, {ends.count('refused')} refused in {time.perf_counter() - start:.0f} s"
+    )
+    assert min(ends.count("read"), ends.count("refused")) > count // 10
+
+
+def speeds(draw: random.Random) -> list[list[str]]:
+    """A signal of cage speed."""
+    times = np.cumsum([draw.uniform(0.5, 1.5) * 10.0 ** draw.randrange(-3, 1) for _ in range(draw.randrange(15, 120))])
+    return [["t_s", "cage_speed_rpm"], *([repr(float(t)), f"{draw.gauss(9400.0, 40.0):.6g}"] for t in times)]
+
+
+@pytest.mark.slow
+def test_rig_tables_are_read_as_written_or_refused(tmp_path, fuzz_cases):
+    """Fuzz: each row's conditions, measurements, deviations, turns, hold and signal are those of its cells."""
+    (tmp_path / "signal.csv").write_bytes(written([*speeds(random.Random(1)), ["1e4", "9400"]]))
+    run_cases(tmp_path / "rig.csv", fuzz_cases, 1, rig_rows, read_rig, check_rig)
+
+
+@pytest.mark.slow
+def test_samples_are_read_as_written_or_refused(tmp_path, fuzz_cases):
+    """Fuzz: each value of a posterior sample is that of its cell, of the law's or the scene's type."""
+    laws = {key: Law(law="choices", values=values) for key, values in CHOICES.items()}
+
+    def make(draw: random.Random) -> list[list[str]]:
+        keys = draw.sample(list(KEYS), draw.randrange(1, 6))
+        return [keys, *([draw.choice(KEYS[key]) for key in keys] for _ in range(draw.randrange(2, 12)))]
+
+    def check(data: bytes, columns: dict[str, list[Any]]) -> None:
+        header, rows = cells(data)
+        assert list(columns) == [name for name in header if name]
+        for place, name in enumerate(header):
+            texts = [row[place] for row in rows]
+            for text, value in zip(texts, columns[name] if name else texts, strict=True):
+                check_value(name, text, value)
+                assert name or not text
+
+    run_cases(tmp_path / "posterior.csv", fuzz_cases, 2, make, lambda path: read_sample(path, laws), check)
+
+
+@pytest.mark.slow
+def test_tables_without_a_study_lose_no_column(tmp_path, fuzz_cases):
+    """Fuzz: every column is a factor, a response, known by its name or in a note, and its numbers are those of its cells."""
+    path = tmp_path / "table.csv"
+
+    def make(draw: random.Random) -> list[list[str]]:
+        kinds = {
+            "a": "25",
+            "b": "-1.5e-3",
+            "y": "7",
+            "who": "me",
+            "date": "2024-01-01",
+            "y_error": "0.1",
+            "b_error": "2",
+            "block": "1",
+        }
+        names = ["a", *draw.sample(list(kinds)[1:], draw.randrange(1, len(kinds)))]
+        random_cells = (
+            [f"{draw.gauss(0.0, 9.0):.6g}" if name in "aby" else kinds[name] for name in names]
+            for _ in range(draw.randrange(3, 9))
+        )
+        return [names, *random_cells]
+
+    def read(path: Path) -> Any:
+        study, notes = study_of_table(path, ["a"], [], "linear")
+        return study.responses, notes, read_runs(study, path)
+
+    def check(data: bytes, result: Any) -> None:
+        (responses, notes, runs), (header, rows) = result, cells(data)
+        for place, name in enumerate(header):
+            texts = [row[place] for row in rows]
+            noted = any(
+                word in note
+                for note in notes
+                for word in (f" {name} (", f": {name}", f", {name}", f"column {place + 1}")
+            )
+            if name == "a" or name in responses:
+                values = runs.actual[:, 0] if name == "a" else runs.values[:, responses.index(name)]
+                assert values.tolist() == [float(text) for text in texts]
+            elif name.removesuffix("_error") in responses:
+                errors = runs.errors[:, responses.index(name.removesuffix("_error"))].tolist()
+                assert all(
+                    text.lower() in ("", "nan") or float(text) == error
+                    for text, error in zip(texts, errors, strict=True)
+                )
+            else:
+                assert name in ("block", "run", "replicates") or noted or not any(texts), name
+
+    run_cases(path, fuzz_cases, 4, make, read, check)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["cage_pulses", "cage_speed", "orbit"])
+def test_signals_are_read_as_written_or_refused(tmp_path, fuzz_cases, kind):
+    """Fuzz: a signal gives the mean that its numbers give when another program has read and written them."""
+
+    def make(draw: random.Random) -> list[list[str]]:
+        if kind == "cage_pulses":
+            times = np.cumsum([0.006 * draw.uniform(0.97, 1.03) for _ in range(draw.randrange(15, 100))])
+            return [["t_s"], *([repr(float(t))] for t in times)]
+        if kind == "cage_speed":
+            return speeds(draw)
+        count, rate = draw.choice((1500, 2100, 2600, 2600)), draw.choice((2e4, 2e4, 2.5e4))
+        time = np.arange(count) / rate
+        turn = 2.0 * np.pi * rate / draw.uniform(100.0, 900.0) * time
+        place = 30.0 * np.array([np.cos(turn), np.sin(turn)]) + np.random.default_rng(count).standard_normal((2, count))
+        return [
+            ["t_s", "x_um", "y_um"],
+            *([f"{t:.7f}", f"{x:.6g}", f"{y:.6g}"] for t, x, y in zip(time, *place, strict=True)),
+        ]
+
+    def read(path: Path) -> Mean:
+        return whirl(path, 2000.0, (400.0, 1e-9), None) if kind == "orbit" else cage_speed(path, kind, 2)
+
+    def check(data: bytes, mean: Mean) -> None:
+        header, rows = cells(data)
+        canonical = tmp_path / "canonical.csv"
+        names = ("t_s", "cage_speed_rpm", "x_um", "x_m", "y_um", "y_m")
+        used = [place for place, name in enumerate(header) if name in names]
+        again = [[header[place] for place in used], *([repr(float(row[place])) for place in used] for row in rows)]
+        canonical.write_bytes(written(again))
+        assert read(canonical)[:2] == mean[:2] and 0.0 < mean.sd < np.inf
+        if kind == "cage_speed":
+            times, values = (
+                np.array([float(row[header.index(name)]) for row in rows]) for name in ("t_s", "cage_speed_rpm")
+            )
+            steps = np.diff(times)
+            assert mean.value == pytest.approx(float((values[:-1] * steps).sum() / steps.sum()), rel=1e-9)
+
+    run_cases(tmp_path / "signal.csv", fuzz_cases, 3, make, read, check)
