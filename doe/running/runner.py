@@ -29,12 +29,18 @@ class Ran:
     pid: int | None = None
     lost: bool = False
 
+    @property
+    def why(self) -> str:
+        """Why there is no result."""
+        return self.cause or "no result"
+
 
 Progress = Callable[[int, int], None]
-# Takes the points that are ours to run out of those given, and hands over a point that has ended.
+# Takes the points that are ours to run out of those given; stores how a point has ended, in any thread; hands that over.
 Take = Callable[[Sequence[Point]], list[Point]]
+Keep = Callable[[Point, Ran], None]
 Give = Callable[[Point, Ran], None]
-Engine = Callable[[Sequence[Point], Take, Give], None]
+Engine = Callable[[Sequence[Point], Take, Keep, Give], None]
 
 
 def run_points(
@@ -52,15 +58,15 @@ def run_points(
         mine = store.claim(free, sound)
         return [point for point in free if point.key in mine]
 
-    def give(point: Point, ran: Ran) -> None:
+    def keep(point: Point, ran: Ran) -> None:
         if ran.result is not None:
             store.put(point.key, ran.result, seconds=ran.seconds, host=ran.host, pid=ran.pid)
-            outcomes[point.key] = ran.result
-        else:
-            cause = ran.cause or "no result"
-            if not ran.lost:
-                store.fail(point.key, cause, seconds=ran.seconds)
-            outcomes[point.key] = Failure(point.label, cause, point.run, dict(point.factors))
+        elif not ran.lost:
+            store.fail(point.key, ran.why, seconds=ran.seconds)
+
+    def give(point: Point, ran: Ran) -> None:
+        failure = Failure(point.label, ran.why, point.run, dict(point.factors))
+        outcomes[point.key] = failure if ran.result is None else ran.result
         progress(len(outcomes), len(wanted))
 
     if retry:
@@ -73,7 +79,7 @@ def run_points(
                 return outcomes
             taken = {claim.key for claim in store.claims()}
             if free := [point for point in left if point.key not in taken]:
-                engine(free, take, give)
+                engine(free, take, keep, give)
             else:
                 time.sleep(POLL_S)
     finally:

@@ -182,6 +182,25 @@ class Store(Database):
                 [(point.key, self._opened, time.time()) for point in points],
             )
 
+    def sign(self, kind: str) -> None:
+        """Note that this owner lives, from here on; notes of a ``kind`` by owners that are gone are taken away."""
+        with self._transaction(durable=False) as connection:
+            self._sign(connection)
+            rows = connection.execute("SELECT name FROM meta WHERE name LIKE ? || '%'", (kind,)).fetchall()
+            gone = [(name,) for (name,) in rows if not self._lives(name.removeprefix(kind))]
+            connection.executemany("DELETE FROM meta WHERE name = ?", gone)
+
+    def note(self, kind: str, text: str) -> None:
+        """Keep a note of a ``kind``, one for each owner."""
+        with self._transaction(durable=False) as connection:
+            connection.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (kind + self._me.token, text))
+
+    def notes(self, kind: str) -> list[tuple[str, bool]]:
+        """Notes of a ``kind``, each with whether its owner lives."""
+        with self._lock, self._faults():
+            rows = self._connection.execute("SELECT name, value FROM meta WHERE name LIKE ? || '%'", (kind,)).fetchall()
+            return [(text, self._lives(name.removeprefix(kind))) for name, text in rows]
+
     def release(self) -> None:
         """Give back what was claimed and has not ended."""
         with self._transaction(durable=False) as connection:

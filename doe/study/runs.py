@@ -10,6 +10,7 @@ import numpy as np
 from doe import clearance
 from doe.arrays import Array, Whole
 from doe.designs import Design
+from doe.running.agenda import AgendaKeeper
 from doe.running.failure import Failure, alike, sentence
 from doe.running.runner import Progress
 from doe.running.store import Store
@@ -83,6 +84,7 @@ def run_design(
     progress: Progress,
     scheduler: str | None = None,
     retry: bool = False,
+    agenda: AgendaKeeper | None = None,
 ) -> Runs:
     """Design runs, from the store in ``folder`` or simulated in threads or on a cluster.
 
@@ -91,7 +93,7 @@ def run_design(
     ordered = ordered_runs(study)
     check_runs(study, ordered.design)
     with Store(folder / STORE, study.path.stem) as store:
-        simulations = clearance.Simulations(store, workers, scheduler, retry, lambda title: progress)
+        simulations = clearance.Simulations(store, workers, scheduler, retry, lambda title: progress, agenda)
         return runs_of(study, ordered, simulations, progress)
 
 

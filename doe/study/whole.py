@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from doe.arrays import Array
-from doe.clearance import Simulations
+from doe.clearance import Simulations, declares_unknowns
 from doe.designs import Design
 from doe.dimension_chain import ChainResult
 from doe.pareto import ParetoFront
 from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
+from doe.running.agenda import AgendaKeeper
 from doe.running.failure import Failure
 from doe.running.runner import Progress
 from doe.running.store import Store
@@ -30,8 +31,9 @@ from doe.study.front import find_front
 from doe.study.goals import check_goals
 from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
 from doe.study.reference import Beside, beside
-from doe.study.robust import Robust, check_robust, declared, judge, robust_advice
+from doe.study.robust import Robust, check_robust, judge, robust_advice
 from doe.study.runs import STORE, Runs, run_design
+from doe.study.stages import ANSWER, FRONT, study_stages
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
 from doe.study_file import Study
@@ -124,27 +126,33 @@ def run_study(
     direct: bool = False,
     adaptive: bool = False,
     robust: bool = False,
+    agenda: AgendaKeeper | None = None,
 ) -> StudyResult:
     """All of it; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster to run on.
 
     ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself, ``adaptive``: in
-    few runs. ``robust``: judge the pick over what is not known, which is also done where something is declared so. Raises
-    InputError, RunError, KeyboardInterrupt.
+    few runs. ``robust``: judge the pick over what is not known, which is also done where something is declared so. ``agenda``:
+    where all runs are counted. Raises InputError, RunError, KeyboardInterrupt.
     """
     clock, inputs = _Clock(), inputs_digest(study, direct, adaptive, robust)
     check_goals(study)
     check_given(study, folder)
-    if robust := robust or declared(study):
+    if robust := robust or declares_unknowns(study):
         check_robust(study)
     reference = check_study(study, adaptive)
-    runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry)
+    if agenda is not None:
+        agenda.plan(study_stages(study, direct, adaptive, robust))
+        progress = agenda.announced(progress)
+    runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
     clock.lap("design_s")
+    if agenda is not None:
+        agenda.enter(FRONT)
     surfaces = with_rivals(fit_surfaces(study, runs))
     clock.lap("fit_s")
     found = find_front(study, surfaces)
     clock.lap("front_s")
     with Store(folder / STORE, study.path.stem) as store:
-        simulations = Simulations(store, workers, scheduler, retry, progress)
+        simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
         searched: Searched | None = find_direct(study, found, simulations) if direct else None
         if adaptive:
             searched = find_adaptive(study, runs, simulations)
@@ -156,6 +164,8 @@ def run_study(
         clock.lap("confirmation_s")
         judged = judge(study, pick, simulations) if robust else None
         clock.lap("robust_s")
+    if agenda is not None:
+        agenda.enter(ANSWER)
     tolerances = _tolerances(study, surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     reference = reference and reference.only(runs.places)

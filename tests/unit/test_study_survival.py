@@ -223,7 +223,7 @@ def test_rows_that_are_no_results_run_again_with_one_sentence(tmp_path, monkeypa
 
 def test_killed_process_is_taken_over_at_once_by_one_that_waits_for_it(tmp_path, monkeypatch):
     study, out = short_study(tmp_path), tmp_path / "out"
-    slow = start(study, out, 30.0, 19)
+    slow = start(study, out, 30.0, 20)
     wait_for(lambda: (out / STORE).exists() and study_status(Study.load(study), out)["points"]["running"] == 20)
     ran = instantly(monkeypatch.setattr)
     seen: list[tuple[int, int]] = []
