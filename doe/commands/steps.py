@@ -40,13 +40,13 @@ def keeping_runs(out: Path | None, source: Path) -> Iterator[None]:
 
 
 @contextmanager
-def stages(quiet: bool) -> "Iterator[Callable[[str], Progress]]":
-    """Progress of one stage after the other, each by its title: a terminal has room for one bar."""
+def stages(quiet: bool, workers: int | None) -> "Iterator[Callable[[str], Progress]]":
+    """Progress of one stage after the other, each by its title: a terminal has room for one bar. ``workers`` run at once."""
     with ExitStack() as bars:
 
         def stage(title: str) -> "Progress":
             bars.close()
-            return bars.enter_context(progress_bar(title, quiet))
+            return bars.enter_context(progress_bar(title, quiet, workers))
 
         yield stage
 
@@ -66,7 +66,7 @@ def simulations_in(
     from doe.running.store import Store
     from doe.study.runs import STORE
 
-    with Store(folder / STORE, source.stem) as store, stages(quiet) as progress:
+    with Store(folder / STORE, source.stem) as store, stages(quiet, workers) as progress:
         progress = progress if agenda is None else agenda.announced(progress)
         yield Simulations(store, workers, scheduler, retry, progress, agenda)
 
@@ -101,7 +101,7 @@ def fitted(study: "Study", data: Path | None, effort: Effort) -> "list[Surface]"
     if data is not None:
         return fit_surfaces(study, read_runs(study, data))
     out, workers, scheduler, retry, quiet = effort
-    with _store_folder(out, study.path) as folder, progress_bar("design runs", quiet) as progress:
+    with _store_folder(out, study.path) as folder, progress_bar("design runs", quiet, workers) as progress:
         return fit_surfaces(study, run_design(study, folder, workers, progress, scheduler, retry))
 
 

@@ -51,8 +51,9 @@ def study(
 
         options = {"direct": direct, "adaptive": adaptive, "robust": robust}
         with noted_agenda(folder, "doe study", workers, options, digest) as agenda:
-            with stages(quiet or as_json) as progress:
-                outcome = run_study(loaded, folder, workers, progress, scheduler, retry, **options, agenda=agenda)
+            with stages(quiet or as_json, workers) as progress:
+                bars = agenda.announced(progress)
+                outcome = run_study(loaded, folder, workers, bars, scheduler, retry, **options, agenda=agenda)
             record = write(outcome, folder)
             agenda.finish(record["files"])
         if not as_json:

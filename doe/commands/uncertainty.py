@@ -33,7 +33,7 @@ def uncertainty(
     folder = out or Path(f"{path.stem}_uncertainty")
     with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.uncertainty import print_uncertainty, record_of, write
-        from doe.study.stages import ANSWER
+        from doe.running.agenda import ANSWER
         from doe.study.stages_unknown import uncertainty_stages
         from doe.study.status import content_digest
         from doe.study.uncertainty import find_uncertainty

@@ -17,6 +17,8 @@ from rbdyn.faults import InputError, RunError
 
 # Names of the notes in a store, each followed by the owner's token.
 NOTE = "agenda "
+# The last stage of every command, and the wall time [s] that the files of an answer take about.
+ANSWER, ANSWER_S = "answer", 8.0
 
 
 @dataclass
@@ -35,6 +37,11 @@ class Stage:
     since: float | None = None
     seconds: float = 0.0
     measured_work: float = 0.0
+
+    @classmethod
+    def of(cls, name: str, runs: int, work: float, *titles: str) -> Self:
+        """A stage of so many runs of so much work each; its titles begin with its name unless others are given."""
+        return cls(name, titles or (name,), runs, runs * work)
 
 
 @dataclass

@@ -4,14 +4,14 @@ from typing import get_args
 
 from doe import clearance
 from doe.clearance import work_of
-from doe.running.agenda import Stage
+from doe.running.agenda import ANSWER, ANSWER_S, Stage
 from doe.study.runs import ordered_runs
 from doe.study_file import Study
 from doe.study_file.front_section import Front
 
-# Wall time [s] that surfaces with their front, and the files of an answer, take about.
-FRONT_S, ANSWER_S = 6.0, 8.0
-DESIGN, FRONT, ANSWER = "design runs", "front", "answer"
+# Wall time [s] that surfaces with their front take about.
+FRONT_S = 6.0
+DESIGN, FRONT = "design runs", "front"
 
 
 def study_stages(study: Study, direct: bool = False, adaptive: bool = False, robust: bool = False) -> list[Stage]:
@@ -27,16 +27,16 @@ def study_stages(study: Study, direct: bool = False, adaptive: bool = False, rob
     stages = [Stage(DESIGN, (DESIGN,), len(works), sum(works.values())), Stage(FRONT, besides_s=FRONT_S)]
     if direct:
         (scene,) = clearance.direct_scenes(study, study.baseline[None], 0)
-        stages.append(stage_of("direct front", study.file.direct.evaluations, work_of(scene)))
+        stages.append(Stage.of("direct front", study.file.direct.evaluations, work_of(scene)))
     if adaptive:
         usual = clearance.design_scenes(study, study.baseline[None])[0].numerics.replicates
         (scene,) = clearance.adaptive_scenes(study, study.baseline[None], [usual], 0)
-        stages.append(stage_of("adaptive front", max(study.file.adaptive.budget - len(works), 0), work_of(scene)))
+        stages.append(Stage.of("adaptive front", max(study.file.adaptive.budget - len(works), 0), work_of(scene)))
     # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
     rules = len(get_args(Front.model_fields["pick"].annotation))
     points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * (direct or adaptive)
     one = work_of(clearance.confirmation_scene(study, study.baseline))
-    stages.append(stage_of("confirmation", points, one, "confirmation", "beyond the region"))
+    stages.append(Stage.of("confirmation", points, one, "confirmation", "beyond the region"))
     if robust or clearance.declares_unknowns(study):
         from doe.study.stages_unknown import robust_stage
 
@@ -49,8 +49,3 @@ def design_works(study: Study) -> list[tuple[str, float]]:
     ordered = ordered_runs(study)
     points = clearance.points_of(ordered.scenes, ordered.labels, ordered.factors)
     return [(point.key, work_of(scene)) for point, scene in zip(points, ordered.scenes, strict=True)]
-
-
-def stage_of(name: str, runs: int, work: float, *titles: str) -> Stage:
-    """A stage of so many runs of so much work each."""
-    return Stage(name, titles or (name,), runs, runs * work)

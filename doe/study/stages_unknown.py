@@ -5,12 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from doe.clearance import work_of
-from doe.running.agenda import Stage
+from doe.running.agenda import ANSWER, ANSWER_S, Stage
 from doe.study.calibration_question import Question, cases_of
 from doe.study.input_sets import Case, read_case
 from doe.study.robust import case_of_study
 from doe.study.robust_front import CONFIRMED, POINTS
-from doe.study.stages import ANSWER, ANSWER_S, stage_of
 from doe.study.uncertainty import OUTPUTS
 from doe.study_file import Study
 from doe.unknown import screening
@@ -24,7 +23,7 @@ def robust_stage(study: Study) -> Stage:
     runs = round(2 * settings.points * (1.0 + settings.settle)) + _screening_runs(case)
     if settings.front != "none":
         runs += settings.points + POINTS * CONFIRMED
-    return stage_of("robust", runs, _work_of_a_set(case), "screening", "input sets", "runs of the robust front")
+    return Stage.of("robust", runs, _work_of_a_set(case), "screening", "input sets", "runs of the robust front")
 
 
 def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None) -> list[Stage]:
@@ -35,9 +34,9 @@ def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None)
     case = read_case(path, OUTPUTS, overrides)
     one, screened = _work_of_a_set(case), _screening_runs(case)
     return [
-        stage_of("as the scene says", 1, work_of(case.scene)),
-        *([stage_of("screening", screened, one)] if screened else []),
-        stage_of("input sets", case.uncertain.points if points is None else points, one),
+        Stage.of("as the scene says", 1, work_of(case.scene)),
+        *([Stage.of("screening", screened, one)] if screened else []),
+        Stage.of("input sets", case.uncertain.points if points is None else points, one),
         Stage(ANSWER, besides_s=ANSWER_S),
     ]
 
@@ -49,10 +48,10 @@ def calibration_stages(question: Question) -> list[Stage]:
     screened = _screening_runs(replace(case, every=sought))
     sets = case.scene.calibrate.waves * sets_a_wave(min(len(sought), case.uncertain.inputs))
     return [
-        *([stage_of("screening", screened, one)] if screened else []),
-        stage_of("as the scene says", conditions, one),
-        stage_of("waves", sets * conditions, one, "wave"),
-        stage_of("posterior", TRIED * conditions, one),
+        *([Stage.of("screening", screened, one)] if screened else []),
+        Stage.of("as the scene says", conditions, one),
+        Stage.of("waves", sets * conditions, one, "wave"),
+        Stage.of("posterior", TRIED * conditions, one),
         Stage(ANSWER, besides_s=ANSWER_S),
     ]
 

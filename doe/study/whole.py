@@ -12,7 +12,7 @@ from doe.dimension_chain import ChainResult
 from doe.pareto import ParetoFront
 from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
-from doe.running.agenda import AgendaKeeper
+from doe.running.agenda import ANSWER, AgendaKeeper
 from doe.running.failure import Failure
 from doe.running.runner import Progress
 from doe.running.store import Store
@@ -33,7 +33,7 @@ from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
 from doe.study.reference import Beside, beside
 from doe.study.robust import Robust, check_robust, judge, robust_advice
 from doe.study.runs import STORE, Runs, run_design
-from doe.study.stages import ANSWER, FRONT, study_stages
+from doe.study.stages import FRONT, study_stages
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
 from doe.study_file import Study
@@ -134,7 +134,7 @@ def run_study(
     few runs. ``robust``: judge the pick over what is not known, which is also done where something is declared so. ``agenda``:
     where all runs are counted. Raises InputError, RunError, KeyboardInterrupt.
     """
-    clock, inputs = _Clock(), inputs_digest(study, direct, adaptive, robust)
+    clock, inputs = _Clock(agenda), inputs_digest(study, direct, adaptive, robust)
     check_goals(study)
     check_given(study, folder)
     if robust := robust or declares_unknowns(study):
@@ -142,11 +142,8 @@ def run_study(
     reference = check_study(study, adaptive)
     if agenda is not None:
         agenda.plan(study_stages(study, direct, adaptive, robust))
-        progress = agenda.announced(progress)
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
-    clock.lap("design_s")
-    if agenda is not None:
-        agenda.enter(FRONT)
+    clock.lap("design_s", FRONT)
     surfaces = with_rivals(fit_surfaces(study, runs))
     clock.lap("fit_s")
     found = find_front(study, surfaces)
@@ -163,9 +160,7 @@ def run_study(
         edge = _edge(study, surfaces, chosen, searched, simulations)
         clock.lap("confirmation_s")
         judged = judge(study, pick, simulations) if robust else None
-        clock.lap("robust_s")
-    if agenda is not None:
-        agenda.enter(ANSWER)
+        clock.lap("robust_s", ANSWER)
     tolerances = _tolerances(study, surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     reference = reference and reference.only(runs.places)
@@ -246,16 +241,19 @@ def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[G
 
 
 class _Clock:
-    """Wall time of each stage [s]."""
+    """Wall time of each stage [s]; stages without runs are entered in the agenda."""
 
-    def __init__(self) -> None:
+    def __init__(self, agenda: AgendaKeeper | None) -> None:
+        self._agenda = agenda
         self._started = self._last = time.perf_counter()
         self._laps: dict[str, float] = {}
 
-    def lap(self, name: str) -> None:
-        """The stage ``name`` ends here."""
+    def lap(self, name: str, following: str = "") -> None:
+        """The stage ``name`` ends here, and the ``following`` one of the agenda begins."""
         now = time.perf_counter()
         self._laps[name], self._last = now - self._last, now
+        if following and self._agenda is not None:
+            self._agenda.enter(following)
 
     def total(self) -> dict[str, float]:
         """All stages and the whole."""

@@ -62,7 +62,7 @@ def simulate(
         folder = terminal.output_folder(out, "rbdyn simulate", scene) if out else None
         from rbdyn.dynamics.simulate import simulate as run_scene
 
-        with terminal.progress_bar("simulating", quiet or as_json) as progress:
+        with terminal.progress_bar("simulating", quiet or as_json, workers) as progress:
             result = run_scene(loaded, workers, progress, target=aim)
         loaded = type(loaded).from_dict(result.scene)
         files = _write(loaded, result, folder) if folder else []
@@ -177,7 +177,7 @@ def slip_map(
 
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
         points = folder / study.POINTS if folder else None
-        with terminal.keeping(points), terminal.progress_bar("mapping", quiet or as_json) as progress:
+        with terminal.keeping(points), terminal.progress_bar("mapping", quiet or as_json, workers) as progress:
             mapped = study.slip_map(loaded, *axes, workers, progress, points)
         files = _write_map(mapped, folder) if folder else []
         terminal.hand_over(mapped.as_dict, as_json, lambda: _print_map(mapped), folder, files)

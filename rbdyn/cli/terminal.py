@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import typer
 
 from rbdyn.cli.loading import INTERRUPTED
+from rbdyn.cli.remaining import Remaining, clock_words
 from rbdyn.cli.streams import FAILED
 from rbdyn.faults import InputError, RunError
 from rbdyn.records.kept import digest_of
@@ -108,18 +109,33 @@ def output_folder(path: Path, command: str, source: Path) -> Path:
 
 
 @contextmanager
-def progress_bar(title: str, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """Progress on a terminal, silence elsewhere; yields ``progress(done, total)``."""
+def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[Callable[[int, int], None]]:
+    """Progress on a terminal, silence elsewhere; yields ``progress(done, total)``. ``workers``: how many go on at once, all
+    processors by None."""
     if quiet or not sys.stderr.isatty():
         yield lambda done, total: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
+    from rich.text import Text
 
-    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    remaining = Remaining(workers or os.cpu_count() or 1)
+
+    class TimeLeft(ProgressColumn):
+        """The speed that rich estimates is lost where a run takes longer than half a minute."""
+
+        def render(self, task: Task) -> Text:
+            return Text(clock_words(remaining.seconds), style="progress.remaining")
+
+    def progress(done: int, total: int) -> None:
+        remaining.update(done, total)
+        bar.update(task, completed=done, total=total)
+
+    with Progress(
+        TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeLeft(), console=Console(stderr=True), transient=True
+    ) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        yield progress
 
 
 def print_notes(notes: Iterable[str], quiet: bool) -> None:

@@ -19,11 +19,11 @@ from short_studies import short_study, silent
 
 from doe import clearance
 from doe.commands.status import print_status
-from doe.running.agenda import agenda_in
+from doe.running.agenda import ANSWER_S, Stage, agenda_in
 from doe.running.owner import at_work
 from doe.running.store import Point, Store
 from doe.study.runs import STORE, run_design
-from doe.study.stages import ANSWER_S, FRONT_S, stage_of, study_stages
+from doe.study.stages import FRONT_S, study_stages
 from doe.study.status import content_digest, scene_status, status_of, study_status
 from doe.study_file import Study
 from rbdyn.dynamics import simulate as module
@@ -286,7 +286,7 @@ def test_finished_uncertainty_is_so_until_its_scene_changes(tmp_path, monkeypatc
     path, out = short_study(tmp_path).with_name("cylindrical_roller.toml"), tmp_path / "scene"
     out.mkdir()
     with agenda_in(out / STORE, "doe uncertainty", 2, inputs=content_digest(path)) as keeper:
-        keeper.plan([stage_of("input sets", 16, 8.0)])
+        keeper.plan([Stage.of("input sets", 16, 8.0)])
         keeper.announced(lambda title: silent)("input sets")
         count = keeper.counting({str(key): 8.0 for key in range(16)}, silent)
         count(10, 16)
