@@ -1,7 +1,7 @@
 """The whole study: design, runs, surfaces, front, confirmation, tolerances, dimension chains, a published table beside."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from doe.dimension_chain import ChainResult
 from doe.pareto import ParetoFront
 from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
-from doe.running.agenda import ANSWER, AgendaKeeper
+from doe.running.agenda import ANSWER, AgendaKeeper, Stage
 from doe.running.failure import Failure
 from doe.running.runner import Progress
 from doe.running.store import Store
@@ -140,14 +140,10 @@ def run_study(
     if robust := robust or declares_unknowns(study):
         check_robust(study)
     reference = check_study(study, adaptive)
-    if agenda is not None:
-        agenda.plan(study_stages(study, direct, adaptive, robust))
+    clock.plan(study_stages(study, direct, adaptive, robust))
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
     clock.lap("design_s", FRONT)
-    surfaces = with_rivals(fit_surfaces(study, runs))
-    clock.lap("fit_s")
-    found = find_front(study, surfaces)
-    clock.lap("front_s")
+    surfaces, found = _surfaces_and_front(study, runs, clock)
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
         searched: Searched | None = find_direct(study, found, simulations) if direct else None
@@ -189,6 +185,14 @@ def run_study(
         notes=(*runs.notes, *notes, *_offers(study, surfaces, searched, judged)),
         cost=clock.total(),
     )
+
+
+def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list[Surface], ParetoFront]:
+    surfaces = with_rivals(fit_surfaces(study, runs))
+    clock.lap("fit_s")
+    front = find_front(study, surfaces)
+    clock.lap("front_s")
+    return surfaces, front
 
 
 def _offers(study: Study, surfaces: list[Surface], searched: Searched | None, judged: Robust | None) -> list[str]:
@@ -247,6 +251,11 @@ class _Clock:
         self._agenda = agenda
         self._started = self._last = time.perf_counter()
         self._laps: dict[str, float] = {}
+
+    def plan(self, stages: Sequence[Stage]) -> None:
+        """The stages to come."""
+        if self._agenda is not None:
+            self._agenda.plan(stages)
 
     def lap(self, name: str, following: str = "") -> None:
         """The stage ``name`` ends here, and the ``following`` one of the agenda begins."""
