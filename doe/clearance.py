@@ -24,6 +24,7 @@ from doe.running.store import Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
 from rbdyn.records.kept import code_version, run_key
+from rbdyn.records.words import counted
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.unknown import plain_values
@@ -165,7 +166,7 @@ def direct_run(study: Study) -> str:
     numerics = scene.numerics
     windows = int(numerics.turns / scene.impact_window_turns + 1e-9)
     return (
-        f"each of {numerics.replicates} replicates of {numerics.turns:g} counted shaft turns ({windows} whole windows of the "
+        f"each of {numerics.replicates} replicates of {numerics.turns:g} counted shaft turns ({counted(windows, 'whole window')} of the "
         f"impact, {scene.impact_window_turns:g} turns each) after {numerics.warm_up_turns:g} discarded ones"
     )
 

@@ -10,6 +10,7 @@ from doe.arrays import Array, Rows, Whole
 from doe.designs.evaluation import block_contrasts
 from doe.designs.model import Terms
 from doe.response_surface.least_squares import dependent_columns
+from rbdyn.records.words import are, counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +103,10 @@ def check_matrix(name: str, model: str, terms: Terms, matrix: Array) -> None:
     runs, size = matrix.shape
     if runs <= size:
         blocks = f", {size - len(terms)} for the blocks" if size > len(terms) else ""
-        least = f"{size + 1} ({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
-        raise ValueError(f"{name}: {runs} runs are too few for the {model} model; give at least {least}")
+        least = f"{size + 1} ({counted(len(terms), 'term')}{blocks} and one to judge the fit) or choose a simpler model"
+        raise ValueError(
+            f"{name}: {counted(runs, 'run')} {are(runs)} too few for the {model} model; give at least {least}"
+        )
     if dependent := dependent_columns(matrix):
         names = dict.fromkeys(terms[column] if column < len(terms) else "the blocks" for column in dependent)
         what = f"{', '.join(sorted(names))} from the other terms of the {model} model (its matrix is singular)"

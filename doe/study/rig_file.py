@@ -8,6 +8,7 @@ from typing import Any
 from doe.study.rig_signals import KINDS, cage_speed, whirl
 from doe.study_file.table import NUMBER, fields, listed
 from rbdyn.faults import InputError, refuse
+from rbdyn.records.words import counted
 
 # What can be measured, by its name in the results of a simulation; the others of these are no positive numbers.
 OUTPUTS = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
@@ -77,7 +78,7 @@ def read_rig(path: Path) -> Rig:
     ]
     teaching = sum(not row.held for row in found)
     if teaching < FEWEST:
-        faults.append(f"{path}: {teaching} rows to learn from; give {FEWEST} at least that are not on hold")
+        faults.append(f"{path}: {counted(teaching, 'row')} to learn from; give {FEWEST} at least that are not on hold")
     refuse(faults)
     return Rig(path, found, keys, outputs, tuple(notes))
 

@@ -18,6 +18,7 @@ from doe.study.design import actual_of, check_runs, design_of, terms_of
 from doe.study_file import Study
 from doe.study_file.table import read_table
 from rbdyn.faults import RunError
+from rbdyn.records.words import are, counted
 from rbdyn.scene import Scene
 
 # Name of the store in the folder of a study.
@@ -111,7 +112,9 @@ def runs_of(study: Study, ordered: Ordered, simulations: clearance.Simulations, 
     sound = [result for result in results if not isinstance(result, Failure)]
     notes = _each_once(note for result in sound for note in result.notes)
     if failures:
-        notes.append(f"{len(failures)} design runs failed and are left out: {sentence(failures)}")
+        notes.append(
+            f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures)}"
+        )
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[left] if design.blocks > 1 else None
     return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)

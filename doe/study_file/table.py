@@ -13,6 +13,7 @@ import numpy as np
 
 from doe.arrays import Array, Whole
 from rbdyn.faults import LONGEST_NAME, InputError, one_line, read_text, refuse
+from rbdyn.records.words import counted
 
 # As every program writes it: float() would also take 1_000, nan and the digits of other scripts.
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -105,7 +106,7 @@ def fields(path: Path) -> tuple[list[str], list[list[str]]]:
         if len(row) != len(header):
             only_commas = len(row) > len(header) and not any(field.strip() for field in row[len(header) :])
             mend = "remove the commas at its end" if only_commas else "give it a field a column, in the header's order"
-            faults.append(f"{path}: row {number} has {len(row)} fields and the header {len(header)}; {mend}")
+            faults.append(f"{path}: row {number} has {counted(len(row), 'field')} and the header {len(header)}; {mend}")
     refuse(faults)
     return header, rows
 

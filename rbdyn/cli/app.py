@@ -12,6 +12,7 @@ from rbdyn.cli.ball import ball
 from rbdyn.cli.keys import command as keys
 from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
+from rbdyn.records.words import counted
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -138,7 +139,7 @@ def _print_map(mapped: "SlipMap") -> None:
         for value, row in zip(mapped.loads_N, mapped.grid("cage_slip"), strict=True)
     ]
     terminal.print_table("cage slip", header, rows)
-    print(f"{len(mapped.points)} points in {mapped.wall_s:.1f} s, seed {mapped.seed}")
+    print(f"{counted(len(mapped.points), 'point')} in {mapped.wall_s:.1f} s, seed {mapped.seed}")
 
 
 def _write_map(mapped: "SlipMap", folder: Path) -> list[str]:
@@ -290,7 +291,9 @@ def _print_target(target: dict[str, Any]) -> None:
     errors = target["relative_error"].items()
     reached = ", ".join(f"{name} {'unknown' if e is None else f'{100.0 * e:.2g} %'}" for name, e in errors)
     aim = f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached})"
-    runs = f"{chosen['replicates']} replicates of {chosen['turns']:g} turns at rtol {chosen['rtol']:g}"
+    runs = (
+        f"{counted(chosen['replicates'], 'replicate')} of {counted(chosen['turns'], 'turn')} at rtol {chosen['rtol']:g}"
+    )
     spent = f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides"
     pilots = f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots"
     print(f"{aim} by {runs}; {spent}, {pilots}; the seconds are those of pilots and all runs")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.cli.terminal import print_notes, print_table
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
+from rbdyn.records.words import counted
 from rbdyn.scene import BallScene
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
         radial = f"{runout['indicator_um']:.3g} um by an indicator, {runout['minimum_zone_um']:.3g} um between circles"
         axial = f"axial {runout['axial_um']:.3g} um, face {runout['face_um']:.3g} um"
         asynchronous = f"asynchronous {runout['asynchronous_radial_um']:.3g} um"
-        print(f"runout over {runout['turns']} turns: radial {radial}, {axial}; {asynchronous}")
+        print(f"runout over {counted(runout['turns'], 'turn')}: radial {radial}, {axial}; {asynchronous}")
     print_notes(result.notes or (), quiet)
 
 

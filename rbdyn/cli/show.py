@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from rbdyn.cli.terminal import print_notes, print_table
 from rbdyn.faults import refuse
+from rbdyn.records.words import counted
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
 
@@ -63,7 +64,9 @@ def request_of(path: Path, turns: float | None, replicate: int) -> Request:
     most = min(most_turns(scene), numerics.turns)
     chosen = min(SHOWN_TURNS, most) if turns is None else turns
     if turns is not None and not fewest <= turns <= numerics.turns:
-        faults.append(f"--turns {turns:g}: the result counted {numerics.turns:g} turns; choose from {fewest:g} to that")
+        faults.append(
+            f"--turns {turns:g}: the result counted {counted(numerics.turns, 'turn')}; choose from {fewest:g} to that"
+        )
     elif chosen > most:
         faults.append(f"--turns {turns:g}: memory has room for {most:.4g} turns of this scene; show no more")
     if not 1 <= replicate <= numerics.replicates:

@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 import typer
 
+from rbdyn.cli.columns import blocks
 from rbdyn.cli.loading import INTERRUPTED
 from rbdyn.cli.remaining import Remaining, clock_words
 from rbdyn.cli.streams import FAILED
@@ -145,19 +146,22 @@ def print_notes(notes: Iterable[str], quiet: bool) -> None:
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A plain table; the first column to the left, the others to the right."""
+    """A plain table; the first column to the left, the others to the right. One that is wider than the terminal goes on below,
+    its first column repeated, for no word is broken."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD)
-    for index, column in enumerate(header):
-        table.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
-    for row in rows:
-        table.add_row(*row)
     # Wide enough for the table when the output is a file or a pipe, which has no width of its own.
     console = Console(width=None if sys.stdout.isatty() else 160, highlight=False, markup=False)
     # A title of the table's own would be broken at the table's width.
     if title:
         console.print(title, style="bold")
-    console.print(table)
+    for block in blocks([*zip(header, *rows, strict=True)], console.width):
+        table = Table(box=box.SIMPLE_HEAD)
+        for place, width in block:
+            justify = "left" if place == 0 else "right"
+            table.add_column(header[place], justify=justify, width=width, overflow="fold")  # type: ignore[arg-type]
+        for row in rows:
+            table.add_row(*(row[place] for place, _ in block))
+        console.print(table)

@@ -47,6 +47,17 @@ def shown(value: Any, digits: int = 4) -> str:
     return f"{value:.0f}" if "e+" in text and abs(value) < PLAIN_BELOW else text
 
 
+def counted(number: float, noun: str) -> str:
+    """'1 run', '2 runs', '0 classes': a number of things."""
+    ending = "" if number == 1 else "es" if noun.endswith(("s", "x", "ch", "sh")) else "s"
+    return f"{number:.0f} {noun}{ending}" if number == round(number) else f"{number:g} {noun}{ending}"
+
+
+def are(number: float) -> str:
+    """'is' or 'are', of a number of things."""
+    return "is" if number == 1 else "are"
+
+
 def decimals(error: float) -> int:
     """Decimals that show two significant digits of an error."""
     return min(max(1 - math.floor(math.log10(error)), 0), 9)

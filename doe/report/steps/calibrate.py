@@ -15,7 +15,7 @@ from doe.unknown import laws
 from doe.unknown.posterior import seen
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.kept import digest_of
-from rbdyn.records.words import quantity, shown
+from rbdyn.records.words import are, counted, quantity, shown
 from rbdyn.result import write_json
 from rbdyn.scene.unknown import Input
 
@@ -147,7 +147,7 @@ def print_calibration(record: dict[str, Any]) -> None:
     if record["screened"]:
         most = max(record["screened"], key=lambda key: record["screened"][key])
         print(
-            f"{len(record['screened'])} more inputs stay as they are: in a screening none made more than "
+            f"{counted(len(record['screened']), 'further input')} {are(len(record['screened']))} left at the scene's value: in a screening none made more than "
             f"{100.0 * record['screened'][most]:.2g} % of an output's variance ({most})"
         )
     for note in record["notes"]:

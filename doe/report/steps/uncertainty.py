@@ -9,7 +9,7 @@ from doe.study.uncertainty import OutputRange, Uncertainty
 from doe.unknown.sensitivity import CONFIDENCE
 from doe.unknown.spread import Share
 from rbdyn.cli.terminal import print_table
-from rbdyn.records.words import quantity, shown, with_error
+from rbdyn.records.words import are, counted, quantity, shown, with_error
 from rbdyn.result import write_json
 
 FORMAT = "doe.uncertainty/1"
@@ -94,7 +94,7 @@ def print_uncertainty(found: Uncertainty) -> None:
     if found.screened:
         most = max(found.screened, key=lambda key: found.screened[key])
         print(
-            f"{len(found.screened)} more inputs stay as they are: in a screening none made more than "
+            f"{counted(len(found.screened), 'further input')} {are(len(found.screened))} left at the scene's value: in a screening none made more than "
             f"{100.0 * found.screened[most]:.2g} % of an output's variance ({most})"
         )
     for note in found.notes:
