@@ -266,7 +266,7 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
     if result.target is not None:
         _print_target(result.target)
     loads = f"{result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer)"
-    runs = f"{result.replicates} replicates, seed {result.seed}"
+    runs = f"{counted(result.replicates, 'replicate')}, seed {result.seed}"
     took = f"{result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to load or compile"
     print(f"race loads up to {loads}; power balance closes to {100.0 * result.power_gap:.2g} %; {runs}; {took}")
     for race, at in result.races.items():
