@@ -21,7 +21,7 @@ def full_factorial(factors: int, *, levels: int = 3, centre_replicates: int = 0)
     if (runs := levels**factors) > MOST_RUNS:
         mend = 'give fewer levels or use kind = "sobol"'
         raise ValueError(
-            f"levels = {levels}: {counted(factors, 'factor')} would give {runs} runs, more than {MOST_RUNS}; {mend}"
+            f"levels = {levels}: {counted(factors, 'factor')} give {runs} runs, more than {MOST_RUNS}; {mend}"
         )
     values = np.linspace(-1.0, 1.0, levels)
     return _filled("grid", np.array([each[::-1] for each in product(values, repeat=factors)]), centre_replicates)

@@ -14,10 +14,11 @@ from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.running.failure import Failure, sentence
-from doe.study_file.table import NUMBER, fields
+from doe.study_file.table import fields
 from doe.unknown import laws, screening
 from doe.unknown.joint import Joint
 from rbdyn.faults import InputError, RunError, read_toml, refuse, set_key
+from rbdyn.records.cells import NUMBER
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import shown
 from rbdyn.result import SimulationResult

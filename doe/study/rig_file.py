@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from doe.study.rig_signals import KINDS, cage_speed, whirl
-from doe.study_file.table import NUMBER, fields, listed
+from doe.study_file.table import fields, listed
 from rbdyn.faults import InputError, refuse
+from rbdyn.records.cells import NUMBER
 from rbdyn.records.words import counted
 
 # What can be measured, by its name in the results of a simulation; the others of these are no positive numbers.

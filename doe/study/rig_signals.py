@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from doe.arrays import Array
-from doe.study_file.table import NUMBER, fields
+from doe.study_file.table import fields
 from rbdyn.faults import InputError
+from rbdyn.records.cells import NUMBER
 from rbdyn.records.words import counted
 
 # What a signal holds: its columns, of which some may have another unit.

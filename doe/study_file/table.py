@@ -3,7 +3,6 @@
 import csv
 import io
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,10 +12,9 @@ import numpy as np
 
 from doe.arrays import Array, Whole
 from rbdyn.faults import LONGEST_NAME, InputError, one_line, read_text, refuse
+from rbdyn.records.cells import NUMBER, plain_cell
 from rbdyn.records.words import counted
 
-# As every program writes it: float() would also take 1_000, nan and the digits of other scripts.
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # Squares of larger values, and their sums, overflow; larger labels and counts are no whole numbers in floating point.
 LARGEST, LARGEST_WHOLE = 1e100, 1e9
 COUNT, LABELS = "replicates", ("block", "run")
@@ -82,7 +80,10 @@ def listed(names: Iterable[str]) -> str:
 
 
 def fields(path: Path) -> tuple[list[str], list[list[str]]]:
-    """Names in the header and fields of the rows, as many in each; blank lines are none. Raises InputError."""
+    """Names in the header and fields of the rows, as many in each; blank lines are none. Raises InputError.
+
+    A quote that kept a spreadsheet from taking text for a formula is taken off.
+    """
     lines = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
     found, start = [], 1
     try:
@@ -95,7 +96,7 @@ def fields(path: Path) -> tuple[list[str], list[list[str]]]:
         raise InputError([f"{path}: line {start}: is not CSV ({error}); {mend}"]) from None
     if not found:
         raise InputError([f"{path}: is empty; write a header of names and a row a run"])
-    header, rows = [name.strip() for name in found[0]], found[1:]
+    header, *rows = [[plain_cell(text.strip()) for text in row] for row in found]
     if len(header) == 1 and (marks := [mark for mark in ";\t|" if mark in header[0]]):
         raise InputError([f"{path}: has {marks[0]!r} between its fields; write commas there and points in numbers"])
     several = {name: count for name, count in Counter(header).items() if count > 1 and name}

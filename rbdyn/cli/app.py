@@ -12,6 +12,7 @@ from rbdyn.cli.ball import ball
 from rbdyn.cli.keys import command as keys
 from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
+from rbdyn.records.cells import save_table
 from rbdyn.records.words import counted
 
 if TYPE_CHECKING:
@@ -148,7 +149,7 @@ def _write_map(mapped: "SlipMap", folder: Path) -> list[str]:
     from rbdyn.result import write_json
 
     write_json(folder / "map.json", mapped.as_dict())
-    mapped.table().to_csv(folder / "map.csv", index=False)
+    save_table(mapped.table(), folder / "map.csv")
     draw(mapped, folder / "map.png")
     return ["map.json", "map.csv", "map.png"]
 
@@ -236,7 +237,7 @@ def _write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str
     result.save(folder / "result.json")
     turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
     shown = history(scene, turns)
-    shown.table().to_csv(folder / "history.csv", index=False, float_format="%.6g")
+    save_table(shown.table(), folder / "history.csv", "%.6g")
     title = f"first {turns:g} counted shaft turns"
     plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
     plots.pocket_forces({title: shown}, folder / "pocket_forces.png")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.cli.terminal import print_notes, print_table
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
+from rbdyn.records.cells import save_table
 from rbdyn.records.words import counted
 from rbdyn.scene import BallScene
 
@@ -54,10 +55,10 @@ def write(result: BallResult, folder: Path, path: "pd.DataFrame | None" = None) 
         return ["result.json"]
     from rbdyn.plots.ball import pictures
 
-    result.table().to_csv(folder / "balls.csv", index=False, float_format="%.8g")
+    save_table(result.table(), folder / "balls.csv", "%.8g")
     files = ["result.json", "balls.csv", *pictures(result, folder)]
     if path is not None:
-        path.to_csv(folder / "runout.csv", index=False, float_format="%.8g")
+        save_table(path, folder / "runout.csv", "%.8g")
         files.append("runout.csv")
     return files
 

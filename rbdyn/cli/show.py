@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from rbdyn.cli.terminal import print_notes, print_table
 from rbdyn.faults import refuse
+from rbdyn.records.cells import save_table
 from rbdyn.records.words import counted
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
@@ -83,7 +84,7 @@ def write(
 
     motion = history(request.scene, request.turns, request.replicate)
     tasks: dict[str, Callable[[Path], object]] = {
-        "history.csv": partial(motion.table().to_csv, index=False, float_format="%.6g"),
+        "history.csv": partial(save_table, motion.table(), float_format="%.6g"),
         **_pictures(request, motion),
     }
     steps = 1 + len(tasks) + animate + lyapunov

@@ -14,6 +14,7 @@ from doe.study.input_sets import NORMAL
 from doe.unknown import laws
 from doe.unknown.posterior import seen
 from rbdyn.cli.terminal import print_table
+from rbdyn.records.cells import quoted_cell
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import are, counted, quantity, shown
 from rbdyn.result import write_json
@@ -168,9 +169,8 @@ def write(found: Calibration, record: dict[str, Any], folder: Path) -> None:
     if found.found.sampled is not None:
         rows = found.sample
         with (folder / SAMPLE).open("w", newline="", encoding="utf-8") as file:
-            table = csv.DictWriter(file, list(rows[0]))
-            table.writeheader()
-            table.writerows(rows)
+            table = csv.writer(file)
+            table.writerows([map(quoted_cell, row) for row in (list(rows[0]), *(each.values() for each in rows))])
         told = {name: record[name] for name in ("verdict", "reasons", "scene", "data", "made_of")}
         sha256 = digest_of((folder / SAMPLE).read_bytes())
         write_json(folder / OF_SAMPLE, {"format": POSTERIOR, "sample": SAMPLE, "sha256": sha256, **told})

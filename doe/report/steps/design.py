@@ -6,6 +6,7 @@ from doe.designs import Design
 from doe.study.design import actual_of
 from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
+from rbdyn.records.cells import quoted_cell
 from rbdyn.records.words import counted
 
 
@@ -41,7 +42,7 @@ def design_record(study: Study, design: Design, evaluation: dict[str, Any]) -> d
 def print_csv(record: dict[str, Any]) -> None:
     """Run and actual factors, with the block where there are several."""
     blocked = record["evaluation"]["blocks"] is not None
-    print(",".join(["run", *(["block"] if blocked else []), *record["factors"]]))
+    print(",".join(["run", *(["block"] if blocked else []), *map(quoted_cell, record["factors"])]))
     for run in record["runs"]:
         values = [f"{x:.9g}" for x in run["factors"].values()]
         print(",".join([str(run["run"]), *([str(run["block"])] if blocked else []), *values]))

@@ -9,6 +9,7 @@ from doe.study.uncertainty import OutputRange, Uncertainty
 from doe.unknown.sensitivity import CONFIDENCE
 from doe.unknown.spread import Share
 from rbdyn.cli.terminal import print_table
+from rbdyn.records.cells import quoted_cell
 from rbdyn.records.words import are, counted, quantity, shown, with_error
 from rbdyn.result import write_json
 
@@ -118,9 +119,9 @@ def write(found: Uncertainty, folder: Path) -> list[str]:
     keys = [each.key for each in found.inputs]
     with (folder / "input_sets.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
-        table.writerow([*keys, *found.outputs])
+        table.writerow(map(quoted_cell, [*keys, *found.outputs]))
         for values, outputs in zip(found.sets.inputs, found.sets.outputs.tolist(), strict=True):
-            table.writerow([*(values[key] for key in keys), *outputs])
+            table.writerow(map(quoted_cell, [*(values[key] for key in keys), *outputs]))
     draw(found, folder / "uncertainty.png")
     return ["uncertainty.json", "input_sets.csv", "uncertainty.png"]
 

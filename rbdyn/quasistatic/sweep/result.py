@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rbdyn.arrays import Array, Whole
 from rbdyn.quasistatic.result import ball_columns, ball_records
+from rbdyn.records.cells import save_table
 from rbdyn.records.record import finite, plain
 from rbdyn.records.words import counted
 from rbdyn.result import read_record, versions, write_json
@@ -155,7 +156,7 @@ class SweepResult:
     def save(self, path: Path | str) -> None:
         """Write the table as CSV where the name ends so, else everything as JSON."""
         if str(path).endswith(".csv"):
-            self.table().to_csv(path, index=False, float_format="%.9g")
+            save_table(self.table(), path, "%.9g")
         else:
             write_json(path, self.as_dict())
 
