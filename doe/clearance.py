@@ -19,7 +19,7 @@ import numpy as np
 from doe.arrays import Array, Whole
 from doe.running.agenda import AgendaKeeper
 from doe.running.failure import Failure
-from doe.running.runner import Engine, Give, Keep, Progress, Ran, RunResult, Take, run_points
+from doe.running.runner import Engine, Ledger, Progress, Ran, RunResult, run_points
 from doe.running.store import Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
@@ -244,9 +244,7 @@ def _result(point: Point, outcome: RunResult) -> SimulationResult | Failure:
     return SimulationResult.from_dict(outcome)
 
 
-def _in_threads(
-    scenes: Mapping[str, Scene], workers: int | None, points: Sequence[Point], take: Take, keep: Keep, give: Give
-) -> None:
+def _in_threads(scenes: Mapping[str, Scene], workers: int | None, points: Sequence[Point], ledger: Ledger) -> None:
     """Engine of this process. The thread that runs a point claims it before and stores it after: what is claimed is under
     way, and processes share the work."""
     from rbdyn.dynamics.ensemble import Ended, Stop, run_all
@@ -256,10 +254,10 @@ def _in_threads(
     stop, threads = Stop(), workers or os.cpu_count() or 1
 
     def run(point: Point, inside: int) -> Ran | None:
-        if not take([point]):
+        if not ledger.take([point]):
             return None
         ran = attempt(scenes[point.key], stop, inside)
-        keep(point, ran)
+        ledger.keep(point, ran)
         return ran
 
     def runs() -> Iterator[Callable[[], Ran | None]]:
@@ -275,30 +273,28 @@ def _in_threads(
             raise one.fault
         # None: another process has claimed it.
         if one.found is not None:
-            give(points[one.place], one.found)
+            ledger.give(points[one.place], one.found)
 
     run_all(runs(), workers, stop, end)
 
 
-def _on_cluster(
-    texts: Mapping[str, str], scheduler: str, points: Sequence[Point], take: Take, keep: Keep, give: Give
-) -> None:
+def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point], ledger: Ledger) -> None:
     """Engine of a cluster, whose scheduler knows best what runs where: it gets all points at once."""
     from doe.running.cluster import run_on_cluster
 
     taken: list[Point] = []
 
     def tasks() -> list[str]:
-        taken.extend(take(points))
+        taken.extend(ledger.queue(points))
         return [texts[point.key] for point in taken]
 
     work = partial(attempt_text, version=code_version(SIMULATION))
 
     def end(place: int, ran: Ran) -> None:
-        keep(taken[place], ran)
-        give(taken[place], ran)
+        ledger.keep(taken[place], ran)
+        ledger.give(taken[place], ran)
 
-    run_on_cluster(scheduler, work, tasks, end)
+    run_on_cluster(scheduler, work, tasks, end, lambda place: ledger.begin(taken[place]))
 
 
 def attempt(scene: Scene, stop: "Stop | None" = None, workers: int = 1) -> Ran:

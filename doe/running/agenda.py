@@ -7,11 +7,11 @@ import json
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Self
 
-from doe.running.runner import Engine, Give, Keep, Progress, Ran, Take
+from doe.running.runner import Engine, Ledger, Progress, Ran
 from doe.running.store import Point, Store
 from rbdyn.faults import InputError, RunError
 
@@ -138,7 +138,7 @@ class AgendaKeeper:
         """The same engine; what its runs take counts."""
         agenda, place = self.agenda, self.agenda.place
 
-        def run(points: Sequence[Point], take: Take, keep: Keep, give: Give) -> None:
+        def run(points: Sequence[Point], ledger: Ledger) -> None:
             def end(point: Point, ran: Ran) -> None:
                 if ran.result is not None:
                     agenda.work += works[point.key]
@@ -146,9 +146,9 @@ class AgendaKeeper:
                     if agenda.stages:
                         agenda.stages[place].measured_work += works[point.key]
                         agenda.stages[place].seconds += ran.seconds
-                give(point, ran)
+                ledger.give(point, ran)
 
-            engine(points, take, keep, end)
+            engine(points, replace(ledger, give=end))
 
         return run
 

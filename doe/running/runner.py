@@ -6,6 +6,7 @@ Where points run is the business of an engine: threads of this process, or the w
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from doe.running.failure import Failure
@@ -36,11 +37,24 @@ class Ran:
 
 
 Progress = Callable[[int, int], None]
-# Takes the points that are ours to run out of those given; stores how a point has ended, in any thread; hands that over.
-Take = Callable[[Sequence[Point]], list[Point]]
-Keep = Callable[[Point, Ran], None]
-Give = Callable[[Point, Ran], None]
-Engine = Callable[[Sequence[Point], Take, Keep, Give], None]
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Where an engine enters what becomes of points, in any thread but for ``give``.
+
+    ``take`` claims points that begin at once, ``queue`` such as wait for a worker until they ``begin``; both return those that
+    are ours to run. ``keep`` stores how a point has ended, ``give`` hands that over.
+    """
+
+    take: Callable[[Sequence[Point]], list[Point]]
+    queue: Callable[[Sequence[Point]], list[Point]]
+    begin: Callable[[Point], None]
+    keep: Callable[[Point, Ran], None]
+    give: Callable[[Point, Ran], None]
+
+
+Engine = Callable[[Sequence[Point], Ledger], None]
 
 
 def run_points(
@@ -54,8 +68,8 @@ def run_points(
     wanted = {point.key: point for point in points}
     outcomes: dict[str, RunResult] = {}
 
-    def take(free: Sequence[Point]) -> list[Point]:
-        mine = store.claim(free, sound)
+    def take(free: Sequence[Point], queued: bool = False) -> list[Point]:
+        mine = store.claim(free, sound, queued)
         return [point for point in free if point.key in mine]
 
     def keep(point: Point, ran: Ran) -> None:
@@ -69,6 +83,7 @@ def run_points(
         outcomes[point.key] = failure if ran.result is None else ran.result
         progress(len(outcomes), len(wanted))
 
+    ledger = Ledger(take, partial(take, queued=True), lambda point: store.begin(point.key), keep, give)
     if retry:
         store.forget_failures(list(wanted.values()))
     try:
@@ -79,7 +94,7 @@ def run_points(
                 return outcomes
             taken = {claim.key for claim in store.claims()}
             if free := [point for point in left if point.key not in taken]:
-                engine(free, take, keep, give)
+                engine(free, ledger)
             else:
                 time.sleep(POLL_S)
     finally:

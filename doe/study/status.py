@@ -53,6 +53,11 @@ class Content:
             )
 
     @property
+    def running(self) -> list[Claim]:
+        """Runs under way; what waits for a worker of a cluster is not."""
+        return [claim for claim in self.claims if claim.since is not None]
+
+    @property
     def alive(self) -> list[Agenda]:
         """Agendas of live processes."""
         return [agenda for agenda, alive in self.agendas if alive]
@@ -82,7 +87,7 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
         agenda.seconds, agenda.work = (float(sum(column)) for column in zip(*rows, strict=True)) if rows else (0.0, 0.0)
     keys = set(works)
     failures = [outcome for outcome in content.outcomes.values() if isinstance(outcome, Failure)]
-    running = [claim for claim in content.claims if claim.key in keys]
+    running = [claim for claim in content.running if claim.key in keys]
     counts = {
         "total": len(keys),
         "done": len(content.outcomes) - len(failures),
@@ -94,7 +99,7 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
     other = {
         "done": others.count("done"),
         "failed": others.count("failed"),
-        "running": len(content.claims) - len(running),
+        "running": len(content.running) - len(running),
     }
     return _record(study.path, folder, content, agenda, answered, counts, other, failures)
 
@@ -109,7 +114,7 @@ def scene_status(path: Path, folder: Path) -> dict[str, Any]:
     total = sum(stage.done for stage in past) + sum(stage.runs for stage in ahead)
     ended = sum(stage.done for stage in agenda.stages)
     failed = sum(run.status == "failed" for run in content.ended)
-    running = len(content.claims)
+    running = len(content.running)
     counts = {
         "total": ended if answered else total,
         "done": max(ended - failed, 0),
@@ -187,7 +192,7 @@ def _record(
         "stages": [{"name": each.name, "done": each.done, "runs": each.runs} for each in agenda.stages],
         "points": dict(counts),
         "failures": grouped(failures),
-        "running": [_running(claim) for claim in content.claims],
+        "running": [_running(claim) for claim in content.running],
         "other": dict(other),
         "spent_s": sum(run.seconds or 0.0 for run in content.ended),
         "left_s": 0.0 if answered else _left_s(agenda, content),
@@ -197,9 +202,13 @@ def _record(
 def _running(claim: Claim) -> dict[str, Any]:
     return {
         **{key: getattr(claim, key) for key in ("label", "run", "host", "pid")},
-        "since": datetime.fromtimestamp(claim.since, UTC).isoformat(timespec="seconds"),
-        "for_s": max(0.0, time.time() - claim.since),
+        "since": datetime.fromtimestamp(claim.since or 0.0, UTC).isoformat(timespec="seconds"),
+        "for_s": _for_s(claim, time.time()),
     }
+
+
+def _for_s(claim: Claim, now: float) -> float:
+    return max(0.0, now - (claim.since or 0.0))
 
 
 def _left_s(agenda: Agenda, content: Content) -> float | None:
@@ -218,7 +227,7 @@ def _left_s(agenda: Agenda, content: Content) -> float | None:
         seconds, at_once = pace * max(work, 0.0), float(threads)
         if begun and content.alive and stage.since is not None:
             at_once = _at_once(stage.since, content, now) or at_once
-            seconds -= sum(min(now - claim.since, pace * work / len(content.claims)) for claim in content.claims)
+            seconds -= sum(min(_for_s(claim, now), pace * work / len(content.running)) for claim in content.running)
             overdue_s = OVERDUE * (now - stage.since) if stage.besides_s else 0.0
             besides_s = max(stage.besides_s - (now - stage.since), overdue_s)
         else:
@@ -230,9 +239,10 @@ def _left_s(agenda: Agenda, content: Content) -> float | None:
 def _at_once(since: float, content: Content, now: float) -> float | None:
     """Runs at once, in the mean since a moment; None while too few have ended to tell."""
     rows = [run for run in content.ended if run.seconds and run.started is not None and run.started >= since]
-    running = [claim.since for claim in content.claims]
     begin = min((run.started for run in rows if run.started is not None), default=now)
     if len(rows) < 2 or now <= begin:
         return None
-    busy = sum(run.seconds or 0.0 for run in rows) + sum(now - max(start, begin) for start in running)
+    busy = sum(run.seconds or 0.0 for run in rows) + sum(
+        min(_for_s(claim, now), now - begin) for claim in content.running
+    )
     return max(busy / (now - begin), 0.1)

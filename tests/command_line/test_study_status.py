@@ -61,14 +61,14 @@ def test_running_study_tells_who_runs_what_and_how_long_it_will_take(tmp_path, m
     first, middle, last = records.values()
     assert first["points"]["missing"] == 20 and first["status"] == "unfinished" and first["left_s"] is None
     points = middle["points"]
-    assert middle["status"] == "running" and points["done"] == 6 and points["failed"] == 2
+    assert middle["status"] == "running" and 6 <= points["done"] <= 8 and points["failed"] == 2
     assert 1 <= points["running"] <= 2 and sum(points.values()) == 2 * points["total"]
     for claim in middle["running"]:
         assert claim["pid"] == os.getpid() and claim["label"] == f"design run {claim['run']}"
         assert abs(datetime.fromisoformat(claim["since"]).timestamp() - time.time()) < 60.0
-    # Two threads, runs of 0.02 s and more: 8 have ended, 12 and the confirmation are left.
-    assert 8 * 0.02 <= middle["spent_s"] <= 2.0 * passed[8]
-    assert 12 * 0.01 + FRONT_S + ANSWER_S <= middle["left_s"] <= 30 / 8 * passed[8] + FRONT_S + ANSWER_S
+    # Two threads, runs of 0.02 s and more: 8 or a few more have ended, the others and the confirmation are left.
+    assert 8 * 0.02 <= middle["spent_s"] <= 2.5 * passed[8]
+    assert 10 * 0.01 + FRONT_S + ANSWER_S <= middle["left_s"] <= 30 / 8 * passed[8] + FRONT_S + ANSWER_S
     (group,) = middle["failures"]
     assert group["runs"] == [2, 4] and "the oil froze" in group["cause"]
     # The answer is not written, and the confirmation has not begun.
