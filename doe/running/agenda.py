@@ -6,10 +6,12 @@ The note outlives the process, so that the state of a command that was killed ca
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Self
+
+from pydantic import TypeAdapter
 
 from doe.running.runner import Engine, Ledger, Progress, Ran
 from doe.running.store import Point, Store
@@ -66,9 +68,11 @@ class Agenda:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Read a note. Raises ValueError, TypeError, KeyError for what is none."""
-        record = json.loads(text)
-        return cls(**{**record, "stages": [Stage(**stage) for stage in record["stages"]]})
+        """Read a note. Raises ValueError for what is none."""
+        agenda = TypeAdapter(cls).validate_json(text, strict=True)
+        if not 0 <= agenda.place < max(len(agenda.stages), 1):
+            raise ValueError(agenda.place)
+        return agenda
 
     @property
     def stage(self) -> Stage | None:
@@ -196,8 +200,6 @@ def agendas_of(store: Store) -> list[tuple[Agenda, bool]]:
     agendas = []
     for text, alive in store.notes(NOTE):
         # What cannot be read tells nothing.
-        try:
+        with suppress(ValueError):
             agendas.append((Agenda.from_json(text), alive))
-        except (ValueError, TypeError, KeyError):
-            continue
     return sorted(agendas, key=lambda each: each[0].begin)

@@ -305,7 +305,7 @@ def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
     out: Annotated[Path | None, given.folder_option("Write here.", "'show' beside the result")] = None,
     turns: Annotated[float | None, given.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
-    replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
+    replicate: Annotated[int, typer.Option(metavar="N", help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, given.flag("--animate", says="Also a moving picture and a player.")] = False,
     lyapunov: Annotated[bool, given.flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,
     as_json: given.Json = False,
