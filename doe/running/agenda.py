@@ -79,21 +79,30 @@ class Agenda:
         """The stage under way; None before the first one."""
         return self.stages[self.place] if self.begin and self.stages and self.stages[self.place].since else None
 
-    def left(self) -> list[tuple[Stage, int, float]]:
-        """Stages to come and the one under way, each with the runs and the work that are left of it."""
-        return [(stage, stage.runs - stage.done, stage.work - stage.done_work) for stage in self.stages[self.place :]]
+    def left(self) -> list[tuple[Stage, float]]:
+        """The stage under way and those to come, each with the work that is left of it."""
+        return [(stage, stage.work - stage.done_work) for stage in self.stages[self.place :]]
 
 
 @dataclass
 class AgendaKeeper:
-    """An agenda of a live process, noted in the store whenever something of it changes."""
+    """An agenda of a live process, noted in the store at ``path`` whenever something of it changes, once it is planned."""
 
-    store: Store
+    path: Path
     agenda: Agenda
+    _store: Store | None = None
     _keys: dict[int, dict[str, float]] = field(default_factory=dict)
 
     def plan(self, stages: Sequence[Stage]) -> None:
-        """Take up the stages, before anything runs."""
+        """Take up the stages, before anything runs and after all was checked. Raises as ``Store``.
+
+        Agendas of processes that are gone make room; what a unit of work took them is taken over.
+        """
+        if self._store is None:
+            self._store = Store(self.path)
+            if before := agendas_of(self._store):
+                self.agenda.work, self.agenda.seconds = before[-1][0].work, before[-1][0].seconds
+            self._store.sign(NOTE)
         self.agenda.stages = list(stages)
         self._note()
 
@@ -166,33 +175,32 @@ class AgendaKeeper:
         self.agenda.fault = fault
         self._note()
 
+    def close(self) -> None:
+        """The process has nothing more to do."""
+        if self._store is not None:
+            self._store.close()
+
     def _note(self) -> None:
-        self.store.note(NOTE, json.dumps(asdict(self.agenda)))
+        if self._store is not None:
+            self._store.note(NOTE, json.dumps(asdict(self.agenda)))
 
 
 @contextmanager
 def agenda_in(
     path: Path, command: str, threads: int, options: Mapping[str, bool] | None = None, inputs: str = ""
 ) -> Iterator[AgendaKeeper]:
-    """An agenda in the store at ``path`` for as long as the command runs; its stages are planned later.
-
-    Agendas of processes that are gone make room for it; what a unit of work took them is taken over. Raises as ``Store``.
-    """
-    with Store(path) as store:
-        agenda = Agenda(command, dict(options or {}), inputs, threads, [], time.time())
-        if before := agendas_of(store):
-            agenda.work, agenda.seconds = before[-1][0].work, before[-1][0].seconds
-        store.sign(NOTE)
-        keeper = AgendaKeeper(store, agenda)
-        keeper.plan([])
-        try:
-            yield keeper
-        except KeyboardInterrupt:
-            keeper.fail("interrupted")
-            raise
-        except (InputError, RunError) as error:
-            keeper.fail(str(error))
-            raise
+    """An agenda in the store at ``path`` for as long as the command runs; its stages are planned later."""
+    keeper = AgendaKeeper(path, Agenda(command, dict(options or {}), inputs, threads, [], time.time()))
+    try:
+        yield keeper
+    except KeyboardInterrupt:
+        keeper.fail("interrupted")
+        raise
+    except (InputError, RunError) as error:
+        keeper.fail(str(error))
+        raise
+    finally:
+        keeper.close()
 
 
 def agendas_of(store: Store) -> list[tuple[Agenda, bool]]:

@@ -220,7 +220,7 @@ def _left_s(agenda: Agenda, content: Content) -> float | None:
         return None
     now, left_s = time.time(), 0.0
     threads = max(sum(each.threads for each in content.alive), 1) if content.alive else agenda.threads
-    for place, (stage, _, work) in enumerate(agenda.left()):
+    for place, (stage, work) in enumerate(agenda.left()):
         begun = stage.since is not None and place == 0
         measured = begun and stage.measured_work > 0.0
         pace = stage.seconds / stage.measured_work if measured else agenda.seconds / agenda.work

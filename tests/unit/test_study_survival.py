@@ -185,6 +185,25 @@ def test_two_doe_study_on_one_folder_both_get_runs_and_none_runs_twice(tmp_path)
     assert not list(out.glob("*.partial"))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+def test_study_killed_in_its_confirmation_is_unfinished_and_nothing_runs(tmp_path, workers):
+    path, out = short_study(tmp_path), tmp_path / "out"
+    process, study = start(path, out, 0.5, workers, "--whole"), Study.load(path)
+
+    def status() -> dict:
+        return study_status(study, out)
+
+    wait_for(lambda: (out / STORE).exists() and status()["stage"] == "confirmation" and status()["running"] != [])
+    before = status()
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    after = status()
+    assert before["status"] == "running" and len(before["running"]) <= workers
+    assert after["status"] == "unfinished" and after["stage"] == "confirmation" and after["left_s"] > 0.0
+    assert after["running"] == [] and after["points"]["done"] == 20 and not (out / "summary.json").exists()
+
+
 def spoil(store: Path, key: str, **values) -> None:
     """Write something else into the row of a run."""
     with sqlite3.connect(store) as connection:
