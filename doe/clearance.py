@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from doe.arrays import Array, Whole
+from doe.running.agenda import AgendaKeeper
 from doe.running.failure import Failure
-from doe.running.runner import Give, Progress, Ran, RunResult, Take, run_points
+from doe.running.runner import Engine, Ledger, Progress, Ran, RunResult, run_points
 from doe.running.store import Point, Store
 from doe.study_file import Study
 from rbdyn.faults import InputError, RunError, read_toml, refuse
 from rbdyn.records.kept import code_version, run_key
+from rbdyn.records.words import counted
 from rbdyn.result import SimulationResult
 from rbdyn.scene import Scene
 from rbdyn.scene.unknown import plain_values
@@ -76,6 +78,13 @@ def read_scene(study: Study) -> dict[str, Any]:
         if key not in known
     )
     return data
+
+
+def declares_unknowns(study: Study) -> bool:
+    """Whether the study or its scene declares what is not known; to name values as estimates alone is not to ask for it."""
+    if study.file.uncertain is not None:
+        return True
+    return bool(set(read_scene(study).get("uncertain", {})) - {"estimated"})
 
 
 def scene_at(study: Study, data: dict[str, Any], factors: Array, seed: int, overrides: Sequence[str]) -> Scene:
@@ -157,7 +166,7 @@ def direct_run(study: Study) -> str:
     numerics = scene.numerics
     windows = int(numerics.turns / scene.impact_window_turns + 1e-9)
     return (
-        f"each of {numerics.replicates} replicates of {numerics.turns:g} counted shaft turns ({windows} whole windows of the "
+        f"each of {numerics.replicates} replicates of {numerics.turns:g} counted shaft turns ({counted(windows, 'whole window')} of the "
         f"impact, {scene.impact_window_turns:g} turns each) after {numerics.warm_up_turns:g} discarded ones"
     )
 
@@ -167,7 +176,8 @@ class Simulations:
     """Runs scenes once each and keeps them in ``store``.
 
     ``workers``: threads, all processors by default; ``scheduler``: address of a cluster to run on instead.
-    ``retry``: run those again that failed before. ``progress(title)`` gives the progress of a stage.
+    ``retry``: run those again that failed before. ``progress(title)`` gives the progress of a stage. ``agenda``: where the
+    runs of the command are counted.
     """
 
     store: Store
@@ -175,6 +185,7 @@ class Simulations:
     scheduler: str | None
     retry: bool
     progress: Callable[[str], Progress]
+    agenda: AgendaKeeper | None = None
 
     def run(
         self,
@@ -191,12 +202,21 @@ class Simulations:
         points = points_of(scenes, labels, factors)
         if self.scheduler is None:
             by_key = dict(zip((point.key for point in points), scenes, strict=True))
-            engine = partial(_in_threads, by_key, self.workers)
+            engine: Engine = partial(_in_threads, by_key, self.workers)
         else:
             texts = {point.key: scene.model_dump_json() for point, scene in zip(points, scenes, strict=True)}
             engine = partial(_on_cluster, texts, self.scheduler)
+        if self.agenda is not None:
+            works = {point.key: work_of(scene) for point, scene in zip(points, scenes, strict=True)}
+            engine, progress = self.agenda.timed(engine, works), self.agenda.counting(works, progress)
         outcomes = run_points(points, self.store, engine, progress, sound, self.retry)
         return [_result(point, outcomes[point.key]) for point in points]
+
+
+def work_of(scene: Scene) -> float:
+    """Shaft turns that a run of a scene takes at least, its companions' included."""
+    numerics = scene.numerics
+    return (numerics.replicates + numerics.companions) * (numerics.warm_up_turns + numerics.turns)
 
 
 def points_of(
@@ -224,45 +244,57 @@ def _result(point: Point, outcome: RunResult) -> SimulationResult | Failure:
     return SimulationResult.from_dict(outcome)
 
 
-def _in_threads(
-    scenes: Mapping[str, Scene], workers: int | None, points: Sequence[Point], take: Take, give: Give
-) -> None:
-    """Engine of this process. A point is claimed when a thread is free for it, so that processes share the work."""
-    from rbdyn.dynamics.ensemble import Stop, run_all
+def _in_threads(scenes: Mapping[str, Scene], workers: int | None, points: Sequence[Point], ledger: Ledger) -> None:
+    """Engine of this process. The thread that runs a point claims it before and stores it after: what is claimed is under
+    way, and processes share the work."""
+    from rbdyn.dynamics.ensemble import Ended, Stop, run_all
     from rbdyn.dynamics.parameters.model import roller_bearing
     from rbdyn.dynamics.run import prepare
 
-    stop, taken = Stop(), list[Point]()
-    threads = workers or os.cpu_count() or 1
+    stop, threads = Stop(), workers or os.cpu_count() or 1
 
-    def runs() -> Iterator[Callable[[], Ran]]:
+    def run(point: Point, inside: int) -> Ran | None:
+        if not ledger.take([point]):
+            return None
+        ran = attempt(scenes[point.key], stop, inside)
+        ledger.keep(point, ran)
+        return ran
+
+    def runs() -> Iterator[Callable[[], Ran | None]]:
+        # Compiled once here, lest every thread wait for the same compilation; faults are the run's to tell.
+        with suppress(Exception):
+            prepare(scenes[points[0].key], roller_bearing(scenes[points[0].key]))
         for left, point in zip(range(len(points), 0, -1), points, strict=True):
             # Of the last points the replicates go side by side too, lest threads wait for the longest point.
-            inside = threads if left < 2 * threads else 1
-            if take([point]):
-                scene = scenes[point.key]
-                if not taken:
-                    # Compiled once here, lest every thread wait for the same compilation; faults are the run's to tell.
-                    with suppress(Exception):
-                        prepare(scene, roller_bearing(scene))
-                taken.append(point)
-                yield partial(attempt, scene, stop, inside)
+            yield partial(run, point, threads if left < 2 * threads else 1)
 
-    run_all(runs(), workers, stop, lambda one: give(taken[one.place], one.result()))
+    def end(one: Ended[Ran | None]) -> None:
+        if one.fault is not None:
+            raise one.fault
+        # None: another process has claimed it.
+        if one.found is not None:
+            ledger.give(points[one.place], one.found)
+
+    run_all(runs(), workers, stop, end)
 
 
-def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point], take: Take, give: Give) -> None:
+def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point], ledger: Ledger) -> None:
     """Engine of a cluster, whose scheduler knows best what runs where: it gets all points at once."""
     from doe.running.cluster import run_on_cluster
 
     taken: list[Point] = []
 
     def tasks() -> list[str]:
-        taken.extend(take(points))
+        taken.extend(ledger.queue(points))
         return [texts[point.key] for point in taken]
 
     work = partial(attempt_text, version=code_version(SIMULATION))
-    run_on_cluster(scheduler, work, tasks, lambda place, ran: give(taken[place], ran))
+
+    def end(place: int, ran: Ran) -> None:
+        ledger.keep(taken[place], ran)
+        ledger.give(taken[place], ran)
+
+    run_on_cluster(scheduler, work, tasks, end, lambda place: ledger.begin(taken[place]))
 
 
 def attempt(scene: Scene, stop: "Stop | None" = None, workers: int = 1) -> Ran:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from rbdyn.faults import InputError, bounded, path_of, read_text
 from rbdyn.records.record import Record, derived, json_fields, keyed
-from rbdyn.records.words import Brief, Figure, error_alone, quantity, value_alone
+from rbdyn.records.words import Brief, Figure, counted, error_alone, quantity, value_alone
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -117,7 +117,10 @@ class SimulationResult(Brief, SavedRecord):
             for key, each in self.quantities.items()
             for words, unit in (quantity(key),)
         ]
-        return f"{self.status}, {self.replicates} replicates, seed {self.seed}, {len(self.notes)} notes", figures
+        return (
+            f"{self.status}, {counted(self.replicates, 'replicate')}, seed {self.seed}, {counted(len(self.notes), 'note')}",
+            figures,
+        )
 
     def table(self) -> "pd.DataFrame":
         """A row a figure: value, the half-widths of its 95 % errors, effective samples; units in the names."""

@@ -29,6 +29,7 @@ from doe.pareto.goals import Goals
 from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import NAMES, Rule, pick_all
 from doe.threads import one_thread
+from rbdyn.records.words import counted
 
 FRESH = 0.2  # of the budget: fresh runs at the finalists
 TESTED = 4  # last batches that tell how right the emulators' deviations are
@@ -169,7 +170,7 @@ class _Search:
     def _fit(self, runs: Runs) -> Emulators:
         good = int(runs.good.sum())
         if good < 2 + len(self.centre):
-            raise ValueError(f"only {good} runs went well; emulators need {2 + len(self.centre)}")
+            raise ValueError(f"only {counted(good, 'run')} went well; emulators need {2 + len(self.centre)}")
         region = self.region
         self.emulators = fit_emulators(self.goals, runs, self.emulators, region.levels, region.inactive, self.shares)
         return self.emulators

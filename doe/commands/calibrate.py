@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from doe.commands.options import Quiet, Retry, Scheduler
-from doe.commands.steps import keeping_runs, simulations_in
+from doe.commands.steps import keeping_runs, noted_agenda, simulations_in
 from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
 from rbdyn.cli.terminal import guarded, hand_over, output_folder
 
@@ -33,17 +33,24 @@ def calibrate(
     folder = out or Path(f"{path.stem}_calibration")
     with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.calibrate import files_of, print_calibration, record_of, stored, write
+        from doe.running.agenda import ANSWER
         from doe.study.calibration import find_calibration
         from doe.study.calibration_question import question_of, read_question
+        from doe.study.stages_unknown import calibration_stages
+        from doe.study.status import content_digest
 
         asked = read_question(path, data, free or (), overrides or ())
         made_of = question_of(asked)
         output_folder(folder, "doe", path)
         record = None if retry else stored(folder, made_of)
         if record is None:
-            with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json) as simulations:
-                found = find_calibration(asked, simulations)
-            record = record_of(found, made_of)
-            write(found, record, folder)
+            with noted_agenda(folder, "doe calibrate", workers, inputs=content_digest(path)) as agenda:
+                agenda.plan(calibration_stages(asked))
+                with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json, agenda) as simulations:
+                    found = find_calibration(asked, simulations)
+                agenda.enter(ANSWER)
+                record = record_of(found, made_of)
+                write(found, record, folder)
+                agenda.finish(files_of(record))
         known = record
         hand_over(lambda: known, as_json, lambda: print_calibration(known), folder, files_of(known))

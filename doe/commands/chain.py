@@ -15,7 +15,7 @@ from rbdyn.faults import InputError, refuse
 
 def chain(
     path: Annotated[
-        Path, typer.Argument(metavar="CHAIN.toml", help="Dimension chain to solve, or several as [[chain]].")
+        Path, typer.Argument(metavar="CHAIN.toml", help="Dimension chain to solve, or several in tables named chain.")
     ],
     out: Save = None,
     as_json: Json = False,

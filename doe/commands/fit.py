@@ -57,10 +57,10 @@ def fit(
         record = fit_record(surfaces) | ({"notes": remarks} if remarks else {})
         save(out, loaded.path, "fit.json", record)
         if out is not None:
-            import pandas as pd
+            from rbdyn.records.cells import save_table
 
             for name, rows in fit_tables(surfaces).items():
-                pd.DataFrame(rows).to_csv(out / name, index=False)
+                save_table(rows, out / name)
         if path is None and not as_json:
             named = f"factors {', '.join(loaded.factors)}; responses {', '.join(loaded.responses)}"
             print(f"{data}: {named}; coded -1 and +1 are the ends of a factor's range")

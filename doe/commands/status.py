@@ -3,36 +3,50 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-from doe.commands.options import Quiet, StudyPath
+import typer
+
+from doe.commands.options import Quiet
 from rbdyn.cli.options import Json, folder_option
 from rbdyn.cli.terminal import guarded, hand_over, print_table
 
 
 def status(
-    path: StudyPath,
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE.toml", help="Study, or scene of an uncertainty or calibration.")
+    ],
     out: Annotated[
-        Path | None, folder_option("Folder of the study.", "where it runs; if it does not, STUDY_results")
+        Path | None,
+        folder_option(
+            "Folder of the runs.", "where it runs; if it does not, STUDY_results, SCENE_uncertainty or _calibration"
+        ),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Tell where a study stands: done, failed by cause, running, missing, time spent and left."""
+    """Tell where a study stands: its stage, runs done, failed by cause, running, missing, time spent and left."""
     with guarded(as_json):
-        from doe.study.status import folder_of, study_status
-        from doe.study_file import Study
+        from doe.study.status import status_of
 
-        loaded = Study.load(path)
-        record = study_status(loaded, out or folder_of(loaded))
+        record = status_of(path, out)
         hand_over(lambda: record, as_json, lambda: print_status(record, quiet))
 
 
 def print_status(record: dict[str, Any], quiet: bool) -> None:
-    """A line of counts, one of where they were read and one of time; unless ``quiet`` also who runs what, and why points failed."""
-    points = record["points"]
+    """A line of counts, one of where they were read, one of stages and one of time; unless ``quiet`` also who runs what, and
+    why points failed."""
+    points, state = record["points"], record["status"]
     counts = ", ".join(f"{points[kind]} {kind}" for kind in ("done", "failed", "running", "missing"))
-    print(f"{record['study']}: {record['status']}; of {points['total']} design points {counts}")
+    if record["stage"]:
+        state += f", {'in stage' if state == 'running' else 'ended in stage'} {record['stage']}"
+    kind = "design points" if any(each["name"] == "design runs" for each in record["stages"]) else "runs"
+    print(f"{record['study']}: {state}; of {points['total']} {kind} {counts}")
     read = "read from" if Path(record["store"]).exists() else "nothing has run yet in"
     print(f"{read} {record['store']}")
+    if record["stages"]:
+        listed = ", ".join(_stage(each, record["status"] == "finished") for each in record["stages"])
+        print(f"{record['command']}: {listed}")
+    if record["stopped_by"]:
+        print(f"stopped by: {record['stopped_by']}")
     left = "not known yet" if record["left_s"] is None else _span(record["left_s"])
     print(f"time spent {_span(record['spent_s'])} of one thread; time left {left}")
     if quiet:
@@ -48,6 +62,13 @@ def print_status(record: dict[str, Any], quiet: bool) -> None:
         print_table("running", ("", "host", "process", "since", "for"), rows)
     for group in record["failures"]:
         print(f"failed: {', '.join(group['labels'])}: {group['cause']}")
+
+
+def _stage(stage: dict[str, Any], finished: bool) -> str:
+    if not stage["runs"]:
+        return str(stage["name"])
+    of = f"{stage['done']} of {stage['runs']}" if stage["done"] < stage["runs"] and not finished else f"{stage['done']}"
+    return f"{stage['name']} {of}"
 
 
 def _span(seconds: float) -> str:

@@ -1,7 +1,8 @@
 """What the commands share: runs and surfaces of a study, and where a record goes."""
 
+import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from doe.clearance import Simulations
     from doe.pareto import ParetoFront
     from doe.response_surface import Surface
+    from doe.running.agenda import AgendaKeeper
     from doe.running.runner import Progress
     from doe.study.direct import Direct
     from doe.study_file import Study
@@ -38,28 +40,47 @@ def keeping_runs(out: Path | None, source: Path) -> Iterator[None]:
 
 
 @contextmanager
-def stages(quiet: bool) -> "Iterator[Callable[[str], Progress]]":
-    """Progress of one stage after the other, each by its title: a terminal has room for one bar."""
+def stages(quiet: bool, workers: int | None) -> "Iterator[Callable[[str], Progress]]":
+    """Progress of one stage after the other, each by its title: a terminal has room for one bar. ``workers`` run at once."""
     with ExitStack() as bars:
 
         def stage(title: str) -> "Progress":
             bars.close()
-            return bars.enter_context(progress_bar(title, quiet))
+            return bars.enter_context(progress_bar(title, quiet, workers))
 
         yield stage
 
 
 @contextmanager
 def simulations_in(
-    folder: Path, source: Path, workers: int | None, scheduler: str | None, retry: bool, quiet: bool
+    folder: Path,
+    source: Path,
+    workers: int | None,
+    scheduler: str | None,
+    retry: bool,
+    quiet: bool,
+    agenda: "AgendaKeeper | None" = None,
 ) -> "Iterator[Simulations]":
-    """Simulations of what the file ``source`` asks for, kept in the store of a folder."""
+    """Simulations of what the file ``source`` asks for, kept in the store of a folder and counted in an agenda."""
     from doe.clearance import Simulations
     from doe.running.store import Store
     from doe.study.runs import STORE
 
-    with Store(folder / STORE, source.stem) as store, stages(quiet) as progress:
-        yield Simulations(store, workers, scheduler, retry, progress)
+    with Store(folder / STORE, source.stem) as store, stages(quiet, workers) as progress:
+        progress = progress if agenda is None else agenda.announced(progress)
+        yield Simulations(store, workers, scheduler, retry, progress, agenda)
+
+
+@contextmanager
+def noted_agenda(
+    folder: Path, command: str, workers: int | None, options: Mapping[str, bool] | None = None, inputs: str = ""
+) -> "Iterator[AgendaKeeper]":
+    """The agenda of a command in the store of its folder, for ``doe status``; ``inputs``: the digest of what it answers."""
+    from doe.running.agenda import agenda_in
+    from doe.study.runs import STORE
+
+    with agenda_in(folder / STORE, command, workers or os.cpu_count() or 1, options, inputs) as agenda:
+        yield agenda
 
 
 class Effort(NamedTuple):
@@ -80,7 +101,7 @@ def fitted(study: "Study", data: Path | None, effort: Effort) -> "list[Surface]"
     if data is not None:
         return fit_surfaces(study, read_runs(study, data))
     out, workers, scheduler, retry, quiet = effort
-    with _store_folder(out, study.path) as folder, progress_bar("design runs", quiet) as progress:
+    with _store_folder(out, study.path) as folder, progress_bar("design runs", quiet, workers) as progress:
         return fit_surfaces(study, run_design(study, folder, workers, progress, scheduler, retry))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import typer
 
 from doe.commands.options import Adaptive, Direct, Quiet, Retry, Robust, Scheduler, StudyOut, StudyPath, Verbose
-from doe.commands.steps import keeping_runs, stages
+from doe.commands.steps import keeping_runs, noted_agenda, stages
 from rbdyn.cli.options import Json, Workers
 from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json
 from rbdyn.faults import InputError
@@ -49,9 +49,13 @@ def study(
         from doe.report.study.files import write
         from doe.study.whole import run_study
 
-        with stages(quiet or as_json) as progress:
-            outcome = run_study(loaded, folder, workers, progress, scheduler, retry, direct, adaptive, robust)
-        record = write(outcome, folder)
+        options = {"direct": direct, "adaptive": adaptive, "robust": robust}
+        with noted_agenda(folder, "doe study", workers, options, digest) as agenda:
+            with stages(quiet or as_json, workers) as progress:
+                bars = agenda.announced(progress)
+                outcome = run_study(loaded, folder, workers, bars, scheduler, retry, **options, agenda=agenda)
+            record = write(outcome, folder)
+            agenda.finish(record["files"])
         if not as_json:
             print_verdict(outcome)
             if verbose:

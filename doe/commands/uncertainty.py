@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from doe.commands.options import Quiet, Retry, Scheduler
-from doe.commands.steps import keeping_runs, simulations_in
+from doe.commands.steps import keeping_runs, noted_agenda, simulations_in
 from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
 from rbdyn.cli.terminal import guarded, hand_over, output_folder
 from rbdyn.faults import refuse
@@ -33,13 +33,20 @@ def uncertainty(
     folder = out or Path(f"{path.stem}_uncertainty")
     with guarded(as_json), keeping_runs(folder, path):
         from doe.report.steps.uncertainty import print_uncertainty, record_of, write
+        from doe.running.agenda import ANSWER
+        from doe.study.stages_unknown import uncertainty_stages
+        from doe.study.status import content_digest
         from doe.study.uncertainty import find_uncertainty
         from rbdyn.dynamics.target import target_of
 
         refuse([] if points is None else no_power_of_two("--points ", points))
         accuracy = target_of(target)
         output_folder(folder, "doe", path)
-        with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json) as simulations:
-            found = find_uncertainty(path, overrides or (), simulations, points, accuracy)
-        files = write(found, folder)
+        with noted_agenda(folder, "doe uncertainty", workers, inputs=content_digest(path)) as agenda:
+            agenda.plan(uncertainty_stages(path, overrides or (), points))
+            with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json, agenda) as simulations:
+                found = find_uncertainty(path, overrides or (), simulations, points, accuracy)
+            agenda.enter(ANSWER)
+            files = write(found, folder)
+            agenda.finish(files)
         hand_over(lambda: record_of(found), as_json, lambda: print_uncertainty(found), folder, files)

@@ -6,6 +6,7 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.designs.design import Design, assembled
+from rbdyn.records.words import counted
 
 MOST_RUNS = 10_000
 # More runs of a Latin hypercube are even enough by themselves, and exchanges among them take seconds.
@@ -19,7 +20,9 @@ def full_factorial(factors: int, *, levels: int = 3, centre_replicates: int = 0)
     """
     if (runs := levels**factors) > MOST_RUNS:
         mend = 'give fewer levels or use kind = "sobol"'
-        raise ValueError(f"levels = {levels}: {factors} factors give {runs} runs, more than {MOST_RUNS}; {mend}")
+        raise ValueError(
+            f"levels = {levels}: {counted(factors, 'factor')} give {runs} runs, more than {MOST_RUNS}; {mend}"
+        )
     values = np.linspace(-1.0, 1.0, levels)
     return _filled("grid", np.array([each[::-1] for each in product(values, repeat=factors)]), centre_replicates)
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from doe.arrays import Array
 from doe.designs.design import Design, assembled
 from doe.designs.model import Terms, model_matrix, model_terms
+from rbdyn.records.words import counted
 
 Criterion = Literal["d", "i"]
 FEWEST, MOST = 4, 40  # random designs that exchanges start from; the best is kept
@@ -64,7 +65,7 @@ def optimal(
     if len(fixed) + runs < needed:
         beside = f"beside {len(fixed)} given or at the centre " if len(fixed) else ""
         mend = f"give at least {needed + 1 - len(fixed)}"
-        raise ValueError(f"runs = {runs}: {beside}too few for a model of {len(terms)} terms; {mend}")
+        raise ValueError(f"runs = {runs}: {beside}too few for a model of {counted(len(terms), 'term')}; {mend}")
     if runs > MOST_RUNS:
         mend = "give fewer, or kind = 'sobol'"
         raise ValueError(f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; {mend}")

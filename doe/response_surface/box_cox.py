@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from scipy import linalg, optimize, special, stats
 
 from doe.arrays import Array
+from rbdyn.records.words import counted
 
 USUAL = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 SEARCHED = (-5.0, 5.0)
@@ -47,7 +48,7 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response") -> 
     check_positive(response, name)
     runs, terms = columns.shape
     if runs <= terms:
-        raise ValueError(f"{name}: {runs} runs leave no residual beside {terms} terms; add runs")
+        raise ValueError(f"{name}: {counted(runs, 'run')} leave no residual beside {counted(terms, 'term')}; add runs")
     if np.ptp(response) == 0.0:
         raise ValueError(f"{name}: all values are equal, so no transform can be judged; leave it out")
     log_likelihood = _log_likelihood(columns, response)

@@ -16,6 +16,7 @@ from doe.designs.design import replicate_groups
 from doe.emulator import Emulator, fit_emulator
 from doe.response_surface.surface import Surface
 from doe.threads import one_thread
+from rbdyn.records.words import counted
 
 # More points than these are left out in groups.
 MOST_SINGLY, FOLDS = 60, 20
@@ -124,7 +125,7 @@ def _left_out(
             foretold.append(np.column_stack([rival(rows, points[fold]) for rival in rivals]))
             truths.append(np.array([response[group == first].mean() for first in fold]))
     if (count := sum(map(len, truths))) < 3:
-        few = f"only {count} points can be left out of the polynomial, too few to compare"
+        few = f"only {counted(count, 'point')} can be left out of the polynomial, too few to compare"
         raise ValueError(f"{name}: {few}; add design points or choose a simpler model")
     return np.concatenate(truths), np.vstack(foretold)
 

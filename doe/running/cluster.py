@@ -3,9 +3,11 @@
 import asyncio
 import logging
 import queue
+import uuid
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 from doe.running.failure import StoppedError
@@ -21,9 +23,14 @@ LOOK_S = 1.0
 
 
 def run_on_cluster(
-    address: str, work: Callable[[str], Ran], tasks: Callable[[], Sequence[str]], ended: Callable[[int, Ran], None]
+    address: str,
+    work: Callable[[str], Ran],
+    tasks: Callable[[], Sequence[str]],
+    ended: Callable[[int, Ran], None],
+    begun: Callable[[int], None] = lambda place: None,
 ) -> None:
-    """Run ``work`` on every text of ``tasks()`` and hand over each result, with its place, as it ends.
+    """Run ``work`` on every text of ``tasks()`` and hand over each result, with its place, as it ends; and, in another thread,
+    its place as it begins.
 
     ``tasks`` is called once the cluster is there. A task whose worker is lost runs again on another; one that was lost
     again and again is handed over as lost. Raises InputError when there is no cluster to start on, or its workers run
@@ -31,7 +38,10 @@ def run_on_cluster(
     """
     with _client(address) as client:
         # All at once, so that workers which join later find work.
-        futures = dict(enumerate(client.map(work, tasks(), pure=False)))
+        texts, topic = tasks(), f"rbdyn-{uuid.uuid4().hex}"
+        client.subscribe_topic(topic, lambda event: begun(event[1]))
+        announced = partial(_announced, work, topic)
+        futures = dict(enumerate(client.map(announced, range(len(texts)), texts, pure=False)))
         answers: queue.SimpleQueue[int] = queue.SimpleQueue()
         for number, future in futures.items():
             future.add_done_callback(lambda _, number=number: answers.put(number))
@@ -60,6 +70,14 @@ def run_on_cluster(
             # What is still held would be run again if its worker were lost.
             futures.pop(place).release()
             ended(place, ran)
+
+
+def _announced(work: Callable[[str], Ran], topic: str, place: int, text: str) -> Ran:
+    """Work on a worker, which says that it begins."""
+    from distributed import get_worker
+
+    get_worker().log_event(topic, place)
+    return work(text)
 
 
 def _gone(address: str, client: Any) -> StoppedError:

@@ -6,6 +6,7 @@ Where points run is the business of an engine: threads of this process, or the w
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from doe.running.failure import Failure
@@ -29,12 +30,31 @@ class Ran:
     pid: int | None = None
     lost: bool = False
 
+    @property
+    def why(self) -> str:
+        """Why there is no result."""
+        return self.cause or "no result"
+
 
 Progress = Callable[[int, int], None]
-# Takes the points that are ours to run out of those given, and hands over a point that has ended.
-Take = Callable[[Sequence[Point]], list[Point]]
-Give = Callable[[Point, Ran], None]
-Engine = Callable[[Sequence[Point], Take, Give], None]
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Where an engine enters what becomes of points, in any thread but for ``give``.
+
+    ``take`` claims points that begin at once, ``queue`` such as wait for a worker until they ``begin``; both return those that
+    are ours to run. ``keep`` stores how a point has ended, ``give`` hands that over.
+    """
+
+    take: Callable[[Sequence[Point]], list[Point]]
+    queue: Callable[[Sequence[Point]], list[Point]]
+    begin: Callable[[Point], None]
+    keep: Callable[[Point, Ran], None]
+    give: Callable[[Point, Ran], None]
+
+
+Engine = Callable[[Sequence[Point], Ledger], None]
 
 
 def run_points(
@@ -48,21 +68,22 @@ def run_points(
     wanted = {point.key: point for point in points}
     outcomes: dict[str, RunResult] = {}
 
-    def take(free: Sequence[Point]) -> list[Point]:
-        mine = store.claim(free, sound)
+    def take(free: Sequence[Point], queued: bool = False) -> list[Point]:
+        mine = store.claim(free, sound, queued)
         return [point for point in free if point.key in mine]
 
-    def give(point: Point, ran: Ran) -> None:
+    def keep(point: Point, ran: Ran) -> None:
         if ran.result is not None:
             store.put(point.key, ran.result, seconds=ran.seconds, host=ran.host, pid=ran.pid)
-            outcomes[point.key] = ran.result
-        else:
-            cause = ran.cause or "no result"
-            if not ran.lost:
-                store.fail(point.key, cause, seconds=ran.seconds)
-            outcomes[point.key] = Failure(point.label, cause, point.run, dict(point.factors))
+        elif not ran.lost:
+            store.fail(point.key, ran.why, seconds=ran.seconds)
+
+    def give(point: Point, ran: Ran) -> None:
+        failure = Failure(point.label, ran.why, point.run, dict(point.factors))
+        outcomes[point.key] = failure if ran.result is None else ran.result
         progress(len(outcomes), len(wanted))
 
+    ledger = Ledger(take, partial(take, queued=True), lambda point: store.begin(point.key), keep, give)
     if retry:
         store.forget_failures(list(wanted.values()))
     try:
@@ -73,7 +94,7 @@ def run_points(
                 return outcomes
             taken = {claim.key for claim in store.claims()}
             if free := [point for point in left if point.key not in taken]:
-                engine(free, take, give)
+                engine(free, ledger)
             else:
                 time.sleep(POLL_S)
     finally:

@@ -37,14 +37,14 @@ class Point:
 
 @dataclass(frozen=True)
 class Claim:
-    """A run that a live process has taken: who, and since when [s since the epoch]."""
+    """A run that a live process has taken: who, and since when it is under way [s since the epoch]; None while it is queued."""
 
     key: str
     label: str
     run: int | None
     host: str
     pid: int
-    since: float
+    since: float | None
     owner: str
 
 
@@ -105,11 +105,13 @@ class Store(Database):
         self._tell(spoilt, f"kept results that cannot be read count as not done: {', '.join(spoilt)}")
         return outcomes
 
-    def claim(self, points: Sequence[Point], sound: Sound = None) -> set[str]:
+    def claim(self, points: Sequence[Point], sound: Sound = None, queued: bool = False) -> set[str]:
         """Take what nobody has done or is doing; returns the keys that are now ours to run.
 
-        Claims of a process that is gone are taken over; a row spoilt, or whose result is not ``sound``, is not there.
+        Claims of a process that is gone are taken over; a row spoilt, or whose result is not ``sound``, is not there. What is
+        ``queued`` begins later, see ``begin``.
         """
+        started = None if queued else time.time()
         mine, me = set(), self._me
         query = "SELECT owner, status, result, digest, cause FROM runs WHERE key = ?"
         with self._transaction(durable=False) as connection:
@@ -128,10 +130,16 @@ class Store(Database):
                 connection.execute(
                     "INSERT OR REPLACE INTO runs (key, status, study, label, run, factors, started, host, pid, owner) "
                     "VALUES (?, 'claimed', ?, ?, ?, ?, ?, ?, ?, ?)",
-                    (point.key, self._study, point.label, point.run, factors, time.time(), me.host, me.pid, me.token),
+                    (point.key, self._study, point.label, point.run, factors, started, me.host, me.pid, me.token),
                 )
                 mine.add(point.key)
         return mine
+
+    def begin(self, key: str) -> None:
+        """A run that we have queued is under way from now on."""
+        with self._transaction(durable=False) as connection:
+            began = "UPDATE runs SET started = ? WHERE key = ? AND owner = ? AND status = 'claimed'"
+            connection.execute(began, (time.time(), key, self._me.token))
 
     def _sign(self, connection: sqlite3.Connection) -> None:
         """Note that this owner lives, now and from time to time from here on."""
@@ -182,6 +190,25 @@ class Store(Database):
                 [(point.key, self._opened, time.time()) for point in points],
             )
 
+    def sign(self, kind: str) -> None:
+        """Note that this owner lives, from here on; notes of a ``kind`` by owners that are gone are taken away."""
+        with self._transaction(durable=False) as connection:
+            self._sign(connection)
+            rows = connection.execute("SELECT name FROM meta WHERE name LIKE ? || '%'", (kind,)).fetchall()
+            gone = [(name,) for (name,) in rows if not self._lives(name.removeprefix(kind))]
+            connection.executemany("DELETE FROM meta WHERE name = ?", gone)
+
+    def note(self, kind: str, text: str) -> None:
+        """Keep a note of a ``kind``, one for each owner."""
+        with self._transaction(durable=False) as connection:
+            connection.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (kind + self._me.token, text))
+
+    def notes(self, kind: str) -> list[tuple[str, bool]]:
+        """Notes of a ``kind``, each with whether its owner lives."""
+        with self._lock, self._faults():
+            rows = self._connection.execute("SELECT name, value FROM meta WHERE name LIKE ? || '%'", (kind,)).fetchall()
+            return [(text, self._lives(name.removeprefix(kind))) for name, text in rows]
+
     def release(self) -> None:
         """Give back what was claimed and has not ended."""
         with self._transaction(durable=False) as connection:
@@ -191,7 +218,7 @@ class Store(Database):
         """Runs that live processes have taken."""
         with self._lock, self._faults():
             rows = self._connection.execute(
-                "SELECT key, label, run, host, pid, iif(typeof(started) = 'real', started, 0.0), owner "
+                "SELECT key, label, run, host, pid, iif(typeof(started) IN ('real', 'null'), started, 0.0), owner "
                 "FROM runs WHERE status = 'claimed' ORDER BY started, run"
             ).fetchall()
             live = {owner: self._lives(owner) for owner in {row[-1] for row in rows}}

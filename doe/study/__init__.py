@@ -7,7 +7,7 @@
 - ``chosen``, ``confirmation``: points worth a simulation, and whether what they gain is real
 - ``widest``, ``chains``: tolerances that keep the gains, and the parts
 - ``checked``: one judgement of a study before anything runs
-- ``status``, ``finished``: where a study stands
+- ``stages``, ``stages_unknown``, ``status``, ``finished``: what a command runs, and where it stands
 - ``reference``: a published table beside
 - ``whole``: all of it in one go
 """

@@ -18,6 +18,7 @@ from doe.study_file.design_section import KEYS_OF
 from doe.study_file.design_section import Design as DesignSettings
 from doe.study_file.table import Table, read_table
 from rbdyn.faults import InputError, refuse
+from rbdyn.records.words import are, counted
 
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
 MAKERS: dict[str, Callable[..., Design]] = {
@@ -176,9 +177,9 @@ def check_runs(study: Study, design: Design) -> None:
         model, least = response.model, needed(response.model)
         where = f"{study.path}: response[{number}].model = {model!r}"
         if runs < least:
-            effects = f", {design.blocks - 1} block effects" if design.blocks > 1 else ""
+            effects = f", {counted(design.blocks - 1, 'block effect')}" if design.blocks > 1 else ""
             what = f"{least - design.blocks} terms{effects}"
-            few = f"the {runs} runs of the design are too few; it needs {least} ({what} and one to judge the fit)"
+            few = f"the {counted(runs, 'run')} of the design {are(runs)} too few; it needs {least} ({what} and one to judge the fit)"
             key = "runs" if "runs" in KEYS_OF[study.file.design.kind] else "centre_replicates"
             more = "enlarge the design" if key != "runs" and lost(model) else f"raise design.{key}"
             faults.append(f"{where}: {few}: {more} or {simpler(model)}")

@@ -11,6 +11,7 @@ from doe.study.rig_signals import KINDS, cage_speed, whirl
 from doe.study.scene_columns import key_values, unknown_keys
 from doe.study_file.cells import UNKNOWN, Column, Limits, Sheet, listed, read_sheet
 from rbdyn.faults import InputError, refuse
+from rbdyn.records.words import counted
 
 # What can be measured, by its name in the results of a simulation; the others of these are no positive numbers.
 OUTPUTS = ("impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm")
@@ -66,7 +67,7 @@ def read_rig(path: Path) -> Rig:
     faults += [fault for place in range(len(sheet.rows)) for fault in _faults(cells, place, outputs)]
     teaching = sum(cells.text(HOLD, place).lower() not in YES for place in range(len(sheet.rows)))
     if teaching < FEWEST:
-        faults.append(f"{path}: {teaching} rows to learn from; give {FEWEST} at least that are not on hold")
+        faults.append(f"{path}: {counted(teaching, 'row')} to learn from; give {FEWEST} at least that are not on hold")
     refuse(faults)
     rows, notes = [], []
     for place in range(len(sheet.rows)):

@@ -13,6 +13,7 @@ import numpy as np
 from doe.arrays import Array
 from doe.study_file.cells import Limits, read_sheet
 from rbdyn.faults import InputError, refuse
+from rbdyn.records.words import counted
 
 # What a signal holds: its columns, of which some may have another unit.
 KINDS = {
@@ -56,14 +57,15 @@ def cage_speed(path: Path, kind: str, pulses_per_turn: int) -> Mean:
     if kind == "cage_pulses":
         took = np.diff(time[::pulses_per_turn])
         whole = took <= LOST * np.median(took) if took.size else np.zeros(0, bool)
-        lost = f"{(~whole).sum()} of {took.size} turns lack pulses and are left out"
+        lost = f"{(~whole).sum()} of {counted(took.size, 'turn')} lack pulses and are left out"
         note = None if whole.all() else f"{path}: {lost}"
         moments = np.column_stack([np.full(whole.sum(), 60.0), took[whole]])
     else:
         # Each sample counts for the time to the next one.
         moments = np.column_stack([rest[0][:-1] * np.diff(time), np.diff(time)])
     if len(moments) < FEWEST:
-        raise InputError([f"{path}: {len(moments)} turns or samples; {FEWEST} at least tell an error, measure longer"])
+        few = f"{counted(len(moments), 'turn')} or samples; {FEWEST} at least tell an error, measure longer"
+        raise InputError([f"{path}: {few}"])
     mean = estimate([moments], lambda sums: sums[..., 0] / sums[..., 1])
     if not mean.value > 0.0 or not mean.half_width:
         raise InputError([f"{path}: no cage speed above nothing that varies; check the signal"])

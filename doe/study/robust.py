@@ -64,13 +64,6 @@ class Robust:
     notes: tuple[str, ...] = ()
 
 
-def declared(study: Study) -> bool:
-    """Whether the study or its scene declares what is not known; to name values as estimates alone is not to ask for it."""
-    if study.file.uncertain is not None:
-        return True
-    return bool(set(clearance.read_scene(study).get("uncertain", {})) - {"estimated"})
-
-
 def robust_advice(study: Study) -> list[str]:
     """Where the scene names estimates, what a judgement over them would tell and cost; else nothing."""
     if "uncertain" not in clearance.read_scene(study):
@@ -84,13 +77,13 @@ def robust_advice(study: Study) -> list[str]:
 
 def check_robust(study: Study) -> None:
     """Raises InputError where what is not known of the study's scene is declared wrongly."""
-    _case(study)
+    case_of_study(study)
 
 
 @one_thread
 def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     """Judge the pick (k,) beside the baseline. Raises InputError, RunError, KeyboardInterrupt."""
-    case, goals = _case(study), goals_of(study)
+    case, goals = case_of_study(study), goals_of(study)
     inputs, rest = screened(case, simulations)
     joint, seed = case.joint(inputs), case.uncertain.seed
     quantiles = joint.sets(study.file.robust.points, seed)
@@ -134,7 +127,7 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     return Robust(wanted, *judged, inputs, rest, *cost, failures, case.notes)
 
 
-def _case(study: Study) -> Case:
+def case_of_study(study: Study) -> Case:
     """The study's scene with what is not known of it; factors are known."""
     path = study.beside(study.scene.file)
     data = clearance.read_scene(study)

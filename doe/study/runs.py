@@ -10,6 +10,7 @@ import numpy as np
 from doe import clearance
 from doe.arrays import Array, Whole
 from doe.designs import Design
+from doe.running.agenda import AgendaKeeper
 from doe.running.failure import Failure, alike, sentence
 from doe.running.runner import Progress
 from doe.running.store import Store
@@ -17,6 +18,7 @@ from doe.study.design import actual_of, check_runs, design_of, terms_of
 from doe.study_file import Study
 from doe.study_file.table import read_table
 from rbdyn.faults import RunError
+from rbdyn.records.words import are, counted
 from rbdyn.scene import Scene
 
 # Name of the store in the folder of a study.
@@ -83,6 +85,7 @@ def run_design(
     progress: Progress,
     scheduler: str | None = None,
     retry: bool = False,
+    agenda: AgendaKeeper | None = None,
 ) -> Runs:
     """Design runs, from the store in ``folder`` or simulated in threads or on a cluster.
 
@@ -91,7 +94,7 @@ def run_design(
     ordered = ordered_runs(study)
     check_runs(study, ordered.design)
     with Store(folder / STORE, study.path.stem) as store:
-        simulations = clearance.Simulations(store, workers, scheduler, retry, lambda title: progress)
+        simulations = clearance.Simulations(store, workers, scheduler, retry, lambda title: progress, agenda)
         return runs_of(study, ordered, simulations, progress)
 
 
@@ -109,7 +112,9 @@ def runs_of(study: Study, ordered: Ordered, simulations: clearance.Simulations, 
     sound = [result for result in results if not isinstance(result, Failure)]
     notes = _each_once(note for result in sound for note in result.notes)
     if failures:
-        notes.append(f"{len(failures)} design runs failed and are left out: {sentence(failures)}")
+        notes.append(
+            f"{counted(len(failures), 'design run')} failed and {are(len(failures))} left out: {sentence(failures)}"
+        )
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[left] if design.blocks > 1 else None
     return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)

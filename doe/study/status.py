@@ -1,90 +1,248 @@
-"""Where a study stands, from its store: done, failed, running, missing, and the time it took and will take."""
+"""Where a command stands, from its folder: its stages, runs that are done, failed, under way or missing, and the time left.
 
-import os
+What is finished is told by the answer's files alone; whether something runs, by the processes that live.
+"""
+
 import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from doe import clearance
+from doe.clearance import points_of
+from doe.running.agenda import Agenda, Stage, agendas_of
 from doe.running.failure import Failure, grouped
 from doe.running.owner import folders_of
-from doe.running.store import Claim, EndedRun, RunResult, Store
+from doe.running.store import Claim, EndedRun, Point, RunResult, Store
+from doe.study.finished import finished, inputs_digest
 from doe.study.runs import STORE, ordered_runs
+from doe.study.stages import DESIGN, design_works, study_stages
 from doe.study_file import Study
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, read_toml
+from rbdyn.records.kept import digest_of
 
 FORMAT = "doe.status/1"
+# Folders of commands on a scene, where none is named.
+SCENE_FOLDERS = ("{}_uncertainty", "{}_calibration")
+# Time left [s] that is stated at least until all is finished; share of its time so far that an overdue part still takes.
+LEAST_S, OVERDUE = 1.0, 0.3
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a store holds: results and failures of points, claims of live processes, ended runs, and agendas, the newest last,
+    each with whether its process lives."""
+
+    outcomes: Mapping[str, RunResult]
+    claims: Sequence[Claim]
+    ended: Sequence[EndedRun]
+    agendas: Sequence[tuple[Agenda, bool]]
+
+    @classmethod
+    def of(cls, folder: Path, points: Sequence[Point]) -> "Content":
+        """Read the store in a folder, if there is one. Raises InputError."""
+        if not (folder / STORE).exists():
+            return cls({}, [], [], [])
+        with Store(folder / STORE, read_only=True) as store:
+            outcomes, claims = store.outcomes(points, clearance.sound), store.claims()
+            return cls(
+                outcomes, [each for each in claims if each.key not in outcomes], store.ended(), agendas_of(store)
+            )
+
+    @property
+    def running(self) -> list[Claim]:
+        """Runs under way; what waits for a worker of a cluster is not."""
+        return [claim for claim in self.claims if claim.since is not None]
+
+    @property
+    def alive(self) -> list[Agenda]:
+        """Agendas of live processes."""
+        return [agenda for agenda, alive in self.agendas if alive]
+
+    @property
+    def agenda(self) -> Agenda | None:
+        """The newest agenda of a live process; of those that are gone, where none lives."""
+        return next(iter([*self.alive[::-1], *(agenda for agenda, _ in self.agendas[::-1])]), None)
 
 
 def study_status(study: Study, folder: Path) -> dict[str, Any]:
-    """Record of ``doe status``. Changes nothing, not even while the study runs. Raises InputError."""
+    """Record of ``doe status`` for a study. Changes nothing, not even while the study runs. Raises InputError."""
     ordered = ordered_runs(study)
-    points = clearance.points_of(ordered.scenes, ordered.labels, ordered.factors)
-    outcomes, claims, ended = dict[str, RunResult](), list[Claim](), list[EndedRun]()
-    if (folder / STORE).exists():
-        with Store(folder / STORE, read_only=True) as store:
-            outcomes, claims, ended = store.outcomes(points, clearance.sound), store.claims(), store.ended()
-    keys = {point.key for point in points}
-    failures = [outcome for outcome in outcomes.values() if isinstance(outcome, Failure)]
-    claims = [claim for claim in claims if claim.key not in outcomes]
-    running = [claim for claim in claims if claim.key in keys]
-    missing = len(keys) - len(outcomes) - len(running)
-    others = [run.status for run in ended if run.key not in keys]
+    points = points_of(ordered.scenes, ordered.labels, ordered.factors)
+    content = Content.of(folder, points)
+    works, agenda = dict(design_works(study)), content.agenda
+    options = {"direct": False, "adaptive": False, "robust": False} | (agenda.options if agenda else {})
+    answered = bool(finished(folder, inputs_digest(study, **options))) if agenda else _answered(study, folder)
+    if agenda is None or not agenda.stages or agenda.inputs != inputs_digest(study, **options):
+        # Nothing was planned for the study as it stands now.
+        fresh = Agenda("doe study", options, "", agenda.threads if agenda else 1, study_stages(study, **options))
+        fresh.work, fresh.seconds = (agenda.work, agenda.seconds) if agenda else (0.0, 0.0)
+        agenda = fresh
+    _count_design(agenda.stages, works, content.outcomes)
+    if not agenda.work:
+        rows = [(run.seconds, works[run.key]) for run in content.ended if run.seconds is not None and run.key in works]
+        agenda.seconds, agenda.work = (float(sum(column)) for column in zip(*rows, strict=True)) if rows else (0.0, 0.0)
+    keys = set(works)
+    failures = [outcome for outcome in content.outcomes.values() if isinstance(outcome, Failure)]
+    running = [claim for claim in content.running if claim.key in keys]
+    counts = {
+        "total": len(keys),
+        "done": len(content.outcomes) - len(failures),
+        "failed": len(failures),
+        "running": len(running),
+        "missing": len(keys) - len(content.outcomes) - len(running),
+    }
+    others = [run.status for run in content.ended if run.key not in keys]
+    other = {
+        "done": others.count("done"),
+        "failed": others.count("failed"),
+        "running": len(content.running) - len(running),
+    }
+    return _record(study.path, folder, content, agenda, answered, counts, other, failures)
+
+
+def scene_status(path: Path, folder: Path) -> dict[str, Any]:
+    """The same for ``doe uncertainty`` and ``doe calibrate`` of a scene, whose runs count all alike. Raises InputError."""
+    content = Content.of(folder, [])
+    agenda = content.agenda or Agenda("", {}, "", 1, [])
+    same = agenda.inputs == content_digest(path)
+    answered = same and agenda.files is not None and all((folder / name).is_file() for name in agenda.files)
+    past, ahead = agenda.stages[: agenda.place], agenda.stages[agenda.place :]
+    total = sum(stage.done for stage in past) + sum(stage.runs for stage in ahead)
+    ended = sum(stage.done for stage in agenda.stages)
+    failed = sum(run.status == "failed" for run in content.ended)
+    running = len(content.running)
+    counts = {
+        "total": ended if answered else total,
+        "done": max(ended - failed, 0),
+        "failed": failed,
+        "running": running,
+        "missing": 0 if answered else max(total - ended - running, 0),
+    }
+    return _record(path, folder, content, agenda, answered, counts, {"done": 0, "failed": 0, "running": 0}, [])
+
+
+def status_of(path: Path, folder: Path | None) -> dict[str, Any]:
+    """Record of ``doe status`` for a study or a scene, in its folder unless one is given. Raises InputError."""
+    if "bearing" in read_toml(path):
+        return scene_status(path, folder or folder_of(path, *SCENE_FOLDERS))
+    study = Study.load(path)
+    return study_status(study, folder or folder_of(path, "{}_results"))
+
+
+def folder_of(path: Path, *usual: str) -> Path:
+    """Folder in which a command works on a file, or the ``usual`` one that has a store while none does. Raises InputError where
+    there are several."""
+    running = folders_of(path)
+    if len(running) > 1:
+        raise InputError([f"{path}: runs in {' and in '.join(map(str, running))}; name one of them by --out"])
+    named = [Path(each.format(path.stem)) for each in usual]
+    stores = running or [folder for folder in named if (folder / STORE).exists()]
+    if len(stores) > 1:
+        raise InputError([f"{path}: has runs in {' and in '.join(map(str, stores))}; name one of them by --out"])
+    return stores[0] if stores else named[0]
+
+
+def content_digest(path: Path) -> str:
+    """Digest of the content of a scene's file. Raises OSError."""
+    return digest_of(path.read_bytes())
+
+
+def _answered(study: Study, folder: Path) -> bool:
+    """Whether the folder holds the answer to the study with any options."""
+    for direct, adaptive, robust in product((False, True), repeat=3):
+        if not (direct and adaptive) and finished(folder, inputs_digest(study, direct, adaptive, robust)):
+            return True
+    return False
+
+
+def _count_design(stages: Sequence[Stage], works: Mapping[str, float], outcomes: Mapping[str, RunResult]) -> None:
+    """What the store has of the design counts, whichever process ran it."""
+    for stage in stages:
+        if stage.name == DESIGN:
+            stage.done = max(stage.done, len(outcomes))
+            stage.done_work = max(stage.done_work, sum(works[key] for key in outcomes))
+
+
+def _record(
+    path: Path,
+    folder: Path,
+    content: Content,
+    agenda: Agenda,
+    answered: bool,
+    counts: Mapping[str, int],
+    other: Mapping[str, int],
+    failures: Sequence[Failure],
+) -> dict[str, Any]:
+    # A live process whose answer is written has nothing left to run.
+    alive = any(each.files is None for each in content.alive) or bool(content.claims and not answered)
+    answered = answered and not alive
+    stage = agenda.stage
     return {
         "format": FORMAT,
-        "status": "finished" if missing + len(running) == 0 else "running" if claims else "unfinished",
-        "study": str(study.path),
+        "status": "running" if alive else "finished" if answered else "unfinished",
+        "study": str(path),
         "store": str(folder / STORE),
-        "points": {
-            "total": len(keys),
-            "done": len(outcomes) - len(failures),
-            "failed": len(failures),
-            "running": len(running),
-            "missing": missing,
-        },
+        "command": " ".join([agenda.command, *(f"--{name}" for name, given in agenda.options.items() if given)]),
+        "stage": None if answered or stage is None else stage.name,
+        "stopped_by": "" if answered or alive else agenda.fault,
+        "stages": [{"name": each.name, "done": each.done, "runs": each.runs} for each in agenda.stages],
+        "points": dict(counts),
         "failures": grouped(failures),
-        "running": [_running(claim) for claim in claims],
-        "other": {
-            "done": others.count("done"),
-            "failed": others.count("failed"),
-            "running": len(claims) - len(running),
-        },
-        "spent_s": sum(run.seconds or 0.0 for run in ended if run.key in keys),
-        "left_s": _left_s(missing + len(running), claims, [run for run in ended if run.key in keys]),
+        "running": [_running(claim) for claim in content.running],
+        "other": dict(other),
+        "spent_s": sum(run.seconds or 0.0 for run in content.ended),
+        "left_s": 0.0 if answered else _left_s(agenda, content),
     }
-
-
-def folder_of(study: Study) -> Path:
-    """Folder in which the study runs, or its usual one while it does not. Raises InputError where it runs in several."""
-    running = folders_of(study.path)
-    if len(running) > 1:
-        folders = " and in ".join(map(str, running))
-        raise InputError([f"{study.path}: runs in {folders}; name one of them by --out"])
-    return running[0] if running else Path(f"{study.path.stem}_results")
 
 
 def _running(claim: Claim) -> dict[str, Any]:
     return {
         **{key: getattr(claim, key) for key in ("label", "run", "host", "pid")},
-        "since": datetime.fromtimestamp(claim.since, UTC).isoformat(timespec="seconds"),
-        "for_s": max(0.0, time.time() - claim.since),
+        "since": datetime.fromtimestamp(claim.since or 0.0, UTC).isoformat(timespec="seconds"),
+        "for_s": _for_s(claim, time.time()),
     }
 
 
-def _left_s(left: int, claims: list[Claim], ended: list[EndedRun]) -> float | None:
-    """Wall time that the rest takes: at the pace of the processes at work, else at that of all processors here.
+def _for_s(claim: Claim, now: float) -> float:
+    return max(0.0, now - (claim.since or 0.0))
 
-    None while nothing has ended that could tell.
+
+def _left_s(agenda: Agenda, content: Content) -> float | None:
+    """Wall time [s] that the stages left take, with all that is known of what their runs take; None while nothing is.
+
+    A live process goes on with as many runs at once as it has had in the stage, another with its threads.
     """
-    if left == 0:
-        return 0.0
-    owners = {claim.owner for claim in claims}
-    fresh = [run for run in ended if run.owner in owners and run.started is not None]
-    if fresh:
-        begun = min(run.started for run in fresh if run.started is not None)
-        return left * (fresh[-1].ended - begun) / len(fresh)
-    seconds = [run.seconds for run in ended if run.seconds is not None]
-    if not seconds:
+    if not agenda.work:
         return None
-    return left * sum(seconds) / len(seconds) / min(os.cpu_count() or 1, left)
+    now, left_s = time.time(), 0.0
+    threads = max(sum(each.threads for each in content.alive), 1) if content.alive else agenda.threads
+    for place, (stage, work) in enumerate(agenda.left()):
+        begun = stage.since is not None and place == 0
+        measured = begun and stage.measured_work > 0.0
+        pace = stage.seconds / stage.measured_work if measured else agenda.seconds / agenda.work
+        seconds, at_once = pace * max(work, 0.0), float(threads)
+        if begun and content.alive and stage.since is not None:
+            at_once = _at_once(stage.since, content, now) or at_once
+            seconds -= sum(min(_for_s(claim, now), pace * work / len(content.running)) for claim in content.running)
+            overdue_s = OVERDUE * (now - stage.since) if stage.besides_s else 0.0
+            besides_s = max(stage.besides_s - (now - stage.since), overdue_s)
+        else:
+            besides_s = stage.besides_s
+        left_s += max(seconds, 0.0) / at_once + besides_s
+    return max(left_s, LEAST_S)
+
+
+def _at_once(since: float, content: Content, now: float) -> float | None:
+    """Runs at once, in the mean since a moment; None while too few have ended to tell."""
+    rows = [run for run in content.ended if run.seconds and run.started is not None and run.started >= since]
+    begin = min((run.started for run in rows if run.started is not None), default=now)
+    if len(rows) < 2 or now <= begin:
+        return None
+    busy = sum(run.seconds or 0.0 for run in rows) + sum(
+        min(_for_s(claim, now), now - begin) for claim in content.running
+    )
+    return max(busy / (now - begin), 0.1)

@@ -12,6 +12,7 @@ from doe.unknown.joint import Joint
 from doe.unknown.sensitivity import Indices, shapley, sobol
 from doe.unknown.spread import Emulated, Runs, Share, Spread, emulated, spread_of
 from rbdyn.faults import RunError
+from rbdyn.records.words import are, counted
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene.unknown import Input
 
@@ -113,7 +114,7 @@ def _notes(of_case: Sequence[str], sets: Sets, spreads: Sequence[Spread], count:
     lost = len(sets.failures) + len(sets.impossible)
     if lost:
         why = (*map(str, sets.failures), *sets.impossible)[0]
-        notes.append(f"{lost} input sets gave no result and are left out: {why}")
+        notes.append(f"{counted(lost, 'input set')} gave no result and {are(lost)} left out: {why}")
     for name, spread in zip(OUTPUTS, spreads, strict=True):
         if spread.hidden:
             mend = "raise numerics.replicates or numerics.turns in uncertain.set"

@@ -1,17 +1,18 @@
 """The whole study: design, runs, surfaces, front, confirmation, tolerances, dimension chains, a published table beside."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from doe.arrays import Array
-from doe.clearance import Simulations
+from doe.clearance import Simulations, declares_unknowns
 from doe.designs import Design
 from doe.dimension_chain import ChainResult
 from doe.pareto import ParetoFront
 from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
+from doe.running.agenda import ANSWER, AgendaKeeper, Stage
 from doe.running.failure import Failure
 from doe.running.runner import Progress
 from doe.running.store import Store
@@ -30,8 +31,9 @@ from doe.study.front import find_front
 from doe.study.goals import check_goals
 from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
 from doe.study.reference import Beside, beside
-from doe.study.robust import Robust, check_robust, declared, judge, robust_advice
+from doe.study.robust import Robust, check_robust, judge, robust_advice
 from doe.study.runs import STORE, Runs, run_design
+from doe.study.stages import FRONT, study_stages
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
 from doe.study_file import Study
@@ -126,27 +128,26 @@ def run_study(
     direct: bool = False,
     adaptive: bool = False,
     robust: bool = False,
+    agenda: AgendaKeeper | None = None,
 ) -> StudyResult:
     """All of it; ``progress(title)`` gives the progress of a stage, ``scheduler`` is the address of a cluster to run on.
 
     ``retry``: run those again that failed before. ``direct``: also search the front on the simulator itself, ``adaptive``: in
-    few runs. ``robust``: judge the pick over what is not known, which is also done where something is declared so. Raises
-    InputError, RunError, KeyboardInterrupt.
+    few runs. ``robust``: judge the pick over what is not known, which is also done where something is declared so. ``agenda``:
+    where all runs are counted. Raises InputError, RunError, KeyboardInterrupt.
     """
-    clock, inputs = _Clock(), inputs_digest(study, direct, adaptive, robust)
+    clock, inputs = _Clock(agenda), inputs_digest(study, direct, adaptive, robust)
     check_goals(study)
     check_given(study, folder)
-    if robust := robust or declared(study):
+    if robust := robust or declares_unknowns(study):
         check_robust(study)
     reference = check_study(study, adaptive)
-    runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry)
-    clock.lap("design_s")
-    surfaces = with_rivals(fit_surfaces(study, runs))
-    clock.lap("fit_s")
-    found = find_front(study, surfaces)
-    clock.lap("front_s")
+    clock.plan(study_stages(study, direct, adaptive, robust))
+    runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
+    clock.lap("design_s", FRONT)
+    surfaces, found = _surfaces_and_front(study, runs, clock)
     with Store(folder / STORE, study.path.stem) as store:
-        simulations = Simulations(store, workers, scheduler, retry, progress)
+        simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
         searched: Searched | None = find_direct(study, found, simulations) if direct else None
         if adaptive:
             searched = find_adaptive(study, runs, simulations)
@@ -157,7 +158,7 @@ def run_study(
         edge = _edge(study, surfaces, chosen, searched, simulations)
         clock.lap("confirmation_s")
         judged = judge(study, pick, simulations) if robust else None
-        clock.lap("robust_s")
+        clock.lap("robust_s", ANSWER)
     tolerances = _tolerances(study, surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
     reference = reference and reference.only(runs.places)
@@ -186,6 +187,14 @@ def run_study(
         notes=(*runs.notes, *notes, *_offers(study, surfaces, searched, judged)),
         cost=clock.total(),
     )
+
+
+def _surfaces_and_front(study: Study, runs: Runs, clock: "_Clock") -> tuple[list[Surface], ParetoFront]:
+    surfaces = with_rivals(fit_surfaces(study, runs))
+    clock.lap("fit_s")
+    front = find_front(study, surfaces)
+    clock.lap("front_s")
+    return surfaces, front
 
 
 def _offers(study: Study, surfaces: list[Surface], searched: Searched | None, judged: Robust | None) -> list[str]:
@@ -238,16 +247,24 @@ def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[G
 
 
 class _Clock:
-    """Wall time of each stage [s]."""
+    """Wall time of each stage [s]; stages without runs are entered in the agenda."""
 
-    def __init__(self) -> None:
+    def __init__(self, agenda: AgendaKeeper | None) -> None:
+        self._agenda = agenda
         self._started = self._last = time.perf_counter()
         self._laps: dict[str, float] = {}
 
-    def lap(self, name: str) -> None:
-        """The stage ``name`` ends here."""
+    def plan(self, stages: Sequence[Stage]) -> None:
+        """The stages to come."""
+        if self._agenda is not None:
+            self._agenda.plan(stages)
+
+    def lap(self, name: str, following: str = "") -> None:
+        """The stage ``name`` ends here, and the ``following`` one of the agenda begins."""
         now = time.perf_counter()
         self._laps[name], self._last = now - self._last, now
+        if following and self._agenda is not None:
+            self._agenda.enter(following)
 
     def total(self) -> dict[str, float]:
         """All stages and the whole."""

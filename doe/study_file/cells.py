@@ -16,9 +16,9 @@ import numpy as np
 
 from doe.arrays import Array
 from rbdyn.faults import LONGEST_NAME, InputError, one_line, read_text, refuse
+from rbdyn.records.cells import NUMBER, plain_cell, quoted_cell
+from rbdyn.records.words import counted
 
-# As every program writes it: float() would also take 1_000, nan and the digits of other scripts.
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
 # Characters of a number: every double has a shorter form, and Python converts no integer of thousands of digits.
 LONGEST_NUMBER = 400
@@ -91,7 +91,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A CSV file: names in its ``header``, and ``rows`` with as many fields."""
+    """A CSV file: names in its ``header``, and ``rows`` with as many fields as they are written."""
 
     path: Path
     header: list[str]
@@ -108,7 +108,7 @@ class Sheet:
     def column(self, name: str) -> Column:
         """The column of a name."""
         place = self.places[name]
-        return Column(self.path, name, [row[place].strip() for row in self.rows])
+        return Column(self.path, name, [plain_cell(row[place].strip()) for row in self.rows])
 
     @property
     def nameless(self) -> list[int]:
@@ -139,7 +139,7 @@ def read_sheet(path: Path) -> Sheet:
         raise InputError([f"{path}: line {start}: is not CSV ({error}); {fix}"]) from None
     if not fields:
         raise InputError([f"{path}: is empty; write a header of names and a row a run"])
-    header, rows = [name.strip() for name in fields[0]], fields[1:]
+    header, rows = [plain_cell(name.strip()) for name in fields[0]], fields[1:]
     if len(header) == 1 and (marks := [mark for mark in ";\t|" if mark in header[0]]):
         raise InputError([f"{path}: has {marks[0]!r} between its fields; write commas there and points in numbers"])
     several = {name: count for name, count in Counter(header).items() if count > 1 and name}
@@ -150,7 +150,7 @@ def read_sheet(path: Path) -> Sheet:
         if len(row) != len(header):
             only_commas = len(row) > len(header) and not any(field.strip() for field in row[len(header) :])
             fix = "remove the commas at its end" if only_commas else "give it a field a column, in the header's order"
-            faults.append(f"{path}: row {number} has {len(row)} fields and the header {len(header)}; {fix}")
+            faults.append(f"{path}: row {number} has {counted(len(row), 'field')} and the header {len(header)}; {fix}")
     refuse(faults)
     return Sheet(path, header, rows)
 
@@ -161,8 +161,8 @@ def is_number(text: str) -> bool:
 
 
 def text_of(value: Any) -> Any:
-    """What a CSV writer is given for a value, so that it reads as the same: TOML's words for booleans."""
-    return str(value).lower() if isinstance(value, bool) else value
+    """What a CSV writer is given for a value, so that it reads as the same: TOML's words for booleans, no formulas."""
+    return str(value).lower() if isinstance(value, bool) else quoted_cell(value)
 
 
 def listed(names: Collection[str]) -> str:

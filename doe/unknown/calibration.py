@@ -74,6 +74,11 @@ class Matched:
 Simulate = Callable[[Array, int], Batch]
 
 
+def sets_a_wave(inputs: int) -> int:
+    """Input sets that a wave simulates for so many unknown inputs."""
+    return max(FEWEST, EACH * inputs)
+
+
 def matched(
     simulate: Simulate, measured: Measured, unknowns: Unknowns, seed: int, waves: int = 4, particles: int = PARTICLES
 ) -> Matched:
@@ -82,7 +87,7 @@ def matched(
     ``simulate(quantiles, number)`` runs input sets of the stage of that number. Raises what that raises, and RunError.
     """
     random = np.random.default_rng(seed)
-    count, inputs = max(FEWEST, EACH * unknowns.inputs), unknowns.inputs
+    count, inputs = sets_a_wave(unknowns.inputs), unknowns.inputs
     candidates = nested(inputs, CANDIDATES, seed)
     points, volumes, refuted, batch, cells = candidates[:count], list[float](), list[int](), None, None
     for wave in range(waves):

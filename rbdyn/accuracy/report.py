@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from rbdyn.dynamics.ensemble import Reporter
+from rbdyn.records.cells import save_table
 from rbdyn.result import versions, write_json
 
 T = TypeVar("T")
@@ -113,13 +114,11 @@ def reported(
 
 def write(report: Report, folder: Path) -> list[str]:
     """Write the record, the sheets and the pictures; returns the file names."""
-    import pandas as pd
-
     files = [f"{report.stem}.json"]
     write_json(folder / files[0], report.record)
     for name, rows in report.sheets.items():
         files.append(f"{name}.csv")
-        pd.DataFrame(rows).to_csv(folder / files[-1], index=False)
+        save_table(rows, folder / files[-1])
     for name, draw in report.pictures.items():
         files.append(f"{name}.png")
         draw(folder / files[-1])

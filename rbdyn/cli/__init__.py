@@ -5,7 +5,7 @@
 - ``manual``: keys, commands, equations and the prose between them as one page
 - ``new``: a scene of a catalogue bearing, from ``new_scene`` and a ``template``
 - ``options``, ``ranges``: arguments that several commands share, lists of numbers as they are typed
-- ``terminal``: exit codes, messages, output folders, progress, for ``doe`` too; ``streams``, ``loading``: streams that
+- ``terminal``: exit codes, messages, output folders, progress (``remaining``: time left), for ``doe`` too; ``streams``, ``loading``: streams that
   close and Ctrl-C, at any moment
 """
 

@@ -12,7 +12,8 @@ from rbdyn.cli.ball import ball
 from rbdyn.cli.keys import command as keys
 from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
-from rbdyn.records.words import error_alone, value_alone
+from rbdyn.records.cells import save_table
+from rbdyn.records.words import counted, error_alone, value_alone
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -63,7 +64,7 @@ def simulate(
         folder = terminal.output_folder(out, "rbdyn simulate", scene) if out else None
         from rbdyn.dynamics.simulate import simulate as run_scene
 
-        with terminal.progress_bar("simulating", quiet or as_json) as progress:
+        with terminal.progress_bar("simulating", quiet or as_json, workers) as progress:
             result = run_scene(loaded, workers, progress, target=aim, notice=terminal.notice(quiet or as_json))
         loaded = type(loaded).from_dict(result.scene)
         files = _write(loaded, result, folder) if folder else []
@@ -139,7 +140,7 @@ def _print_map(mapped: "SlipMap") -> None:
         for value, row in zip(mapped.loads_N, mapped.grid("cage_slip"), strict=True)
     ]
     terminal.print_table("cage slip", header, rows)
-    print(f"{len(mapped.points)} points in {mapped.wall_s:.1f} s, seed {mapped.seed}")
+    print(f"{counted(len(mapped.points), 'point')} in {mapped.wall_s:.1f} s, seed {mapped.seed}")
 
 
 def _write_map(mapped: "SlipMap", folder: Path) -> list[str]:
@@ -148,7 +149,7 @@ def _write_map(mapped: "SlipMap", folder: Path) -> list[str]:
     from rbdyn.result import write_json
 
     write_json(folder / "map.json", mapped.as_dict())
-    mapped.table().to_csv(folder / "map.csv", index=False)
+    save_table(mapped.table(), folder / "map.csv")
     draw(mapped, folder / "map.png")
     return ["map.json", "map.csv", "map.png"]
 
@@ -178,7 +179,7 @@ def slip_map(
 
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
         points = folder / study.POINTS if folder else None
-        with terminal.keeping(points), terminal.progress_bar("mapping", quiet or as_json) as progress:
+        with terminal.keeping(points), terminal.progress_bar("mapping", quiet or as_json, workers) as progress:
             say = terminal.notice(quiet or as_json)
             mapped = study.slip_map(loaded, *axes, workers, progress, points, say)
         files = _write_map(mapped, folder) if folder else []
@@ -237,7 +238,7 @@ def _write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str
     result.save(folder / "result.json")
     turns = min(TRACE_TURNS, scene.numerics.turns, most_turns(scene))
     shown = history(scene, turns, notice=None)  # the simulation has stated its pace
-    shown.table().to_csv(folder / "history.csv", index=False, float_format="%.6g")
+    save_table(shown.table(), folder / "history.csv", "%.6g")
     title = f"first {turns:g} counted shaft turns"
     plots.cage_orbit({title: shown}, folder / "cage_orbit.png")
     plots.pocket_forces({title: shown}, folder / "pocket_forces.png")
@@ -267,7 +268,7 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
     if result.target is not None:
         _print_target(result.target)
     loads = f"{result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer)"
-    runs = f"{result.replicates} replicates, seed {result.seed}"
+    runs = f"{counted(result.replicates, 'replicate')}, seed {result.seed}"
     took = f"{result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to load or compile"
     print(f"race loads up to {loads}; power balance closes to {100.0 * result.power_gap:.2g} %; {runs}; {took}")
     for race, at in result.races.items():
@@ -292,7 +293,9 @@ def _print_target(target: dict[str, Any]) -> None:
     errors = target["relative_error"].items()
     reached = ", ".join(f"{name} {'unknown' if e is None else f'{100.0 * e:.2g} %'}" for name, e in errors)
     aim = f"target {100.0 * target['asked']:g} % {'met' if target['met'] else 'not met'} ({reached})"
-    runs = f"{chosen['replicates']} replicates of {chosen['turns']:g} turns at rtol {chosen['rtol']:g}"
+    runs = (
+        f"{counted(chosen['replicates'], 'replicate')} of {counted(chosen['turns'], 'turn')} at rtol {chosen['rtol']:g}"
+    )
     spent = f"{cost['rhs_evaluations'] / 1e6:.1f} million right-hand sides"
     pilots = f"{cost['pilot_rhs_evaluations'] / 1e6:.1f} of them for pilots"
     print(f"{aim} by {runs}; {spent}, {pilots}; the seconds are those of pilots and all runs")
@@ -303,7 +306,7 @@ def show(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or a folder that holds one.")],
     out: Annotated[Path | None, given.folder_option("Write here.", "'show' beside the result")] = None,
     turns: Annotated[float | None, given.valued("N", "Counted shaft turns to show.", "all, at most 20")] = None,
-    replicate: Annotated[int, typer.Option(help="Which replicate, from 1.")] = 1,
+    replicate: Annotated[int, typer.Option(metavar="N", help="Which replicate, from 1.")] = 1,
     animate: Annotated[bool, given.flag("--animate", says="Also a moving picture and a player.")] = False,
     lyapunov: Annotated[bool, given.flag("--lyapunov", says="Also the largest Lyapunov exponent.")] = False,
     as_json: given.Json = False,

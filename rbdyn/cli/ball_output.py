@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.cli.terminal import print_notes, print_table
 from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport
+from rbdyn.records.cells import save_table
+from rbdyn.records.words import counted
 from rbdyn.scene import BallScene
 
 if TYPE_CHECKING:
@@ -32,7 +34,7 @@ def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
         radial = f"{runout['indicator_um']:.3g} um by an indicator, {runout['minimum_zone_um']:.3g} um between circles"
         axial = f"axial {runout['axial_um']:.3g} um, face {runout['face_um']:.3g} um"
         asynchronous = f"asynchronous {runout['asynchronous_radial_um']:.3g} um"
-        print(f"runout over {runout['turns']} turns: radial {radial}, {axial}; {asynchronous}")
+        print(f"runout over {counted(runout['turns'], 'turn')}: radial {radial}, {axial}; {asynchronous}")
     print_notes(result.notes or (), quiet)
 
 
@@ -53,10 +55,10 @@ def write(result: BallResult, folder: Path, path: "pd.DataFrame | None" = None) 
         return ["result.json"]
     from rbdyn.plots.ball import pictures
 
-    result.table().to_csv(folder / "balls.csv", index=False, float_format="%.8g")
+    save_table(result.table(), folder / "balls.csv", "%.8g")
     files = ["result.json", "balls.csv", *pictures(result, folder)]
     if path is not None:
-        path.to_csv(folder / "runout.csv", index=False, float_format="%.8g")
+        save_table(path, folder / "runout.csv", "%.8g")
         files.append("runout.csv")
     return files
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rbdyn.cli.terminal import FAILED, hand_over, keeping, output_folder, print_notes, print_table, progress_bar
+from rbdyn.records.words import counted
 from rbdyn.result import write_json
 
 if TYPE_CHECKING:
@@ -49,7 +50,9 @@ def run(scene: "BallScene", texts: Sequence[str], out: Path | None, source: Path
 def show(result: "SweepResult", quiet: bool) -> None:
     """Print the points, what they cost and the notes."""
     print_points(result)
-    print(f"{len(result.statuses)} points in {result.wall_s:.3g} s, {result.cold} of them not started from a neighbour")
+    print(
+        f"{counted(len(result.statuses), 'point')} in {result.wall_s:.3g} s, {result.cold} of them not started from a neighbour"
+    )
     print_notes((f"{result.where(note['points'])}: {note['note']}" for note in result.notes), quiet)
 
 

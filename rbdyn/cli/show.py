@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from rbdyn.cli.terminal import print_notes, print_table
 from rbdyn.faults import refuse
-from rbdyn.records.words import with_error
+from rbdyn.records.cells import save_table
+from rbdyn.records.words import counted, with_error
 from rbdyn.result import SimulationResult, versions, write_json
 from rbdyn.scene import Scene
 
@@ -65,7 +66,9 @@ def request_of(path: Path, turns: float | None, replicate: int) -> Request:
     most = min(most_turns(scene), numerics.turns)
     chosen = min(SHOWN_TURNS, most) if turns is None else turns
     if turns is not None and not fewest <= turns <= numerics.turns:
-        faults.append(f"--turns {turns:g}: the result counted {numerics.turns:g} turns; choose from {fewest:g} to that")
+        faults.append(
+            f"--turns {turns:g}: the result counted {counted(numerics.turns, 'turn')}; choose from {fewest:g} to that"
+        )
     elif chosen > most:
         faults.append(f"--turns {turns:g}: memory has room for {most:.4g} turns of this scene; show no more")
     if not 1 <= replicate <= numerics.replicates:
@@ -87,7 +90,7 @@ def write(
 
     motion = history(request.scene, request.turns, request.replicate, notice=notice)
     tasks: dict[str, Callable[[Path], object]] = {
-        "history.csv": partial(motion.table().to_csv, index=False, float_format="%.6g"),
+        "history.csv": partial(save_table, motion.table(), float_format="%.6g"),
         **_pictures(request, motion),
     }
     steps = 1 + len(tasks) + animate + lyapunov

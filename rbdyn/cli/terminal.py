@@ -11,7 +11,9 @@ from typing import Any, NoReturn
 
 import typer
 
+from rbdyn.cli.columns import blocks
 from rbdyn.cli.loading import INTERRUPTED
+from rbdyn.cli.remaining import Remaining, clock_words
 from rbdyn.cli.streams import FAILED
 from rbdyn.faults import InputError, RunError
 from rbdyn.records.kept import digest_of
@@ -108,18 +110,33 @@ def output_folder(path: Path, command: str, source: Path) -> Path:
 
 
 @contextmanager
-def progress_bar(title: str, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """Progress on a terminal, silence elsewhere; yields ``progress(done, total)``."""
+def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[Callable[[int, int], None]]:
+    """Progress on a terminal, silence elsewhere; yields ``progress(done, total)``. ``workers``: how many go on at once, all
+    processors by None."""
     if quiet or not sys.stderr.isatty():
         yield lambda done, total: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
+    from rich.text import Text
 
-    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    remaining = Remaining(workers or os.cpu_count() or 1)
+
+    class TimeLeft(ProgressColumn):
+        """The speed that rich estimates is lost where a run takes longer than half a minute."""
+
+        def render(self, task: Task) -> Text:
+            return Text(clock_words(remaining.seconds), style="progress.remaining")
+
+    def progress(done: int, total: int) -> None:
+        remaining.update(done, total)
+        bar.update(task, completed=done, total=total)
+
+    with Progress(
+        TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeLeft(), console=Console(stderr=True), transient=True
+    ) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        yield progress
 
 
 def notice(quiet: bool) -> Callable[[str], None] | None:
@@ -134,19 +151,22 @@ def print_notes(notes: Iterable[str], quiet: bool) -> None:
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A plain table; the first column to the left, the others to the right."""
+    """A plain table; the first column to the left, the others to the right. One that is wider than the terminal goes on below,
+    its first column repeated, for no word is broken."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD)
-    for index, column in enumerate(header):
-        table.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
-    for row in rows:
-        table.add_row(*row)
     # Wide enough for the table when the output is a file or a pipe, which has no width of its own.
     console = Console(width=None if sys.stdout.isatty() else 160, highlight=False, markup=False)
     # A title of the table's own would be broken at the table's width.
     if title:
         console.print(title, style="bold")
-    console.print(table)
+    for block in blocks([*zip(header, *rows, strict=True)], console.width):
+        table = Table(box=box.SIMPLE_HEAD)
+        for place, width in block:
+            justify = "left" if place == 0 else "right"
+            table.add_column(header[place], justify=justify, width=width, overflow="fold")  # type: ignore[arg-type]
+        for row in rows:
+            table.add_row(*(row[place] for place, _ in block))
+        console.print(table)

@@ -25,6 +25,7 @@ from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError
 from rbdyn.records.kept import Kept, code_version, run_key
 from rbdyn.records.record import Record, derived, keyed, spread
+from rbdyn.records.words import counted
 from rbdyn.result import Quantity, versions
 from rbdyn.scene import Scene
 
@@ -52,7 +53,7 @@ class SlipMap(Record):
 
     format: str = derived(lambda self: FORMAT)
     status: str = derived(
-        lambda self: f"{len(self.failed)} of {len(self.points)} points failed" if self.failed else "ok"
+        lambda self: f"{len(self.failed)} of {counted(len(self.points), 'point')} failed" if self.failed else "ok"
     )
     speeds_rpm: tuple[float, ...]
     loads_N: tuple[float, ...]  # noqa: N815

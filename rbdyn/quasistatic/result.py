@@ -16,7 +16,7 @@ from rbdyn.quasistatic.fatigue import solution_life
 from rbdyn.quasistatic.remarks import Rating, needed_friction
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_ANGLE, OUTER_LOAD, PULL, Solution
 from rbdyn.records.record import Record, outside_json, spread
-from rbdyn.records.words import Brief, Figure
+from rbdyn.records.words import Brief, Figure, counted
 from rbdyn.result import SavedRecord
 from rbdyn.scene.ball import BallScene
 
@@ -130,7 +130,7 @@ class BallResult(Brief, SavedRecord, kw_only=True):
         for axis in "xyz" if self.report else "":
             figures.append(Figure(f"displacement {axis}", 1e3 * self.reached.displacement_mm[axis], None, "µm"))
             figures.append(Figure(f"stiffness {axis}", self.reached.stiffness[f"{axis}_N_per_um"], None, "N/µm"))
-        return f"{self.status}, {len(self.notes or ())} notes", figures
+        return f"{self.status}, {counted(len(self.notes or ()), 'note')}", figures
 
     def table(self) -> "pd.DataFrame":
         """A row a ball: azimuth, angles, loads, centrifugal force, gyroscopic moment; units in the names."""

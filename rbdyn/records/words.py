@@ -49,6 +49,17 @@ def shown(value: Any, digits: int = 4) -> str:
     return f"{value:.0f}" if "e+" in text and abs(value) < PLAIN_BELOW else text
 
 
+def counted(number: float, noun: str) -> str:
+    """'1 run', '2 runs', '0 classes': a number of things."""
+    ending = "" if number == 1 else "es" if noun.endswith(("s", "x", "ch", "sh")) else "s"
+    return f"{number:.0f} {noun}{ending}" if number == round(number) else f"{number:g} {noun}{ending}"
+
+
+def are(number: float) -> str:
+    """'is' or 'are', of a number of things."""
+    return "is" if number == 1 else "are"
+
+
 def decimals(error: float) -> int:
     """Decimal place of the second significant digit of an error: 2 of 0.35 and of 0.0996, -1 of 123."""
     return 1 - int(f"{error:.1e}".partition("e")[2])

@@ -10,6 +10,7 @@ from pydantic_core import PydanticKnownError
 
 from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive
+from rbdyn.records.words import counted
 
 # Keys that belong to one roller profile each.
 PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "table": "profile_table_mm_um"}
@@ -149,7 +150,7 @@ class Bearing(Consistent):
     def _form_faults(self) -> Iterator[str]:
         errors = self.roller_diameter_errors_um
         if errors is not None and len(errors) != self.rollers:
-            why = f"bearing.roller_diameter_errors_um: {len(errors)} values for {self.rollers} rollers"
+            why = f"bearing.roller_diameter_errors_um: {counted(len(errors), 'value')} for {self.rollers} rollers"
             yield f"{why}; give one a roller"
         if errors is not None and self.roller_diameter_spread_um > 0.0:
             what = "bearing.roller_diameter_errors_um and bearing.roller_diameter_spread_um contradict each other"

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI
+from rbdyn.records.words import counted
 from rbdyn.scene.bearing import Harmonic
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ def misfits(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diame
     """What does not go with a row of ``balls`` on a pitch circle, one sentence each."""
     given = errors.ball_diameter_errors_um
     if given is not None and len(given) != balls:
-        yield f"errors.ball_diameter_errors_um: {len(given)} values for {balls} balls; give one a ball"
+        yield f"errors.ball_diameter_errors_um: {counted(len(given), 'value')} for {balls} balls; give one a ball"
     limit = LARGEST_ERROR * ball_diameter_mm * 1e3
     if any(abs(error) > limit for error in given or []) or errors.ball_diameter_spread_um > limit:
         yield f"errors: ball diameters beyond {limit:g} um, a hundredth of the ball; give micrometres"

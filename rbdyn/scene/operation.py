@@ -9,6 +9,7 @@ from pydantic import Field
 
 from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import LIGHTEST_RING_KG, SI, InSI, NonNegative, Positive
+from rbdyn.records.words import counted
 
 Speed = Annotated[float, Field(ge=-1e6, le=1e6)]
 Load = Annotated[float, Field(ge=0.0, le=1e7)]
@@ -37,7 +38,7 @@ class Schedule(Consistent):
         for key in ("inner_speed_rpm", "radial_load_N"):
             values = getattr(self, key)
             if values is not None and len(values) != len(times):
-                yield f"operation.schedule.{key}: {len(values)} values for {len(times)} times; give one a time"
+                yield f"operation.schedule.{key}: {counted(len(values), 'value')} for {counted(len(times), 'time')}; give one a time"
         if self.inner_speed_rpm is None and self.radial_load_N is None:
             yield "operation.schedule: schedules nothing; give inner_speed_rpm or radial_load_N"
 

@@ -58,7 +58,7 @@ def test_command_line_table_and_options(command):
     options = ("--turns", "2", "--replicates", "1", "--seed", "5")
     shown = command("simulate", EXAMPLE, *QUICK, *options, "-v")
     assert shown.returncode == 0
-    for words in ("power loss [W]", "not estimated", "1 replicates, seed 5", "rolling resistance", "effective samples"):
+    for words in ("power loss [W]", "not estimated", "1 replicate, seed 5", "rolling resistance", "effective samples"):
         assert words in shown.stdout
     quiet = command("simulate", EXAMPLE, *QUICK, *options, "-q")
     assert quiet.returncode == 0 and "note:" not in quiet.stdout

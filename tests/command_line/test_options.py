@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import typer.main
+from rich.text import Text
 from typer.testing import CliRunner
 
 from doe.cli import app as doe_app
@@ -29,6 +30,21 @@ def test_every_option_has_help_and_tells_its_default(app, command, option):
     assert not re.search(r"\[\w+\.\w+\]", option.help)
     if option.param_type_name == "option" and not option.is_flag and not option.required:
         assert option.default is not None or isinstance(option.show_default, str), option.name
+
+
+@pytest.mark.parametrize("name", APPS)
+def test_help_shows_all_that_is_written_in_it(name):
+    """Command line: no text of a command or option is swallowed as a tag of rich text."""
+    for command, known in typer.main.get_command(APPS[name]).commands.items():
+        for text in (known.help, *(option.help for option in known.params)):
+            assert Text.from_markup(text).plain == text, f"{name} {command}"
+
+
+@pytest.mark.parametrize("width", ["80", "120"])
+def test_chains_in_one_file_are_named_in_the_help(monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", width)
+    printed = " ".join(re.sub("[│─]", "", CliRunner().invoke(doe_app, ["chain", "--help"]).output).split())
+    assert "or several in tables named chain." in printed and "[]" not in printed
 
 
 def test_defaults_stand_in_the_help_as_printed(monkeypatch):

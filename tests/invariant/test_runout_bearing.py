@@ -284,7 +284,7 @@ def test_unit_turning_outer_ring():
 
 @pytest.mark.parametrize(
     ("changes", "sentence"),
-    [((), "errors: missing"), (("errors.ball_diameter_errors_um=[1.0]",), "1 values for 18 balls")],
+    [((), "errors: missing"), (("errors.ball_diameter_errors_um=[1.0]",), "1 value for 18 balls")],
 )
 def test_unit_scenes_without_runout(changes, sentence):
     """Unit: no errors, no runout; errors that do not fit the balls are refused with the scene."""

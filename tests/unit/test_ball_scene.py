@@ -116,7 +116,7 @@ def test_unit_faults_of_the_operation(name):
         ({"materials": {"ball": "chees"}}, ("materials.ball = 'chees'", "choose one of")),
         ({"model": {"ring_expansion": True}}, ("bearing.bore_mm: missing", "the inner ring turns", "model.ring_expansion = false")),
         ({"cage": {"mass_g": 3.0}}, ("cage: unknown key",)),
-        ({"errors": {"ball_diameter_errors_um": [1.0]}}, ("errors.ball_diameter_errors_um", "1 values for 29 balls")),
+        ({"errors": {"ball_diameter_errors_um": [1.0]}}, ("errors.ball_diameter_errors_um", "1 value for 29 balls")),
     ],
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
 )  # fmt: skip

@@ -131,6 +131,23 @@ def test_study_on_a_cluster_that_loses_a_worker_has_the_bits_of_a_local_one(tmp_
 
 
 @pytest.mark.slow
+def test_only_what_a_worker_of_a_cluster_runs_is_under_way(tmp_path, monkeypatch):
+    """Of ten texts for two workers, two are begun at once and not one more; all are begun before they end."""
+    begun: list[int] = []
+    ended: list[tuple[int, int]] = []
+    with started(tmp_path, 2) as there:
+        cluster.run_on_cluster(
+            there.address,
+            slow_echo,
+            lambda: ["0.4"] * 10,
+            lambda place, ran: ended.append((place, len(begun))),
+            begun.append,
+        )
+    assert sorted(begun) == list(range(10))
+    assert all(place in begun[:so_far] and so_far <= done + 2 for done, (place, so_far) in enumerate(ended, 1))
+
+
+@pytest.mark.slow
 def test_cluster_gives_each_place_its_own_and_tells_what_is_gone(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "WORKERS_S", 0.5)
     monkeypatch.setattr(cluster, "DESERTED_S", 2.0)

@@ -203,6 +203,18 @@ def test_spoilt_result_is_told_and_not_read_but_run_again(path, spoilt, capsys):
         assert store.get("key 1") == result(1)
 
 
+def test_queued_run_is_under_way_once_it_begins(path):
+    with Store(path) as store, Store(path) as other:
+        assert store.claim(POINTS[:2], queued=True) == {"key 1", "key 2"}
+        assert other.claim(POINTS[:2]) == set()
+        other.begin("key 1")
+        assert [claim.since for claim in other.claims()] == [None, None]
+        store.begin("key 2")
+        before = time.time()
+        one, two = sorted(other.claims(), key=lambda claim: claim.key)
+        assert one.since is None and two.since is not None and before - 5.0 < two.since <= before
+
+
 def test_spoilt_times_and_signs_of_life_stop_nobody(path):
     with Store(path) as store, Store(path) as other:
         store.put("key 1", result(1), seconds=2.0)

@@ -185,6 +185,25 @@ def test_two_doe_study_on_one_folder_both_get_runs_and_none_runs_twice(tmp_path)
     assert not list(out.glob("*.partial"))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+def test_study_killed_in_its_confirmation_is_unfinished_and_nothing_runs(tmp_path, workers):
+    path, out = short_study(tmp_path), tmp_path / "out"
+    process, study = start(path, out, 0.5, workers, "--whole"), Study.load(path)
+
+    def status() -> dict:
+        return study_status(study, out)
+
+    wait_for(lambda: (out / STORE).exists() and status()["stage"] == "confirmation" and status()["running"] != [])
+    before = status()
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    after = status()
+    assert before["status"] == "running" and len(before["running"]) <= workers
+    assert after["status"] == "unfinished" and after["stage"] == "confirmation" and after["left_s"] > 0.0
+    assert after["running"] == [] and after["points"]["done"] == 20 and not (out / "summary.json").exists()
+
+
 def spoil(store: Path, key: str, **values) -> None:
     """Write something else into the row of a run."""
     with sqlite3.connect(store) as connection:
@@ -223,7 +242,7 @@ def test_rows_that_are_no_results_run_again_with_one_sentence(tmp_path, monkeypa
 
 def test_killed_process_is_taken_over_at_once_by_one_that_waits_for_it(tmp_path, monkeypatch):
     study, out = short_study(tmp_path), tmp_path / "out"
-    slow = start(study, out, 30.0, 19)
+    slow = start(study, out, 30.0, 20)
     wait_for(lambda: (out / STORE).exists() and study_status(Study.load(study), out)["points"]["running"] == 20)
     ran = instantly(monkeypatch.setattr)
     seen: list[tuple[int, int]] = []

@@ -10,7 +10,7 @@ from doe.report.sections.plots_of_fronts import Front
 from doe.report.sections.record import Record, factors, nearest, part, responses
 from doe.report.sections.searches import in_few_runs
 from doe.report.words import change
-from rbdyn.records.words import chance, label, shown, with_error
+from rbdyn.records.words import chance, counted, label, shown, with_error
 
 # Points of a front that are drawn; more cannot be told apart.
 MOST_POINTS = 400
@@ -174,7 +174,9 @@ def _with_tolerances(aware: Record, names: Sequence[str]) -> list[Block]:
     kind = str(aware.get("kind") or "").replace("_", " ")
     level = f" {shown(aware['quantile'])}" if aware.get("quantile") is not None and kind == "quantile" else ""
     number = len(aware.get("front") or [])
-    blocks: list[Block] = [Words(f"Front with tolerances: {kind}{level} over the tolerance box, {number} points.")]
+    blocks: list[Block] = [
+        Words(f"Front with tolerances: {kind}{level} over the tolerance box, {counted(number, 'point')}.")
+    ]
     points = {
         "baseline": aware.get("baseline_robust"),
         "plain pick": aware.get("plain_pick_robust"),

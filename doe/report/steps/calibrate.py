@@ -16,7 +16,7 @@ from doe.unknown import laws
 from doe.unknown.posterior import seen
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.kept import digest_of, intact, sign
-from rbdyn.records.words import quantity, shown
+from rbdyn.records.words import are, counted, quantity, shown
 from rbdyn.result import read_json, write_json
 from rbdyn.scene.unknown import Input
 
@@ -148,7 +148,7 @@ def print_calibration(record: dict[str, Any]) -> None:
     if record["screened"]:
         most = max(record["screened"], key=lambda key: record["screened"][key])
         print(
-            f"{len(record['screened'])} more inputs stay as they are: in a screening none made more than "
+            f"{counted(len(record['screened']), 'further input')} {are(len(record['screened']))} left at the scene's value: in a screening none made more than "
             f"{100.0 * record['screened'][most]:.2g} % of an output's variance ({most})"
         )
     for note in record["notes"]:
@@ -180,9 +180,7 @@ def write(found: Calibration, record: dict[str, Any], folder: Path) -> None:
 def write_sample(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """A posterior sample as CSV, a row an input set by key, which reads as the same values."""
     with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, list(rows[0]))
-        table.writeheader()
-        table.writerows({key: text_of(value) for key, value in row.items()} for row in rows)
+        csv.writer(file).writerows(map(text_of, row) for row in (list(rows[0]), *(each.values() for each in rows)))
 
 
 def files_of(record: dict[str, Any]) -> list[str]:

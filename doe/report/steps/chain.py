@@ -6,7 +6,7 @@ from typing import Any
 from doe.dimension_chain import ChainResult
 from doe.dimension_chain.selective_assembly import SelectiveAssembly
 from rbdyn.cli.terminal import print_table
-from rbdyn.records.words import with_error
+from rbdyn.records.words import counted, with_error
 
 BAR = 20  # characters of a contribution of 100 %
 
@@ -89,7 +89,7 @@ def _print_selective(found: SelectiveAssembly, verbose: bool) -> None:
     closing = f"closing link {low:.4f} to {high:.4f} mm in worst case ({needed} the limits)"
     mates = f"{100 * found.matched:.2f} % of the parts find a mate, {with_error(found.good, found.standard_error)}"
     good = f"of the matched within the limits ({found.random:.6f} at random)"
-    print(f"matched in {found.classes} classes: {closing}, {mates} {good}")
+    print(f"matched in {counted(found.classes, 'class')}: {closing}, {mates} {good}")
     if verbose:
         rows = [(name, "  ".join(f"{edge:.4f}" for edge in edges)) for name, edges in found.edges_mm.items()]
         print_table("classes", ("part", "limits of the classes [mm]"), rows)

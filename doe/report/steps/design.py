@@ -6,6 +6,8 @@ from doe.designs import Design
 from doe.study.design import actual_of
 from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
+from rbdyn.records.cells import quoted_cell
+from rbdyn.records.words import counted
 
 
 def runs_record(study: Study, design: Design) -> list[dict[str, Any]]:
@@ -40,7 +42,7 @@ def design_record(study: Study, design: Design, evaluation: dict[str, Any]) -> d
 def print_csv(record: dict[str, Any]) -> None:
     """Run and actual factors, with the block where there are several."""
     blocked = record["evaluation"]["blocks"] is not None
-    print(",".join(["run", *(["block"] if blocked else []), *record["factors"]]))
+    print(",".join(["run", *(["block"] if blocked else []), *map(quoted_cell, record["factors"])]))
     for run in record["runs"]:
         values = [f"{x:.9g}" for x in run["factors"].values()]
         print(",".join([str(run["run"]), *([str(run["block"])] if blocked else []), *values]))
@@ -62,7 +64,7 @@ def print_design(record: dict[str, Any], quiet: bool = False, verbose: bool = Fa
         columns["standard"] = [str(run["standard"]) for run in record["runs"]]
         columns["seed"] = [str(run["seed"]) for run in record["runs"]]
         columns["leverage"] = [f"{x:.3f}" for x in record["evaluation"]["leverage"]]
-    title = f"{record['kind']}, {len(record['runs'])} runs"
+    title = f"{record['kind']}, {counted(len(record['runs']), 'run')}"
     print_table(title, list(columns), list(zip(*columns.values(), strict=True)))
     if not quiet:
         _print_evaluation(record["evaluation"], verbose)
@@ -85,7 +87,9 @@ def _print_evaluation(found: dict[str, Any], verbose: bool) -> None:
         relation = "orthogonal" if found["blocks"]["orthogonal"] else "not orthogonal"
         cosine = found["blocks"]["largest_cosine"]
         rows.append(["blocks", f"{relation} to the terms (largest cosine {cosine:.3f})"])
-    title = f"{found['model']} model, {len(found['terms'])} terms, over the {region['shape']} of {size} (coded)"
+    title = (
+        f"{found['model']} model, {counted(len(found['terms']), 'term')}, over the {region['shape']} of {size} (coded)"
+    )
     print_table(title, ["", "value"], rows)
     terms = [
         [term, f"{inflation:.3f}", *(_percent(found["power_percent"][term][key]) for key in SIGMAS)]

@@ -20,7 +20,7 @@ from doe.study.predicted import PredictedGain, predicted_gains, statement
 from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.record import finite
-from rbdyn.records.words import chance, error_alone, with_error
+from rbdyn.records.words import chance, counted, error_alone, with_error
 
 
 def front_record(study: Study, surfaces: list[Surface], front: ParetoFront) -> dict[str, Any]:
@@ -135,7 +135,8 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
             print(sentence)
         for limit in point["constraints"]:
             print(f"limit at the point asked for: {limit_sentence(limit)}")
-        print(f"{point['dominated_by']} of the {len(record['front'])} points of the front dominate it")
+        dominating, whole = point["dominated_by"], counted(len(record["front"]), "point")
+        print(f"{dominating} of the {whole} of the front {'dominates' if dominating == 1 else 'dominate'} it")
 
 
 def _print_convergence(record: dict[str, Any]) -> None:

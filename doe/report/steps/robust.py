@@ -8,7 +8,7 @@ from doe.study.robust import Robust
 from doe.study.robust_front import RobustFront
 from doe.unknown.decision import Better
 from rbdyn.cli.terminal import print_table
-from rbdyn.records.words import quantity, shown
+from rbdyn.records.words import counted, quantity, shown
 
 # Gain in the chance of choosing rightly below which no measurement is proposed, and the share that is nearly all cases.
 WORTH, NEARLY_ALL = 0.02, 0.9
@@ -79,7 +79,7 @@ def robust_sentences(robust: Robust, factors: Sequence[str]) -> list[str]:
     whole = robust.better.all
     sure = f"the gains {'hold over' if whole.value >= NEARLY_ALL else 'depend on'} what is not known"
     return [
-        f"Of 100 cases the pick is better {each}, and in all of these in {of_hundred(whole)}: {sure} ({len(robust.inputs)} inputs, "
+        f"Of 100 cases the pick is better {each}, and in all of these in {of_hundred(whole)}: {sure} ({counted(len(robust.inputs), 'input')}, "
         f"{robust.pairs} input sets, both designs at each).",
         _decision(robust),
         *_of_front(robust, factors),

@@ -10,7 +10,7 @@ from doe.study.compared import Compared
 from doe.study.held import Pull, near_limits, pulls
 from doe.study.whole import StudyResult
 from doe.study_file import Study
-from rbdyn.records.words import improvement, quantity, with_error
+from rbdyn.records.words import counted, improvement, quantity, with_error
 
 SURE = 1.5  # root mean square miss in standard deviations up to which emulators knew how little they know
 HELD = {
@@ -52,7 +52,7 @@ def spent_sentence(study: Study, adaptive: Adaptive) -> str:
     moved = dict.fromkeys((face.factor, int(face.side > 0)) for face, _ in found.moves)
     grown = [_place(study.factors[place[0]], float(adaptive.edges[place]), " to") for place in moved]
     return (
-        f"The search ended because {found.stopped}: {len(found.spent)} runs of design and search and {found.fresh} fresh ones at "
+        f"The search ended because {found.stopped}: {counted(len(found.spent), 'run')} of design and search and {found.fresh} fresh ones at "
         f"its points and the baseline, in {adaptive.seconds:.0f} s from the end of the design on, with at most {left:.1f} % of the "
         f"hypervolume of its front still to gain.{f' Its region grew: {_listed(grown)}.' if grown else ''}"
     )
@@ -102,7 +102,7 @@ def trust_sentence(study: Study, adaptive: Adaptive) -> str:
     sure = [name for name, times in zip(study.responses, missed, strict=True) if times > SURE]
     claim = f"to know {_listed(sure)} better than they did" if sure else "no more than they knew"
     return (
-        f"The emulators foretold the fresh runs at {len(front.points)} points of the front better than these came, on average "
+        f"The emulators foretold the fresh runs at {counted(len(front.points), 'point')} of the front better than these came, on average "
         f"{_listed(flattered)} of the range on the front (below 0: worse), and missed {_listed(told)} standard deviations in root "
         f"mean square: they claimed {claim}. What is reported of the front are these fresh runs alone."
     )
@@ -115,7 +115,7 @@ def beside_sentence(adaptive: Adaptive, compared: Compared) -> str:
     share = f" ({100.0 * compared.surfaces / foretold:.0f} % of the first)" if foretold > 0.0 else ""
     told = [
         f"front foretold {foretold:.3f}",
-        f"its {points} points by their fresh runs {with_error(fresh, 1.96 * error)}",
+        f"its {counted(points, 'point')} by their fresh runs {with_error(fresh, 1.96 * error)}",
         f"front on the surfaces, by the same emulators, {compared.surfaces:.3f}{share}",
     ]
     if compared.direct is not None and compared.direct_reached is not None:
@@ -125,7 +125,7 @@ def beside_sentence(adaptive: Adaptive, compared: Compared) -> str:
             off = 196.0 * math.hypot(error, fresh / reached * doubt) / reached
             part = f", of which the search has {with_error(100.0 * fresh / reached, off)} %"
         told.append(
-            f"direct front of {compared.direct['evaluations']} evaluations, its {len(compared.direct['front'])} points by their fresh "
+            f"direct front of {compared.direct['evaluations']} evaluations, its {counted(len(compared.direct['front']), 'point')} by their fresh "
             f"runs {with_error(reached, 1.96 * doubt)}{part}"
         )
     return f"Hypervolumes on one scale: {'; '.join(told)}."

@@ -10,7 +10,7 @@ from doe.study_file.cells import text_of
 from doe.unknown.sensitivity import CONFIDENCE
 from doe.unknown.spread import Share
 from rbdyn.cli.terminal import print_table
-from rbdyn.records.words import quantity, shown, with_error
+from rbdyn.records.words import are, counted, quantity, shown, with_error
 from rbdyn.result import write_json
 
 FORMAT = "doe.uncertainty/1"
@@ -95,7 +95,7 @@ def print_uncertainty(found: Uncertainty) -> None:
     if found.screened:
         most = max(found.screened, key=lambda key: found.screened[key])
         print(
-            f"{len(found.screened)} more inputs stay as they are: in a screening none made more than "
+            f"{counted(len(found.screened), 'further input')} {are(len(found.screened))} left at the scene's value: in a screening none made more than "
             f"{100.0 * found.screened[most]:.2g} % of an output's variance ({most})"
         )
     for note in found.notes:
@@ -119,9 +119,9 @@ def write(found: Uncertainty, folder: Path) -> list[str]:
     keys = [each.key for each in found.inputs]
     with (folder / "input_sets.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
-        table.writerow([*keys, *found.outputs])
+        table.writerow(map(text_of, [*keys, *found.outputs]))
         for values, outputs in zip(found.sets.inputs, found.sets.outputs.tolist(), strict=True):
-            table.writerow([*(text_of(values[key]) for key in keys), *outputs])
+            table.writerow(map(text_of, [*(values[key] for key in keys), *outputs]))
     draw(found, folder / "uncertainty.png")
     return ["uncertainty.json", "input_sets.csv", "uncertainty.png"]
 

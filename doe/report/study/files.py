@@ -13,6 +13,7 @@ from doe.report.study.answer import answer_text
 from doe.report.study.summary import summary
 from doe.study.design import RUNS_TABLE
 from doe.study.whole import StudyResult
+from rbdyn.records.cells import save_table
 from rbdyn.records.kept import digest_of, sign
 from rbdyn.result import write_json
 
@@ -25,8 +26,6 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
 
     summary.json is written last: where it is, all else is whole.
     """
-    import pandas as pd
-
     from doe.report.study import plots
 
     study, record = outcome.study, summary(outcome)
@@ -47,7 +46,7 @@ def write(outcome: StudyResult, folder: Path) -> dict[str, Any]:
     if outcome.reference_values is not None:
         tables["beside_reference.csv"] = _beside_table(outcome)
     for name, rows in tables.items():
-        pd.DataFrame(rows).to_csv(folder / name, index=False)
+        save_table(rows, folder / name)
     pictures = []
     for surface in outcome.surfaces:
         pictures.append(f"surface_{surface.name}.png")

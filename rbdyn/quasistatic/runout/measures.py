@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from rbdyn.arrays import Array
+from rbdyn.records.words import counted
 
 # Places round the face where the axial indicator may stand.
 PLACES = 72
@@ -52,7 +53,7 @@ def runout(path: Array, turns: int, face_radius: float) -> Runout:
     """
     steps, left = divmod(len(path), turns)
     if left or steps < 3:
-        what = f"{len(path)} steps in {turns} turns: not whole turns of at least three steps"
+        what = f"{counted(len(path), 'step')} in {counted(turns, 'turn')}: not whole turns of at least three steps"
         raise ValueError(f"{what}; mend the number of turns")
     orbit, axial = path[:, :2], path[:, 2]
     # Far from the origin, digits of the small motion would be lost.

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.arrays import Array, Whole
+from rbdyn.records.words import counted
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,9 @@ def ball_path(errors: RaceErrors, turning: Turning, steps: int, turns: int = 1, 
     ``start``: azimuth of the first ball at the first step [rad]. Raises ValueError unless steps and turns are positive.
     """
     if steps < 1 or turns < 1:
-        raise ValueError(f"{turns} turns of {steps} steps make no path; give at least one of each")
+        raise ValueError(
+            f"{counted(turns, 'turn')} of {counted(steps, 'step')} make no path; give at least one of each"
+        )
     z = errors.balls
     turn = 2.0 * math.pi * np.arange(steps * turns)[:, np.newaxis] / steps
     azimuth = start + turning.cage * turn + 2.0 * math.pi * np.arange(z) / z

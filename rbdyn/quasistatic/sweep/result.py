@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from rbdyn.arrays import Array, Whole
 from rbdyn.quasistatic.result import ball_columns, ball_records
+from rbdyn.records.cells import save_table
 from rbdyn.records.record import finite, plain
+from rbdyn.records.words import counted
 from rbdyn.result import read_record, versions, write_json
 
 if TYPE_CHECKING:
@@ -49,7 +51,7 @@ class SweepResult:
     def status(self) -> str:
         """ "ok", or how many points failed."""
         count = sum(status != OK for status in self.statuses)
-        return OK if count == 0 else f"{count} of {len(self.statuses)} points failed"
+        return OK if count == 0 else f"{count} of {counted(len(self.statuses), 'point')} failed"
 
     @property
     def failures(self) -> dict[str, list[int]]:
@@ -71,7 +73,7 @@ class SweepResult:
     def where(self, places: Sequence[int]) -> str:
         """How many points, and at which values of the keys the first of them lies."""
         first = ", ".join(f"{key} = {value:g}" for key, value in self.at(places[0]).items())
-        return f"{'1 point' if len(places) == 1 else f'{len(places)} points, the first'} at {first}"
+        return f"{counted(len(places), 'point')}{', the first' if len(places) > 1 else ''} at {first}"
 
     def grid(self, column: str) -> Array:
         """A column over the grid, one axis a key. Raises KeyError for an unknown one."""
@@ -154,7 +156,7 @@ class SweepResult:
     def save(self, path: Path | str) -> None:
         """Write the table as CSV where the name ends so, else everything as JSON."""
         if str(path).endswith(".csv"):
-            self.table().to_csv(path, index=False, float_format="%.9g")
+            save_table(self.table(), path, "%.9g")
         else:
             write_json(path, self.as_dict())
 

@@ -1,0 +1,51 @@
+"""The stages of a study: what each runs, as far as that is known before it begins. Loads nothing heavy for a plain study."""
+
+from typing import get_args
+
+from doe import clearance
+from doe.clearance import work_of
+from doe.running.agenda import ANSWER, ANSWER_S, Stage
+from doe.study.runs import ordered_runs
+from doe.study_file import Study
+from doe.study_file.front_section import Front
+
+# Wall time [s] that surfaces with their front take about.
+FRONT_S = 6.0
+DESIGN, FRONT = "design runs", "front"
+
+
+def study_stages(study: Study, direct: bool = False, adaptive: bool = False, robust: bool = False) -> list[Stage]:
+    """Stages of ``doe study`` with these options. Raises InputError where the study is impossible.
+
+    Further points, where a limit is not kept, are not among them: nobody knows whether they are needed.
+    """
+    works = {
+        key: work
+        for at in (study.every_level if adaptive else [study.levels])
+        for key, work in design_works(study.at(at))
+    }
+    stages = [Stage(DESIGN, (DESIGN,), len(works), sum(works.values())), Stage(FRONT, besides_s=FRONT_S)]
+    if direct:
+        (scene,) = clearance.direct_scenes(study, study.baseline[None], 0)
+        stages.append(Stage.of("direct front", study.file.direct.evaluations, work_of(scene)))
+    if adaptive:
+        usual = clearance.design_scenes(study, study.baseline[None])[0].numerics.replicates
+        (scene,) = clearance.adaptive_scenes(study, study.baseline[None], [usual], 0)
+        stages.append(Stage.of("adaptive front", max(study.file.adaptive.budget - len(works), 0), work_of(scene)))
+    # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
+    rules = len(get_args(Front.model_fields["pick"].annotation))
+    points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * (direct or adaptive)
+    one = work_of(clearance.confirmation_scene(study, study.baseline))
+    stages.append(Stage.of("confirmation", points, one, "confirmation", "beyond the region"))
+    if robust or clearance.declares_unknowns(study):
+        from doe.study.stages_unknown import robust_stage
+
+        stages.append(robust_stage(study))
+    return [*stages, Stage(ANSWER, besides_s=ANSWER_S)]
+
+
+def design_works(study: Study) -> list[tuple[str, float]]:
+    """Key and work of every design run. Raises InputError."""
+    ordered = ordered_runs(study)
+    points = clearance.points_of(ordered.scenes, ordered.labels, ordered.factors)
+    return [(point.key, work_of(scene)) for point, scene in zip(points, ordered.scenes, strict=True)]

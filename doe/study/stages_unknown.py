@@ -1,0 +1,68 @@
+"""The stages of what runs input sets: a robust judgement, ``doe uncertainty``, ``doe calibrate``."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from doe.clearance import work_of
+from doe.running.agenda import ANSWER, ANSWER_S, Stage
+from doe.study.calibration_question import Question, cases_of
+from doe.study.input_sets import Case, read_case
+from doe.study.robust import case_of_study
+from doe.study.robust_front import CONFIRMED, POINTS
+from doe.study.uncertainty import OUTPUTS
+from doe.study_file import Study
+from doe.unknown import screening
+from doe.unknown.calibration import TRIED, sets_a_wave
+from rbdyn.scene import Scene
+
+
+def robust_stage(study: Study) -> Stage:
+    """Input sets of the baseline and the pick, further replicates, a robust front and the simulations of its points."""
+    settings, case = study.file.robust, case_of_study(study)
+    runs = round(2 * settings.points * (1.0 + settings.settle)) + _screening_runs(case)
+    if settings.front != "none":
+        runs += settings.points + POINTS * CONFIRMED
+    return Stage.of("robust", runs, _work_of_a_set(case), "screening", "input sets", "runs of the robust front")
+
+
+def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None) -> list[Stage]:
+    """Stages of ``doe uncertainty`` with so many input sets, as the scene says where left out; they may be doubled later.
+
+    Raises InputError.
+    """
+    case = read_case(path, OUTPUTS, overrides)
+    one, screened = _work_of_a_set(case), _screening_runs(case)
+    return [
+        Stage.of("as the scene says", 1, work_of(case.scene)),
+        *([Stage.of("screening", screened, one)] if screened else []),
+        Stage.of("input sets", case.uncertain.points if points is None else points, one),
+        Stage(ANSWER, besides_s=ANSWER_S),
+    ]
+
+
+def calibration_stages(question: Question) -> list[Stage]:
+    """Stages of ``doe calibrate``; fewer waves may do. Raises InputError."""
+    case, sought = question.case, question.sought
+    conditions, one = len(cases_of(case, question.rig)), _work_of_a_set(case)
+    screened = _screening_runs(replace(case, every=sought))
+    sets = case.scene.calibrate.waves * sets_a_wave(min(len(sought), case.uncertain.inputs))
+    return [
+        *([Stage.of("screening", screened, one)] if screened else []),
+        Stage.of("as the scene says", conditions, one),
+        Stage.of("waves", sets * conditions, one, "wave"),
+        Stage.of("posterior", TRIED * conditions, one),
+        Stage(ANSWER, besides_s=ANSWER_S),
+    ]
+
+
+def _work_of_a_set(case: Case) -> float:
+    return work_of(Scene.from_dict(case.data, case.source, case.uncertain.set))
+
+
+def _screening_runs(case: Case) -> int:
+    """Runs of a screening, which only too many inputs need."""
+    sought = [each for each in case.every if each.key not in case.sample]
+    if len(case.every) <= case.uncertain.inputs or not sought:
+        return 0
+    return len(screening.two_levels(len(sought)))

@@ -1,0 +1,42 @@
+"""Numbers of things in words."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from conftest import EXAMPLE
+from instant_runs import instant_result
+
+from rbdyn.records.words import are, counted
+from rbdyn.scene import Scene
+
+
+@pytest.mark.parametrize(
+    ("number", "noun", "words"),
+    [
+        (0, "note", "0 notes"),
+        (1, "note", "1 note"),
+        (2, "note", "2 notes"),
+        (1.0, "turn", "1 turn"),
+        (1.5, "turn", "1.5 turns"),
+        (1, "class", "1 class"),
+        (3, "class", "3 classes"),
+        (12345678, "run", "12345678 runs"),
+        (1234567, "point", "1234567 points"),
+    ],
+)
+def test_unit_number_of_things_has_its_plural(number, noun, words):
+    """Unit: one thing stands in the singular, all other numbers of them in the plural, whole numbers in full."""
+    assert counted(number, noun) == words
+    assert are(number) == ("is" if number == 1 else "are")
+
+
+def test_unit_result_of_one_note_counts_one_note():
+    """Unit: what a notebook shows of a result."""
+    from dataclasses import replace
+
+    result = replace(instant_result(Scene.load(EXAMPLE)), notes=("only this",), replicates=1)
+    shown = repr(result) + result._repr_html_()
+    assert "1 note" in shown and "1 replicate," in shown
+    assert not re.search(r"\b1 (notes|replicates)", shown)
