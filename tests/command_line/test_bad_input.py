@@ -72,7 +72,7 @@ def table(folder: Path, text: str | bytes):
         ("a,b,y,run,y_error\n1,2,3,1,.1\n1,2,4,1,.1\n", "column y_error: rows of one run are its replicates, whose scatter"),
         ("a,b,y,run,replicates\n1,2,3,1,8\n1,2,4,1,8\n", "column replicates: rows of one run are its replicates"),
         ("a,b,y\n1,2,1e-60\n", "y in row 1 = 1e-60: is nearer to 0 than 1e-50; check the unit"),
-        ('a,b,y\n1,2,3\n""\n', "row 2 has 1 fields and the header 3"),
+        ('a,b,y\n1,2,3\n""\n', "row 2 has 1 field and the header 3"),
         ("a" * 200_000 + ",b,y\n1,2,3\n", "line 1: is not CSV (field larger than field limit"),
         ("a,b," + "y" * 5000 + "\n1,2,3\n", "column 'y' is missing"),
         ("a,b,y\n1,2," + "9" * 5000 + "\n", "is longer than 400 characters; write a shorter number"),

@@ -93,7 +93,7 @@ def _run(arguments: Sequence[str]) -> Any:
         ({"uncertain": UNCERTAIN + "[calibrate]\ndiscrepancy = 'some'\n"}, "calibrate.discrepancy"),
         ({"uncertain": UNCERTAIN.replace("set = [", "set = ['operation.inner_speed_rpm=1e4', ")}, "is a column of"),
         ({"header": HEADER.replace("operation.inner_speed_rpm", "numerics.seed")}, "column numerics.seed: every run has a seed"),
-        ({"header": HEADER.replace("operation.inner_speed_rpm", "calibrate.waves")}, "calibrate.waves: no run depends on it"),
+        ({"header": HEADER.replace("operation.inner_speed_rpm", "calibrate.seed")}, "calibrate.seed: no run depends on it"),
     ],
 )  # fmt: skip
 def test_bad_input_ends_in_a_sentence_before_anything_runs(

@@ -160,12 +160,12 @@ def killed_in(monkeypatch, seeds_from: int, after: int = 0) -> None:
     instantly(monkeypatch.setattr, seconds=0.002)
     instant, ended = module.simulate, []
 
-    def simulate(scene, *rest):
+    def simulate(scene, *rest, **more):
         if scene.numerics.seed >= seeds_from:
             if len(ended) >= after:
                 raise Killed
             ended.append(scene)
-        return instant(scene, *rest)
+        return instant(scene, *rest, **more)
 
     monkeypatch.setattr(module, "simulate", simulate)
 
@@ -239,13 +239,13 @@ def test_as_many_runs_are_under_way_as_are_running(tmp_path, monkeypatch, worker
     instantly(monkeypatch.setattr)
     instant, lock = module.simulate, threading.Lock()
 
-    def simulate(scene, *rest):
+    def simulate(scene, *rest, **more):
         with lock:
             active[0] += 1
         time.sleep(0.01)
         with lock:
             counts.append((study_status(study, tmp_path)["points"]["running"], active[0]))
-            result = instant(scene, *rest)
+            result = instant(scene, *rest, **more)
             active[0] -= 1
         return result
 

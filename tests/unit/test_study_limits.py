@@ -86,8 +86,8 @@ def biased(patch, excess):
 
     usual = module.simulate
 
-    def simulate(scene, *rest):
-        result = usual(scene, *rest)
+    def simulate(scene, *rest, **more):
+        result = usual(scene, *rest, **more)
         if scene.numerics.seed < clearance.CONFIRMATION_SEEDS:
             return result
         worse = instant_result(scene).as_dict()

@@ -109,10 +109,10 @@ def test_unexpected_fault_of_a_run_is_a_failure_too(tmp_path, monkeypatch):
 
     instant = module.simulate
 
-    def sometimes(scene, *rest):
+    def sometimes(scene, *rest, **more):
         if scene.numerics.seed == 4:
             raise ZeroDivisionError("division by zero")
-        return instant(scene, *rest)
+        return instant(scene, *rest, **more)
 
     monkeypatch.setattr(module, "simulate", sometimes)
     runs = run_design(study, tmp_path, 1, silent)
