@@ -29,6 +29,7 @@ from doe.study.status import content_digest, scene_status, status_of, study_stat
 from doe.study_file import Study
 from rbdyn.dynamics import simulate as module
 from rbdyn.faults import read_toml
+from rbdyn.records.kept import digest_of, sign
 
 
 def files(folder: Path) -> dict[str, tuple[int, float]]:
@@ -217,7 +218,9 @@ def test_study_is_finished_once_its_answer_is_written_and_no_longer_when_that_is
             "files": ["summary.json", "answer.txt"],
             "status": "ok",
             "limits_sentence": "",
+            "answer_sha256": digest_of(b"none"),
         }
+        sign(record)
         (folder / "summary.json").write_text(json.dumps(record), encoding="utf-8")
         return record
 
