@@ -21,8 +21,8 @@ def test_cost_of_a_run_to_a_target_is_that_of_pilots_and_all_runs(outer, monkeyp
         runs.extend(run for each in found for run in each)
         return found
 
-    def watched(*arguments):
-        results.append(simulate(*arguments))
+    def watched(*arguments, **options):
+        results.append(simulate(*arguments, **options))
         return results[-1]
 
     monkeypatch.setattr("rbdyn.dynamics.target.run_series", series)
