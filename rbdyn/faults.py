@@ -4,7 +4,7 @@ import difflib
 import math
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from datetime import date, time
 from os import PathLike
 from pathlib import Path
@@ -18,6 +18,8 @@ Model = TypeVar("Model", bound=BaseModel)
 
 # Faults told at once, and characters of a sentence and of a name within one: a screen of them can be read.
 MOST_FAULTS, LONGEST_SENTENCE, LONGEST_NAME = 50, 1000, 60
+# Likeness of two names, of 1, from which one may be meant for the other; what a missing key is ahead of others alike.
+LEAST_LIKENESS, MISSING_FIRST = 0.6, 0.1
 # Bytes of a file, and tables within tables: far more than any input of ours has, and still read in seconds.
 LARGEST_FILE, DEEPEST = 20_000_000, 20
 # What takes the parser of TOML long, and what it cannot convert.
@@ -273,6 +275,7 @@ def _without(data: Any, bad: set[tuple[int | str, ...]], place: tuple[str, ...] 
 def _sentences(model: type[BaseModel], errors: Sequence[Any], data: Any, source: str) -> list[str]:
     sentences: list[str] = []
     mends: dict[str, list[str]] = {}
+    missing = {_place(fault, data) for fault in errors if fault["type"] == "missing"}
     for fault in errors:
         kind, value, place = fault["type"], fault["input"], _place(fault, data)
         # Where a key may be of several kinds, each kind complains: keep what fits the value given.
@@ -282,7 +285,7 @@ def _sentences(model: type[BaseModel], errors: Sequence[Any], data: Any, source:
         key = _dotted(place)
         if kind == "extra_forbidden":
             # To look for the nearest key takes a millisecond; beyond what is told nobody reads it.
-            mend = _nearest(model, place) if len(sentences) < MOST_FAULTS else "remove it"
+            mend = _nearest(model, place, missing) if len(sentences) < MOST_FAULTS else "remove it"
             sentences.append(f"{source}: {key}: unknown key; {mend}")
         elif kind == "missing":
             sentences.append(f"{source}: {key}: missing; add it")
@@ -348,12 +351,21 @@ def _shown(value: Any) -> str:
     return text if len(text) <= LONGEST_NAME else text[: LONGEST_NAME - 3] + "..."
 
 
-def _nearest(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
-    known = _fields_at(model, location[:-1])
-    lower = {name.lower(): name for name in known}
-    close = difflib.get_close_matches(str(location[-1])[:LONGEST_NAME].lower(), lower, n=1)
-    if close:
-        return f"did you mean {lower[close[0]]}?"
+def _nearest(
+    model: type[BaseModel], location: tuple[int | str, ...], missing: Collection[tuple[int | str, ...]]
+) -> str:
+    """What the unknown key may have meant: the key most like it, one that is ``missing`` in its table before others."""
+    known, key = _fields_at(model, location[:-1]), str(location[-1])[:LONGEST_NAME].lower()
+    matcher = difflib.SequenceMatcher(b=key)
+    likeness: dict[str, float] = {}
+    for name in known:
+        matcher.set_seq1(name.lower())
+        wanted = (*location[:-1], name) in missing
+        part_of = wanted and set(key.split("_")) <= set(name.lower().split("_"))
+        if part_of or matcher.ratio() >= LEAST_LIKENESS:
+            likeness[name] = matcher.ratio() + MISSING_FIRST * wanted
+    if likeness:
+        return f"did you mean {max(likeness, key=lambda name: likeness[name])}?"
     return f"known keys here: {', '.join(sorted(known))}" if known else "remove it"
 
 

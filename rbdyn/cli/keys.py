@@ -20,6 +20,7 @@ from pydantic import BaseModel
 from rbdyn.cli.options import Json, flag
 from rbdyn.cli.terminal import guarded, print_json
 from rbdyn.faults import InputError
+from rbdyn.records.words import quantity
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 WIDTH = 100
@@ -27,14 +28,8 @@ WIDTH = 100
 BOUNDLESS = 1e12
 Word = Annotated[str | None, typer.Argument(metavar="WORD", help="Only keys that have it in name or description.")]
 AsSchema = Annotated[bool, flag("--schema", says="Print a JSON Schema, by which an editor completes TOML.")]
-# Unit by the end of a key; the longest that fits counts.
-UNITS = {
-    "_mm": "mm", "_um": "µm", "_mm_um": "mm, µm", "_m": "m", "_deg": "deg", "_mrad": "mrad",
-    "_rpm": "rpm", "_m_s": "m/s", "_m_s2": "m/s²", "_s": "s", "_turns": "shaft turns", "_per_turn": "a shaft turn",
-    "_N": "N", "_Nm": "N m", "_N_m": "N/m", "_N_s_m": "N s/m", "_s_m": "s/m", "_MPa": "MPa", "_GPa": "GPa", "_1_GPa": "1/GPa",
-    "_mPas": "mPa s", "_g": "g", "_kg": "kg", "_g_mm": "g mm", "_kg_mm2": "kg mm²", "_kg_m3": "kg/m³",
-    "_C": "°C", "_K": "K", "_per_K": "1/K", "_1e_6_K": "1e-6/K",
-}  # fmt: skip
+# What a whole number or a length in turns is counted by, by the end of a key.
+TURNS = {"_per_turn": "per shaft turn", "turns": "shaft turns"}
 
 
 class Key(NamedTuple):
@@ -195,8 +190,7 @@ def _unknown(key: str) -> str:
 
 
 def _unit(key: str) -> str:
-    fitting = [end for end in UNITS if key.endswith(end)]
-    return UNITS[max(fitting, key=len)] if fitting else ""
+    return next((unit for end, unit in TURNS.items() if key.endswith(end)), quantity(key)[1])
 
 
 def _values(node: Mapping[str, Any]) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.plots.ball import angles_on
 from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, Axes, Line2D, plain, plt, save
+from rbdyn.records.words import quantity
 
 if TYPE_CHECKING:
     from rbdyn.quasistatic.sweep.result import SweepResult
@@ -51,15 +52,9 @@ def pictures(result: "SweepResult", folder: Path) -> list[str]:
 def label(key: str) -> str:
     """A key as an axis says it: its last part, the unit in brackets."""
     name, _, item = key.rpartition(".")[2].partition("[")
-    unit = next((unit for unit in UNITS if name.endswith(unit)), "")
-    words = f"{name.removesuffix(unit).replace('_', ' ')} {item.rstrip(']')}".rstrip()
-    return f"{words} [{UNITS[unit]}]" if unit else words
-
-
-UNITS = {
-    "_rpm": "rpm", "_Nm": "N·m", "_N": "N", "_mm": "mm", "_um": "µm", "_mrad": "mrad", "_deg": "°", "_C": "°C", "_GPa": "GPa",
-    "_kg_m3": "kg/m³", "_1e_6_K": "10⁻⁶/K",
-}  # fmt: skip
+    words, unit = quantity(name)
+    words = f"{words} {item.rstrip(']')}".rstrip()
+    return f"{words} [{unit}]" if unit else words
 
 
 def angles(result: "SweepResult", path: Path) -> None:

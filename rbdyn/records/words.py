@@ -6,10 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple, TypeGuard
 
+# Unit by the end of a name; the longest that fits counts.
 UNITS = {
-    "mm": "mm", "um": "µm", "N": "N", "W": "W", "rpm": "rpm", "s": "s", "ms": "ms", "h": "h", "MPa": "MPa",
-    "GPa": "GPa", "percent": "%", "K": "K", "g": "g",
+    "mm": "mm", "um": "µm", "mm_um": "mm, µm", "m": "m", "deg": "deg", "mrad": "mrad", "rpm": "rpm", "m_s": "m/s", "m_s2": "m/s²",
+    "s": "s", "ms": "ms", "h": "h", "hz": "Hz", "N": "N", "Nm": "N m", "N_m": "N/m", "N_s_m": "N s/m", "s_m": "s/m", "W": "W",
+    "MPa": "MPa", "GPa": "GPa", "1_GPa": "1/GPa", "mPas": "mPa s", "C_mm2_s": "°C, mm²/s", "g": "g", "kg": "kg", "g_mm": "g mm",
+    "kg_mm2": "kg mm²", "kg_m3": "kg/m³", "C": "°C", "K": "K", "per_K": "1/K", "1e_6_K": "1e-6/K", "percent": "%",
 }  # fmt: skip
+MOST_PARTS = 3
+# Whole names that end like a unit and have none.
+UNITLESS = {"mu_m"}
 # A number below this many digits before the point is written without an exponent.
 PLAIN_BELOW = 1e7
 # What is smaller is left over from rounding.
@@ -22,8 +28,10 @@ MARK = re.compile(r"\{\{([A-Z]+)\}\}")
 def quantity(name: str) -> tuple[str, str]:
     """'impact_force_N' as ('impact force', 'N'); the unit is empty where the name has none."""
     words = name.split("_")
-    if len(words) > 1 and words[-1] in UNITS:
-        return " ".join(words[:-1]), UNITS[words[-1]]
+    plain = name.rpartition(".")[2] in UNITLESS
+    for parts in range(min(MOST_PARTS, len(words) - 1), 0, -1):
+        if not plain and (end := "_".join(words[-parts:])) in UNITS:
+            return " ".join(words[:-parts]), UNITS[end]
     return " ".join(words), ""
 
 

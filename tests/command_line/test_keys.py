@@ -10,10 +10,13 @@ from typer.testing import CliRunner
 
 import rbdyn
 from doe.cli import app as doe_app
+from doe.commands.keys import kinds as study_kinds
 from doe.dimension_chain.reading import Chains
 from doe.study_file import StudyFile
 from rbdyn.cli.app import app as rbdyn_app
 from rbdyn.cli.keys import _models, descriptions, keys, schema
+from rbdyn.plots.ball_sweep import label as axis_label
+from rbdyn.records.words import label, quantity
 from rbdyn.scene import Scene
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
 
@@ -107,6 +110,58 @@ def test_keys_as_json_and_a_word_that_no_key_has():
     assert (speed["unit"], speed["required"], speed["default"]) == ("rpm", True, None)
     assert json.loads(printed(rbdyn_app, "wheel", "--json", code=2))["status"] == "refused"
     assert printed(doe_app, "wheel", code=2) == ""
+
+
+# Each key that has a unit, by the last part of its name; every other has none.
+UNITS = {
+    "mm": """axial_offset ball_diameter bore crown_radius effective_length fit guide_clearance half_width housing_diameter
+        interference_change land_diameter land_width lower mean narrowest nominal outside_diameter outside pitch_diameter
+        pocket_clearance pocket_contact_length pocket_radial_clearance raceway radial_clearance roller_diameter roller_length
+        shaft_bore upper widest x y z""",
+    "um": """amplitude ball_diameter_errors ball_diameter_spread clearance_change height imbalance inner_interference
+        land_film_floor least_clearance outer_interference pocket_film_floor preload race_damping_engagement race_roughness
+        roller_diameter_errors roller_diameter_spread roller_roughness""",
+    "N": "axial_load dynamic_capacity load lundberg_load preload radial_load rotating_load static_capacity",
+    "C": "housing_temperature inner_ring_temperature outer_ring_temperature reference_temperature roller_temperature shaft_temperature temperature",
+    "K": "lower temperature_rise upper",
+    "deg": "contact_angle gravity_direction phase tilt_direction",
+    "mrad": "tilt tilt_x tilt_y",
+    "rpm": "inner_speed outer_speed speed",
+    "m_s": "blend_speed land_restitution_speed pocket_restitution_speed u_m",
+    "s_m": "land_damping_alpha pocket_damping_alpha race_damping_alpha",
+    "GPa": "bore_modulus elastic_modulus shaft_modulus",
+    "hz": "whirl_cutoff whirl_notches",
+    "N_m": "pocket_bar_stiffness stiffness",
+    "kg": "inner_ring_mass outer_ring_mass",
+    "turns": "discard impact_window",
+    "per_turn": "samples step_budget",
+    "s": "time", "Nm": "moment", "N_s_m": "damping", "m_s2": "gravity", "g": "mass", "g_mm": "unbalance", "kg_mm2": "inertia",
+    "kg_m3": "density", "MPa": "eyring_stress", "1_GPa": "pressure_coefficient", "mPas": "viscosity", "C_mm2_s": "viscosities",
+    "mm_um": "profile_table", "per_K": "expansion", "1e_6_K": "thermal_expansion",
+}  # fmt: skip
+SHOWN = {
+    "um": "µm", "C": "°C", "m_s": "m/s", "s_m": "s/m", "hz": "Hz", "N_m": "N/m", "turns": "shaft turns", "per_turn": "per shaft turn",
+    "Nm": "N m", "N_s_m": "N s/m", "m_s2": "m/s²", "g_mm": "g mm", "kg_mm2": "kg mm²", "kg_m3": "kg/m³", "1_GPa": "1/GPa", "mPas": "mPa s",
+    "C_mm2_s": "°C, mm²/s", "mm_um": "mm, µm", "per_K": "1/K", "1e_6_K": "1e-6/K",
+}  # fmt: skip
+
+
+def test_every_key_has_the_unit_of_its_name():
+    """Command line: units of all keys of scenes, studies and chains are those of an explicit table, and others have none."""
+    units = {f"{name}_{end}": SHOWN.get(end, end) for end, names in UNITS.items() for name in names.split()}
+    units["turns"] = "shaft turns"
+    listed = {key.key.rpartition(".")[2]: key.unit for key in [*keys(SCENES), *keys(study_kinds())]}
+    assert {name: unit for name, unit in listed.items() if unit} == units
+    assert not listed["mu_m"] and not listed["oil_fraction"]
+
+
+def test_labels_and_keys_agree_on_units():
+    """Command line: what a report, a notebook or a picture writes of a key has the unit that its description has."""
+    for key in (*keys(SCENES), *keys(study_kinds())):
+        if "turn" not in key.unit:
+            words, unit = quantity(key.key)
+            assert unit == key.unit and (not unit or label(key.key) == f"{words} [{unit}]")
+            assert axis_label(key.key).endswith(f"[{unit}]" if unit else words.rpartition(".")[2])
 
 
 def test_a_key_that_kinds_share_is_listed_once():

@@ -87,6 +87,32 @@ def test_unit_unknown_keys_are_suggested(key, value, suggestion):
     assert "unknown key" in fault and suggestion in fault
 
 
+@pytest.mark.parametrize(
+    ("table", "missing", "key", "suggestion"),
+    [
+        ("operation", "inner_speed_rpm", "speed_rpm", "inner_speed_rpm"),
+        ("operation", "inner_speed_rpm", "speed", "inner_speed_rpm"),
+        ("operation", "inner_speed_rpm", "outer_sped_rpm", "outer_speed_rpm"),
+        ("operation", "radial_load_N", "load", "radial_load_N"),
+        ("operation", "radial_load_N", "load_N", "radial_load_N"),
+        ("bearing", "radial_clearance_mm", "clearance_mm", "radial_clearance_mm"),
+        ("bearing", "roller_length_mm", "length_mm", "roller_length_mm"),
+        ("bearing", "effective_length_mm", "length_mm", "effective_length_mm"),
+        ("cage", "guide_clearance_mm", "clearance_mm", "guide_clearance_mm"),
+        ("cage", "pocket_clearance_mm", "clearance_mm", "pocket_clearance_mm"),
+        ("cage", "mass_g", "mass", "mass_g"),
+    ],
+)
+def test_unit_a_missing_key_is_suggested_before_others(table, missing, key, suggestion):
+    """Unit: an unknown key in a table that lacks a required one means that, unless another is clearly more alike."""
+    tables = copy.deepcopy(TABLE)
+    tables[table][key] = tables[table].pop(missing, 0.1)
+    with pytest.raises(InputError) as caught:
+        Scene.from_dict(tables, "s.toml")
+    assert f"s.toml: {table}.{key}: unknown key; did you mean {suggestion}?" in caught.value.faults
+    assert f"s.toml: {table}.{missing}: missing; add it" in caught.value.faults
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("key", ["cage.mass_g", "operation.inner_speed_rpm", "bearing.radial_clearance_mm"])
 def test_unit_numbers_must_be_finite(key, value):
