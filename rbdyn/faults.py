@@ -65,6 +65,10 @@ def check_all(checks: Iterable[Callable[[], object]]) -> None:
     refuse(dict.fromkeys(faults))
 
 
+class MethodError(ValueError):
+    """A case that a method cannot take; the message is a sentence for a user. Errors of libraries and slips of code are none."""
+
+
 class RunError(Exception):
     """A run that could not go on; the message says which, where and why. A command exits with 1."""
 

@@ -29,6 +29,7 @@ from doe.pareto.goals import Goals
 from doe.pareto.nsga2 import InfeasibleError
 from doe.pareto.picks import NAMES, Rule, pick_all
 from doe.threads import one_thread
+from rbdyn.faults import MethodError
 from rbdyn.records.words import counted
 
 FRESH = 0.2  # of the budget: fresh runs at the finalists
@@ -81,7 +82,7 @@ def adaptive_front(
     ``centre`` and ``step`` (k,) turn coded units into those of the factors, in which ``evaluate`` is asked and the
     ``baseline`` is given. ``design`` are the first runs. The region may grow as far as the ``border``, not at all without one.
 
-    Raises ValueError where the budget has no room for the design, a batch and the fresh runs, or too few runs go well;
+    Raises MethodError where the budget has no room for the design, a batch and the fresh runs, or too few runs go well;
     InfeasibleError where no run comes near to keeping the limits.
     """
     check_budget(plan, len(design.points))
@@ -94,11 +95,11 @@ def adaptive_front(
 
 
 def check_budget(plan: Plan, design: int) -> None:
-    """Raises ValueError where the budget has no room for the runs of the design, a batch and the fresh runs."""
+    """Raises MethodError where the budget has no room for the runs of the design, a batch and the fresh runs."""
     searched = design + plan.batch
     if searched > plan.budget - plan.fresh:
         least = next(budget for budget in range(searched, 4 * searched) if budget - round(FRESH * budget) >= searched)
-        raise ValueError(
+        raise MethodError(
             f"budget = {plan.budget}: {design} runs of the design, a batch of {plan.batch} and {plan.fresh} fresh runs at the end "
             f"do not fit; give at least {least}"
         )
@@ -170,7 +171,7 @@ class _Search:
     def _fit(self, runs: Runs) -> Emulators:
         good = int(runs.good.sum())
         if good < 2 + len(self.centre):
-            raise ValueError(f"only {counted(good, 'run')} went well; emulators need {2 + len(self.centre)}")
+            raise MethodError(f"only {counted(good, 'run')} went well; emulators need {2 + len(self.centre)}")
         region = self.region
         self.emulators = fit_emulators(self.goals, runs, self.emulators, region.levels, region.inactive, self.shares)
         return self.emulators
@@ -236,7 +237,7 @@ class _Search:
         random = np.random.default_rng([self.plan.seed, len(self.history), 1])
         finals = self._finals((baseline - self.centre) / self.step, random)
         if not finals.runs.good.any():
-            raise ValueError("every run at the finalists failed; see the failures of the runs")
+            raise MethodError("every run at the finalists failed; see the failures of the runs")
         started = time.perf_counter()
         emulators = self._tested(self._fit(self.runs.plus(finals.runs)))
         points = candidates(emulators, self.region, random, self.runs.points[~self.runs.good], ROUNDS)

@@ -8,6 +8,7 @@ import numpy as np
 
 from doe.arrays import Array, Rows
 from doe.designs.design import Design, assembled
+from rbdyn.faults import MethodError
 
 # Generators of the smallest regular fractions of resolution V or more: each added factor is the product of
 # the named ones. Box and Hunter, The 2^(k-p) fractional factorial designs II, Technometrics 3 (1961).
@@ -34,16 +35,16 @@ def central_composite(
         `centre_shares`.
     cube_blocks : blocks of the cube, 1, 2 or 4 (with ``blocks``).
 
-    Raises ValueError when a number is out of its range, ``alpha`` or ``cube`` is an unknown word, no fraction is
+    Raises MethodError when a number is out of its range, ``alpha`` or ``cube`` is an unknown word, no fraction is
     tabulated, or the blocks are impossible.
 
     Source: Box and Hunter, Multi-factor experimental designs for exploring response surfaces,
     Ann. Math. Stat. 28 (1957) 195-241.
     """
     if factors < 2:
-        raise ValueError(f"factors = {factors}: a central composite design needs at least 2 factors")
+        raise MethodError(f"factors = {factors}: a central composite design needs at least 2 factors")
     if centre_replicates < 0:
-        raise ValueError(f"centre_replicates = {centre_replicates}: must be at least 0")
+        raise MethodError(f"centre_replicates = {centre_replicates}: must be at least 0")
     corners = cube_points(factors, cube)
     number = cube_blocks if blocks else 1
     shares = centre_shares(factors, len(corners), alpha, centre_replicates, number)
@@ -75,7 +76,7 @@ def axial_distance(
     - "orthogonal_columns": alpha^2 = (sqrt(F N) - F)/2; square terms are estimated independently of each other
     - "face_centred": 1; "inscribed": 1, with the cube shrunk
 
-    Raises ValueError for an unknown word or a number that is not positive and finite.
+    Raises MethodError for an unknown word or a number that is not positive and finite.
 
     Source: Box and Hunter (1957), rotatability and blocks; Khuri and Cornell, Response Surfaces (1987), columns.
     """
@@ -92,10 +93,10 @@ def axial_distance(
     if isinstance(alpha, str):
         if alpha not in distances:
             words = ", ".join(f'"{word}"' for word in distances)
-            raise ValueError(f"alpha = {alpha!r}: write {words} or a positive number")
+            raise MethodError(f"alpha = {alpha!r}: write {words} or a positive number")
         return distances[alpha]
     if not (math.isfinite(alpha) and alpha > 0):
-        raise ValueError(f"alpha = {alpha}: must be a positive number")
+        raise MethodError(f"alpha = {alpha}: must be a positive number")
     return float(alpha)
 
 
@@ -108,7 +109,7 @@ def centre_shares(
     for alpha = "orthogonal_blocks"), so that blocks disturb the surface least; every block of the cube gets
     the same number.
 
-    Raises ValueError for an unknown ``alpha``.
+    Raises MethodError for an unknown ``alpha``.
     """
     asked = "rotatable" if alpha in ("orthogonal_blocks", "inscribed") else alpha
     wanted = axial_distance(factors, asked, cube_runs=cube_runs, centres=(0, centre_replicates))
@@ -126,15 +127,15 @@ def cube_points(factors: int, cube: str = "full") -> Array:
     """Corners (n, k) in standard order, the first factor fastest.
 
     ``cube``: "full" for 2^k corners, "resolution_v" for the smallest tabulated fraction in which no main
-    effect or two-factor interaction is confused with another. Raises ValueError where none is tabulated or
+    effect or two-factor interaction is confused with another. Raises MethodError where none is tabulated or
     the word is unknown.
     """
     if cube not in ("full", "resolution_v"):
-        raise ValueError(f'cube = {cube!r}: choose "full" or "resolution_v"')
+        raise MethodError(f'cube = {cube!r}: choose "full" or "resolution_v"')
     generators = RESOLUTION_V.get(factors, ()) if cube == "resolution_v" else ()
     if cube == "resolution_v" and not generators:
         tabulated = f"tabulated for {factors} factors, only for {min(RESOLUTION_V)} to {max(RESOLUTION_V)}"
-        raise ValueError(f"cube = 'resolution_v': no fraction of resolution V is {tabulated}; use cube = \"full\"")
+        raise MethodError(f"cube = 'resolution_v': no fraction of resolution V is {tabulated}; use cube = \"full\"")
     basic = factors - len(generators)
     corners = np.array([corner[::-1] for corner in product((-1.0, 1.0), repeat=basic)])
     added = [corners[:, ["ABCDEFGH".index(letter) for letter in word]].prod(axis=1) for word in generators]
@@ -145,7 +146,7 @@ def corner_blocks(corners: Array, blocks: int) -> Rows:
     """Block (n,) of each corner, such that no block effect is confused with a term up to second order.
 
     Blocks are told by the signs of interactions of three or more factors, the longest that serve; their
-    products must not be short either. Raises ValueError where no such division exists.
+    products must not be short either. Raises MethodError where no such division exists.
     """
     if blocks == 1:
         return np.zeros(len(corners), dtype=np.intp)
@@ -162,7 +163,7 @@ def corner_blocks(corners: Array, blocks: int) -> Rows:
             if not np.abs(short.T @ between).any():
                 return (2 * (one > 0) + (two > 0)).astype(np.intp)
     what = f"cube_blocks = {blocks}: {len(corners)} corners of {corners.shape[1]} factors cannot be divided so without"
-    raise ValueError(f"{what} confusing a block with a second-order term; use fewer blocks or a larger cube")
+    raise MethodError(f"{what} confusing a block with a second-order term; use fewer blocks or a larger cube")
 
 
 def _short_products(corners: Array) -> Array:

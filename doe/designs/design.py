@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from doe.arrays import Array, Rows, Whole
+from rbdyn.faults import MethodError
 
 Region = Literal["ball", "box"]
 SAME_POINT = 1e-9  # coded units within which two runs are replicates
@@ -89,9 +90,9 @@ def to_actual(coded: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
 def to_coded(actual: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
     """Coded values of actual points (..., k); the inverse of `to_actual`.
 
-    Raises ValueError when a step is zero.
+    Raises MethodError when a step is zero.
     """
     step = np.asarray(step, float)
     if np.any(step == 0):
-        raise ValueError(f"step = {step.tolist()}: every step must differ from zero")
+        raise MethodError(f"step = {step.tolist()}: every step must differ from zero")
     return (np.asarray(actual, float) - np.asarray(centre, float)) / step

@@ -15,6 +15,7 @@ from scipy import special, stats
 from doe.arrays import Array, Rows
 from doe.designs.design import Region, replicate_groups
 from doe.designs.model import model_matrix, term_powers
+from rbdyn.faults import MethodError
 
 SIGNIFICANCE = 0.05  # of the tests whose power is given
 RADII = 11  # of the variance dispersion graph
@@ -49,7 +50,7 @@ def evaluate(
     ``condition_number`` of the model matrix with columns of unit length; ``degrees_of_freedom``; ``blocks``:
     None for one block, else ``sizes``, whether ``orthogonal`` and the ``largest_cosine`` between block and terms.
 
-    Raises ValueError naming the terms that the runs cannot tell apart.
+    Raises MethodError naming the terms that the runs cannot tell apart.
 
     Source: Atkinson, Donev and Tobias, Optimum Experimental Designs (2007) (efficiencies);
     Giovannitti-Jensen and Myers, Technometrics 31 (1989) (by radius); Zahran, Anderson-Cook and Myers,
@@ -60,7 +61,7 @@ def evaluate(
     groups = np.zeros(runs, dtype=np.intp) if block is None else np.unique(block, return_inverse=True)[1]
     lost = lost_terms(points, terms, groups)
     if lost:
-        raise ValueError(f"the {runs} runs cannot tell {', '.join(lost)} from the other terms")
+        raise MethodError(f"the {runs} runs cannot tell {', '.join(lost)} from the other terms")
     region, reach = _where(points, region, reach)
     # A row a run in memory too: sums over columns then have the same bits whatever made the columns.
     matrix, contrasts = np.ascontiguousarray(model_matrix(points, terms)), block_contrasts(groups)

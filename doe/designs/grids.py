@@ -6,6 +6,7 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.designs.design import Design, assembled
+from rbdyn.faults import MethodError
 from rbdyn.records.words import counted
 
 MOST_RUNS = 10_000
@@ -16,11 +17,11 @@ MOST_EXCHANGED = 200
 def full_factorial(factors: int, *, levels: int = 3, centre_replicates: int = 0) -> Design:
     """All combinations of ``levels`` equally spaced values of each factor, the first factor fastest.
 
-    ``centre_replicates`` points are added at the centre. Raises ValueError beyond 10 000 combinations.
+    ``centre_replicates`` points are added at the centre. Raises MethodError beyond 10 000 combinations.
     """
     if (runs := levels**factors) > MOST_RUNS:
         mend = 'give fewer levels or use kind = "sobol"'
-        raise ValueError(
+        raise MethodError(
             f"levels = {levels}: {counted(factors, 'factor')} give {runs} runs, more than {MOST_RUNS}; {mend}"
         )
     values = np.linspace(-1.0, 1.0, levels)

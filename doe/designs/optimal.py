@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from doe.arrays import Array
 from doe.designs.design import Design, assembled
 from doe.designs.model import Terms, model_matrix, model_terms
+from rbdyn.faults import MethodError
 from rbdyn.records.words import counted
 
 Criterion = Literal["d", "i"]
@@ -52,7 +53,7 @@ def optimal(
     block : of each of these, from 0 (m,); where there are several blocks, the new runs make one more.
     centre_replicates : centre points besides.
 
-    The same seed gives the same design. Raises ValueError when the runs are too few for the terms, or too many.
+    The same seed gives the same design. Raises MethodError when the runs are too few for the terms, or too many.
     """
     from doe.designs.evaluation import block_contrasts, moment_matrix
 
@@ -65,10 +66,10 @@ def optimal(
     if len(fixed) + runs < needed:
         beside = f"beside {len(fixed)} given or at the centre " if len(fixed) else ""
         mend = f"give at least {needed + 1 - len(fixed)}"
-        raise ValueError(f"runs = {runs}: {beside}too few for a model of {counted(len(terms), 'term')}; {mend}")
+        raise MethodError(f"runs = {runs}: {beside}too few for a model of {counted(len(terms), 'term')}; {mend}")
     if runs > MOST_RUNS:
         mend = "give fewer, or kind = 'sobol'"
-        raise ValueError(f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; {mend}")
+        raise MethodError(f"runs = {runs}: exchanges among more than {MOST_RUNS} take long; {mend}")
     reach = max(1.0, float(np.abs(old).max(initial=0.0)))
     blocks = np.concatenate([groups, np.full(centre_replicates + runs, new)])
     contrasts = block_contrasts(blocks)

@@ -7,6 +7,7 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.designs.design import Design, assembled
+from rbdyn.faults import MethodError
 
 # Factors that vary together, in the order of the published tables, and how the design divides into blocks:
 # by parts of that list (4 and 5 factors) or by the sign of the product of the three (6 and 7 factors).
@@ -27,7 +28,7 @@ def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = Fals
     ``blocks``: the published division into orthogonal blocks (3 for 4 factors, 2 for 5 to 7), each with an
     equal share of the centre points.
 
-    Raises ValueError when the number of factors is out of range, blocks do not exist for it, or the centre points
+    Raises MethodError when the number of factors is out of range, blocks do not exist for it, or the centre points
     cannot be shared equally.
 
     Source: Box and Behnken, Some new three level designs for the study of quantitative variables,
@@ -35,13 +36,13 @@ def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = Fals
     """
     if factors not in TOGETHER:
         mend = 'use kind = "central_composite"'
-        raise ValueError(f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; {mend}")
+        raise MethodError(f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; {mend}")
     number = BLOCKS.get(factors, 1) if blocks else 1
     if blocks and number == 1:
-        raise ValueError(f"blocks = true: a Box-Behnken design in {factors} factors has no orthogonal blocks")
+        raise MethodError(f"blocks = true: a Box-Behnken design in {factors} factors has no orthogonal blocks")
     if centre_replicates % number:
         need = f"{number} blocks need equal shares of the centre points; give a multiple of {number}"
-        raise ValueError(f"centre_replicates = {centre_replicates}: {need}")
+        raise MethodError(f"centre_replicates = {centre_replicates}: {need}")
     edges, of_run = [], []
     for place, letters in enumerate(TOGETHER[factors]):
         columns = ["ABCDEFG".index(letter) for letter in letters]
@@ -63,7 +64,7 @@ def definitive_screening(factors: int, *, centre_replicates: int = 1) -> Design:
     design. Main effects are orthogonal to each other and to all squares and products; squares can be told from each
     other and from products, products not all from each other: the model for it is "pure_quadratic".
 
-    Raises ValueError when the number of factors is out of range.
+    Raises MethodError when the number of factors is out of range.
 
     Source: Jones and Nachtsheim, A class of three-level designs for definitive screening in the presence of
     second-order effects, J. Qual. Technol. 43 (2011) 1-15; Xiao, Lin and Bai, Constructing definitive screening designs
@@ -71,7 +72,7 @@ def definitive_screening(factors: int, *, centre_replicates: int = 1) -> Design:
     """
     if not 2 <= factors <= MOST_SCREENED:
         mend = 'use kind = "d_optimal"'
-        raise ValueError(
+        raise MethodError(
             f"kind = 'definitive_screening': is for 2 to {MOST_SCREENED} factors, not for {factors}; {mend}"
         )
     half = conference_matrix(factors + factors % 2)[:, :factors]

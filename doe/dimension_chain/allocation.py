@@ -25,6 +25,7 @@ from doe.dimension_chain.links import DIGITS, SLACK, Chain, Cost, Interval, Link
 from doe.dimension_chain.monte_carlo import Assemblies, draw
 from doe.dimension_chain.parts import allocated_part, given_part
 from doe.dimension_chain.yields import closing_moments, exact_shares, standard_error
+from rbdyn.faults import MethodError
 
 SAMPLES = 100_000  # assemblies that judge a yield where no convolution can
 HALVINGS = 26
@@ -68,7 +69,7 @@ class Allocation:
     def parts(self, tolerances: Tolerances, grades: Mapping[str, str] | None = None) -> list[Part]:
         """All parts, those that are not fixed with the given tolerances, mm, and one nominal moved.
 
-        Raises ValueError where no nominal of that part brings the closing link to its limits.
+        Raises MethodError where no nominal of that part brings the closing link to its limits.
         """
         by_name = {link.name: link for link in self.chain.link}
         parts = [
@@ -95,7 +96,7 @@ class Allocation:
             gone += abs(step)
             if not gone <= WANDER * abs(self.adjusted.nominal):
                 break
-        raise ValueError("no nominal of it brings the closing link to its limits; name another part")
+        raise MethodError("no nominal of it brings the closing link to its limits; name another part")
 
     def kept(self, parts: list[Part]) -> bool:
         """Whether parts keep the limits in the mode of the chain."""
@@ -130,7 +131,7 @@ class Allocation:
     def linear_rule(self) -> dict[str, float]:
         """Tolerances, mm, that fill the limits of the linear chain; for a yield by root sum square.
 
-        Raises ValueError where no tolerances can: see the sentences.
+        Raises MethodError where no tolerances can: see the sentences.
         """
         rule, free = self.chain.allocate, self.chain.free
         mode: Mode = "worst_case" if rule.mode == "worst_case" else "rss"
@@ -143,7 +144,7 @@ class Allocation:
         rest = rest if rest > 0 else width
         idle = [link.name for link in free if slopes[link.name] == 0]
         if idle and (rule.method == "cost" or len(idle) == len(free)):
-            raise ValueError(f'"{idle[0]}" does not move the closing link; fix it')
+            raise MethodError(f'"{idle[0]}" does not move the closing link; fix it')
         if rule.method == "cost":
             curves = [link.cost for link in free if link.cost is not None]
             widths = cheapest(curves, [slopes[link.name] for link in free], rest, mode)
@@ -159,7 +160,7 @@ class Allocation:
         def kept(scale: float) -> bool:
             try:
                 return self.kept(self.parts({name: scale * t for name, t in wish.items()}))
-            except ValueError:
+            except MethodError:
                 # Too wide for the functions to have a value, or for the nominal to follow.
                 return False
 
@@ -217,7 +218,7 @@ class Allocation:
 def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode: Mode) -> list[float]:
     """Tolerances, mm, of least cost whose worst case or root sum square is ``width``; slopes must not be zero.
 
-    Where even the widest fill less than the width, these. Raises ValueError, with the width that is needed, where
+    Where even the widest fill less than the width, these. Raises MethodError, with the width that is needed, where
     even the narrowest fill more.
     """
 
@@ -238,7 +239,7 @@ def cheapest(curves: Sequence[Cost], slopes: Sequence[float], width: float, mode
     if excess(SPAN) > 0:
         needed = width * (1 + excess(SPAN))
         what = f"the narrowest tolerances of the cost curves fill {needed:.4f} mm of {width:.4f} mm"
-        raise ValueError(f"{what}; widen the limits or let a process go narrower")
+        raise MethodError(f"{what}; widen the limits or let a process go narrower")
     if excess(-SPAN / 4) < 0:
         return tolerances(-SPAN / 4)
     return tolerances(brentq(excess, -SPAN / 4, SPAN, xtol=1e-13, rtol=1e-14))

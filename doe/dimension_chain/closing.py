@@ -20,6 +20,7 @@ import numpy as np
 from doe.arrays import Array
 from doe.dimension_chain.expressions import evaluate, names_in, shown
 from doe.dimension_chain.links import DIGITS, Interval, Link, Mode, Part, PressFit
+from rbdyn.faults import MethodError
 from rbdyn.mounting.rings import Ring, interface_pressure
 from rbdyn.properties.materials import Material
 
@@ -32,7 +33,7 @@ CORNERS = 12  # functions of more parts are looked at in as many random corners 
 BETWEEN = 512  # points between the corners
 
 
-class NoValueError(ValueError):
+class NoValueError(MethodError):
     """Sizes at which a function has no finite value; the message names the link, the sizes and the mend."""
 
 
@@ -105,7 +106,7 @@ class ClosingFunction:
 def closing_function(links: Sequence[Link]) -> ClosingFunction:
     """The closing link of checked links.
 
-    Raises ValueError for a press fit whose diameters make no rings.
+    Raises MethodError for a press fit whose diameters make no rings.
     """
     by_name = {link.name: link for link in links}
     functions = [Function(link, _function(link, by_name)) for link in links if not link.is_dimension]
@@ -124,7 +125,7 @@ def is_part(link: Link) -> bool:
 
 
 def used_links(link: Link) -> list[str]:
-    """Links that a link is a function of. Raises ValueError for an expression that cannot be read."""
+    """Links that a link is a function of. Raises MethodError for an expression that cannot be read."""
     if link.press_fit:
         return [link.press_fit.shaft, link.press_fit.bore]
     if link.thermal_growth:
@@ -161,7 +162,7 @@ def press_fit_factor(fit: PressFit, bore_nominal: float) -> float:
     """Change of the raceway's diameter per interference of a tight fit; positive on the outer part, else negative.
 
     A solid shaft in a ring of its own material widens the ring's outside by fit/outside. ``bore_nominal`` [mm] is the
-    diameter of the fit unless it has its own. Raises ValueError unless shaft_bore < fit < outside and the raceway lies
+    diameter of the fit unless it has its own. Raises MethodError unless shaft_bore < fit < outside and the raceway lies
     on one of the two parts.
     """
     fit_mm, raceway_mm = fit.fit_mm or bore_nominal, fit.raceway_mm
@@ -170,9 +171,9 @@ def press_fit_factor(fit: PressFit, bore_nominal: float) -> float:
     shaft_bore_mm = (0.0 if outer else raceway_mm) if fit.shaft_bore_mm is None else fit.shaft_bore_mm
     outside_mm = raceway_mm if fit.outside_mm is None else fit.outside_mm
     if fit.outside_mm is None and not outer:
-        raise ValueError("outside_mm is missing: give the outside diameter of what holds the ring")
+        raise MethodError("outside_mm is missing: give the outside diameter of what holds the ring")
     if not shaft_bore_mm <= raceway_mm <= outside_mm or raceway_mm == fit_mm:
-        raise ValueError(f"a raceway of {raceway_mm:g} mm lies on neither part; mend its diameter")
+        raise MethodError(f"a raceway of {raceway_mm:g} mm lies on neither part; mend its diameter")
     # Free of loads but the pressure, a part needs neither mass nor heat.
     shaft_steel = Material(1e9 * fit.shaft_modulus_GPa, fit.shaft_poisson, 0.0)
     bore_steel = Material(1e9 * fit.bore_modulus_GPa, fit.bore_poisson, 0.0)

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from rbdyn.faults import MethodError
+
 Operator = Callable[[Any, Any], Any]
 
 BINARY: dict[type[ast.operator], Operator] = {
@@ -33,7 +35,7 @@ SHOWN = 60  # characters of an expression in a message
 
 
 def names_in(text: str) -> list[str]:
-    """Links that an expression uses, in order. Raises ValueError for what is not such an expression."""
+    """Links that an expression uses, in order. Raises MethodError for what is not such an expression."""
     tree = _parsed(text)
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     names = [node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in called]
@@ -53,16 +55,16 @@ def shown(text: str) -> str:
 @cache
 def _parsed(text: str) -> ast.expr:
     if len(text) > LONGEST:
-        raise ValueError(f"has {len(text)} characters, more than {LONGEST}; split it into links of coefficient 0")
+        raise MethodError(f"has {len(text)} characters, more than {LONGEST}; split it into links of coefficient 0")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError("is no arithmetic expression; write it like 0.5*(bore - shaft)") from None
+        raise MethodError("is no arithmetic expression; write it like 0.5*(bore - shaft)") from None
     level: list[ast.AST] = [tree]
     for _ in range(DEEPEST + 1):
         level = [child for node in level for child in ast.iter_child_nodes(node)]
     if level:
-        raise ValueError(f"nests deeper than {DEEPEST} operations; split it into links of coefficient 0")
+        raise MethodError(f"nests deeper than {DEEPEST} operations; split it into links of coefficient 0")
     for node in ast.walk(tree):
         match node:
             case ast.Name() | ast.Load() | ast.UAdd() | ast.USub() | ast.UnaryOp() | ast.operator():
@@ -77,7 +79,7 @@ def _parsed(text: str) -> ast.expr:
                 read = False
         if not read:
             what, known = shown(ast.unparse(node) or type(node).__name__), ", ".join(FUNCTIONS)
-            raise ValueError(f"holds {what}; only + - * / **, numbers, names of links and {known} are read")
+            raise MethodError(f"holds {what}; only + - * / **, numbers, names of links and {known} are read")
     return tree
 
 

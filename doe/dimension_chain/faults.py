@@ -10,6 +10,7 @@ from doe.dimension_chain.expressions import shown
 from doe.dimension_chain.iso286 import LARGEST, positioned
 from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link
 from doe.dimension_chain.parts import coded_limits
+from rbdyn.faults import MethodError
 
 
 def faults(chain: Chain) -> list[str]:
@@ -167,11 +168,11 @@ def _nearest(limits: ClosingLink, width: float) -> str:
 
 
 def _sentence(attempt: Callable[[], object]) -> str | None:
-    """The message of a ValueError, if one comes; one that names its link itself passes."""
+    """The message of a MethodError, if one comes; one that names its link itself passes."""
     try:
         attempt()
     except NoValueError:
         raise
-    except ValueError as error:
+    except MethodError as error:
         return str(error)
     return None

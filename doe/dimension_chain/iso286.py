@@ -11,6 +11,8 @@ from bisect import bisect_left
 from math import cbrt
 from pathlib import Path
 
+from rbdyn.faults import MethodError
+
 TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 RANGES: list[int] = TABLES["ranges_mm"]
 LARGEST = RANGES[-1]
@@ -27,7 +29,7 @@ def tolerance_unit(nominal_mm: float) -> float:
 def grade_tolerances(nominal_mm: float) -> dict[str, float]:
     """Tolerance in mm of each grade IT01 to IT18 as the standard lists it, from the narrowest.
 
-    Raises ValueError outside 0 to 500 mm.
+    Raises MethodError outside 0 to 500 mm.
     """
     column = _column(nominal_mm)
     return {grade: 1e-3 * row[column] for grade, row in STANDARD_TOLERANCES.items()}
@@ -36,12 +38,12 @@ def grade_tolerances(nominal_mm: float) -> dict[str, float]:
 def fit_limits(nominal_mm: float, code: str) -> tuple[float, float]:
     """Lower and upper deviation in mm of a tolerance class such as "k5" (shaft) or "H7" (hole).
 
-    Raises ValueError for a class or size that is not listed here.
+    Raises MethodError for a class or size that is not listed here.
     """
     match = CODE.fullmatch(code)
     if match is None or f"IT{match[2]}" not in STANDARD_TOLERANCES:
         letters = "letters known: d to h, j, js, k, m, n, p, r, s"
-        raise ValueError(f'is no tolerance class such as "h6", "k5" or "H7"; {letters}')
+        raise MethodError(f'is no tolerance class such as "h6", "k5" or "H7"; {letters}')
     letter, width = match[1], grade_tolerances(nominal_mm)[f"IT{match[2]}"]
     if letter in ("js", "JS"):
         return -width / 2, width / 2
@@ -55,7 +57,7 @@ def fit_limits(nominal_mm: float, code: str) -> tuple[float, float]:
 def positioned(nominal_mm: float, letter: str, width_mm: float) -> tuple[float, float]:
     """Lower and upper deviation in mm of a tolerance of any width at the position of a letter.
 
-    Only for letters whose fundamental deviation does not depend on the grade. Raises ValueError as ``fit_limits``.
+    Only for letters whose fundamental deviation does not depend on the grade. Raises MethodError as ``fit_limits``.
     """
     if letter in ("js", "JS"):
         return -width_mm / 2, width_mm / 2
@@ -65,7 +67,7 @@ def positioned(nominal_mm: float, letter: str, width_mm: float) -> tuple[float, 
 
 def _column(nominal_mm: float) -> int:
     if not 0 < nominal_mm <= LARGEST:
-        raise ValueError(f"lies outside the tables of ISO 286, which reach from 0 to {LARGEST} mm here")
+        raise MethodError(f"lies outside the tables of ISO 286, which reach from 0 to {LARGEST} mm here")
     return bisect_left(RANGES, nominal_mm)
 
 
@@ -97,7 +99,7 @@ def _hole(nominal_mm: float, letter: str, grade: int) -> float:
     last = 8 if lower in "kmn" else 7
     if lower in "kn" and grade > last and column > 0:
         if lower == "k":
-            raise ValueError("is not in the standard: K ends at grade 8 above 3 mm")
+            raise MethodError("is not in the standard: K ends at grade 8 above 3 mm")
         return 0.0
     return -_deviation(nominal_mm, lower) + (_delta(column, grade) if grade <= last else 0.0)
 
@@ -105,7 +107,7 @@ def _hole(nominal_mm: float, letter: str, grade: int) -> float:
 def _delta(column: int, grade: int) -> float:
     """What a hole gives back so that it fits as the shaft of the next finer grade does (sizes above 3 mm)."""
     if grade < 3:
-        raise ValueError("is not in the standard: holes K to S begin at grade 3")
+        raise MethodError("is not in the standard: holes K to S begin at grade 3")
     here, finer = (STANDARD_TOLERANCES[f"IT{each}"][column] for each in (grade, grade - 1))
     return here - finer if column > 0 else 0.0
 
@@ -113,5 +115,5 @@ def _delta(column: int, grade: int) -> float:
 def _listed(table: str, grade: int) -> list[float]:
     rows: dict[str, list[float]] = TABLES[table]
     if str(grade) not in rows:
-        raise ValueError(f"is not listed here: {'j' if table == 'shaft_j' else 'J'} has the grades {', '.join(rows)}")
+        raise MethodError(f"is not listed here: {'j' if table == 'shaft_j' else 'J'} has the grades {', '.join(rows)}")
     return rows[str(grade)]

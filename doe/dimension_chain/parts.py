@@ -7,6 +7,7 @@ from pathlib import Path
 
 from doe.dimension_chain.iso286 import fit_limits, positioned
 from doe.dimension_chain.links import DIGITS, Interval, Link, Part
+from rbdyn.faults import MethodError
 
 SURFACES = tomllib.loads(Path(__file__).with_name("iso492.toml").read_text(encoding="utf-8"))
 CLASSES = [name for name in SURFACES["bore"] if name != "sizes_mm"]
@@ -19,20 +20,22 @@ def ring_limits(nominal_mm: float, code: str) -> tuple[float, float]:
     deviation is 0, the lower one is in ``iso492.toml``; sizes that could not be checked against several published catalogue
     tables are left out.
 
-    Raises ValueError for a class, surface or size that is not listed here.
+    Raises MethodError for a class, surface or size that is not listed here.
     """
     name, _, surface = code.partition(" ")
     if surface not in SURFACES or name not in CLASSES:
-        raise ValueError(f'is no ring class such as "P5 bore" or "Normal outside"; classes known: {", ".join(CLASSES)}')
+        raise MethodError(
+            f'is no ring class such as "P5 bore" or "Normal outside"; classes known: {", ".join(CLASSES)}'
+        )
     ranges, lower = SURFACES[surface]["sizes_mm"], SURFACES[surface][name]
     column = bisect_left(ranges, nominal_mm)
     if nominal_mm <= 0 or column >= len(lower):
-        raise ValueError(f"is listed here from 0 to {ranges[len(lower) - 1]:g} mm; give the deviations themselves")
+        raise MethodError(f"is listed here from 0 to {ranges[len(lower) - 1]:g} mm; give the deviations themselves")
     return 1e-3 * lower[column], 0.0
 
 
 def coded_limits(link: Link) -> Interval:
-    """Lower and upper deviation, mm, of the link's ``fit``. Raises ValueError for an unknown code or size."""
+    """Lower and upper deviation, mm, of the link's ``fit``. Raises MethodError for an unknown code or size."""
     code = link.fit or ""
     rings = any(code.endswith(surface) for surface in SURFACES)
     return (ring_limits if rings else fit_limits)(link.nominal, code)

@@ -29,6 +29,7 @@ from doe.emulator.likelihood import (
     solved,
 )
 from doe.threads import one_thread
+from rbdyn.faults import MethodError
 
 Trend = Literal["none", "constant", "linear", "quadratic"]
 
@@ -156,15 +157,15 @@ def fit_emulator(
     The trend is the largest up to the one asked for with at most a term for two runs. ``start``: hyperparameters of nearly
     the same runs, from which the search starts in the place of the last of its own starts; without ``search`` they stay as
     they are. ``prior``: mean and deviation of the logarithm of a length in half ranges of one factor alone. ``trended``: the
-    first so many coordinates, all unless told, are those of the trend. Raises ValueError for
+    first so many coordinates, all unless told, are those of the trend. Raises MethodError for
     numbers that are not finite, variances below 0 or fewer than two runs.
     """
     at, y = np.asarray(points, float), np.asarray(values, float)
     known = np.array(np.broadcast_to(np.asarray(variances, float), y.shape))
     if at.ndim != 2 or y.shape != (len(at),) or len(at) < 2:
-        raise ValueError(f"emulator: points {at.shape} and values {y.shape}: give two runs at least, a value each")
+        raise MethodError(f"emulator: points {at.shape} and values {y.shape}: give two runs at least, a value each")
     if not (np.isfinite(at).all() and np.isfinite(y).all() and np.isfinite(known).all() and (known >= 0.0).all()):
-        raise ValueError(
+        raise MethodError(
             "emulator: a point, value or variance is not a finite number, or a variance is below 0; mend it"
         )
     terms = _terms(trend, len(at), at.shape[1] if trended is None else trended)

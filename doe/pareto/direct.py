@@ -19,6 +19,7 @@ from doe.pareto.archive import dominance, error_aware_dominance, order, ranks, s
 from doe.pareto.goals import Goals
 from doe.pareto.nsga2 import check_search
 from doe.pareto.picks import NAMES, Rule, pick_all
+from rbdyn.faults import MethodError
 
 Evaluate = Callable[[Array], tuple[Array, Array]]
 
@@ -96,7 +97,7 @@ def direct_front(
     confidence : at which a difference counts while the search sorts.
     resample : share of the budget for fresh runs at the end. pick : rule that makes the pick.
 
-    Raises ValueError when the bounds are not a box, a setting is out of range, the budget is below five populations, or
+    Raises MethodError when the bounds are not a box, a setting is out of range, the budget is below five populations, or
     every run at the points of a stage failed or breaks a limit.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
@@ -114,7 +115,7 @@ def direct_front(
     ours, base = final.rows(slice(len(chosen))), final.rows(slice(len(chosen), None)).values
     sound = np.flatnonzero(~ours.failed)
     if not sound.size:
-        raise ValueError("every run at the finalists failed; see the failures of the runs")
+        raise MethodError("every run at the finalists failed; see the failures of the runs")
     ours, believed = ours.rows(sound), goals.costs(candidates.values[chosen][sound])
     base_costs = goals.costs(base[0]) if len(base) and not np.isnan(base).any() else None
     picks, among = pick_all(goals.costs(fresh.values[chosen][sound]), goals, base_costs)
@@ -141,10 +142,10 @@ def direct_front(
 def _check(low: Array, high: Array, evaluations: int, population: int, resample: float, confidence: float) -> None:
     check_search(low, high, population, 1, 2)
     if not 0.1 <= resample <= 0.9 or not 0.5 < confidence < 1.0:
-        raise ValueError(f"resample = {resample}, confidence = {confidence}: must be in [0.1, 0.9] and (0.5, 1)")
+        raise MethodError(f"resample = {resample}, confidence = {confidence}: must be in [0.1, 0.9] and (0.5, 1)")
     if evaluations < 5 * population:
         mend = "give more runs or a smaller population"
-        raise ValueError(f"evaluations = {evaluations}: must be at least five populations ({5 * population}); {mend}")
+        raise MethodError(f"evaluations = {evaluations}: must be at least five populations ({5 * population}); {mend}")
 
 
 def _search(
@@ -225,7 +226,7 @@ def _allowed(batch: Samples, goals: Goals) -> Rows:
     good[good] &= _broken(batch.rows(good), goals) <= 0.0
     rows = np.flatnonzero(good)
     if not rows.size:
-        raise ValueError("every run failed or breaks a limit; loosen the limits or see the failures")
+        raise MethodError("every run failed or breaks a limit; loosen the limits or see the failures")
     return rows
 
 

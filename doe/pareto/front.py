@@ -16,6 +16,7 @@ from doe.pareto.nsga2 import Doubt, Judged, Objectives, check_search, search
 from doe.pareto.picks import NAMES, Rule, knee_depth, thinned
 from doe.pareto.tolerance_aware import ToleranceAware
 from doe.pareto.uncertainty import FrontUncertainty
+from rbdyn.faults import MethodError
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,13 +80,13 @@ def front(
     pick : rule that makes the pick.
     doubt : maps points (n, k) to how far below and above (n, m) their responses may be; limits hold all over it.
 
-    Raises ValueError when the bounds are not a box, a setting is out of range, or an objective is not finite;
+    Raises MethodError when the bounds are not a box, a setting is out of range, or an objective is not finite;
     InfeasibleError when no point evaluated keeps all limits.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     check_search(low, high, population, generations, keep)
     if baseline is not None and np.shape(baseline) != low.shape:
-        raise ValueError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
+        raise MethodError(f"baseline has shape {np.shape(baseline)}; give one value a factor ({low.size})")
     if goals is None:
         goals = Goals.of(["min"] * _values(objectives, (low + high)[None, :] / 2).shape[1])
     searched = search(partial(_judged, objectives, goals, doubt), low, high, population, generations, seed)
@@ -124,14 +125,14 @@ def _judged(objectives: Objectives, goals: Goals, doubt: Doubt | None, points: A
 
 
 def _values(objectives: Objectives, points: Array) -> Array:
-    """Responses (n, m) of points. Raises ValueError unless they are finite, a row a point, two or more in a row."""
+    """Responses (n, m) of points. Raises MethodError unless they are finite, a row a point, two or more in a row."""
     values = np.asarray(objectives(points), float)
     if values.ndim != 2 or len(values) != len(points) or values.shape[1] < 2:
         given = f"objectives gave shape {values.shape} for {len(points)} points"
-        raise ValueError(f"{given}; give one row a point and at least two objectives")
+        raise MethodError(f"{given}; give one row a point and at least two objectives")
     bad = np.argwhere(~np.isfinite(values))
     if bad.size:
         row, column = bad[0]
         given = f"objective {column + 1} is {values[row, column]} at {points[row].tolist()}"
-        raise ValueError(f"{given}; narrow the bounds or mend the objective")
+        raise MethodError(f"{given}; narrow the bounds or mend the objective")
     return values

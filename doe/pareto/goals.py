@@ -11,6 +11,7 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from doe.arrays import Array, Rows
+from rbdyn.faults import MethodError
 
 Kind = Literal["min", "max", "target", "none"]
 # What stands for a wish that a response does not have.
@@ -39,7 +40,7 @@ class Goals:
     def of(cls, kinds: Sequence[Kind], **given: Sequence[Any]) -> Self:
         """Goals of the ``kinds``; what else is ``given`` has None where a response has none.
 
-        Raises ValueError for a target without its number or a lower limit that is not below the upper one.
+        Raises MethodError for a target without its number or a lower limit that is not below the upper one.
         """
         columns = {key: [blank] * len(kinds) for key, blank in BLANK.items()}
         for key, column in given.items():
@@ -47,9 +48,9 @@ class Goals:
         goals = cls(tuple(kinds), **{key: np.array(column, float) for key, column in columns.items()})
         for index, kind in enumerate(kinds):
             if kind == "target" and not np.isfinite(goals.target[index]):
-                raise ValueError(f'response {index + 1}: goal = "target" needs its target; give the number')
+                raise MethodError(f'response {index + 1}: goal = "target" needs its target; give the number')
             if goals.lower[index] >= goals.upper[index]:
-                raise ValueError(f"response {index + 1}: lower limit must be below the upper limit")
+                raise MethodError(f"response {index + 1}: lower limit must be below the upper limit")
         return goals
 
     @property

@@ -14,6 +14,7 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.pareto.archive import Archive, merged
+from rbdyn.faults import MethodError
 
 Objectives = Callable[[Array], Array]
 # How far below and above (n, m) what is foretold of points (n, k) their responses may be when limits are judged.
@@ -31,7 +32,7 @@ Judge = Callable[[Array], Judged]
 History = list[tuple[Array, Judged]]  # points of each generation and what they are judged
 
 
-class InfeasibleError(ValueError):
+class InfeasibleError(MethodError):
     """No point keeps all limits. ``point`` comes closest and breaks limit c by ``violations`` (c,)."""
 
     def __init__(self, point: Array, violations: Array) -> None:
@@ -66,16 +67,16 @@ def search(judge: Judge, low: Array, high: Array, population: int, generations: 
 
 
 def check_search(low: Array, high: Array, population: int, generations: int, keep: int) -> None:
-    """Raises ValueError when the bounds are not a box or a setting is out of range."""
+    """Raises MethodError when the bounds are not a box or a setting is out of range."""
     if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low) & np.isfinite(high)).all():
-        raise ValueError("lower and upper bounds must be equally long lists of finite numbers")
+        raise MethodError("lower and upper bounds must be equally long lists of finite numbers")
     wrong = np.flatnonzero(low >= high)
     if wrong.size:
         at = wrong[0]
-        raise ValueError(f"factor {at + 1}: lower bound {low[at]:g} must be below upper bound {high[at]:g}")
+        raise MethodError(f"factor {at + 1}: lower bound {low[at]:g} must be below upper bound {high[at]:g}")
     for name, value, least in (("population", population, 4), ("generations", generations, 1), ("keep", keep, 2)):
         if value < least:
-            raise ValueError(f"{name} = {value}: must be at least {least}")
+            raise MethodError(f"{name} = {value}: must be at least {least}")
 
 
 def _scale(violations: Array) -> Array:

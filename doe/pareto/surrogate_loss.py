@@ -7,6 +7,7 @@ import numpy as np
 from doe.arrays import Array
 from doe.pareto.archive import hypervolume, non_dominated
 from doe.pareto.direct import DirectFront
+from rbdyn.faults import MethodError
 from rbdyn.records.words import signed_with_error
 
 DRAWS = 200  # of the noise of a front
@@ -62,12 +63,12 @@ def compare_with_surrogate(
     (failed runs) are left out. Both fronts are normalised to the ideal and nadir of the two together. A front of more
     points can cover more: compare equally many.
 
-    Raises ValueError when no surrogate point is left.
+    Raises MethodError when no surrogate point is left.
     """
     goals = direct.goals
     good = np.isfinite(surrogate_values).all(axis=1)
     if not good.any():
-        raise ValueError("every run at the surrogate's points failed; nothing can be compared")
+        raise MethodError("every run at the surrogate's points failed; nothing can be compared")
     costs, errors = goals.costs(surrogate_values[good]), surrogate_errors[good][:, goals.objectives]
     both = np.vstack([direct.costs, costs])
     both = both[non_dominated(both)]

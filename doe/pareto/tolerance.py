@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 
 from doe.arrays import Array, Mask, Rows
 from doe.pareto.manufacture import Distribution, error_of_share, random_offsets
+from rbdyn.faults import MethodError
 from rbdyn.records.words import with_error
 
 Costs = Callable[[Array], Array]
@@ -87,15 +88,15 @@ def widest_tolerances(
     The widest is looked for from the pick outwards up to the first loss, so all narrower tolerances keep the limits
     too. Where even the exact pick breaks a limit, all widths are zero.
 
-    Raises ValueError when a ratio is not positive, a probability is not in (0, 1), or the pick is outside the region.
+    Raises MethodError when a ratio is not positive, a probability is not in (0, 1), or the pick is outside the region.
     """
     centre, share = np.asarray(pick, float), np.asarray(ratios, float)
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     room = np.minimum(centre - low, high - centre)
     if (share <= 0.0).any() or not 0.0 < probability < 1.0:
-        raise ValueError(f"ratios = {share.tolist()}, probability = {probability}: must be positive and in (0, 1)")
+        raise MethodError(f"ratios = {share.tolist()}, probability = {probability}: must be positive and in (0, 1)")
     if (room < -1e-9 * (high - low)).any():
-        raise ValueError(f"pick = {centre.tolist()}: lies outside the region; pick a point within it")
+        raise MethodError(f"pick = {centre.tolist()}: lies outside the region; pick a point within it")
     drawn = random_offsets(samples, centre.size, distribution, seed)
     parts = _Parts(objectives, centre, np.asarray(limits, float), room.clip(0.0), drawn, names, probability, promise)
     exact = np.zeros(centre.size)

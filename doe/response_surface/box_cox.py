@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from scipy import linalg, optimize, special, stats
 
 from doe.arrays import Array
+from rbdyn.faults import MethodError
 from rbdyn.records.words import counted
 
 USUAL = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
@@ -40,7 +41,7 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response") -> 
     lies in the interval, else the usual exponent in it nearest to ``lambda``, else ``lambda`` itself; 1 again
     where the whole interval lies beyond the usual ones, which speaks of outliers or missing terms.
 
-    Raises ValueError when a value is not positive, the values are all equal, or no more runs than columns are given.
+    Raises MethodError when a value is not positive, the values are all equal, or no more runs than columns are given.
 
     Source: Box and Cox (1964), maximized likelihood.
     """
@@ -48,9 +49,9 @@ def box_cox(matrix: ArrayLike, values: ArrayLike, *, name: str = "response") -> 
     check_positive(response, name)
     runs, terms = columns.shape
     if runs <= terms:
-        raise ValueError(f"{name}: {counted(runs, 'run')} leave no residual beside {counted(terms, 'term')}; add runs")
+        raise MethodError(f"{name}: {counted(runs, 'run')} leave no residual beside {counted(terms, 'term')}; add runs")
     if np.ptp(response) == 0.0:
-        raise ValueError(f"{name}: all values are equal, so no transform can be judged; leave it out")
+        raise MethodError(f"{name}: all values are equal, so no transform can be judged; leave it out")
     log_likelihood = _log_likelihood(columns, response)
     grid = np.union1d(np.linspace(*SEARCHED, 81), USUAL)
     heights = np.array([log_likelihood(each) for each in grid])
@@ -97,18 +98,18 @@ def _log_likelihood(columns: Array, response: Array) -> Callable[[float], float]
 
 
 def check_positive(values: ArrayLike, name: str) -> None:
-    """Raises ValueError, naming the first run at fault, unless all values are finite and positive."""
+    """Raises MethodError, naming the first run at fault, unless all values are finite and positive."""
     response = np.asarray(values, float)
     bad = np.flatnonzero(~(np.isfinite(response) & (response > 0.0)))
     if bad.size:
         given = f"the value of run {bad[0] + 1} is {response[bad[0]]:g}"
-        raise ValueError(f'{name}: {given}, but a power transform needs positive values; use transform = "none"')
+        raise MethodError(f'{name}: {given}, but a power transform needs positive values; use transform = "none"')
 
 
 def forward(values: ArrayLike, exponent: float) -> Array:
     """Transformed values t = (y^lambda - 1)/lambda, or ln y for lambda = 0, of positive ``values``.
 
-    Raises ValueError when a value is not positive.
+    Raises MethodError when a value is not positive.
     """
     check_positive(values, "transform")
     return special.boxcox(np.asarray(values, float), exponent)

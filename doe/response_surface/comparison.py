@@ -16,6 +16,7 @@ from doe.designs.design import replicate_groups
 from doe.emulator import Emulator, fit_emulator
 from doe.response_surface.surface import Surface
 from doe.threads import one_thread
+from rbdyn.faults import MethodError
 from rbdyn.records.words import counted
 
 # More points than these are left out in groups.
@@ -46,7 +47,7 @@ def compare(
     centre of a spherical design, is not compared: no one would leave it out.
 
     coded, values : runs in coded units (n, k) and their response (n,).
-    refit : the polynomial fitted to the runs of the given rows; it raises ValueError where they do not suffice.
+    refit : the polynomial fitted to the runs of the given rows; it raises MethodError where they do not suffice.
     name : of the response, for the sentence.
     matrix : model matrix of the polynomial (n, p), to find the points that it cannot do without (leverage of all
         replicates together above 0.95); without it only those whose absence makes ``refit`` fail.
@@ -59,7 +60,7 @@ def compare(
     which takes them as independent; ``points`` compared; ``folds``: how often some were left out; ``recommended``:
     "gaussian_process" only where the interval lies above zero, else "polynomial"; ``sentence``.
 
-    Raises ValueError when fewer than three points can be left out.
+    Raises MethodError when fewer than three points can be left out.
 
     Source: Stone, Cross-validatory choice, J. R. Stat. Soc. B 36 (1974); the interval is rough, for there is no
     unbiased variance of a cross-validation (Bengio and Grandvalet, J. Mach. Learn. Res. 5 (2004)).
@@ -116,17 +117,17 @@ def _left_out(
 ) -> tuple[Array, Array]:
     """Mean responses (c,) of points left out a fold at a time, and what rivals fitted without them foretell (c, rivals).
 
-    A fold without which a rival cannot be fitted is passed over. Raises ValueError where fewer than three points are left.
+    A fold without which a rival cannot be fitted is passed over. Raises MethodError where fewer than three points are left.
     """
     truths, foretold = [np.empty(0)], [np.empty((0, len(rivals)))]
     for fold in folds:
         rows = np.flatnonzero(~np.isin(group, fold))
-        with suppress(ValueError):
+        with suppress(MethodError):
             foretold.append(np.column_stack([rival(rows, points[fold]) for rival in rivals]))
             truths.append(np.array([response[group == first].mean() for first in fold]))
     if (count := sum(map(len, truths))) < 3:
         few = f"only {counted(count, 'point')} can be left out of the polynomial, too few to compare"
-        raise ValueError(f"{name}: {few}; add design points or choose a simpler model")
+        raise MethodError(f"{name}: {few}; add design points or choose a simpler model")
     return np.concatenate(truths), np.vstack(foretold)
 
 

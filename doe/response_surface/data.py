@@ -10,6 +10,7 @@ from doe.arrays import Array, Rows, Whole
 from doe.designs.evaluation import block_contrasts
 from doe.designs.model import Terms
 from doe.response_surface.least_squares import dependent_columns
+from rbdyn.faults import MethodError
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,17 +58,17 @@ def checked(
     block: ArrayLike | None,
     without: Collection[int] = (),
 ) -> Data:
-    """Runs as arrays. Raises ValueError when shapes differ, a number is not finite, or all values are equal."""
+    """Runs as arrays. Raises MethodError when shapes differ, a number is not finite, or all values are equal."""
     points, response = np.asarray(coded, float), np.asarray(values, float)
     if points.ndim != 2 or response.shape != (len(points),):
         shapes = f"points of shape {points.shape} and values of shape {response.shape}"
-        raise ValueError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
+        raise MethodError(f"{name}: {shapes} do not match; give one row of factors and one value a run")
     if not np.isfinite(points).all():
-        raise ValueError(f"{name}: a coded factor is not a finite number; mend or leave out that run")
+        raise MethodError(f"{name}: a coded factor is not a finite number; mend or leave out that run")
     bad = np.flatnonzero(~np.isfinite(response))
     if bad.size:
         given = f"the value of run {bad[0] + 1} is {response[bad[0]]}"
-        raise ValueError(f"{name}: {given}; mend or leave out that run")
+        raise MethodError(f"{name}: {given}; mend or leave out that run")
     errors = None if standard_errors is None else np.broadcast_to(standard_errors, response.shape)
     known = errors is not None and bool((np.isfinite(errors) & (errors > 0)).all())
     return Data(
@@ -83,36 +84,36 @@ def checked(
 
 
 def check_errors(name: str, standard_errors: ArrayLike | None) -> None:
-    """Raises ValueError unless every run has a positive standard error, as weighting by them needs."""
+    """Raises MethodError unless every run has a positive standard error, as weighting by them needs."""
     mend = 'give each run a positive error or use weighting = "equal"'
     if standard_errors is None:
-        raise ValueError(f'{name}: weighting = "replicates" needs the errors of the runs; {mend}')
+        raise MethodError(f'{name}: weighting = "replicates" needs the errors of the runs; {mend}')
     errors = np.atleast_1d(np.asarray(standard_errors, float))
     bad = np.flatnonzero(~(np.isfinite(errors) & (errors > 0)))
     if bad.size:
         given = f"the error of run {bad[0] + 1} is {errors[bad[0]]:g}"
-        raise ValueError(f'{name}: {given}, but weighting = "replicates" needs positive ones; {mend}')
+        raise MethodError(f'{name}: {given}, but weighting = "replicates" needs positive ones; {mend}')
 
 
 def check_size(name: str, model: str, terms: Terms, block: Whole) -> None:
-    """Raises ValueError when runs, by the ``block`` (n,) of each, are too few for the terms and the blocks."""
+    """Raises MethodError when runs, by the ``block`` (n,) of each, are too few for the terms and the blocks."""
     runs, more = len(block), len(np.unique(block)) - 1
     size = len(terms) + more
     if runs <= size:
         blocks = f", {more} for the blocks" if more else ""
         least = f"{size + 1} ({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
-        raise ValueError(f"{name}: {runs} runs are too few for the {model} model; give at least {least}")
+        raise MethodError(f"{name}: {runs} runs are too few for the {model} model; give at least {least}")
 
 
 def check_matrix(name: str, model: str, terms: Terms, matrix: Array) -> None:
-    """Raises ValueError when runs cannot tell the columns apart.
+    """Raises MethodError when runs cannot tell the columns apart.
 
     ``matrix`` (n, p) holds the columns of ``terms``, then those of the blocks.
     """
     if dependent := dependent_columns(matrix):
         names = dict.fromkeys(terms[column] if column < len(terms) else "the blocks" for column in dependent)
         what = f"{', '.join(sorted(names))} from the other terms of the {model} model (its matrix is singular)"
-        raise ValueError(f"{name}: the runs cannot tell {what}; add design points or choose a simpler model")
+        raise MethodError(f"{name}: the runs cannot tell {what}; add design points or choose a simpler model")
 
 
 def _whole(labels: ArrayLike | None, size: int) -> Whole:

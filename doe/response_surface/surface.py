@@ -26,6 +26,7 @@ from doe.response_surface.diagnostics import Diagnostics, diagnose
 from doe.response_surface.least_squares import solve
 from doe.response_surface.model_error import KnownVariance, ModelError, compare, model_error
 from doe.threads import one_thread
+from rbdyn.faults import MethodError
 from rbdyn.records.record import Record, derived, outside_json
 
 Weighting = Literal["equal", "replicates"]
@@ -124,7 +125,7 @@ class Surface(Record):
         return error / slope(self.predict(coded), self.transform)
 
     def refit(self, rows: Rows) -> "Surface":
-        """The same kind of surface through these runs alone. Raises ValueError when they do not suffice."""
+        """The same kind of surface through these runs alone. Raises MethodError when they do not suffice."""
         transform: Transform = "none" if self.transform is None else self.transform
         return _fit(self.name, self.data.rows(rows), self.model, self.weighting, transform, advised=False)
 
@@ -191,12 +192,12 @@ def fit(
     transform : "none", "box_cox" for the recommended exponent, or an exponent: (y^lambda - 1)/lambda, ln y for 0.
     without : places of factors that the surface does not depend on.
 
-    Raises ValueError when a value is not finite, all are equal, shapes differ, the model is unknown, runs are too few
+    Raises MethodError when a value is not finite, all are equal, shapes differ, the model is unknown, runs are too few
     for it, the runs cannot tell its terms apart, a transform meets a value that is not positive, or weights are
     asked for and an error is not positive.
     """
     if model not in MODELS:
-        raise ValueError(f"{name}: model = {model!r}: choose {', '.join(MODELS[:-1])} or {MODELS[-1]}")
+        raise MethodError(f"{name}: model = {model!r}: choose {', '.join(MODELS[:-1])} or {MODELS[-1]}")
     data = checked(name, coded, values, centre, step, standard_errors, replicates, block, without)
     if weighting == "replicates":
         check_errors(name, standard_errors)
@@ -214,7 +215,7 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
     check_matrix(name, model, terms, _columns(data, terms))
     if not np.ptp(data.values):
         alike = f"all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit"
-        raise ValueError(f"{name}: {alike}; check the response or leave it out")
+        raise MethodError(f"{name}: {alike}; check the response or leave it out")
     exponent = _exponent(name, data, terms, transform)
     response, variances = _on_scale_of_fit(data, exponent)
     weights = 1.0 / variances if weighting == "replicates" and variances is not None else None

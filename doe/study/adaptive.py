@@ -28,7 +28,7 @@ from doe.study.runs import Runs, ordered_runs, runs_of
 from doe.study.surfaces import independent_values, standard_errors
 from doe.study_file import Study
 from doe.threads import one_thread
-from rbdyn.faults import InputError, RunError, check_all, refuse
+from rbdyn.faults import InputError, MethodError, RunError, check_all, refuse
 
 SIGNIFICANT = 0.05
 # Where a drawing has no resolution, points are twins within this share of the half range of the region.
@@ -71,7 +71,7 @@ def check_adaptive(study: Study, wanted: bool) -> None:
     check_all([partial(clearance.adaptive_scenes, study.at(at), study.baseline[None], [2], 0) for at in every])
     try:
         check_budget(plan_of(study), sum(len(design_of(study.at(at)).coded) for at in every))
-    except ValueError as error:
+    except MethodError as error:
         raise InputError([f"{study.path}: adaptive.{error}"]) from None
 
 
@@ -113,7 +113,7 @@ def find_adaptive(study: Study, runs: Runs, simulations: Simulations) -> Adaptiv
             )
         except InfeasibleError:
             raise
-        except ValueError as error:
+        except MethodError as error:
             if evaluate.failures:
                 causes = "; ".join(group["cause"] for group in grouped(evaluate.failures))
                 raise RunError(f"adaptive front: {error} ({causes})") from None

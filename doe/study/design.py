@@ -17,7 +17,7 @@ from doe.study_file import Study
 from doe.study_file.design_section import KEYS_OF
 from doe.study_file.design_section import Design as DesignSettings
 from doe.study_file.table import Table, read_table
-from rbdyn.faults import InputError, refuse
+from rbdyn.faults import InputError, MethodError, refuse
 from rbdyn.records.words import are, counted
 
 OPTIMAL = {f"{criterion}_optimal": partial(designs.optimal, criterion=criterion) for criterion in ("d", "i")}
@@ -58,7 +58,7 @@ def design_of(study: Study) -> Design:
     given = _given(study) if settings.kind in OPTIMAL else None
     try:
         design = _design(settings.model_dump_json(exclude_unset=True), len(study.factors), given)
-    except ValueError as error:
+    except MethodError as error:
         raise InputError([f"{study.path}: design.{error}"]) from None
     whole = np.array([factor.whole for factor in study.file.factor])
     reach = design.reach * study.step

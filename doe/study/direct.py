@@ -19,7 +19,7 @@ from doe.running.runner import Progress
 from doe.study.goals import goals_of, region_of
 from doe.study.surfaces import standard_errors
 from doe.study_file import Study
-from rbdyn.faults import InputError, RunError
+from rbdyn.faults import InputError, MethodError, RunError
 from rbdyn.scene import Scene
 
 
@@ -100,7 +100,7 @@ def find_direct(study: Study, on_surfaces: ParetoFront, simulations: Simulations
         # As many runs a point as a finalist of the direct front has.
         surrogate = repeated(evaluate, on_surfaces.points[rows], front.repeats)
         loss = compare_with_surrogate(front, surrogate.values, surrogate.errors, seed=settings.seed)
-    except ValueError as error:
+    except MethodError as error:
         if evaluate.failures:
             causes = "; ".join(group["cause"] for group in grouped(evaluate.failures))
             raise RunError(f"direct front: {error} ({causes})") from None

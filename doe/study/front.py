@@ -20,7 +20,7 @@ from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
 from doe.study_file import Study
 from doe.threads import one_thread
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, MethodError
 
 Found = TypeVar("Found", "ParetoFront", "ToleranceAware")
 
@@ -140,5 +140,5 @@ def named_faults(study: Study, goals: Goals, actual: Callable[[Array], Array], a
         none = f"no point of the region keeps all limits{after}; the closest ({where}) misses {missed}"
         mend = "loosen a limit or widen the design"
         raise InputError([f"{study.path}: response.lower, response.upper: {none}; {mend}"]) from None
-    except ValueError as error:
+    except MethodError as error:
         raise InputError([f"{study.path}: front{after}: {error}"]) from None

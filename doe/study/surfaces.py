@@ -14,7 +14,7 @@ from doe.study.runs import Runs
 from doe.study_file import Study
 from doe.study_file.study import Fitted
 from doe.threads import one_thread
-from rbdyn.faults import refuse
+from rbdyn.faults import MethodError, refuse
 
 # Runs of which a Gaussian process takes a minute and a gigabyte; both go with a power of their number.
 MOST_RIVALLED = 3000
@@ -33,7 +33,7 @@ def fit_surfaces(study: Study, runs: Runs) -> list[Surface]:
         asked = response.model_dump(include={"name", *Fitted.model_fields}) | units
         try:
             surfaces.append(fit(runs.coded, values, standard_errors=error, replicates=behind, **asked))
-        except ValueError as error_of_fit:
+        except MethodError as error_of_fit:
             faults.append(f"{study.path}: {error_of_fit}")
     refuse(faults)
     return surfaces
@@ -54,7 +54,7 @@ def with_rivals(surfaces: Sequence[Surface]) -> list[Surface]:
             continue
         data, matrix = surface.data, model_matrix(surface.data.points, surface.terms)
         errors = data.standard_errors if surface.weighting == "replicates" else None
-        with suppress(ValueError):
+        with suppress(MethodError):
             runs = data.points, data.values, surface.refit
             rival = compare(*runs, name=surface.name, matrix=matrix, standard_errors=errors)
             found[place] = replace(surface, rival=rival)

@@ -44,9 +44,7 @@ def widest_of(
     drawn = draw_all(surfaces, settings.samples, settings.seed) if settings.surface_uncertainty else None
 
     def responses(coded: Array) -> Array:
-        if drawn is None:
-            return predict_all(surfaces, coded)
-        return predict_paired(surfaces, drawn, coded)
+        return predict_all(surfaces, coded) if drawn is None else predict_paired(surfaces, drawn, coded)
 
     def objectives(parts: Array) -> Array:
         points = np.tile(point, (len(parts), 1))

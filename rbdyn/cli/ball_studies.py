@@ -10,7 +10,7 @@ import numpy as np
 from rbdyn.cli.ball_sweep import print_points
 from rbdyn.cli.ranges import axis_values
 from rbdyn.cli.terminal import hand_over, output_folder, print_notes, print_table
-from rbdyn.faults import InputError
+from rbdyn.faults import InputError, MethodError
 from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
 from rbdyn.quasistatic.remarks import remarks, tipping
 from rbdyn.quasistatic.row.equilibrium import OK
@@ -54,7 +54,7 @@ def optimum_study(scene: BallScene, swept: str, values: Sequence[float]) -> tupl
     run, unit, si = SWEPT[swept]
     try:
         scan = run(_single(scene, swept), [si * value for value in values])
-    except ValueError as error:
+    except MethodError as error:
         raise InputError([f"--{swept}: {error}"]) from None
     table = _table(scene, f"{swept}_{unit}", values, scan)
     names = {"value": f"{swept}_{unit}", **SWEPT_FIGURES, "status": "status"}
@@ -102,10 +102,10 @@ def race_limits(scene: BallScene, tolerance_class: str, wanted: float, seed: int
     try:
         allowed = running_accuracy(cast(ToleranceClass, tolerance_class), 1e-3 * row.bearing.bore_mm)
         if allowed.axial is None:
-            raise ValueError(f"class {tolerance_class} sets no limit on axial runout; choose P2, P4 or P5")
+            raise MethodError(f"class {tolerance_class} sets no limit on axial runout; choose P2, P4 or P5")
         asked: dict[str, Any] = {"radial_limit": allowed.radial, "axial_limit": allowed.axial, "wanted": wanted}
         limits = design(bench_of(row), Lot(), **asked, seed=seed, solved=SOLVED)
-    except ValueError as error:
+    except MethodError as error:
         raise InputError([f"--race-limits {tolerance_class}: {error}"]) from None
     lengths = ("inner_roundness", "outer_roundness", "inner_sway", "outer_sway", "radial_limit", "axial_limit")
     return {

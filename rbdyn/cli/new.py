@@ -9,7 +9,7 @@ import typer
 
 from rbdyn.cli.options import Json, valued
 from rbdyn.cli.terminal import guarded, print_json
-from rbdyn.faults import LONGEST_NAME, InputError, one_line, refuse
+from rbdyn.faults import LONGEST_NAME, InputError, MethodError, one_line, refuse
 
 if TYPE_CHECKING:
     from rbdyn.properties.catalogue import Envelope
@@ -100,18 +100,18 @@ def _read(reader: Any, name: str, text: str, faults: list[str]) -> Any:
     """What ``reader`` makes of a text; None, and one more fault, where it refuses it."""
     try:
         return reader(text)
-    except ValueError as error:
+    except MethodError as error:
         faults.append(f"{name} {one_line(text, LONGEST_NAME)}: {error}")
         return None
 
 
 def _class_named(text: str) -> str:
-    """A clearance class as the tables name it. Raises ValueError."""
+    """A clearance class as the tables name it. Raises MethodError."""
     from rbdyn.properties.catalogue import CLEARANCE_CLASSES
 
     name = text.strip().upper()
     if name not in CLEARANCE_CLASSES:
-        raise ValueError(f"is no clearance class; choose one of {', '.join(CLEARANCE_CLASSES)}")
+        raise MethodError(f"is no clearance class; choose one of {', '.join(CLEARANCE_CLASSES)}")
     return name
 
 
@@ -133,7 +133,7 @@ def _misfits(named: "Designation", speed: float | None, preload: float | None, c
 
 
 def _envelope(named: "Designation", sizes: dict[str, float | None]) -> "Envelope":
-    """Boundary dimensions as typed or as the catalogue lists them. Raises ValueError, InputError."""
+    """Boundary dimensions as typed or as the catalogue lists them. Raises MethodError, InputError."""
     from rbdyn.properties.catalogue import Envelope, envelope
 
     given = [value for value in sizes.values() if value is not None]

@@ -9,6 +9,7 @@ Lengths in m, angles in rad.
 import math
 
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
+from rbdyn.faults import MethodError
 
 # lambda of a single row: what practice falls short of the theory (ISO/TR 1281-1), and the theory's constant [N, mm].
 REDUCTION = 0.95
@@ -32,18 +33,18 @@ def ball_size_term(ball_diameter: float) -> float:
 
 
 def refuse_impossible(gamma: float, inner_groove_factor: float, outer_groove_factor: float) -> None:
-    """Raise ValueError unless 0 < gamma < 1 and both groove factors exceed 0.5."""
+    """Raise MethodError unless 0 < gamma < 1 and both groove factors exceed 0.5."""
     if not 0.0 < gamma < 1.0:
-        raise ValueError(f"gamma = {gamma:g}: the ball must be smaller than the pitch circle")
+        raise MethodError(f"gamma = {gamma:g}: the ball must be smaller than the pitch circle")
     if not min(inner_groove_factor, outer_groove_factor) > 0.5:
         what = f"groove factors {inner_groove_factor:g} and {outer_groove_factor:g} must be above 0.5"
-        raise ValueError(f"{what}, or the ball jams")
+        raise MethodError(f"{what}, or the ball jams")
 
 
 def capacity_factor(gamma: float, inner_groove_factor: float = 0.52, outer_groove_factor: float = 0.52) -> float:
     """f_c of a radial or angular contact ball bearing (ISO 281, in N and mm), gamma = D cos(alpha)/d_m.
 
-    The standard's own table holds for 0.52; it grants a closer groove no more. Raises ValueError unless
+    The standard's own table holds for 0.52; it grants a closer groove no more. Raises MethodError unless
     0 < gamma < 1 and both factors exceed 0.5.
     """
     refuse_impossible(gamma, inner_groove_factor, outer_groove_factor)
@@ -67,7 +68,7 @@ def dynamic_capacity(
 ) -> float:
     """Basic dynamic radial load rating C_r [N] by ISO 281: b_m f_c (i cos alpha)^0.7 Z^(2/3) D^1.8.
 
-    Raises ValueError as ``capacity_factor``.
+    Raises MethodError as ``capacity_factor``.
     """
     gamma = ball_diameter * math.cos(contact_angle) / pitch_diameter
     factor = rating_factor * capacity_factor(gamma, inner_groove_factor, outer_groove_factor)

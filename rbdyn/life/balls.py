@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.faults import MethodError
 from rbdyn.life.ball_capacity import groove_ratio
 from rbdyn.life.turns import Life, Turning
 
@@ -60,11 +61,11 @@ def row_life(inner_load: Array, outer_load: Array, capacities: tuple[float, floa
     """Life of a row from the loads on its balls, (Z,) or (samples, Z), on the inner and on the outer race [N].
 
     ``capacities``: of the inner and the outer race [N], by one of the functions above. ``turning``: the rings that
-    turn against the load. Raises ValueError for arrays that do not match, or hold negative loads or NaN.
+    turn against the load. Raises MethodError for arrays that do not match, or hold negative loads or NaN.
     """
     inner, outer = _loads(inner_load, "inner"), _loads(outer_load, "outer")
     if inner.shape != outer.shape:
-        raise ValueError(f"loads of shape {inner.shape} inside and {outer.shape} outside do not match")
+        raise MethodError(f"loads of shape {inner.shape} inside and {outer.shape} outside do not match")
     inner_equivalent = standing_race_load(inner) if turning == "outer" else turning_race_load(inner)
     outer_equivalent = standing_race_load(outer) if turning == "inner" else turning_race_load(outer)
     inner_capacity, outer_capacity = capacities
@@ -77,7 +78,7 @@ def row_life(inner_load: Array, outer_load: Array, capacities: tuple[float, floa
 def _loads(loads: Array, race: str) -> Array:
     array = np.atleast_2d(np.asarray(loads, dtype=np.float64))
     if array.ndim != 2 or array.size == 0:
-        raise ValueError(f"{race} loads of shape {np.shape(loads)}: give (Z,) or (samples, Z)")
+        raise MethodError(f"{race} loads of shape {np.shape(loads)}: give (Z,) or (samples, Z)")
     if not np.all(array >= 0.0) or not np.all(np.isfinite(array)):
-        raise ValueError(f"{race} loads hold negative values, NaN or infinity")
+        raise MethodError(f"{race} loads hold negative values, NaN or infinity")
     return array

@@ -1,6 +1,7 @@
 """Load ratings of a cylindrical roller bearing (ISO 281 and ISO 76, f_c as it is commonly cited), and the radial loads below
 which makers expect its rollers to skid."""
 
+from rbdyn.faults import MethodError
 from rbdyn.fields import RPM
 
 # Life of a race falls with the fourth power of its load; 9/8 is the slope of the Weibull line.
@@ -19,10 +20,10 @@ SMALLEST_FACTOR, LARGEST_FACTOR = 0.1, 0.3
 def capacity_factor(gamma: float) -> float:
     """f_c of a radial roller bearing (ISO 281, in N and mm) at gamma = roller over pitch diameter.
 
-    Raises ValueError unless 0 < gamma < 1.
+    Raises MethodError unless 0 < gamma < 1.
     """
     if not 0.0 < gamma < 1.0:
-        raise ValueError(f"gamma = {gamma:g}: the roller must be smaller than the pitch circle")
+        raise MethodError(f"gamma = {gamma:g}: the roller must be smaller than the pitch circle")
     ratio = (1.0 - gamma) / (1.0 + gamma)
     races = (1.0 + (1.04 * ratio ** (143.0 / 108.0)) ** LAMINA_EXPONENT) ** (-1.0 / LAMINA_EXPONENT)
     shape = gamma ** (2.0 / 9.0) * (1.0 - gamma) ** (29.0 / 27.0) / (1.0 + gamma) ** 0.25
@@ -40,7 +41,7 @@ def dynamic_capacity(
     """Basic dynamic radial load rating C_r [N] by ISO 281, for catalogues that give none; lengths in m.
 
     C_r = b_m f_c (i L)^(7/9) Z^(3/4) D^(29/27) in N and mm; ``rating_factor`` b_m is 1.1 for machined cylindrical
-    roller bearings of contemporary steel. Raises ValueError as ``capacity_factor``.
+    roller bearings of contemporary steel. Raises MethodError as ``capacity_factor``.
     """
     factor = rating_factor * capacity_factor(roller_diameter / pitch_diameter)
     sizes = (rows * effective_length * 1e3) ** (7.0 / 9.0) * (roller_diameter * 1e3) ** (29.0 / 27.0)

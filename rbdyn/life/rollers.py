@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.faults import MethodError
 from rbdyn.life.roller_capacity import LAMINA_EXPONENT, LOAD_LIFE, REDUCTION, WEIBULL
 from rbdyn.life.turns import Life, Turning
 
@@ -62,7 +63,7 @@ def standing_race_load(loads: Array, angle: Array | None = None, positions: int 
 
     Each place on it meets its own loads: a fourth-power mean at each place over time, then a mean of the power 4.5
     over the places. ``angle``: place of each roller on that race [rad], (samples, rollers), sorted into ``positions``
-    equal sectors; None: each roller keeps its place. Raises ValueError when no roller ever comes by a sector.
+    equal sectors; None: each roller keeps its place. Raises MethodError when no roller ever comes by a sector.
     """
     powers = loads**LOAD_LIFE
     if angle is None:
@@ -72,7 +73,7 @@ def standing_race_load(loads: Array, angle: Array | None = None, positions: int 
         sector = np.minimum((turn * positions).astype(np.int64), positions - 1)
         visits = np.bincount(sector.ravel(), minlength=positions)
         if not np.all(visits):
-            raise ValueError(f"no roller came by some of the {positions} sectors; give more samples or fewer sectors")
+            raise MethodError(f"no roller came by some of the {positions} sectors; give more samples or fewer sectors")
         damage = np.zeros((positions, loads.shape[2]))
         np.add.at(damage, sector, powers)
         damage /= visits[:, None]
@@ -96,15 +97,15 @@ def reference_life(
     samples evenly spaced in time. ``capacity``: C_r [N], of a catalogue or ``dynamic_capacity``. ``gamma``: roller
     over pitch diameter. ``turning``: the rings that turn against the load. ``angle``: place of each roller on the
     ring that stands against the load [rad], (samples, rollers); None for rollers that keep their places. ``edges``:
-    whether ``edge_stress`` raises the lamina loads. Raises ValueError for arrays that do not match, or hold
+    whether ``edge_stress`` raises the lamina loads. Raises MethodError for arrays that do not match, or hold
     negative loads or NaN.
     """
     inner, outer = _lamina_loads(inner, "inner"), _lamina_loads(outer, "outer")
     if inner.shape != outer.shape:
-        raise ValueError(f"loads of shape {inner.shape} inside and {outer.shape} outside do not match")
+        raise MethodError(f"loads of shape {inner.shape} inside and {outer.shape} outside do not match")
     _, rollers, slices = inner.shape
     if angle is not None and np.shape(angle) != inner.shape[:2]:
-        raise ValueError(f"angles of shape {np.shape(angle)} do not match loads of {inner.shape[:2]}")
+        raise MethodError(f"angles of shape {np.shape(angle)} do not match loads of {inner.shape[:2]}")
     factor = edge_stress(slices) if edges else np.ones(slices)
 
     def equivalent(loads: Array, turns: bool) -> float:
@@ -126,7 +127,7 @@ def _lamina_loads(loads: Array, race: str) -> Array:
     if array.ndim == 2:
         array = array[:, :, None]
     if array.ndim != 3 or array.size == 0:
-        raise ValueError(f"{race} loads of shape {np.shape(loads)}: give (samples, rollers) or with slices")
+        raise MethodError(f"{race} loads of shape {np.shape(loads)}: give (samples, rollers) or with slices")
     if not np.all(array >= 0.0) or not np.all(np.isfinite(array)):
-        raise ValueError(f"{race} loads hold negative values, NaN or infinity")
+        raise MethodError(f"{race} loads hold negative values, NaN or infinity")
     return array

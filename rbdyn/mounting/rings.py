@@ -7,6 +7,7 @@ Radii are of the drawing; growths are radial, clearances and interferences diame
 import math
 from dataclasses import dataclass, replace
 
+from rbdyn.faults import MethodError
 from rbdyn.properties.materials import Material
 
 
@@ -15,7 +16,7 @@ class Ring:
     """A ring, a solid (inner radius 0) or hollow shaft, or a housing.
 
     Radii [m]; ``temperature_rise`` above the temperature of the drawing [K], uniform; ``speed`` [rad/s].
-    Raises ValueError unless 0 <= inner radius < outer radius.
+    Raises MethodError unless 0 <= inner radius < outer radius.
     """
 
     inner_radius: float
@@ -27,7 +28,7 @@ class Ring:
     def __post_init__(self) -> None:
         if not 0.0 <= self.inner_radius < self.outer_radius:
             what = f"a ring from {self.inner_radius:g} to {self.outer_radius:g} m has no wall"
-            raise ValueError(f"{what}; mend its diameters")
+            raise MethodError(f"{what}; mend its diameters")
 
     def pressure_growth(self, radius: float, inside: float = 0.0, outside: float = 0.0) -> float:
         """Growth at ``radius`` [m] under pressures on bore and outside [Pa] (Lamé)."""
@@ -69,11 +70,11 @@ def interface_pressure(inner: Ring, outer: Ring, interference: float) -> float:
 
     ``interference``: diametral, at the temperature of the drawing and at rest [m], positive tight. From
     compatibility: growth of the outer bore less growth of the inner outside is half the interference.
-    Raises ValueError when the rings do not share the nominal radius.
+    Raises MethodError when the rings do not share the nominal radius.
     """
     if not math.isclose(inner.outer_radius, outer.inner_radius, rel_tol=1e-9):
         what = f"radii of {inner.outer_radius:g} and {outer.inner_radius:g} m are not those of one fit"
-        raise ValueError(f"{what}; give the nominal radius to both and the rest as interference")
+        raise MethodError(f"{what}; give the nominal radius to both and the rest as interference")
     radius = outer.inner_radius
     overlap = 0.5 * interference + inner.growth(radius) - outer.growth(radius)
     compliance = outer.pressure_growth(radius, inside=1.0) - inner.pressure_growth(radius, outside=1.0)
@@ -84,7 +85,7 @@ def loosening_speed(inner: Ring, outer: Ring, interference: float) -> float:
     """Speed [rad/s] of both rings together at which their fit comes loose, whatever speeds they have themselves.
 
     Rotation widens the outer more: overlap at rest = (difference of the growths at 1 rad/s) times speed^2. 0 where the
-    fit is loose at rest, infinite where the inner ring grows as much as the outer. Raises ValueError as
+    fit is loose at rest, infinite where the inner ring grows as much as the outer. Raises MethodError as
     ``interface_pressure``.
     """
     if interface_pressure(replace(inner, speed=0.0), replace(outer, speed=0.0), interference) == 0.0:
@@ -149,7 +150,7 @@ def mounted_clearance(
 ) -> MountedClearance:
     """Diametral clearance of a mounted roller bearing as it runs, from ``initial`` of the loose parts [m].
 
-    Raises ValueError as ``interface_pressure``.
+    Raises MethodError as ``interface_pressure``.
     """
     inner_pressure, outer_pressure = rings.inner_pressure, rings.outer_pressure
     inner, outer = rings.inner_ring, rings.outer_ring

@@ -15,6 +15,7 @@ from BSF) and from C and C0 of NSK's 72 and 73 with 40 degrees (11 sizes, by ISO
 import math
 from typing import NamedTuple
 
+from rbdyn.faults import MethodError
 from rbdyn.properties.designation import ANGLES, Designation
 from rbdyn.properties.tables import table
 
@@ -76,7 +77,7 @@ class BallInterior(NamedTuple):
 
 
 def envelope(named: Designation) -> Envelope:
-    """What the catalogue lists of a designation. Raises ValueError where it does not."""
+    """What the catalogue lists of a designation. Raises MethodError where it does not."""
     size, bore = named.series + named.code, BORES.get(named.code, 5.0 * int(named.code))
     rollers = named.kind == "cylindrical_roller"
     for row in table("cylindrical_rollers" if rollers else "ball_bearings"):
@@ -87,23 +88,23 @@ def envelope(named: Designation) -> Envelope:
             return Envelope(*box, 1e3 * number["C"], 1e3 * number["C0"], *raceways)
         if not rollers and (row["diameter_series"], box[0]) == (named.diameter_series, bore):
             return Envelope(*box)
-    raise ValueError("is not in the tables here; add --bore, --outside and --width in mm")
+    raise MethodError("is not in the tables here; add --bore, --outside and --width in mm")
 
 
 def radial_clearance(bore: float, name: str, kind: str) -> tuple[float, float]:
-    """Limits of a class of ISO 5753-1 [um] of a cylindrical roller or a deep groove ball bearing. Raises ValueError."""
+    """Limits of a class of ISO 5753-1 [um] of a cylindrical roller or a deep groove ball bearing. Raises MethodError."""
     if name not in CLEARANCE_CLASSES:
-        raise ValueError(f"{name} is no clearance class here; choose one of {', '.join(CLEARANCE_CLASSES)}")
+        raise MethodError(f"{name} is no clearance class here; choose one of {', '.join(CLEARANCE_CLASSES)}")
     listed = [row for row in table("clearance_classes") if row["kind"] == kind and row[f"{name}_min"]]
     for row in listed:
         if bore <= float(row["bore"]):
             return float(row[f"{name}_min"]), float(row[f"{name}_max"])
     reach = f"{name} is listed to a bore of {listed[-1]['bore']} mm, not of {bore:g} mm"
-    raise ValueError(f"{reach}; take a smaller bearing or another class")
+    raise MethodError(f"{reach}; take a smaller bearing or another class")
 
 
 def roller_interior(sizes: Envelope, narrow: bool) -> RollerInterior:
-    """Interior of a cylindrical roller bearing; ``narrow``: of series 10. Raises ValueError for impossible dimensions."""
+    """Interior of a cylindrical roller bearing; ``narrow``: of series 10. Raises MethodError for impossible dimensions."""
     height = 0.5 * (sizes.outside - sizes.bore)
     if sizes.inner_raceway is not None and sizes.outer_raceway is not None:
         diameter = 0.5 * (sizes.outer_raceway - sizes.inner_raceway)
@@ -120,7 +121,7 @@ def roller_interior(sizes: Envelope, narrow: bool) -> RollerInterior:
             pitch, around = 0.5 * PITCH_SHARE * (sizes.outside + sizes.bore), "estimated: 1.01 (d + D)/2, +-0.3 %"
     rollers = round(math.pi * pitch / (SPACING * diameter)) if diameter > 0.0 else 0
     if rollers < 3 or not sizes.bore < pitch - diameter < pitch + diameter < sizes.outside:
-        raise ValueError("leaves no room for rings and rollers; check --bore and --outside")
+        raise MethodError("leaves no room for rings and rollers; check --bore and --outside")
     if sizes.static_capacity is not None:
         length = sizes.static_capacity / (44.0 * (1.0 - diameter / pitch) * rollers * diameter)
         along = "estimated: gives the catalogue's C0 by ISO 76, +-6 % as the rollers are +-1"
@@ -133,7 +134,7 @@ def roller_interior(sizes: Envelope, narrow: bool) -> RollerInterior:
 
 
 def ball_interior(sizes: Envelope, named: Designation) -> BallInterior:
-    """Interior of a ball bearing. Raises ValueError for impossible dimensions."""
+    """Interior of a ball bearing. Raises MethodError for impossible dimensions."""
     deep = named.kind == "deep_groove_ball"
     pitch, height = 0.5 * (sizes.bore + sizes.outside), sizes.outside - sizes.bore
     usual = named.diameter_series in "23"
@@ -142,7 +143,7 @@ def ball_interior(sizes: Envelope, named: Designation) -> BallInterior:
         share = LARGE_DEEP_GROOVE_SHARE
     diameter = _rounded(share * height, BALL_STEP)
     if not 0.0 < diameter < pitch or diameter > 2.0 * sizes.width:
-        raise ValueError("leaves no room for rings and balls; check --bore, --outside and --width")
+        raise MethodError("leaves no room for rings and balls; check --bore, --outside and --width")
     apart = 2.0 * math.asin(diameter / pitch)
     by = f"estimated: {share:g} (D - d) in 64ths of an inch, +-{5 if usual else 10} %"
     if deep:

@@ -8,6 +8,8 @@ import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from rbdyn.faults import MethodError
+
 SHAPE = re.compile(r"(NUP|NU|NJ|NF|N)?[ -]*(\d{2,5})?(.*)", re.IGNORECASE | re.ASCII)
 LONGEST = 100  # characters of a designation
 # Between suffixes; a class of clearance or tolerance may also follow another suffix at once, as in ZZC3.
@@ -119,7 +121,7 @@ class Designation(NamedTuple):
 
 
 def read_designation(text: str) -> Designation:
-    """Take a designation apart. Raises ValueError for what is none of the kinds known here, and for a suffix that is unknown,
+    """Take a designation apart. Raises MethodError for what is none of the kinds known here, and for a suffix that is unknown,
     changes what is not modelled, or contradicts another.
     """
     plain = " ".join(text.split())
@@ -134,7 +136,7 @@ def read_designation(text: str) -> Designation:
             return Designation(kind, letters, series, code, words, suffixes)
     rollers = "NU, NJ, NUP, N or NF with series 10, 2, 22, 3 or 23 (NU210)"
     balls = "a deep groove ball bearing of series 60, 62, 63, 618, 619 (6208) or an angular contact one"
-    raise ValueError(f"is no designation known here; write {rollers}, {balls} of 70, 72, 73, 718, 719 (7208B)")
+    raise MethodError(f"is no designation known here; write {rollers}, {balls} of 70, 72, 73, 718, 719 (7208B)")
 
 
 def _parts(word: str, kind: str) -> list[str]:
@@ -146,7 +148,7 @@ def _parts(word: str, kind: str) -> list[str]:
 
 
 def _read(word: str, kind: str) -> Iterator[Suffix]:
-    """What a suffix states of a kind of bearing. Raises ValueError."""
+    """What a suffix states of a kind of bearing. Raises MethodError."""
     for form in FORMS[kind]:
         if match := re.fullmatch(form, word):
             for group, value in match.groupdict().items():
@@ -156,14 +158,14 @@ def _read(word: str, kind: str) -> Iterator[Suffix]:
             return
     for pattern, why in REFUSED:
         if re.fullmatch(pattern, word):
-            raise ValueError(f"suffix {word} {why}")
-    raise ValueError(f"suffix {word} is not known; leave it out, or write {KNOWN[kind]}")
+            raise MethodError(f"suffix {word} {why}")
+    raise MethodError(f"suffix {word} is not known; leave it out, or write {KNOWN[kind]}")
 
 
 def _check(suffixes: tuple[Suffix, ...]) -> None:
-    """Raises ValueError for two suffixes of one group."""
+    """Raises MethodError for two suffixes of one group."""
     first: dict[str, Suffix] = {}
     for each in suffixes:
         if (other := first.setdefault(each.group, each)) is not each:
             what = f"suffixes {other.text} and {each.text} both state the {GROUPS[each.group].partition(',')[0]}"
-            raise ValueError(f"{what}; leave one out")
+            raise MethodError(f"{what}; leave one out")

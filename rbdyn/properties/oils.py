@@ -10,6 +10,7 @@ import math
 import re
 from typing import NamedTuple, Self
 
+from rbdyn.faults import MethodError
 from rbdyn.properties.lubricants import ABSOLUTE_ZERO_C, Oil
 from rbdyn.properties.tables import table
 
@@ -112,11 +113,11 @@ class Fluid(NamedTuple):
 def viscosity_index(at_40: float, at_100: float) -> float:
     """Viscosity index of an oil with these kinematic viscosities [mm^2/s] (ASTM D2270, ``d2270.csv``).
 
-    100 (L - U)/(L - H) up to 100, beyond 100 + (10^N - 1)/0.00715 with N = lg(H/U)/lg Y. Raises ValueError where the
+    100 (L - U)/(L - H) up to 100, beyond 100 + (10^N - 1)/0.00715 with N = lg(H/U)/lg Y. Raises MethodError where the
     viscosity at 100 C is below 2 mm^2/s, for which none is defined.
     """
     if at_100 < THINNEST:
-        raise ValueError(f"{at_100:g} mm2/s at 100 C: no viscosity index is defined below {THINNEST:g}")
+        raise MethodError(f"{at_100:g} mm2/s at 100 C: no viscosity index is defined below {THINNEST:g}")
     rows = ([float(value) for value in row.values()] for row in table("d2270"))
     _, a, b, c, d, e, f = [row for row in rows if row[0] <= at_100][-1]
     low, high = (a * at_100 + b) * at_100 + c, (d * at_100 + e) * at_100 + f
@@ -128,11 +129,11 @@ def viscosity_index(at_40: float, at_100: float) -> float:
 def viscosity_at_100(at_40: float, index: float) -> float:
     """Kinematic viscosity at 100 C [mm^2/s] that gives an oil of ``at_40`` this viscosity index.
 
-    Raises ValueError where that is below 2 mm^2/s or not below ``at_40``.
+    Raises MethodError where that is below 2 mm^2/s or not below ``at_40``.
     """
     low, high = THINNEST, min(at_40, THICKEST)
     if not low < high or not viscosity_index(at_40, low) <= index <= viscosity_index(at_40, high):
-        raise ValueError(f"viscosity index {index:g}: no oil of {at_40:g} mm2/s at 40 C has it")
+        raise MethodError(f"viscosity index {index:g}: no oil of {at_40:g} mm2/s at 40 C has it")
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if viscosity_index(at_40, middle) < index else (low, middle)
@@ -141,7 +142,7 @@ def viscosity_at_100(at_40: float, index: float) -> float:
 
 @functools.cache
 def grade_oil(grade: float, base: BaseOil, index: float | None = None) -> Fluid:
-    """An oil of an ISO viscosity grade; its index is the base oil's unless given. Raises ValueError."""
+    """An oil of an ISO viscosity grade; its index is the base oil's unless given. Raises MethodError."""
     at_100 = viscosity_at_100(grade, base.viscosity_index if index is None else index)
     return Fluid(Walther.through((40.0, grade), (100.0, at_100)), base, base.density)
 
@@ -159,7 +160,7 @@ NUMBERS = {"7808": "MIL-L-7808", "23699": "MIL-L-23699", "85734": "MIL-L-85734"}
 
 
 def oil_named(text: str) -> NamedOil:
-    """The oil of a text such as "ISO VG 32", "VG 15 PAO", "grease VG 100 mineral", "23699" or "Jet Oil II". Raises ValueError."""
+    """The oil of a text such as "ISO VG 32", "VG 15 PAO", "grease VG 100 mineral", "23699" or "Jet Oil II". Raises MethodError."""
     plain = " ".join(text.split())
     if graded := NAMED.fullmatch(plain):
         grease, grade, base = graded.groups()
@@ -173,7 +174,7 @@ def oil_named(text: str) -> NamedOil:
         return NamedOil(next(iter(TURBINE_OILS)))
     what = f"is no oil known here; write ISO VG {', '.join(map(str, GRADES[:-1]))} or {GRADES[-1]}"
     why = f"with {', '.join(BASE_OILS)} behind it and grease before it as needed, or 7808, 23699, 85734, Jet Oil II"
-    raise ValueError(f"{what}, {why}; own data go into [lubricant] as oil = 'data_sheet'")
+    raise MethodError(f"{what}, {why}; own data go into [lubricant] as oil = 'data_sheet'")
 
 
 # The maker's data sheet: 27.6 and 5.1 mm^2/s at 40 and 100 C, 1003.5 kg/m^3 at 15 C.

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from rbdyn.arrays import Array
-from rbdyn.faults import validated
+from rbdyn.faults import MethodError, validated
 from rbdyn.life.turns import turning_rings
 from rbdyn.quasistatic.fatigue import reference_capacities, solution_life
 from rbdyn.quasistatic.remarks import Rating, overloads, pressures
@@ -82,10 +82,10 @@ def sweep(case_at: Callable[[float], Case], values: Sequence[float], name: str, 
     """Scan ``values``, at least three and rising, and refine both optima.
 
     ``case_at`` makes the case of a value; ``name``, ``unit`` and ``scale`` (units to one of SI) are for the notes.
-    Raises ValueError for other values, or when fewer than three of them have an equilibrium.
+    Raises MethodError for other values, or when fewer than three of them have an equilibrium.
     """
     if len(values) < 3 or not np.all(np.diff(values) > 0.0):
-        raise ValueError(f"{name}: give at least three rising values to scan, not {list(values)}")
+        raise MethodError(f"{name}: give at least three rising values to scan, not {list(values)}")
     points: list[Point] = []
     start: Solution | None = None
     for value in values:
@@ -94,7 +94,7 @@ def sweep(case_at: Callable[[float], Case], values: Sequence[float], name: str, 
     balanced = [point for point in points if point.solution.found]
     if len(balanced) < 3:
         what = f"{name}: only {len(balanced)} of {len(points)} scanned values have an equilibrium"
-        raise ValueError(f"{what}; scan a range that has one")
+        raise MethodError(f"{what}; scan a range that has one")
 
     def refined(worth: Callable[[Point], float]) -> Point:
         best = min(range(len(balanced)), key=lambda i: worth(balanced[i]))
@@ -143,13 +143,13 @@ def over_preload(
 ) -> Sweep:
     """Sweep of ``operation.preload_N`` [N], which replaces the scene's own; the rest of its load stays.
 
-    ``capacities``: how races are rated, ``fatigue.reference_capacities`` or another. Raises ValueError as ``sweep``, or where the
+    ``capacities``: how races are rated, ``fatigue.reference_capacities`` or another. Raises MethodError as ``sweep``, or where the
     scene prescribes the axial displacement, which no force can change; InputError for a preload that no scene may have.
     """
     at = _case(scene, capacities)
     if not math.isnan(at.given[2]):
         what = "operation.prescribed.z_mm or preload_um: the axial displacement is prescribed"
-        raise ValueError(f"{what}, so a preload by force has no effect; leave it out")
+        raise MethodError(f"{what}, so a preload by force has no effect; leave it out")
 
     def case_at(preload: float) -> Case:
         return at._replace(load=load_of(scene.changed({"operation.preload_N": preload})))
@@ -162,13 +162,13 @@ def over_clearance(
 ) -> Sweep:
     """Sweep of the diametral clearance [m] with everything else as in the scene.
 
-    Raises ValueError as ``sweep``, or where the scene gives the contact angle, which rules the clearance.
+    Raises MethodError as ``sweep``, or where the scene gives the contact angle, which rules the clearance.
     """
     angle = scene.bearing.contact_angle_deg
     if angle is not None:
         what = f"bearing.contact_angle_deg = {angle:g} rules the clearance, {1e6 * clearance_of(scene.bearing):.4g} um"
         why = "give bearing.radial_clearance_mm in its place"
-        raise ValueError(f"{what}: {why}, or --sweep bearing.clearance_change_um")
+        raise MethodError(f"{what}: {why}, or --sweep bearing.clearance_change_um")
 
     def case_at(clearance: float) -> Case:
         return _case(_redrawn(scene, radial_clearance_mm=1e3 * clearance), capacities)
@@ -177,7 +177,7 @@ def over_clearance(
 
 
 def over_wear(scene: SingleRowScene, wears: Sequence[float], capacities: Capacities = reference_capacities) -> Sweep:
-    """Sweep of the diameter that every ball has lost [m]; raises ValueError as ``sweep`` and ``worn``."""
+    """Sweep of the diameter that every ball has lost [m]; raises MethodError as ``sweep`` and ``worn``."""
     return sweep(lambda wear: _case(worn(scene, wear), capacities), wears, "a wear of", "um", 1e6)
 
 
@@ -197,12 +197,12 @@ def worn(scene: SingleRowScene, wear: float) -> SingleRowScene:
     """The scene with balls that have lost ``wear`` of their diameter [m], evenly; the grooves keep their radii.
 
     The diametral clearance grows by twice the wear, the groove factors as 1/D, and with both the contact angle.
-    Raises ValueError for a wear that is negative or leaves no ball.
+    Raises MethodError for a wear that is negative or leaves no ball.
     """
     drawing = scene.bearing
     diameter = drawing.ball_diameter_mm - 1e3 * wear
     if not wear >= 0.0 or not diameter > 0.0:
-        raise ValueError(f"wear {wear:g} m must lie between 0 and the ball's diameter")
+        raise MethodError(f"wear {wear:g} m must lie between 0 and the ball's diameter")
     grown = drawing.ball_diameter_mm / diameter
     return _redrawn(
         scene,

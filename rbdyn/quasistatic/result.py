@@ -10,6 +10,7 @@ from rbdyn.arrays import Array
 from rbdyn.contact import point_film
 from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
+from rbdyn.faults import MethodError
 from rbdyn.life.turns import turning_rings
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.fatigue import solution_life
@@ -101,21 +102,21 @@ class BallResult(Brief, SavedRecord, kw_only=True):
 
     @property
     def displacement(self) -> Array:
-        """(x, y, z [m], theta_x, theta_y [rad]) of the inner ring. Raises ValueError where there is no equilibrium."""
+        """(x, y, z [m], theta_x, theta_y [rad]) of the inner ring. Raises MethodError where there is no equilibrium."""
         report = self.reached
         place, tilt = report.displacement_mm, report.tilt_mrad
         return 1e-3 * np.array([place["x"], place["y"], place["z"], tilt["x"], tilt["y"]])
 
     @property
     def reached(self) -> RowReport | DoubleDeckerReport:
-        """What was found. Raises ValueError where nothing was."""
+        """What was found. Raises MethodError where nothing was."""
         if self.report is None:
-            raise ValueError(f"there is no equilibrium: {self.status}")
+            raise MethodError(f"there is no equilibrium: {self.status}")
         return self.report
 
     @property
     def row_reports(self) -> dict[str, RowReport]:
-        """What was found of each row, by its name: "inner" and "outer", or "" for a single one. Raises ValueError as ``reached``."""
+        """What was found of each row, by its name: "inner" and "outer", or "" for a single one. Raises MethodError as ``reached``."""
         report = self.reached
         return {"": report} if isinstance(report, RowReport) else {"inner": report.inner, "outer": report.outer}
 

@@ -87,6 +87,27 @@ def test_invariant_units_end_at_the_scene():
     assert needed == set(EDGES), "an edge that reads none is none"
 
 
+# Calls whose ValueError may be put into words: conversions of one text or file, signals, and an integrator of SciPy.
+CONVERSIONS = {"float", "int", "loads", "read_json", "decode", "parse", "solve_ivp", "open"}
+
+
+def test_invariant_errors_of_libraries_are_not_the_users():
+    """Invariant: the words of a ValueError are shown where one text was converted; all other sentences are our own errors."""
+    words, found = 0, []
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.Try):
+                continue
+            called = {
+                ast.unparse(each.func).rpartition(".")[2] for each in ast.walk(node) if isinstance(each, ast.Call)
+            }
+            for handler in (each for each in node.handlers if each.name and each.type):
+                words += 1
+                if re.search(r"\bValueError\b", ast.unparse(handler.type)) and not called & CONVERSIONS:
+                    found.append(f"{path.relative_to(ROOT).as_posix()}:{handler.lineno}")
+    assert words > 20 and not found
+
+
 def test_invariant_kernels_index_from_the_start():
     """Invariant: no index of a kernel is written as one that counts from the end, which compiled code would not follow."""
     seen, found = 0, []

@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from rbdyn.faults import MethodError
 from rbdyn.fields import RPM
 
 OIL_BATH = 3.3
@@ -81,11 +82,11 @@ def load_torque(
     """Palmgren's torque of the load M1 = f1 P1 dm [N m], f1 = z (P0/C0)^y of angular contact ball bearings.
 
     P1 = 0.9 Fa cot(alpha0) - 0.1 Fr, but not below Fr. Loads and capacity [N], angle [rad], diameter [m].
-    Raises ValueError unless angle and capacity are positive.
+    Raises MethodError unless angle and capacity are positive.
     """
     if static_capacity <= 0.0 or contact_angle <= 0.0:
         given = f"a static capacity of {static_capacity:g} N and a contact angle of {contact_angle:g} rad"
-        raise ValueError(f"{given} give no load torque; both must be greater than 0")
+        raise MethodError(f"{given} give no load torque; both must be greater than 0")
     radial, axial = abs(radial_load), abs(axial_load)
     scale, exponent = ANGULAR_CONTACT
     rating = static_equivalent_load(radial, axial, contact_angle) / static_capacity

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from rbdyn.faults import MethodError
 from rbdyn.properties.tables import table
 
 ToleranceClass = Literal["P2", "P4", "P5", "P6", "normal"]
@@ -27,16 +28,16 @@ def running_accuracy(
 ) -> RunningAccuracy:
     """Limits of a class for a bore and, where K_ea is wanted, an outside diameter [m].
 
-    Raises ValueError for a class or a bore that the tables do not hold.
+    Raises MethodError for a class or a bore that the tables do not hold.
     """
     if tolerance_class not in get_args(ToleranceClass):
         known = ", ".join(get_args(ToleranceClass))
-        raise ValueError(f"tolerance class {tolerance_class!r} is not known; choose one of {known}")
+        raise MethodError(f"tolerance class {tolerance_class!r} is not known; choose one of {known}")
     row = _row(tolerance_class, "bore", 1e3 * bore)
     if row is None:
         held = _rows(tolerance_class, "bore")
         reach = f"above {held[0]['above']} mm and up to {held[-1]['up_to']} mm"
-        raise ValueError(f"a bore of {1e3 * bore:g} mm: class {tolerance_class} is held here {reach}")
+        raise MethodError(f"a bore of {1e3 * bore:g} mm: class {tolerance_class} is held here {reach}")
     outer = None if outside_diameter is None else _row(tolerance_class, "outside", 1e3 * outside_diameter)
     limits = (*(row[name] for name in ("K_ia", "S_d", "S_ia")), outer["K_ea"] if outer else "")
     return RunningAccuracy(*(1e-6 * float(limit) if limit else None for limit in limits))  # type: ignore[arg-type]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.arrays import Array, Whole
-from rbdyn.faults import RunError
+from rbdyn.faults import MethodError, RunError
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.row import Row
@@ -45,13 +45,13 @@ class LinearResponse(NamedTuple):
 def linear_response(row: Row, control: Control, load: Array, given: Array | None = None) -> LinearResponse:
     """Response of a row of equal, evenly spaced balls under an axial load, by central differences.
 
-    Arguments as of ``equilibrium.solve``. Raises ValueError where load or row single out a direction, and RunError
+    Arguments as of ``equilibrium.solve``. Raises MethodError where load or row single out a direction, and RunError
     with the reason where there is no equilibrium.
     """
     if np.any(np.delete(load, 2)):
-        raise ValueError("load: runout answers in proportion only under a purely axial load; set the rest to 0")
+        raise MethodError("load: runout answers in proportion only under a purely axial load; set the rest to 0")
     if any(np.ptp(getattr(row, name)) > 0.0 for name in CHANGES):
-        raise ValueError("row: balls differ already; give the nominal row")
+        raise MethodError("row: balls differ already; give the nominal row")
     middle = _settled(solve(row, control, load, given))
     slopes = []
     for name in CHANGES:

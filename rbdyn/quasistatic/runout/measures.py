@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from rbdyn.arrays import Array
+from rbdyn.faults import MethodError
 from rbdyn.records.words import counted
 
 # Places round the face where the axial indicator may stand.
@@ -49,12 +50,12 @@ class Runout:
 def runout(path: Array, turns: int, face_radius: float) -> Runout:
     """Runout of a path (turns * steps, 5) of displacements x, y, z [m], theta_x, theta_y [rad].
 
-    ``face_radius``: where an axial indicator touches the ring [m]. Raises ValueError unless the steps fill whole turns.
+    ``face_radius``: where an axial indicator touches the ring [m]. Raises MethodError unless the steps fill whole turns.
     """
     steps, left = divmod(len(path), turns)
     if left or steps < 3:
         what = f"{counted(len(path), 'step')} in {counted(turns, 'turn')}: not whole turns of at least three steps"
-        raise ValueError(f"{what}; mend the number of turns")
+        raise MethodError(f"{what}; mend the number of turns")
     orbit, axial = path[:, :2], path[:, 2]
     # Far from the origin, digits of the small motion would be lost.
     orbit = orbit - orbit.mean(axis=0)

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.arrays import Array, Whole
+from rbdyn.faults import MethodError
 from rbdyn.records.words import counted
 
 
@@ -120,10 +121,12 @@ def rolling(ball_diameter: float, pitch_diameter: float, contact_angle: float, o
 
     Diameters in m, the angle in rad; ``outer``: turns of the outer ring (0: it stands, -1: the inner ring stands).
     omega_c = (omega_i (1 - g) + omega_o (1 + g))/2, spin = (omega_i - omega_o) (1 - g^2) dm/(2D), g = D cos(alpha)/dm.
-    Raises ValueError unless 0 < D < dm.
+    Raises MethodError unless 0 < D < dm.
     """
     if not 0.0 < ball_diameter < pitch_diameter:
-        raise ValueError(f"a ball of {ball_diameter:g} m on a pitch circle of {pitch_diameter:g} m: it must be smaller")
+        raise MethodError(
+            f"a ball of {ball_diameter:g} m on a pitch circle of {pitch_diameter:g} m: it must be smaller"
+        )
     gamma = ball_diameter * math.cos(contact_angle) / pitch_diameter
     cage = 0.5 * ((1.0 + outer) * (1.0 - gamma) + outer * (1.0 + gamma))
     spin = 0.5 * pitch_diameter / ball_diameter * (1.0 - gamma**2)
@@ -148,10 +151,10 @@ class BallPath(NamedTuple):
 def ball_path(errors: RaceErrors, turning: Turning, steps: int, turns: int = 1, start: float = 0.0) -> BallPath:
     """Follow the balls through ``turns`` turns of the inner ring against the outer, ``steps`` to a turn.
 
-    ``start``: azimuth of the first ball at the first step [rad]. Raises ValueError unless steps and turns are positive.
+    ``start``: azimuth of the first ball at the first step [rad]. Raises MethodError unless steps and turns are positive.
     """
     if steps < 1 or turns < 1:
-        raise ValueError(
+        raise MethodError(
             f"{counted(turns, 'turn')} of {counted(steps, 'step')} make no path; give at least one of each"
         )
     z = errors.balls

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.faults import MethodError
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.row import Row
 from rbdyn.quasistatic.runout import lots
@@ -101,11 +102,11 @@ def design(
     ``outer_share``: limit of an outer race over that of the inner one. ``sway_shares``: side-sway limits over roundness
     limits that are tried; the one that leaves the largest product of both is taken, so that neither is held tight for
     the other's sake. ``solved``: how many bearings are solved in full, again and again to set the size of all limits and
-    once more of the fresh lot; 0 leaves all to the proportion. Raises ValueError where the balls alone
+    once more of the fresh lot; 0 leaves all to the proportion. Raises MethodError where the balls alone
     fail the class or no race error reaches the ring, and as ``linear_response`` and ``turn.follow``.
     """
     if not 0.0 < wanted < 1.0:
-        raise ValueError(f"wanted = {wanted:g}: a yield lies between 0 and 1; give a share such as 0.95")
+        raise MethodError(f"wanted = {wanted:g}: a yield lies between 0 and 1; give a share such as 0.95")
     response = lots.linear_response(bench.row, bench.control, bench.load, bench.given)
     parts, read = _lot(bench, lot, response, bearings, seed)
     allowed = np.array([radial_limit, axial_limit])
@@ -179,11 +180,11 @@ def _widest(shares: Array, read: lots.Readings, allowed: Array, wanted: float) -
         return float(((radial <= allowed[0]) & (face <= allowed[1])).mean()) >= wanted
 
     if not passes(0.0):
-        raise ValueError("the balls alone fail the class; take better balls or a wider class")
+        raise MethodError("the balls alone fail the class; take better balls or a wider class")
     low, high = 0.0, float(allowed[0])
     while passes(high):
         if high > 1e6 * allowed[0]:
-            raise ValueError("no order of these race errors reaches the ring; let the lot have more orders")
+            raise MethodError("no order of these race errors reaches the ring; let the lot have more orders")
         low, high = high, 2.0 * high
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
