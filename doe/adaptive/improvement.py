@@ -110,6 +110,8 @@ def batch(
     ``left`` (u,) is the probability that a level is still to be gained. Candidates within ``apart`` (k,) of one taken are
     its twins, and refused. Each is taken to turn out as foretold (Ginsbourger, Le Riche and Carraro's kriging believer). There are fewer rows than ``count`` where nothing else is left to gain.
     """
+    if not len(candidates):
+        return [], np.empty(0)
     means, deviations = emulators.predict(candidates)
     # The first of a Sobol sequence are even; every second one is not.
     still = np.flatnonzero(left > 0.0)

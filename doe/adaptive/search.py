@@ -148,7 +148,7 @@ class _Search:
             levels, left, state = self._state(emulators, points, random)
             count = min(self.plan.batch, room - len(self.runs.points))
             rows, _ = batch(emulators, points, levels, left, count, self.region.apart)
-            check = nothing_gained(self.history, since) and count >= CHECKS
+            check = len(points) > 0 and nothing_gained(self.history, since) and count >= CHECKS
             if check:
                 rows = self._check(emulators, points, levels)
             chosen, why = points[rows], "" if not rows else "check" if check else "improvement"
@@ -281,6 +281,8 @@ class _Search:
             emulators = self._fit(self.runs.plus(runs))
             chosen = self._finalists(emulators, runs.points, size, random)
             self.seconds += time.perf_counter() - started
+            if believed and not len(chosen):
+                break  # every point that the front may still have was run anew
             asked = chosen if believed else np.vstack([chosen, original])
             more = self._run(asked, np.full(len(asked), self.plan.usual))
             if not believed:
@@ -303,7 +305,8 @@ class _Search:
         points = candidates(
             emulators, self.region, random, np.vstack([self.runs.points[~self.runs.good], before]), ROUNDS
         )
-        self._check_limits(emulators, points)
+        if len(points):
+            self._check_limits(emulators, points)
         rows, costs = front_rows(emulators, np.vstack([points, before]))
         levels = levels_of(costs[rows], costs[rows].min(axis=0), random)
         left = known_of(levels, emulators, emulators.draws(DRAWS, random)(before)).left

@@ -201,3 +201,17 @@ def test_widest_tolerances_of_a_study_keep_what_they_say(tmp_path):
     assert kept.mean() == pytest.approx(0.95, abs=0.01)
     unsure = widest_of(study, surfaces, point, Tolerances(surface_uncertainty=True))
     assert unsure.half_widths.tolist() == [0.0, 0.0, 0.0] and "even the exact pick" in unsure.sentence
+
+
+@pytest.mark.parametrize("place", ["doe.study.front.front", "doe.study.surfaces.fit", "doe.study.design._design"])
+def test_invariant_a_slip_of_the_code_is_not_called_bad_input(tmp_path, monkeypatch, place):
+    """Invariant: an error of a library below a command is raised on as what it is, with no file or key named in it."""
+    study, _, _ = front_of(tmp_path)
+
+    def slip(*arguments, **options):
+        raise ValueError("attempt to get argmax of an empty sequence")
+
+    monkeypatch.setattr(place, slip)
+    shown = command(study)
+    assert shown.exit_code == 1 and type(shown.exception) is ValueError
+    assert "empty sequence" not in shown.output

@@ -219,6 +219,21 @@ def test_replicates_are_made_where_they_matter():
     assert sum(map(len, fresh)) == plan.fresh and max(map(len, fresh)) <= plan.batch, "learnt a batch at a time"
 
 
+@pytest.mark.parametrize("levels", [2, 3])
+def test_unit_a_region_of_few_points_is_searched_to_its_end(levels):
+    """Unit: where every point that can be drawn was run, the search ends and reports the front of these few."""
+    evaluate, zero = noisy(bowls, 1, 1e-6), np.zeros(2)
+    spacing = 2.0 / (levels - 1)
+    region = Region(-np.ones(2), np.ones(2), -np.ones(2), np.full(2, spacing), np.full(2, 0.5 * spacing))
+    points = np.array([[x, y] for x in np.linspace(-1, 1, levels) for y in np.linspace(-1, 1, levels)])
+    ones = np.ones(len(points), dtype=np.int64)
+    design = Runs(points, *evaluate(points, ones), ones)
+    plan = Plan(40, least=1, most=1, usual=1)
+    found = adaptive_front(evaluate, zero, np.ones(2), region, design, TWO, plan, zero)
+    assert "no point is left" in found.stopped and len(found.front.points) >= 1
+    assert region.twins(found.front.points, points).all()
+
+
 def shifted(points):
     """Squared distances to two points outside the region."""
     return np.column_stack([((points - end) ** 2).sum(axis=1) for end in ([1.9, 0.4], [1.9, -0.4])])
