@@ -71,7 +71,7 @@ class Pace:
         numerics = self.scene.numerics
         shorter = ["model.slices"] if self.scene.slices > 1 else []
         shorter += ["numerics.turns", *(["numerics.replicates"] if numerics.replicates > 1 else [])]
-        return f"lessen {' or '.join([', '.join(shorter[:-1]), shorter[-1]] if shorter[1:] else shorter)} to shorten it"
+        return f"reduce {' or '.join([', '.join(shorter[:-1]), shorter[-1]] if shorter[1:] else shorter)} to shorten it"
 
 
 def duration(seconds: float) -> str:

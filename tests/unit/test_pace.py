@@ -45,7 +45,7 @@ def test_unit_long_runs_state_their_time_and_what_shortens_it(make_scene):
     (sentence,) = sentences(scene, [(12.0, 5.0, 10_000, 10**7)], growth=8.0)
     assert sentence == (
         "all runs take about 24 min at this pace: 10 runs of 120 shaft turns at 2.4 s each, 2 at once, up to 8 times that where "
-        "figures drift; lessen model.slices, numerics.turns or numerics.replicates to shorten it"
+        "figures drift; reduce model.slices, numerics.turns or numerics.replicates to shorten it"
     )
 
 
