@@ -72,9 +72,10 @@ def test_running_study_tells_who_runs_what_and_how_long_it_will_take(tmp_path, m
     for claim in middle["running"]:
         assert claim["pid"] == os.getpid() and claim["label"] == f"design run {claim['run']}"
         assert abs(datetime.fromisoformat(claim["since"]).timestamp() - time.time()) < 60.0
-    # Two threads, runs of 0.02 s and more: 8 or a few more have ended, the others and the confirmation are left.
+    # Two threads, runs of 0.02 s and more: 8 or a few more have ended, the others and the confirmation are left. What is under
+    # way on a busy machine may be nearly done, so half of what these take is sure.
     assert 8 * 0.02 <= middle["spent_s"] <= 2.5 * passed[8]
-    assert 10 * 0.01 + FRONT_S + ANSWER_S <= middle["left_s"] <= 30 / 8 * passed[8] + FRONT_S + ANSWER_S
+    assert 5 * 0.01 + FRONT_S + ANSWER_S <= middle["left_s"] <= 30 / 8 * passed[8] + FRONT_S + ANSWER_S
     (group,) = middle["failures"]
     assert group["runs"] == [2, 4] and "the oil froze" in group["cause"]
     # The answer is not written, and the confirmation has not begun.

@@ -17,7 +17,7 @@ from scipy.stats import spearmanr
 
 from doe import clearance
 from doe.study.input_sets import Case, case_of
-from doe.study.robust import _case
+from doe.study.robust import case_of_study
 from doe.study_file import Study
 from doe.study_file.study import StudyFile
 from doe.unknown import laws
@@ -155,7 +155,7 @@ def study_with(draw: random.Random, folder: Path, table: dict[str, Any]) -> tupl
         data["scene"] = {**data["scene"], "set": draw.sample(SETS, 2)}
     study = Study(folder / "study.toml", validated(StudyFile, {**data, "uncertain": table}, str(folder / "study.toml")))
     point = study.centre + study.step * np.array([draw.uniform(-1.0, 1.0) for _ in study.factors])
-    return _case(study), clearance.assignments(study, point)
+    return case_of_study(study), clearance.assignments(study, point)
 
 
 def check(case: Case, table: dict[str, Any], design: list[str], seed: int) -> int:

@@ -24,7 +24,7 @@ TYPED = {
 # Choices that a law may state, whatever the key: what looks like another type, and what CSV puts in quotes.
 STATED = [
     [True, False], [1, 2, 3], [1, 2.5, "x"], ["1", "2"], ["true", "false"], ["1e3", "nan", "inf"], ["a,b", 'c"d', "e\nf"], ["007", "7"],
-    ["", "x"], [0.1, 1e-300, 1e300], [-1, 0, 10**18], ["yes", "no", "no1"], ["è", "１", "0x10"], [True, "1"], [1.0, "true"], ["1_000", "a b"],
+    ["", "x"], [0.1, 1e-12, 1e12], [-1, 0, 10**18], ["yes", "no", "no1"], ["è", "１", "0x10"], [True, "1"], [1.0, "true"], ["1_000", "a b"],
 ]  # fmt: skip
 
 
