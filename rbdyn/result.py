@@ -46,7 +46,12 @@ class Quantity(Record):
     def __str__(self) -> str:
         parts = {"statistical": self.statistical_error, "numerical": self.numerical_error}
         errors = [f"{error_alone(error)} ({kind})" for kind, error in parts.items() if error is not None]
-        return " ".join((value_alone(self.value, self.error), *errors))
+        return " ".join((self.shown, *errors))
+
+    @property
+    def shown(self) -> str:
+        """The value to the digits that its error bears; to five where the statistical error is unknown."""
+        return value_alone(self.value, None if self.statistical_error is None else self.error)
 
 
 class SavedRecord(Record):
@@ -143,7 +148,8 @@ def read_record(path: Path | str, form: str, what: str, restore: Callable[[dict[
         data = None
     given = data.get("format") if isinstance(data, dict) else None
     if given != form:
-        old = f"format is {given}, not {form}; run the scene again"
+        same = isinstance(given, str) and given.partition("/")[0] == form.partition("/")[0]
+        old = f"format is {given}, not {form}; {'run the scene again' if same else f'name a saved {what}'}"
         raise InputError([f"{path}: {old if isinstance(given, str) else f'not a saved {what}; check the path'}"])
     try:
         return restore(bounded(data, str(path)))

@@ -8,6 +8,7 @@ import typer
 from doe.commands.options import Quiet
 from rbdyn.cli.options import Json, folder_option
 from rbdyn.cli.terminal import guarded, hand_over, print_table
+from rbdyn.faults import InputError
 
 
 def status(
@@ -27,6 +28,8 @@ def status(
     with guarded(as_json):
         from doe.study.status import status_of
 
+        if out is not None and out.exists() and not out.is_dir():
+            raise InputError([f"--out {out}: is a file; name the folder of the results"])
         record = status_of(path, out)
         hand_over(lambda: record, as_json, lambda: print_status(record, quiet))
 

@@ -14,11 +14,21 @@ from doe.dimension_chain.links import Distribution, Part
 
 FILLING = ("uniform", "triangular")  # the tolerance from end to end
 NORMAL_REACH = 9.0  # standard deviations beyond which a normal part has a share below 1e-18
+# A normal cut to fewer standard deviations than this is a uniform one to 1e-10; its own formulas lose their digits there.
+FLAT = 1e-4
 
 
 def standard_limits(part: Part) -> tuple[float, float]:
     """Limits of a part in standard deviations from its mean; the part must have a tolerance."""
     return (part.lower_mm - part.mean_mm) / part.sigma_mm, (part.upper_mm - part.mean_mm) / part.sigma_mm
+
+
+def resolved(part: Part, kind: Distribution) -> Distribution:
+    """The distribution, or "uniform" where a truncated normal is as flat as one between the limits of the part."""
+    if kind != "truncated_normal" or part.tolerance_mm == 0:
+        return kind
+    low, high = standard_limits(part)
+    return "uniform" if high - low < FLAT else kind
 
 
 def frame(part: Part, kind: Distribution) -> tuple[float, float]:
@@ -30,6 +40,7 @@ def quantile(part: Part, kind: Distribution, probability: Array) -> Array:
     """Deviation from the nominal, mm, below which a part lies with each probability."""
     if part.tolerance_mm == 0:
         return np.full_like(probability, part.lower_mm)
+    kind = resolved(part, kind)
     scale, shift = frame(part, kind)
     if kind == "triangular":
         root = np.sqrt(np.minimum(probability, 1 - probability) / 2)
@@ -44,6 +55,7 @@ def share_below(part: Part, kind: Distribution, deviation: Array) -> Array:
     """Share of a part's production below each deviation from the nominal, mm."""
     if part.tolerance_mm == 0:
         return (deviation >= part.lower_mm).astype(float)
+    kind = resolved(part, kind)
     scale, shift = frame(part, kind)
     place = (deviation - shift) / scale
     if kind in FILLING:
@@ -59,6 +71,7 @@ def moments(part: Part, kind: Distribution) -> tuple[float, float]:
     """Mean deviation from the nominal, mm, and variance, mm^2."""
     if part.tolerance_mm == 0:
         return part.lower_mm, 0.0
+    kind = resolved(part, kind)
     if kind in FILLING:
         return part.middle_mm, part.tolerance_mm**2 / (12 if kind == "uniform" else 24)
     if kind == "normal":

@@ -11,6 +11,7 @@ from doe.designs.evaluation import block_contrasts
 from doe.designs.model import Terms
 from doe.response_surface.least_squares import dependent_columns
 from rbdyn.faults import MethodError
+from rbdyn.records.words import are, counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,9 @@ def check_size(name: str, model: str, terms: Terms, block: Whole) -> None:
     if runs <= size:
         blocks = f", {more} for the blocks" if more else ""
         least = f"{size + 1} ({len(terms)} terms{blocks} and one to judge the fit) or choose a simpler model"
-        raise MethodError(f"{name}: {runs} runs are too few for the {model} model; give at least {least}")
+        raise MethodError(
+            f"{name}: {counted(runs, 'run')} {are(runs)} too few for the {model} model; give at least {least}"
+        )
 
 
 def check_matrix(name: str, model: str, terms: Terms, matrix: Array) -> None:

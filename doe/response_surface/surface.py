@@ -30,6 +30,8 @@ from rbdyn.faults import MethodError
 from rbdyn.records.record import Record, derived, outside_json
 
 Weighting = Literal["equal", "replicates"]
+# Range of values over the largest of them, below which too few digits are left for their sums of squares.
+LEAST_SPREAD = 1e-9
 Transform = Literal["none", "box_cox"] | float
 
 TESTED = ("t", "p", "low", "high")
@@ -216,6 +218,9 @@ def _fit(name: str, data: Data, model: Model, weighting: Weighting, transform: T
     if not np.ptp(data.values):
         alike = f"all {len(data.values)} values are {data.values[0]:g}, so there is nothing to fit"
         raise MethodError(f"{name}: {alike}; check the response or leave it out")
+    if np.ptp(data.values) < LEAST_SPREAD * np.abs(data.values).max():
+        near = f"values differ by {np.ptp(data.values):.3g} about {data.values.mean():.6g}, which rounding hides"
+        raise MethodError(f"{name}: {near}; subtract a constant from all")
     exponent = _exponent(name, data, terms, transform)
     response, variances = _on_scale_of_fit(data, exponent)
     weights = 1.0 / variances if weighting == "replicates" and variances is not None else None

@@ -13,7 +13,7 @@ from rbdyn.cli.keys import command as keys
 from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
 from rbdyn.records.cells import save_table
-from rbdyn.records.words import counted, error_alone, value_alone
+from rbdyn.records.words import counted, error_alone
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.slip_map import SlipMap
@@ -251,7 +251,7 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
 
     contact = {"largest of it by contact alone, without the film [N]": result.impact_contact_force}
     figures = {
-        f"largest roller/cage force in {result.impact_window_turns:g} shaft turns [N]": result.impact_force,
+        f"largest roller/cage force in {counted(result.impact_window_turns, 'shaft turn')} [N]": result.impact_force,
         **({} if result.impact_contact_force == result.impact_force else contact),
         "whirl deviation ratio": result.whirl_deviation_ratio,
         "power loss [W]": result.power_loss,
@@ -262,7 +262,7 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
     rows = []
     for label, of in figures.items():
         errors = shown(of.statistical_error), shown(of.numerical_error)
-        rows.append((label, value_alone(of.value, of.error), *errors, f"{of.effective_samples:.0f}"))
+        rows.append((label, of.shown, *errors, f"{of.effective_samples:.0f}"))
     columns = len(header) if verbose else -1
     terminal.print_table("", header[:columns], [row[:columns] for row in rows])
     if result.target is not None:
@@ -280,7 +280,7 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         print(f"clearance: {parts}")
     if verbose:
         if result.transient_turns is not None:
-            print(f"transient: {result.transient_turns:g} shaft turns")
+            print(f"transient: {counted(result.transient_turns, 'shaft turn')}")
         terms = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
         gap = result.power_gap * result.power_loss.value
         terminal.print_table(f"power lost; the power balance closes to {gap:.2g} W", ("term", "W"), terms)

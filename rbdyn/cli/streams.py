@@ -55,7 +55,7 @@ def run(app: Callable[[], object]) -> NoReturn:
             code = end.code
         sys.stdout.flush()
     except BaseException as error:
-        if not swallowed and not isinstance(error, KeyboardInterrupt):
+        if not swallowed and not _is_interrupt(error):
             raise
         code = INTERRUPTED
     if out is not None:
@@ -69,6 +69,11 @@ def run(app: Callable[[], object]) -> NoReturn:
             # An interrupt that passed through ``exec`` would have the interpreter end by the signal, not by this code.
             os._exit(code)
     sys.exit(code)
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether it is Ctrl-C, or what Python made of one that fell into the making of a class."""
+    return error is not None and (isinstance(error, KeyboardInterrupt) or _is_interrupt(error.__cause__))
 
 
 def _word_warnings() -> None:

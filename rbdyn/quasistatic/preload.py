@@ -85,7 +85,8 @@ def sweep(case_at: Callable[[float], Case], values: Sequence[float], name: str, 
     Raises MethodError for other values, or when fewer than three of them have an equilibrium.
     """
     if len(values) < 3 or not np.all(np.diff(values) > 0.0):
-        raise MethodError(f"{name}: give at least three rising values to scan, not {list(values)}")
+        given = ", ".join(f"{scale * value:.6g}" for value in values[:6]) + (", ..." if len(values) > 6 else "")
+        raise MethodError(f"give at least three rising values to scan, not {given} {unit}")
     points: list[Point] = []
     start: Solution | None = None
     for value in values:

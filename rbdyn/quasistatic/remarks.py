@@ -21,6 +21,8 @@ STEEPEST = math.radians(80.0)
 OILED_FRICTION = 0.07
 # Makers allow angular contact bearings about this misalignment, deep groove ones up to three times as much [rad].
 TIPPED = 1e-3
+# A ball load [N] that is left over from rounding.
+NO_LOAD = 1e-9
 
 
 class Rating(NamedTuple):
@@ -93,7 +95,7 @@ def needed_friction(balls: Array, ratings: Sequence[Rating]) -> Array:
 def remarks(balls: Array, ratings: Sequence[Rating], name: str = "") -> list[Remark]:
     """Remarks on n equilibria of a row, ``balls`` (n, Z, FIGURES); ``name`` of the row, where there are two."""
     row = f"{name} row: " if name else ""
-    touching, angle = balls[:, :, INNER_LOAD] > 0.0, np.degrees(balls[:, :, INNER_ANGLE])
+    touching, angle = balls[:, :, INNER_LOAD] > NO_LOAD, np.degrees(balls[:, :, INNER_ANGLE])
     size = touching.shape[1]
     clear = size - touching.sum(axis=1)
     steepest = np.where(touching, np.abs(angle), 0.0).max(axis=1)

@@ -20,6 +20,8 @@ OilName = Literal[
 ]  # fmt: skip
 GRADE = "ISO VG "
 HOTTEST_C = 350.0
+# Kinematic viscosity [mm^2/s] beyond that of any oil, even at its pour point.
+THICKEST = 1e7
 # Keys that tell a grade or a data sheet more closely; a scene without them is saved without them.
 DATA_KEYS = ("base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3")
 # Keys of [traction] that ask for one curve for all loads.
@@ -90,9 +92,9 @@ class Lubricant(Consistent):
             yield "lubricant.viscosities_C_mm2_s: each point is [temperature in C, viscosity in mm2/s]; mend it"
         elif points:
             (cold, thick), (hot, thin) = sorted(points)
-            if not (-60.0 <= cold < hot <= HOTTEST_C and thick > thin > 0.5):
+            if not (-60.0 <= cold < hot <= HOTTEST_C and THICKEST >= thick > thin > 0.5):
                 what = f"lubricant.viscosities_C_mm2_s = {points}: must fall with temperature"
-                yield f"{what}, from -60 to {HOTTEST_C:g} C, to no less than 0.5 mm2/s; mend them"
+                yield f"{what}, from -60 to {HOTTEST_C:g} C, from {THICKEST:g} at most to more than 0.5 mm2/s; fix them"
 
     @model_serializer(mode="wrap")
     def _without_empty_data(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

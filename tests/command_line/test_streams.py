@@ -122,6 +122,18 @@ def test_ctrl_c_leaves_with_130_and_no_traceback(line):
     assert 130 in codes and codes <= {0, 130}
 
 
+def test_an_interrupt_in_the_making_of_a_class_is_one_too():
+    """Unit: Python 3.11 wraps what is raised while a class names its fields in a RuntimeError; no traceback of it is shown."""
+    program = (
+        "from rbdyn.cli.streams import run\n"
+        "class Field:\n    def __set_name__(self, owner, name):\n        raise KeyboardInterrupt\n"
+        "def app():\n    type('Table', (), {'field': Field()})\n"
+        "run(app)"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
+    assert (ended.returncode, ended.stderr) == (130, "")
+
+
 def test_an_interrupt_that_a_callback_swallows_comes_again():
     """Unit: Ctrl-C inside a callback from compiled code, where nothing can be raised, ends the command all the same."""
     program = (

@@ -16,8 +16,10 @@ import typer
 from doe_command import doe, invoke, loaded_by
 from instant_runs import instantly
 from short_studies import short_study, silent
+from typer.testing import CliRunner
 
 from doe import clearance
+from doe.cli import app
 from doe.commands.status import print_status
 from doe.running.agenda import ANSWER_S, Stage, agenda_in
 from doe.running.owner import at_work
@@ -326,3 +328,10 @@ def test_command_without_a_store_says_that_nothing_ran(tmp_path, monkeypatch, ca
     assert record["status"] == "unfinished" and record["left_s"] is None and record["points"]["total"] == 0
     print_status(record, quiet=False)
     assert "nothing has run yet in cylindrical_roller_uncertainty" in capsys.readouterr().out
+
+
+def test_unit_a_file_is_no_folder_of_results(tmp_path):
+    """Unit: a file named as the folder is refused, not taken for a study that never ran."""
+    path = short_study(tmp_path)
+    shown = CliRunner().invoke(app, ["status", str(path), "--out", str(path)])
+    assert shown.exit_code == 2 and "is a file; name the folder" in shown.output

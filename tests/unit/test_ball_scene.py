@@ -304,3 +304,12 @@ def test_command_line_a_run_without_equilibrium_exits_with_1(tmp_path):
     assert "no equilibrium was found" in status and "model.light_load_share" in status
     mended = CliRunner().invoke(app, ["ball", str(file), "--json", *options[:-2]])
     assert mended.exit_code == 0 and json.loads(mended.stdout)["status"] == "ok"
+
+
+UNLOADED = ("operation.radial_load_N=0.0", "operation.axial_load_N=0.0")
+
+
+def test_unit_balls_without_a_load_touch_nothing():
+    """Unit: loads left over from rounding are no contact; the result says that nothing tells where the ring is."""
+    idle = BallScene.load(EXAMPLES / "angular_contact_ball.toml", UNLOADED)
+    assert any("no ball touches the inner race" in note for note in equilibrium(idle).notes)

@@ -81,6 +81,19 @@ def test_moments_of_an_off_centre_truncated_normal():
     assert moments(one, "truncated_normal") == pytest.approx((reference.mean(), reference.var()))
 
 
+@pytest.mark.parametrize("capability", [1e-2, 1e-4, 1e-5, 1e-9])
+def test_invariant_a_normal_much_wider_than_its_limits_is_uniform(capability):
+    """Invariant: variance, shares and quantiles of a cut normal end in those of a uniform part, without loss of digits."""
+    wide, even = part("truncated_normal", capability=capability), part("uniform")
+    assert moments(wide, "truncated_normal") == pytest.approx(moments(even, "uniform"), rel=3e-3, abs=1e-12)
+    probability = np.linspace(0.0, 1.0, 11)
+    assert quantile(wide, "truncated_normal", probability) == pytest.approx(
+        quantile(even, "uniform", probability), rel=2e-3, abs=1e-5
+    )
+    places = quantile(even, "uniform", probability)
+    assert share_below(wide, "truncated_normal", places) == pytest.approx(probability, abs=1e-3)
+
+
 def test_two_equal_uniform_links_make_a_triangle():
     plain = chain([(1, 5.0, 0.1, -0.1, {"distribution": "uniform"})] * 2, (9.85, 10.05))
     # Below: 0.05^2/2 of 0.2^2, above: 0.15^2/2.

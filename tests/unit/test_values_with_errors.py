@@ -60,3 +60,10 @@ def test_invariant_no_other_place_formats_a_value_with_its_error(folder):
     own = re.compile(r"\} *(?:±|\+-) *\{")
     sources = [path for path in (ROOT / folder).rglob("*.py") if own.search(path.read_text(encoding="utf-8"))]
     assert [path.name for path in sources if path.name != "words.py"] == []
+
+
+def test_unit_a_value_without_a_statistical_error_has_five_digits():
+    """Unit: an error of the time steps alone bears no digits of a figure that scatters."""
+    assert Quantity(212.00564, None, 0.00039, 1.0).shown == "212.01"
+    assert Quantity(212.00564, 0.35, 0.00039, 1.0).shown == "212.01" and Quantity(212.0, None, None, 1.0).shown == "212"
+    assert Quantity(212.00564, 0.035, 0.00039, 9.0).shown == "212.006"

@@ -9,6 +9,7 @@ from rbdyn.cli.terminal import print_table
 from rbdyn.records.words import counted, with_error
 
 BAR = 20  # characters of a contribution of 100 %
+NORMAL = 1.96  # half-width of a 95 % interval over its standard error
 
 
 def chains_record(results: Mapping[str, ChainResult]) -> dict[str, Any]:
@@ -53,24 +54,24 @@ def _print_yields(chain: ChainResult) -> None:
     rows = [
         (
             kind.replace("_", " "),
-            with_error(share, chain.standard_errors[kind]),
+            with_error(share, NORMAL * chain.standard_errors[kind]),
             f"{exact[kind]:.6f}" if kind in exact else "",
             *(_ppm(chain.rejected[kind], side) for side in ("low", "high")),
         )
         for kind, share in chain.yields.items()
     ]
     header = ("distribution of the parts", "yield", "without sampling", "ppm below", "ppm above")
-    print_table(f"yield of {chain.samples} assemblies", header, rows)
+    print_table(f"yield by {counted(chain.samples, 'sample')} (95 % intervals)", header, rows)
 
 
 def _ppm(rejected: Mapping[str, float], side: str) -> str:
-    return with_error(rejected[f"{side}_ppm"], rejected[f"{side}_standard_error_ppm"])
+    return with_error(rejected[f"{side}_ppm"], NORMAL * rejected[f"{side}_standard_error_ppm"])
 
 
 def _print_answer(chain: ChainResult) -> None:
     (low, high), (least, most), out = chain.worst_case_mm, chain.rss_mm, chain.rejected["as_given"]
     closing = f"closing link {low:.4f} to {high:.4f} mm in worst case, {least:.4f} to {most:.4f} mm by root sum square"
-    good = with_error(chain.yields["as_given"], chain.standard_errors["as_given"])
+    good = with_error(chain.yields["as_given"], NORMAL * chain.standard_errors["as_given"])
     able = f", Cp {chain.cp:.2f}, Cpk {chain.cpk:.2f}" if chain.cp is not None else ""
     ppm = f"({out['low_ppm']:.0f} ppm below, {out['high_ppm']:.0f} ppm above){able}"
     print(f"{'as given: ' if chain.refused else ''}{closing}, yield {good} {ppm}")
@@ -87,7 +88,9 @@ def _print_selective(found: SelectiveAssembly, verbose: bool) -> None:
     low, high = found.worst_case_mm
     needed = "no number of classes keeps" if found.classes_needed is None else f"{found.classes_needed} would keep"
     closing = f"closing link {low:.4f} to {high:.4f} mm in worst case ({needed} the limits)"
-    mates = f"{100 * found.matched:.2f} % of the parts find a mate, {with_error(found.good, found.standard_error)}"
+    mates = (
+        f"{100 * found.matched:.2f} % of the parts find a mate, {with_error(found.good, NORMAL * found.standard_error)}"
+    )
     good = f"of the matched within the limits ({found.random:.6f} at random)"
     print(f"matched in {counted(found.classes, 'class')}: {closing}, {mates} {good}")
     if verbose:
