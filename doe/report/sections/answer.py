@@ -6,7 +6,7 @@ from typing import Any
 from doe.report.sections.blocks import Block, Bullets, Section, Table, Tile, Tiles, Words
 from doe.report.sections.record import Factor, Record, factors, nearest, part, responses, scalars
 from doe.report.words import change, dimension, half_width, moved, of_hundred, rounded_down
-from rbdyn.records.words import label, quantity, shown, with_error
+from rbdyn.records.words import chance, label, quantity, shown, with_error
 
 # Characters above which a value is a sentence, to be broken.
 LONG = 40
@@ -109,12 +109,13 @@ def limits(summary: Record, names: Sequence[str] = ()) -> Table:
             f"{label(response)} {limit.get('sense') or ''} {shown(limit.get('bound'))}",
             with_error(limit.get("value"), limit.get("error")),
             LIMITS.get(str(limit.get("verdict")), ""),
+            "" if limit.get("probability") is None else chance(limit["probability"]),
         )
         for name in names or points
         for response, limit in (part(points, name, "limits") or {}).items()
     ]
-    note = "Kept or broken by more than the error; between the two a limit is undecided."
-    header = ("point", "limit", "simulated", "verdict")
+    note = "Kept or broken by more than the error; between the two a limit is undecided. The probability is that of keeping it."
+    header = ("point", "limit", "simulated", "verdict", "probability")
     return Table("Limits judged by simulation", header, rows, note, text_columns=(1, 3))
 
 
