@@ -57,18 +57,25 @@ class Limit:
         return f"{self.response} {self.sense} {self.bound:g} (simulated {with_error(self.value, self.error)}, {sure})"
 
 
+def every_limit(study: Study, confirmed: Confirmed) -> list[Limit]:
+    """All limits of the study at a simulated point, a lower and an upper one of a response each by itself."""
+    one_sided = NormalDist().inv_cdf(study.file.confirmation.limit_probability) / NormalDist().inv_cdf(0.975)
+    values, errors = confirmed.values.tolist(), confirmed.error.tolist()
+    return [
+        Limit(study.responses[index], sense, bound, values[index], errors[index], one_sided)
+        for index, sense, bound in goals_of(study).limited
+    ]
+
+
 def limits_of(study: Study, confirmed: Confirmed) -> list[Limit]:
     """The limits of the study at a simulated point, one a response: of a lower and an upper one that with the worse
     verdict, or with less room."""
-    one_sided = NormalDist().inv_cdf(study.file.confirmation.limit_probability) / NormalDist().inv_cdf(0.975)
-    worst: dict[int, Limit] = {}
-    for index, sense, bound in goals_of(study).limited:
-        value, error = float(confirmed.values[index]), float(confirmed.error[index])
-        limit = Limit(study.responses[index], sense, bound, value, error, one_sided)
-        known = worst.get(index)
+    worst: dict[str, Limit] = {}
+    for limit in every_limit(study, confirmed):
+        known = worst.get(limit.response)
         if known is None or _badness(limit) > _badness(known):
-            worst[index] = limit
-    return [worst[index] for index in sorted(worst)]
+            worst[limit.response] = limit
+    return [worst[name] for name in study.responses if name in worst]
 
 
 def verdict_of(limits: Sequence[Limit]) -> Verdict:
@@ -82,7 +89,7 @@ def sentence(limits: Sequence[Limit], probability: float, tried: int) -> str:
         return ""
     words = {
         "broken": "LIMIT BROKEN at the pick: {}, beyond by more than its error",
-        "undecided": "LIMIT UNDECIDED at the pick: {}, within its error of the bound",
+        "undecided": "LIMIT UNDECIDED at the pick: {}, too near the bound for its error",
         "kept": f"Limit kept at the pick, probability {probability:g} demanded: {{}}",
     }
     parts = []

@@ -18,7 +18,7 @@ from doe.study.back_off import Conditioned, Missed
 from doe.study.confirmation import Confirmed
 from doe.study.edge import edge_of, place_of, share_at_edge
 from doe.study.goals import region_of, rounded_within
-from doe.study.limits import Limit, limits_of, sentence, verdict_of
+from doe.study.limits import Limit, every_limit, limits_of, sentence, verdict_of
 from doe.study.whole import run_study
 from doe.study_file import Study
 from rbdyn.faults import InputError
@@ -71,6 +71,8 @@ def test_the_bad_is_said_first_and_the_worse_of_two_limits_counts(tmp_path):
     point = Confirmed(study.baseline, np.array([79.0, 1.0, 1.0]), np.array([0.6, 0.1, 0.1]), none)
     (found,) = limits_of(study, point)
     assert (found.sense, found.bound, found.verdict) == (">=", 80.0, "broken")
+    each = [(one.sense, one.bound, one.verdict) for one in every_limit(study, point)]
+    assert sorted(each) == [("<=", 90.0, "kept"), (">=", 80.0, "broken")], "each is judged by itself"
     assert point.error[0] == pytest.approx(0.6)
     joint = Confirmed(study.baseline, point.values, np.full(3, 3.0), np.full(3, 4.0))
     assert joint.error.tolist() == [5.0] * 3 and limits_of(study, joint)[0].verdict == "undecided"

@@ -11,7 +11,7 @@ from doe.report.steps.search_words import search_sentences
 from doe.report.words import rounded_down
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
-from doe.study.limits import limits_of
+from doe.study.limits import every_limit
 from doe.study.whole import StudyResult
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.words import improvement, with_error
@@ -79,8 +79,8 @@ def _print_answer(outcome: StudyResult) -> None:
 def _print_limits(outcome: StudyResult) -> None:
     """Every limit at the baseline and at the pick, judged by simulation."""
     rows = []
-    for limit in outcome.limits:
-        base = next(each for each in limits_of(outcome.study, outcome.baseline) if each.response == limit.response)
+    judged = (every_limit(outcome.study, each) for each in (outcome.baseline, outcome.pick))
+    for base, limit in zip(*judged, strict=True):
         values = [(with_error(each.value, each.error), each.verdict) for each in (base, limit)]
         rows.append((f"{limit.response} {limit.sense} {limit.bound:g}", *values[0], *values[1]))
     if rows:
