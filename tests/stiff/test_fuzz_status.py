@@ -22,6 +22,7 @@ from doe.study.stages import study_stages
 from doe.study.status import study_status
 from doe.study_file import Study
 from rbdyn.faults import InputError
+from rbdyn.records.kept import digest_of, sign
 
 OPTIONS = ({}, {"adaptive": True}, {"direct": True}, {"robust": True})
 SPOILT = ("", "{}", "[]", "null", "{", '{"stages": 5}', "\x00", '{"command": 1, "stages": []}')
@@ -65,6 +66,8 @@ def history(draw: random.Random, study: Study, folder: Path, plans: dict) -> dic
     if draw.random() < 0.8:
         # An answer, of these inputs or of others, whole or not.
         record = {"inputs": draw.choice([digest, inputs_digest(study, **options), "other"]), "files": ["answer.txt"]}
+        record["answer_sha256"] = digest_of(b"it")
+        sign(record)
         (folder / "summary.json").write_text(draw.choice([json.dumps(record)] * 4 + ["{", "[]"]), encoding="utf-8")
         if draw.random() < 0.7:
             (folder / "answer.txt").write_text("it", encoding="utf-8")
