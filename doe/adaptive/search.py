@@ -281,8 +281,6 @@ class _Search:
             emulators = self._fit(self.runs.plus(runs))
             chosen = self._finalists(emulators, runs.points, size, random)
             self.seconds += time.perf_counter() - started
-            if believed and not len(chosen):
-                break  # every point that the front may still have was run anew
             asked = chosen if believed else np.vstack([chosen, original])
             more = self._run(asked, np.full(len(asked), self.plan.usual))
             if not believed:
