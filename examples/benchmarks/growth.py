@@ -213,7 +213,7 @@ CASES = (
     Case("design: runs, Sobol", (30, 100, 300, 1000, 3000, 10_000), runs_of("sobol")),
     Case("simulate: replicates", (10, 30, 100, 300, 1000, 3000), simulate("replicates")),
     Case("simulate: turns", (10, 30, 100, 300, 1000, 3000), simulate("turns")),
-    Case("chain: links", (3, 10, 30, 100, 300, 1000), chain_links),
+    Case("chain: links", (4, 10, 30, 100, 300, 1000), chain_links),
     Case("uncertainty: keys", (2, 4, 8, 16, 30), uncertain_keys),
     Case("rig: rows", DECADES, lambda size, folder: rig(size, 0, folder)),
     Case("rig: columns", (10, 30, 100, 300, 1000, 3000, 10_000, 30_000), lambda size, folder: rig(5, size, folder)),
