@@ -24,6 +24,7 @@ NEAR = 0.04  # of the range of a factor: as near to a bound a point lies at it
 AHEAD = 0.5  # coded units beyond the pick at which the simulator is asked: half a level of the design
 STEP = 1e-3  # coded units over which surfaces are differentiated
 MICROMETRE_MM = 1e-3
+BEYOND = "farther out than any run: the surfaces extrapolate there"
 
 
 class Place(NamedTuple):
@@ -41,7 +42,7 @@ class Place(NamedTuple):
         """Where the ``point`` of that name lies, in words; empty inside the region that the runs reach."""
         ends = [f"the {side} bound of {name}, {shown(bound)}" for name, (side, bound) in self.bounds.items()]
         where = [f"at {' and '.join(ends)}"] if ends else []
-        where += ["farther out than any run: the surfaces extrapolate there"] if self.beyond else []
+        where += [BEYOND] if self.beyond else []
         return f"{point} lies {', and '.join(where)}." if where else ""
 
 
@@ -97,12 +98,11 @@ class Edge(Record):
         if self.direct_share is not None:
             shares += f" and {100.0 * self.direct_share:.0f} % of the simulator's own front"
         shares += f" lies within {100.0 * NEAR:g} % of a bound of the region"
-        beyond = "farther out than any run: the surfaces extrapolate there"
         if not self.outward:
-            where = f"between the bounds of the region, but {beyond}" if self.beyond_runs else "inside the region"
+            where = f"between the bounds of the region, but {BEYOND}" if self.beyond_runs else "inside the region"
             return f"The pick lies {where}; {shares}."
         where = "; ".join(each.sentence for each in self.outward)
-        where += f". It lies {beyond}" if self.beyond_runs else ""
+        where += f". It lies {BEYOND}" if self.beyond_runs else ""
         return f"THE PICK LIES AT THE EDGE of the region: {where}. {shares}; a wider design may find more."
 
 

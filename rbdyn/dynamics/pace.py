@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from rbdyn.records.words import counted
 from rbdyn.scene import Scene
 
 # What is done with a sentence on the time that runs take; None where nobody asks.
@@ -62,7 +63,7 @@ class Pace:
             per_turn = self.scene.numerics.step_budget_per_turn
             spent = f"after about {duration(budget_s)} (numerics.step_budget_per_turn = {per_turn})"
             return f"runs will use up their budget of steps {spent} at this pace; {self._remedy}"
-        runs = f"{self.runs} run{'s' if self.runs > 1 else ''} of {self.turns:g} shaft turns at {duration(turn_s)} each"
+        runs = f"{counted(self.runs, 'run')} of {counted(self.turns, 'shaft turn')} at {duration(turn_s)} each"
         longer = f", up to {self.growth:g} times that where figures drift" if self.growth > 1.0 else ""
         return f"all runs take about {duration(whole_s)} at this pace: {runs}, {self.threads} at once{longer}; {self._remedy}"
 

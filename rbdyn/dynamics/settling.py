@@ -32,9 +32,12 @@ class Stage(NamedTuple):
 
 @dataclass(frozen=True)
 class Ensemble:
-    """Replicates and companions as they are counted, how these are integrated, the batch from which they count where nothing drifts, why there are
-    no companions although asked for, shaft turns of the transient (None where it cannot be told), and what a result has
-    to say of its length."""
+    """Replicates and companions as they are counted, and the ``plan`` by which companions are integrated.
+
+    ``since``: batch from which they count where nothing drifts; ``fault``: why there are no companions although asked for;
+    ``transient_turns``: shaft turns of the transient (None where it cannot be told); ``notes``: what a result has to say of
+    its length.
+    """
 
     runs: list[Replicate]
     companions: list[Replicate]

@@ -25,6 +25,7 @@ from rbdyn.quasistatic.row.control import Control, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
 from rbdyn.quasistatic.row.row import Row
+from rbdyn.records.words import counted
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene
@@ -98,7 +99,7 @@ def _solutions(start: Any, rows: int) -> tuple[Solution, ...]:
     whole = isinstance(before, tuple) and all(isinstance(row, Solution) for row in before)
     if not whole or len(before) not in (0, rows):
         what = f"start = {one_line(repr(start), LONGEST_NAME)}: must be a result of equilibrium of such a bearing"
-        raise InputError([f"{what}, or the solution of each of its {rows} row{'s' if rows > 1 else ''}"])
+        raise InputError([f"{what}, or the solution of each of its {counted(rows, 'row')}"])
     return before
 
 
