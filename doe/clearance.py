@@ -9,7 +9,7 @@ import socket
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -177,7 +177,7 @@ class Simulations:
 
     ``workers``: threads, all processors by default; ``scheduler``: address of a cluster to run on instead.
     ``retry``: run those again that failed before. ``progress(title)`` gives the progress of a stage. ``agenda``: where the
-    runs of the command are counted.
+    runs of the command are counted. ``turns_of``: shaft turns of each run asked for, by its key.
     """
 
     store: Store
@@ -186,6 +186,12 @@ class Simulations:
     retry: bool
     progress: Callable[[str], Progress]
     agenda: AgendaKeeper | None = None
+    turns_of: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def turns(self) -> float:
+        """Shaft turns of all runs asked for, whether made now or found in the store."""
+        return sum(self.turns_of.values())
 
     def run(
         self,
@@ -210,7 +216,11 @@ class Simulations:
             works = {point.key: work_of(scene) for point, scene in zip(points, scenes, strict=True)}
             engine, progress = self.agenda.timed(engine, works), self.agenda.counting(works, progress)
         outcomes = run_points(points, self.store, engine, progress, sound, self.retry)
-        return [_result(point, outcomes[point.key]) for point in points]
+        results = [_result(point, outcomes[point.key]) for point in points]
+        for point, result in zip(points, results, strict=True):
+            if isinstance(result, SimulationResult):
+                self.turns_of[point.key] = float(result.cost.get("turns", 0.0))
+        return results
 
 
 def work_of(scene: Scene) -> float:

@@ -31,7 +31,7 @@ class Runs:
 
     ``notes``: what the simulations warn of, once each; none for a table that was read. ``replicates``, (n,) or (n, m),
     count the independent values behind the half-widths (0: unknown), ``block`` (n,) labels each run; None: all unknown,
-    one block. ``failures``: design runs that failed; they are not in the arrays.
+    one block. ``failures``: design runs that failed; they are not in the arrays. ``turns``: shaft turns that all runs took.
     """
 
     coded: Array
@@ -42,6 +42,7 @@ class Runs:
     replicates: Whole | None = None
     block: Whole | None = None
     failures: tuple[Failure, ...] = ()
+    turns: float = 0.0
 
     @property
     def places(self) -> list[int]:
@@ -117,7 +118,7 @@ def runs_of(study: Study, ordered: Ordered, simulations: clearance.Simulations, 
         )
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[left] if design.blocks > 1 else None
-    return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures)
+    return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures, turns=simulations.turns)
 
 
 def _each_once(notes: Iterable[str]) -> list[str]:

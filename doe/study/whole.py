@@ -145,6 +145,7 @@ def run_study(
     clock.plan(study_stages(study, direct, adaptive, robust))
     runs = run_design(study, folder, workers, progress("design runs"), scheduler, retry, agenda)
     clock.lap("design_s", FRONT)
+    turns = runs.turns
     surfaces, found = _surfaces_and_front(study, runs, clock)
     with Store(folder / STORE, study.path.stem) as store:
         simulations = Simulations(store, workers, scheduler, retry, progress, agenda)
@@ -185,7 +186,7 @@ def run_study(
         reference_values=None if reference is None else reference.values,
         failures=(*runs.failures, *lost, *chosen.failures),
         notes=(*runs.notes, *notes, *_offers(study, surfaces, searched, judged)),
-        cost=clock.total(),
+        cost=clock.total() | {"turns": turns + simulations.turns},
     )
 
 

@@ -18,6 +18,7 @@ from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
 from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, REJECTED
 from rbdyn.dynamics.pace import Notice, Pace
 from rbdyn.dynamics.parameters.scales import scales
+from rbdyn.dynamics.relaxation import MOTIONS, Linearised
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed, speed_sums
 from rbdyn.dynamics.statistics.metrics import Replicate
@@ -26,6 +27,8 @@ from rbdyn.scene.laws import MOST_OF_A_RUN
 
 # Long enough that the step cut at a batch's end costs nothing, short against any memory worth finding.
 BATCH_TURNS = 1.0
+# Batches after which the decay of slow motions is read, of runs that may be lengthened: the rollers have been round twice.
+READ_AFTER = (6, 12)
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,7 @@ class Recording:
         # Places of the cage's centre, x and y in turn, and how many samples there were at the end of each batch.
         self._places, self._sampled = array("d"), list[int]()
         self._cpu_s = 0.0
+        self._decay_rates = list[Array]()
 
     def to(self, counted: float) -> Replicate:
         """Go on until so many turns after the warm-up [shaft turns]. Raises RunError or CancelledError."""
@@ -99,6 +103,8 @@ class Recording:
                 kept[:] = 0.0
             self._ends.append(float(end))
             self._looks.append(self._look())
+            if run.scene.extends and self._batches in READ_AFTER:
+                self._decay_rates.append(Linearised(run.scene, run.bearing, run.control).decay_rates(run.carry))
         self._cpu_s += time.thread_time() - started
         return self.replicate
 
@@ -131,6 +137,7 @@ class Recording:
             cpu_s=self._cpu_s,
             method=run.method,
             stiffness=run.carry.stiffness.copy(),
+            decay_rates=np.array(self._decay_rates).reshape(-1, len(MOTIONS)),
         )
 
     def _go(self, end: float) -> None:

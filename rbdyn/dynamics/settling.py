@@ -1,9 +1,9 @@
 """Replicates that run until their figures no longer drift.
 
-Where a figure drifts over the counted turns (``drift``), the run has slow regimes and a small step would not show the
-rest of them: every replicate goes on until it is four times as long, then twice, at most ``numerics.extend_limit`` times
-the turns asked for, and each time the last half counts. Companions run just as far. Nothing depends on the clock or on
-the number of threads.
+A run first counts at least three times the time in which its slowest motion relaxes (``relaxation``). Where a figure then
+drifts over the counted turns (``drift``) by more than its error and a hundredth of it, every replicate goes on until it is
+twice as long, and again, at most ``numerics.extend_limit`` times the turns asked for; each time the last half counts.
+Companions run just as far. Nothing depends on the clock or on the number of threads.
 """
 
 import math
@@ -12,10 +12,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+
 from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
 from rbdyn.dynamics.recording import Recording, batches_of
-from rbdyn.dynamics.statistics.drift import drifting, start_of_counting
+from rbdyn.dynamics.relaxation import Relaxation, slowest
+from rbdyn.dynamics.statistics.drift import start_of_counting, worth_lengthening
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import RunError
 from rbdyn.scene import Scene
@@ -48,8 +51,10 @@ class Ensemble:
     notes: tuple[str, ...]
 
 
-# How many times as long a run gets at the first drift, and at every other or where that is too much.
-GROWTH = (4.0, 2.0)
+# How many times as long a run gets at every drift.
+GROWTH = 2.0
+# Relaxation times of the slowest motion that are counted at least: what is left of a start after them is 5 %.
+RELAXATIONS = 3.0
 # Makes the recording of a replicate, or of a companion where it is given how.
 Start = Callable[[int, Companions | None, Stop], Recording]
 
@@ -61,20 +66,20 @@ def run_until_settled(scene: Scene, start: Start, workers: int | None, progress:
     """
     numerics = scene.numerics
     team = Team(start, range(numerics.replicates), None, workers, stop, progress, numerics.companions)
-    extends = numerics.extend and scene.operation.schedule is None
-    stage = Stage(-1, whole_windows(scene) if extends else numerics.turns)
-    begin = None
+    stage = Stage(-1, whole_windows(scene) if scene.extends else numerics.turns)
+    begin, relaxation = None, None
     while True:
         runs = team.to(stage.turns)
         if begin is None:
             begin = start_of_counting(scene, runs)
             stage = stage._replace(first=begin.first)
+            relaxation = slowest(np.concatenate([run.decay_rates for run in runs]))
         runs = [run.counted_from(stage.first) for run in runs]
-        longer = next_stage(scene, runs, stage) if extends else None
+        longer = next_stage(scene, runs, stage, begin.first, relaxation) if scene.extends else None
         if longer is None:
             break
         stage = longer
-    notes = (*begin.notes, *length_notes(scene, runs, stage, extends))
+    notes = (*begin.notes, *length_notes(scene, runs, stage, begin.first, relaxation))
     plan = companions_of(scene, runs)
     if not numerics.companions:
         return Ensemble(runs, [], plan, begin.first, None, begin.turns, notes)
@@ -128,32 +133,40 @@ def whole_windows(scene: Scene) -> float:
     return math.ceil(scene.numerics.turns / window - 1e-9) * window
 
 
-def next_stage(scene: Scene, runs: Sequence[Replicate], stage: Stage) -> Stage | None:
+def fewest_turns(scene: Scene, relaxation: Relaxation | None) -> float:
+    """Turns that are counted at least: those asked for, or enough for the slowest motion to relax."""
+    needed = 0.0 if relaxation is None else RELAXATIONS * relaxation.time_s / scene.turn_s
+    return max(scene.numerics.turns, needed)
+
+
+def next_stage(
+    scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int, relaxation: Relaxation | None
+) -> Stage | None:
     """How to go on from counted ``runs``: None where nothing drifts, or where that would pass the scene's limit or memory.
 
-    Where ``discard_turns = "auto"`` left fewer turns than asked for, they are made up first.
+    Turns are made up first where ``discard_turns = "auto"`` or the slowest motion left too few of them.
     """
     numerics, window = scene.numerics, scene.impact_window_turns
-    warm_up, batches = numerics.warm_up_turns, batches_of(scene)
+    warm_up, batches, fewest = numerics.warm_up_turns, batches_of(scene), fewest_turns(scene, relaxation)
     longest = numerics.extend_limit * (warm_up + numerics.turns) * (1.0 + 1e-9)
-    missing = numerics.turns - runs[0].duration / scene.turn_s
-    if missing > 1e-6 * numerics.turns:
-        longer = stage._replace(turns=stage.turns + math.ceil(missing / window - 1e-9) * window)
-        return longer if warm_up + longer.turns <= longest and fits(scene, longer.turns) else None
-    if not drifting(runs):
+    missing = fewest - runs[0].duration / scene.turn_s
+    if missing > 1e-6 * fewest:
+        most = math.floor((longest - warm_up) / window + 1e-9) * window
+        longer = stage._replace(turns=min(stage.turns + math.ceil(missing / window - 1e-9) * window, most))
+        return longer if longer.turns > stage.turns and fits(scene, longer.turns) else None
+    if not worth_lengthening(runs, since):
         return None
-    for growth in GROWTH if stage.looks == 0 else GROWTH[-1:]:
-        turns = grown(scene, stage, growth)
-        if warm_up + turns <= longest and fits(scene, turns):
-            counted = math.ceil(0.5 * (warm_up + turns) / window) * batches.per_window
-            return Stage(batches.count(turns) - counted, turns, stage.looks + 1)
-    return None
+    turns = grown(scene, stage)
+    if warm_up + turns > longest or not fits(scene, turns):
+        return None
+    counted = math.ceil(0.5 * (warm_up + turns) / window) * batches.per_window
+    return Stage(batches.count(turns) - counted, turns, stage.looks + 1)
 
 
-def grown(scene: Scene, stage: Stage, growth: float) -> float:
-    """Turns after the warm-up, in whole windows, of a run so many times as long."""
+def grown(scene: Scene, stage: Stage) -> float:
+    """Turns after the warm-up, in whole windows, of a run that is lengthened once more."""
     warm_up, window = scene.numerics.warm_up_turns, scene.impact_window_turns
-    return math.ceil((growth * (warm_up + stage.turns) - warm_up) / window - 1e-9) * window
+    return math.ceil((GROWTH * (warm_up + stage.turns) - warm_up) / window - 1e-9) * window
 
 
 def fits(scene: Scene, turns: float) -> bool:
@@ -161,20 +174,31 @@ def fits(scene: Scene, turns: float) -> bool:
     return batches_of(scene).count(turns) <= scene.numerics.most_batches
 
 
-def length_notes(scene: Scene, runs: Sequence[Replicate], stage: Stage, extends: bool) -> tuple[str, ...]:
+def length_notes(
+    scene: Scene, runs: Sequence[Replicate], stage: Stage, since: int, relaxation: Relaxation | None
+) -> tuple[str, ...]:
     """What a reader should know of how long the runs took and what is counted of them."""
     numerics, turn_s = scene.numerics, scene.turn_s
     notes = []
-    counted = runs[0].duration / turn_s
+    counted, fewest = runs[0].duration / turn_s, fewest_turns(scene, relaxation)
+    if scene.extends and relaxation is not None and fewest > numerics.turns:
+        relaxes = f"{relaxation.motion} relaxes in {relaxation.time_s / turn_s:.2g} shaft turns"
+        if counted < fewest * (1.0 - 1e-6):
+            fix = "raise numerics.extend_limit" if fits(scene, grown(scene, stage)) else "take fewer replicates"
+            notes.append(f"transient: {relaxes}, and only {counted:.4g} turns are counted; {fix}")
+        elif not stage.looks:
+            notes.append(f"length: {relaxes}, so {counted:.4g} turns are counted instead of {numerics.turns:.4g}")
     if stage.looks:
         dropped = float(runs[0].durations[: stage.first].sum()) / turn_s
-        ran = f"{dropped + counted:.4g} shaft turns in place of {numerics.warm_up_turns + numerics.turns:.4g}"
-        last = f"of which the last {counted:.4g} count (numerics.extend = false forbids it)"
-        notes.append(f"length: figures drifted, so each replicate ran {ran}, {last}")
-    if scene.operation.schedule is None and drifting(runs):
-        mend = "raise numerics.extend_limit" if extends else "lengthen numerics.turns or set numerics.extend = true"
-        if not fits(scene, grown(scene, stage, GROWTH[-1])):
-            mend = "take fewer replicates: there is no memory for longer ones"
+        ran = f"{dropped + counted:.4g} shaft turns per replicate instead of {numerics.warm_up_turns + numerics.turns:.4g}"
+        last = f"the last {counted:.4g} are counted (numerics.extend = false forbids it)"
+        notes.append(f"length: figures drifted: {ran}; {last}")
+    if scene.operation.schedule is None and worth_lengthening(runs, since):
+        fix = (
+            "raise numerics.extend_limit" if scene.extends else "lengthen numerics.turns or set numerics.extend = true"
+        )
+        if not fits(scene, grown(scene, stage)):
+            fix = "take fewer replicates: there is no memory for longer ones"
         what = f"transient: figures still drift over the {counted:.4g} turns counted"
-        notes.append(f"{what}; their errors hold what the drift shows, yet it may go farther; {mend}")
+        notes.append(f"{what}; their errors hold what the drift shows, yet it may go farther; {fix}")
     return tuple(notes)

@@ -67,9 +67,8 @@ def simulate(
         _prepared.add(laws)
     started = time.perf_counter()
     numerics = scene.numerics
-    extends = numerics.extend and scene.operation.schedule is None
-    turns = numerics.warm_up_turns + (whole_windows(scene) if extends else numerics.turns)
-    growth = numerics.extend_limit if extends else 1.0
+    turns = numerics.warm_up_turns + (whole_windows(scene) if scene.extends else numerics.turns)
+    growth = numerics.extend_limit if scene.extends else 1.0
     pace = Pace(scene, notice, numerics.replicates + numerics.companions, turns, threads_of(workers), growth)
 
     ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, stop)

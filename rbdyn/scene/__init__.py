@@ -259,6 +259,11 @@ class Scene(SceneFile):
         return self.operation.turn_s
 
     @property
+    def extends(self) -> bool:
+        """Whether its runs go on until they have settled: figures of a schedule never do."""
+        return self.numerics.extend and self.operation.schedule is None
+
+    @property
     def whirl_samples_per_turn(self) -> int:
         """Samples of the cage's centre a shaft turn for the filtered whirl; 0 where it is not filtered."""
         cutoff = self.numerics.whirl_cutoff_hz

@@ -25,7 +25,7 @@ from rbdyn.dynamics.motion.history import history
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.run import Run
 from rbdyn.dynamics.simulate import simulate
-from rbdyn.dynamics.statistics.batch_means import student_factor, student_half_width
+from rbdyn.dynamics.statistics.batch_means import student_chance, student_factor, student_half_width
 from rbdyn.dynamics.statistics.metrics import IMPACT_FORCE, POWER_LOSS, Replicate, quantity
 from rbdyn.faults import InputError, RunError
 from rbdyn.result import Quantity, SimulationResult
@@ -370,6 +370,7 @@ def test_oracle_student_coverage():
     for freedom in (1, 2, 3, 4, 15, 200, 9999):
         # scipy 1.14 itself is off by 2e-11 at one degree of freedom.
         assert student_factor(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=1e-10)
+        assert student_chance(-2.3, freedom) == pytest.approx(2.0 * stats.t.sf(2.3, freedom), rel=1e-9)
 
 
 def test_unit_quantity(outer):

@@ -97,25 +97,30 @@ def student_half_width(values: Array) -> float | None:
 
 def student_factor(freedom: int, level: float = 0.95) -> float:
     """The t that holds the share ``level`` of Student's distribution with ``freedom`` > 0 degrees of freedom between
-    -t and t.
-
-    Bisection of the finite sums of Abramowitz and Stegun, eq 26.7.3 and 26.7.4, in theta = atan(t/sqrt(freedom)).
+    -t and t, by bisection.
     """
-
-    def held(theta: float) -> float:
-        cosine, sine = math.cos(theta), math.sin(theta)
-        even = freedom % 2 == 0
-        term, total = (1.0, 0.0) if even else (cosine, 0.0)
-        for k in range(1 if even else 2, freedom, 2):
-            total += term
-            term *= cosine * cosine * k / (k + 1)
-        return sine * total if even else 2.0 / math.pi * (theta + sine * total)
-
     low, high = 0.0, 0.5 * math.pi
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if held(middle) < level else (low, middle)
+        low, high = (middle, high) if _student_share(freedom, middle) < level else (low, middle)
     return math.sqrt(freedom) * math.tan(0.5 * (low + high))
+
+
+def student_chance(t: float, freedom: int) -> float:
+    """Chance that a variable of Student's distribution with ``freedom`` > 0 degrees of freedom is farther from 0 than ``t``."""
+    return 1.0 - _student_share(freedom, math.atan(abs(t) / math.sqrt(freedom)))
+
+
+def _student_share(freedom: int, theta: float) -> float:
+    """Share of Student's distribution between -t and t, theta = atan(t/sqrt(freedom)): the finite sums of Abramowitz and
+    Stegun, eq 26.7.3 and 26.7.4."""
+    cosine, sine = math.cos(theta), math.sin(theta)
+    even = freedom % 2 == 0
+    term, total = (1.0, 0.0) if even else (cosine, 0.0)
+    for k in range(1 if even else 2, freedom, 2):
+        total += term
+        term *= cosine * cosine * k / (k + 1)
+    return sine * total if even else 2.0 / math.pi * (theta + sine * total)
 
 
 def _pseudo_values(moments: Array, total: Array, figure: Callable[[Array], Array]) -> Array:

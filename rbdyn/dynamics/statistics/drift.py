@@ -12,10 +12,15 @@ curve fitted to a start tells where it leads. What can be tested is whether the 
 gives one difference between the figure of the later half and that of the earlier half; replicates are independent,
 so Student's t of these differences needs no memory of the series (Heidelberger and Welch 1983, *Operations Research* 31,
 1109, test a single series against its spectrum). The test is made on each figure and on the mean speed of the cage's
-centre, which shows a change of regime first; a drift of less than a thousandth of a figure is left to its error.
+centre, which shows a change of regime first. Its level is that of all figures together (Holm 1979, *Scandinavian Journal
+of Statistics* 6, 65): one settled run in twenty is lengthened in vain. A drift within the error of its figure, or below a
+hundredth of it, lengthens no run.
 
-A drift d with standard error s that passes still hides a bias. Of a transient that at least halves from one half to the
-next, the mean over both is off by at most 3 d/2; what of d stands above its noise, max(|d| - s, 0), counts so.
+A drift d with standard error s that lengthens nothing still hides a bias. Of a transient that at least halves from one half
+to the next, the mean over both is off by at most 3 d/2. Where any figure is likelier than not to drift the transient is not
+over, and of every figure sqrt(d^2 + s^2) counts so; elsewhere what of d stands above its noise, max(|d| - s, 0). On seven
+scenes this holds the truth in 0.89 to 0.99 of 200 repeats of each figure; with max(|d| - s, 0) alone it does so in 0.33 of
+repeats where replicates scatter little.
 
 Some regimes last for good: of the replicates of the bearing of Chen et al. 2022 one in 25 ends in another one, at loose
 clearances one in 8. One that none of n replicates is in has a share of about 1/(n + 1) (Laplace's rule of succession);
@@ -31,7 +36,7 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics import metrics
-from rbdyn.dynamics.statistics.batch_means import autocorrelation_time, estimate, student_factor
+from rbdyn.dynamics.statistics.batch_means import autocorrelation_time, estimate, student_chance, student_factor
 from rbdyn.dynamics.statistics.metrics import Figure, Replicate, Runs, mean
 from rbdyn.scene import Scene
 
@@ -42,10 +47,11 @@ FEWEST_GROUPS = 8
 SIGNIFICANT = 4.0
 # Replicates from which their differences are tested as such; fewer are tested by batch means.
 FEWEST_REPLICATES = 3
-# Share of settled runs that a test of one figure lengthens in vain is one less this.
-LEVEL = 0.95
+# Share of settled runs of which any figure seems to drift: of those that are lengthened, and of those whose errors count all
+# of a drift, which costs no turn.
+FALSE_ALARMS, DOUBT = 0.05, 0.3
 # Drift of a figure, over the figure, for which no run is lengthened.
-NEGLIGIBLE = 1e-3
+NEGLIGIBLE = 1e-2
 # Impact windows that make a stretch.
 STRETCH = 2
 # Mean of a transient that halves from half to half, over the difference of the halves: (1 + q)/(2 (1 - q)), q = 1/2.
@@ -129,7 +135,6 @@ TESTED = {
     "whirl_deviation_ratio": metrics.WHIRL_DEVIATION_RATIO,
     "power_loss_W": metrics.POWER_LOSS,
     "cage_speed_rpm": metrics.CAGE_SPEED,
-    "cage_slip": metrics.CAGE_SLIP,
     "whirl speed": WHIRL_SPEED,
 }
 
@@ -144,15 +149,17 @@ class Drift(NamedTuple):
     figure: float
 
     @property
-    def significant(self) -> bool:
-        """Whether the halves differ by more than their scatter, and enough to matter."""
-        least = max(student_factor(self.freedom, LEVEL) * self.error, NEGLIGIBLE * self.figure)
-        return abs(self.size) > least
+    def chance(self) -> float:
+        """Chance that the halves of a settled run differ by as much."""
+        if self.size == 0.0:
+            return 1.0
+        return student_chance(self.size / self.error, self.freedom) if self.error > 0.0 else 0.0
 
-    @property
-    def bias(self) -> float:
-        """What the drift leaves in the mean of both halves."""
-        return BIAS_OF_DRIFT * max(abs(self.size) - self.error, 0.0)
+    def bias(self, moving: bool) -> float:
+        """What the drift leaves in the mean of both halves: where the figures are ``moving`` all that it may be, elsewhere
+        what of it stands above its noise."""
+        seen = math.hypot(self.size, self.error) if moving else max(abs(self.size) - self.error, 0.0)
+        return BIAS_OF_DRIFT * seen
 
 
 def drift_of(figure: Figure, runs: Runs) -> Drift | None:
@@ -178,10 +185,35 @@ def drift_of(figure: Figure, runs: Runs) -> Drift | None:
     return Drift(after.value - before.value, error, freedom, size)
 
 
+def significant_drifts(runs: Runs, false_alarms: float) -> dict[Figure, Drift]:
+    """The tested figures that drift beyond their scatter; the share ``false_alarms`` of settled runs has any."""
+    drifts = {figure: drift for figure in TESTED.values() if (drift := drift_of(figure, runs)) is not None}
+    ranked = sorted(drifts, key=lambda figure: drifts[figure].chance)
+    settled = (drifts[figure].chance > false_alarms / (len(ranked) - place) for place, figure in enumerate(ranked))
+    first = next((place for place, is_settled in enumerate(settled) if is_settled), len(ranked))
+    return {figure: drifts[figure] for figure in ranked[:first]}
+
+
 def drifting(runs: Runs) -> bool:
-    """Whether any figure that can be told drifts beyond its scatter."""
-    drifts = (drift_of(figure, runs) for figure in TESTED.values())
-    return any(drift is not None and drift.significant for drift in drifts)
+    """Whether any figure may still drift, so that the errors of all have to hold it."""
+    return bool(significant_drifts(runs, DOUBT))
+
+
+def worth_lengthening(runs: Runs, since: int) -> bool:
+    """Whether a figure drifts by more than a hundredth of it and than its error without the drift.
+
+    ``since``: batch from which the runs show what regimes there are.
+    """
+    return any(
+        abs(drift.size) > max(NEGLIGIBLE * drift.figure, _settled_error(figure, runs, since))
+        for figure, drift in significant_drifts(runs, FALSE_ALARMS).items()
+    )
+
+
+def _settled_error(figure: Figure, runs: Runs, since: int) -> float:
+    """Half-width of a figure whose runs do not drift."""
+    scatter = estimate([figure.moments(run) for run in runs], figure.of_sums).half_width
+    return math.hypot(scatter or 0.0, unseen_regime(figure, runs, since))
 
 
 def unseen_regime(figure: Figure, runs: Runs, since: int) -> float:
@@ -197,10 +229,11 @@ def unseen_regime(figure: Figure, runs: Runs, since: int) -> float:
     return farthest / (len(runs) + 1)
 
 
-def slow_change(figure: Figure, tested: Figure, runs: Runs, since: int, *, steady: bool) -> float:
-    """Half-width that slow change adds to a figure: drift left over and regimes unseen, as root sum of squares; none in a
-    run that is not ``steady``, whose figures change with its schedule."""
-    if not steady:
-        return 0.0
-    drift = drift_of(tested, runs)
-    return math.hypot(0.0 if drift is None else drift.bias, unseen_regime(figure, runs, since))
+def slow_change(figure: Figure, tested: Figure, runs: Runs, since: int, *, moving: bool) -> float:
+    """Half-width that slow change adds to a figure of steady runs: drift left over and regimes unseen, as root sum of squares.
+
+    ``moving``: whether any figure of the runs is ``drifting``; then the transient is not over for this one either.
+    """
+    drifts = (drift_of(one, runs) for one in (figure, tested))
+    bias = max((drift.bias(moving) for drift in drifts if drift is not None), default=0.0)
+    return math.hypot(bias, unseen_regime(figure, runs, since))

@@ -3,7 +3,7 @@
 import math
 
 from rbdyn.dynamics.statistics import metrics
-from rbdyn.dynamics.statistics.drift import TESTED, Start, slow_change, start_of_counting
+from rbdyn.dynamics.statistics.drift import TESTED, Start, drifting, slow_change, start_of_counting
 from rbdyn.dynamics.statistics.metrics import Replicate, Runs, quantity
 from rbdyn.result import Quantity
 from rbdyn.scene import Scene
@@ -47,9 +47,9 @@ def quantities(
     """
     steady = scene.operation.schedule is None
     since = runs[0].first if since is None else since
-    figures = {}
+    figures, moving = {}, steady and drifting(runs)
     for name, (figure, unit) in FIGURES.items():
-        slow = slow_change(figure, TESTED.get(name, figure), runs, since, steady=steady)
+        slow = slow_change(figure, TESTED.get(name, figure), runs, since, moving=moving) if steady else 0.0
         figures[name] = quantity(figure, runs, companions, share, slow, unit)
     return figures
 

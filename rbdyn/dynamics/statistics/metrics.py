@@ -24,7 +24,7 @@ class Replicate:
     impact window. ``whirl``: samples, sum and sum of squares of the cage centre's speed; ``work``: integrals of the
     loss powers, then of those that come in by shafts and loads; ``largest``: loads; ``energy``: kinetic, elastic and
     load energy together at the ends of batches; ``energy_scale``: contact load times approach;
-    ``stiffness``: as in ``runge_kutta.Carry``.
+    ``stiffness``: as in ``runge_kutta.Carry``; ``decay_rates``: (states, motions) as in ``relaxation`` [1/s].
     """
 
     first: int
@@ -43,6 +43,7 @@ class Replicate:
     cpu_s: float
     method: str = "rk45"
     stiffness: Array = field(default_factory=lambda: np.zeros(3))
+    decay_rates: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     def counted_from(self, first: int) -> "Replicate":
         """The same run, counted from another batch."""
