@@ -10,13 +10,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all
-from rbdyn.dynamics.recording import Recording, batches_of
+from rbdyn.dynamics.recording import batches_of
 from rbdyn.dynamics.relaxation import Relaxation, slowest
 from rbdyn.dynamics.statistics.drift import start_of_counting, worth_lengthening
 from rbdyn.dynamics.statistics.metrics import Replicate
@@ -55,8 +55,18 @@ class Ensemble:
 GROWTH = 2.0
 # Relaxation times of the slowest motion that are counted at least: what is left of a start after them is 5 %.
 RELAXATIONS = 3.0
-# Makes the recording of a replicate, or of a companion where it is given how.
-Start = Callable[[int, Companions | None, Stop], Recording]
+
+
+class Growing(Protocol):
+    """A replicate that can always go on, such as a recording."""
+
+    def to(self, counted: float, /) -> Replicate:
+        """Go on until so many turns after the warm-up [shaft turns]. Raises RunError or CancelledError."""
+        ...
+
+
+# Makes a replicate, or a companion where it is given how.
+Start = Callable[[int, Companions | None, Stop], Growing]
 
 
 def run_until_settled(scene: Scene, start: Start, workers: int | None, progress: Reporter, stop: Stop) -> Ensemble:
@@ -105,7 +115,7 @@ class Team:
     progress: Reporter
     to_come: int
     done: int = 0
-    recordings: dict[int, Recording] = field(default_factory=dict)
+    recordings: dict[int, Growing] = field(default_factory=dict)
 
     def to(self, turns: float) -> list[Replicate]:
         """All of them after so many turns past the warm-up. Raises RunError, KeyboardInterrupt."""

@@ -145,8 +145,8 @@ class Numerics(Consistent):
     """Shaft turns before the counted ones, left out as transient; "auto" takes what the series of the run show, at
     least a batch."""
     extend: bool = True
-    """Where the figures of the counted turns drift, run on and count the last half; counted turns are filled up to
-    whole impact windows."""
+    """Count three relaxation times of the slowest motion at least; where the figures of the counted turns drift, run twice as
+    long and count the last half. Counted turns are filled up to whole impact windows."""
     extend_limit: Annotated[float, Field(ge=1.0, le=1000.0)] = 8.0
     """Longest run that extend makes, as a multiple of the turns asked for."""
     replicates: Annotated[int, Field(ge=1, le=10000)] = 8
