@@ -28,7 +28,7 @@ from rbdyn.scene.laws import MOST_OF_A_RUN
 # Long enough that the step cut at a batch's end costs nothing, short against any memory worth finding.
 BATCH_TURNS = 1.0
 # Batches after which the decay of slow motions is read, of runs that may be lengthened: the rollers have been round twice.
-READ_AFTER = (6, 12)
+READ_AFTER = (5, 10, 15, 20)
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,7 @@ class Recording:
         # Places of the cage's centre, x and y in turn, and how many samples there were at the end of each batch.
         self._places, self._sampled = array("d"), list[int]()
         self._cpu_s = 0.0
+        self._linearised = Linearised(run) if run.scene.extends else None
         self._decay_rates = list[Array]()
 
     def to(self, counted: float) -> Replicate:
@@ -103,8 +104,8 @@ class Recording:
                 kept[:] = 0.0
             self._ends.append(float(end))
             self._looks.append(self._look())
-            if run.scene.extends and self._batches in READ_AFTER:
-                self._decay_rates.append(Linearised(run.scene, run.bearing, run.control).decay_rates(run.carry))
+            if self._linearised is not None and self._batches in READ_AFTER:
+                self._decay_rates.append(self._linearised.decay_rates())
         self._cpu_s += time.thread_time() - started
         return self.replicate
 

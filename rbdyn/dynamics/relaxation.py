@@ -13,12 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.arrays import Array
-from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_SPEED, CAGE_VX, CAGE_VY
 from rbdyn.dynamics.integrators.advance import advance
-from rbdyn.dynamics.integrators.records import Carry, Control, carry_from, empty_tally
+from rbdyn.dynamics.integrators.records import carry_from, empty_tally
 from rbdyn.dynamics.parameters.scales import absolute_tolerance, layout_of, scales
-from rbdyn.scene import Scene
+from rbdyn.dynamics.run import Run
 
 MOTIONS = ("the spin of the cage", "the motion of the cage's centre", "the spin of the rollers")
 # Change of a speed by which slopes are taken, over the speed that a contact can make.
@@ -28,30 +27,31 @@ READING = 1e-6
 
 
 class Linearised:
-    """Reads decay rates of a run in states along its way."""
+    """Reads decay rates in states along the way of a run."""
 
-    def __init__(self, scene: Scene, bearing: RollerBearing, control: Control) -> None:
-        state, z, scale = layout_of(scene), bearing.rollers, scales(scene)
+    def __init__(self, run: Run) -> None:
+        scene = run.scene
+        state, z, scale = layout_of(scene), scene.bearing.rollers, scales(scene)
         cage = state.first_body
-        self.bearing, self.control, self.turn_s = bearing, control, scene.turn_s
+        self.run, self.reading_s = run, READING * scale.length / scale.speed
         self.motions = ([cage + CAGE_SPEED], [cage + CAGE_VX, cage + CAGE_VY], list(range(4 * z, 5 * z)))
-        self.increments = INCREMENT * absolute_tolerance(scene, bearing, 1.0)
-        self.reading_s = READING * scale.length / scale.speed
+        self.increments = INCREMENT * absolute_tolerance(scene, run.bearing, 1.0)
+        self.book = empty_tally()
 
-    def decay_rates(self, carry: Carry) -> Array:
-        """Rates [1/s] at which each of ``MOTIONS`` decays in the state of a run, which stays as it is."""
-        at_rest, rates = self._accelerations(carry, []), []
+    def decay_rates(self) -> Array:
+        """Rates [1/s] at which each of ``MOTIONS`` decays in the present state of the run, which stays as it is."""
+        at_rest, rates = self._accelerations([]), []
         for places in self.motions:
-            change = self._accelerations(carry, places)[places] - at_rest[places]
+            change = self._accelerations(places)[places] - at_rest[places]
             rates.append(-float(np.mean(change / self.increments[places])))
         return np.array(rates)
 
-    def _accelerations(self, carry: Carry, places: Sequence[int]) -> Array:
+    def _accelerations(self, places: Sequence[int]) -> Array:
         """Rates of change of the state where the speeds at some places are larger by their increments."""
-        y = carry.y.copy()
+        run, y = self.run, self.run.carry.y.copy()
         y[places] += self.increments[places]
-        probe = carry_from(y, self.bearing.rollers, self.reading_s, carry.method)
-        advance(self.bearing, self.control, probe, empty_tally(), self.reading_s, self.turn_s)
+        probe = carry_from(y, run.bearing.rollers, self.reading_s, run.carry.method)
+        advance(run.bearing, run.control, probe, self.book, self.reading_s, run.scene.turn_s)
         return probe.k[0]
 
 

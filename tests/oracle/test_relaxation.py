@@ -21,7 +21,7 @@ def test_oracle_decay_rates_are_slopes_of_the_moments(outer, method):
     run = Run(scene, bearing, 0, scene.numerics.rtol, Stop())
     run.to(0.3)
     before = [part.copy() for part in run.carry if isinstance(part, np.ndarray)]
-    rates = Linearised(scene, bearing, run.control).decay_rates(run.carry)
+    rates = Linearised(run).decay_rates()
     after = [part for part in run.carry if isinstance(part, np.ndarray)]
     assert all(np.array_equal(old, new) for old, new in zip(before, after, strict=True))
 
