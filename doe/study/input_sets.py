@@ -203,7 +203,7 @@ def run_notes(case: Case, overrides: Sequence[str], by: str, runs: str = "") -> 
     given = {key_path(each): each for each in case.uncertain.set}
     clashing = _clashing(case, overrides)
     what = f"changes {runs}, not the input sets" if runs else "changes no run"
-    why = f"uncertain.set gives these {', '.join(given[key_path(each)] for each in clashing)}"
+    why = f"uncertain.set gives {'these' if runs else 'all of them'} {', '.join(given[key_path(each)] for each in clashing)}"
     return [f"{by}{', '.join(clashing)} {what}: {why}"] if clashing else []
 
 

@@ -29,8 +29,8 @@ class Pairs:
 
     def at(self, rows: Whole) -> "Pairs":
         """The same at some rows, each as often as it is named."""
-        arrays = (each[:, rows] for each in (self.outputs, self.variances, self.freedom))
-        return Pairs(self.places[rows], self.quantiles[rows], *arrays, self.effort[rows])
+        outputs, variances, freedom = self.outputs[:, rows], self.variances[:, rows], self.freedom[:, rows]
+        return Pairs(self.places[rows], self.quantiles[rows], outputs, variances, freedom, self.effort[rows])
 
     def joined(self, rows: Whole, other: "Pairs") -> "Pairs":
         """The same, at some rows joined with as many replicates more."""
