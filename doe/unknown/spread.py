@@ -160,9 +160,11 @@ def _quantiles(fitted: Emulated, fresh: Array, random: np.random.Generator) -> t
     runs = (others + rest)[:, None] <= values
     control = np.searchsorted(np.sort(rest), values - others[:, None], side="right") / count
     off = runs - control
+    # Between ends known from so few runs 90 % of further sets lie on average (Wilks 1941).
+    levels = (np.array(ENDS) * (count + 1) - 0.5) / count
     # A distribution that a correction bends back is put in order (Chernozhukov, Fernandez-Val and Galichon 2010).
     found = [
-        np.interp(ENDS, np.sort(emulator + weights @ off / count), values)
+        np.interp(levels, np.sort(emulator + weights @ off / count), values)
         for weights in (np.ones(count), *random.multinomial(count, np.full(count, 1.0 / count), DRAWS))
     ]
     ends, *again = fitted.back(np.array(found))
