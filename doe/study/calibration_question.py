@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from doe import clearance
-from doe.study.input_sets import Case, case_of, check_overrides, impossible, tables_of
+from doe.study.input_sets import Case, case_of, check_overrides, impossible, overriding, tables_of
 from doe.study.rig_file import Rig, read_rig
 from rbdyn.faults import Claims, InputError, key_path, refuse
 from rbdyn.records.kept import code_version, digest_of
@@ -76,7 +76,12 @@ def read_question(path: Path, data: Path, free: Sequence[str], overrides: Sequen
     sought = [each for each in case.every if each.law.kind == "unknown" and (not free or each.key in free)]
     varies = "varies, so it has no one value to be found; it keeps the scene's value, or its ratio to the key that it multiplies"
     check_overrides(overrides, sought, fixed)
-    notes = [*rig.notes, *case.remarks, *(f"{each.key} {varies}" for each in case.every if each.law.kind == "varies")]
+    notes = [
+        *rig.notes,
+        *case.remarks,
+        *overriding(case, overrides),
+        *(f"{each.key} {varies}" for each in case.every if each.law.kind == "varies"),
+    ]
     refuse(
         f"--free {key}: its documented range does not count in this scene (rbdyn keys {key}); give it a law"
         for key in free

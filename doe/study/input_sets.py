@@ -1,7 +1,7 @@
 """Input sets of a scene whose inputs are not known: which inputs vary, the scenes at values of them, their runs."""
 
 import copy
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -36,6 +36,8 @@ ENDS = np.array([1e-3, 1.0 - 1e-3])
 NOTHING: Mapping[str, str] = MappingProxyType({})
 # Input sets that are tried before anything runs.
 TRIED = 16
+# Seeds of further replicates of the same input sets.
+ROUND_SEEDS = 10_000
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,27 @@ class Sets:
     freedom: Whole
     failures: tuple[Failure, ...]
     impossible: tuple[str, ...]
+
+    @property
+    def signals(self) -> Array:
+        """Outputs (n, m) as main effects are looked for in them: logarithms of those that are positive throughout."""
+        positive = (self.outputs > 0.0).all(axis=0)
+        return np.where(positive, np.log(np.where(positive, self.outputs, 1.0)), self.outputs)
+
+    def joined(self, other: "Sets") -> "Sets":
+        """The sets that both have, with the replicates of both, which are as many in each."""
+        places = np.intersect1d(self.places, other.places)
+        ours, theirs = (np.flatnonzero(np.isin(each.places, places)) for each in (self, other))
+        return Sets(
+            places,
+            self.quantiles[ours],
+            [self.inputs[row] for row in ours],
+            0.5 * (self.outputs[ours] + other.outputs[theirs]),
+            0.25 * (self.variances[ours] + other.variances[theirs]),
+            self.freedom[ours] + other.freedom[theirs] + 1,
+            (*self.failures, *other.failures),
+            self.impossible,
+        )
 
 
 @dataclass(frozen=True)
@@ -164,6 +187,30 @@ def check_overrides(overrides: Sequence[str], inputs: Sequence[Input], fixed: Ma
     claims |= {key: f"is {what}, whose value each run has; leave it out" for key, what in fixed.items()}
     claimed = Claims({tuple(key.split(".")): reason for key, reason in claims.items()})
     refuse(f"--set {each}: {reason}" for each in overrides if (reason := claimed.on(key_path(each))))
+
+
+def overriding(case: Case, overrides: Sequence[str], runs: str = "") -> list[str]:
+    """Which runs each --set of a numerics key changes: input sets have the keys of uncertain.set, so that only other ``runs``
+    follow the override, none where there are no others."""
+    notes = run_notes(case, overrides, "--set ", runs)
+    clashing = {key_path(each) for each in _clashing(case, overrides)}
+    rest = [each for each in overrides if (path := key_path(each))[:1] == ("numerics",) and path not in clashing]
+    return [*notes, *([f"--set {', '.join(rest)} changes every run"] if rest else [])]
+
+
+def run_notes(case: Case, overrides: Sequence[str], by: str, runs: str = "") -> list[str]:
+    """That input sets have values of uncertain.set where overrides ``by`` an option or a key have others, if so."""
+    given = {key_path(each): each for each in case.uncertain.set}
+    clashing = _clashing(case, overrides)
+    what = f"changes {runs}, not the input sets" if runs else "changes no run"
+    why = f"uncertain.set gives {'these' if runs else 'all of them'} {', '.join(given[key_path(each)] for each in clashing)}"
+    return [f"{by}{', '.join(clashing)} {what}: {why}"] if clashing else []
+
+
+def _clashing(case: Case, overrides: Sequence[str]) -> list[str]:
+    """Overrides of numerics for which uncertain.set has another value."""
+    given = {path: each for each in case.uncertain.set if (path := key_path(each))[:1] == ("numerics",)}
+    return [each for each in overrides if given.get(key_path(each), each) != each]
 
 
 def case_of(
@@ -291,7 +338,7 @@ def _bare(case: Case, fault: str) -> str:
 
 
 def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[str, float]]:
-    """The inputs that vary, of too many those that matter; and the largest share of each of the others.
+    """The inputs that a calibration looks for, of too many those that matter; and the largest share of each of the others.
 
     What a sample or the scene declares stays. Raises RunError, InputError, KeyboardInterrupt.
     """
@@ -301,9 +348,7 @@ def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[st
     quantiles = screening.two_levels(len(tried))
     with_middle = np.column_stack([quantiles, np.full(len(quantiles), 0.5)])
     sets = run(case, tried, with_middle, simulations, SCREENING_SEEDS, title="screening")
-    positive = (sets.outputs > 0.0).all(axis=0)
-    outputs = np.where(positive, np.log(np.where(positive, sets.outputs, 1.0)), sets.outputs)
-    share = screening.shares(sets.quantiles[:, :-1], outputs)
+    share = screening.shares(sets.quantiles[:, :-1], sets.signals)
     declared = [place for place, each in enumerate(tried) if each.key in case.uncertain.laws]
     stay = screening.kept(share, declared, case.uncertain.inputs - len(every) + len(tried))
     left = {tried[place].key: float(share[place].max()) for place in range(len(tried)) if place not in stay}
@@ -334,6 +379,37 @@ def run(
     places = np.array([place for place, _ in good], dtype=np.int64)
     inputs_there = [values[place] for place in places]
     return Sets(places, quantiles[places], inputs_there, outputs, variances, freedom, failures, impossible)
+
+
+def replicated(case: Case, quantiles: Array, simulations: Simulations, effort: int) -> Sets:
+    """Input sets (n, d + 1) of every input with ``effort`` times the replicates of one run, a power of two, those of half as
+    many among them. Raises as ``run``."""
+    sets = run(case, case.every, quantiles, simulations)
+    for again in range(effort.bit_length() - 1):
+        more = [f"numerics.replicates={case.replicates << again}"]
+        sets = sets.joined(run(case, case.every, quantiles, simulations, (again + 1) * ROUND_SEEDS, more))
+    return sets
+
+
+def strongest(case: Case, quantiles: Array, signals: Array) -> tuple[list[int], dict[str, float]]:
+    """Places of the inputs that emulators of signals (n, m) at quantiles (n, d + 1) of every input cover: what a sample or the
+    scene declares, and of the rest what matters most, as many as the scene allows. By key of the others, which vary all the
+    same, the largest share of a signal's variance that their main effect makes."""
+    always = declared(case)
+    places = screening.strongest(quantiles[:, :-1], signals, case.uncertain.inputs, always)
+    return places, outside(case, places, quantiles, signals)
+
+
+def declared(case: Case) -> list[int]:
+    """Places of the inputs that a sample or the scene declares."""
+    keys = {*case.uncertain.laws, *case.sample}
+    return [place for place, each in enumerate(case.every) if each.key in keys]
+
+
+def outside(case: Case, places: Collection[int], quantiles: Array, signals: Array) -> dict[str, float]:
+    """By key of the inputs at no ``places``: the largest share of a signal's variance that their main effect makes."""
+    share = screening.main_effects(quantiles[:, :-1], signals).max(axis=1)
+    return {each.key: float(share[place]) for place, each in enumerate(case.every) if place not in places}
 
 
 def outcomes(

@@ -27,6 +27,11 @@ class Pairs:
     freedom: Whole
     effort: Whole
 
+    def at(self, rows: Whole) -> "Pairs":
+        """The same at some rows, each as often as it is named."""
+        outputs, variances, freedom = self.outputs[:, rows], self.variances[:, rows], self.freedom[:, rows]
+        return Pairs(self.places[rows], self.quantiles[rows], outputs, variances, freedom, self.effort[rows])
+
     def joined(self, rows: Whole, other: "Pairs") -> "Pairs":
         """The same, at some rows joined with as many replicates more."""
         outputs, variances, freedom = self.outputs.copy(), self.variances.copy(), self.freedom.copy()
@@ -40,16 +45,23 @@ class Pairs:
     def gains(self, goals: Goals, design: int = 1) -> tuple[Array, Array]:
         """Relative gains (n, q) of a design over the first, and their variances, smoothed over the inputs: of a row's own few
         replicates they are guesses, whose mean a few large ones make."""
-        index, both = goals.objectives, [0, design]
-        scale = np.abs(self.outputs[0][:, index])
-        before, after = (goals.costs(each) for each in self.outputs[both])
-        gains = (before - after) / scale
-        noise, other = (each[:, index] for each in self.variances[both])
-        # The first stands in the denominator too.
-        once = self.effort[:, None] * (other + (1.0 - gains) ** 2 * noise) / scale**2
-        freedom = self.freedom[both][:, :, index].sum(axis=0)
+        both = [0, design]
+        gains, variances = relative_gains(goals, self.outputs[both], self.variances[both])
+        freedom = self.freedom[both][:, :, goals.objectives].sum(axis=0)
+        once = self.effort[:, None] * variances
         smooth = [pooled_variances(self.quantiles, *each) for each in zip(once.T, freedom.T, strict=True)]
         return gains, np.column_stack(smooth) / self.effort[:, None]
+
+
+def relative_gains(goals: Goals, outputs: Array, variances: Array) -> tuple[Array, Array]:
+    """Relative gains (n, q) of the second design over the first of outputs (2, n, m), and their variances."""
+    index = goals.objectives
+    scale = np.abs(outputs[0][:, index])
+    before, after = (goals.costs(each) for each in outputs)
+    gains = (before - after) / scale
+    noise, other = (each[:, index] for each in variances)
+    # The first is in the denominator too.
+    return gains, (other + (1.0 - gains) ** 2 * noise) / scale**2
 
 
 def simulated(

@@ -15,7 +15,7 @@ from doe.arrays import Array
 from doe.clearance import Simulations
 from doe.running.failure import Failure
 from doe.study.goals import goals_of
-from doe.study.input_sets import Case, case_of, screened
+from doe.study.input_sets import ROUND_SEEDS, Case, case_of, run_notes, strongest
 from doe.study.pairs import simulated
 from doe.study.robust_front import RobustFront, find_robust_front
 from doe.study_file import Study
@@ -26,7 +26,7 @@ from rbdyn.faults import set_key
 from rbdyn.scene.unknown import Input
 
 # Rounds of further replicates: each as many again as there are, so that a set gets 2, 4, 8 and 16.
-ROUNDS, ROUND_SEEDS = 3, 10_000
+ROUNDS = 3
 FRESH = 8192
 
 
@@ -45,8 +45,9 @@ class Decider:
 class Robust:
     """The judgement: ``responses`` with a goal, how likely each and all gains are, deciding inputs by worth, the two
     that are worth most together, how well inputs foretell each gain, by how much the chance of all gains changes with ranges
-    half as wide, the front of points that hold over the inputs, None where the study wants none, what a screening left out,
-    the cost in runs, and notes: what is to be doubted of a posterior sample, which keys do not vary."""
+    half as wide, the front of points that hold over the inputs, None where the study wants none, the inputs, which all vary in
+    every set, ``screened``: those that no emulator of a gain covers, with the largest share that the main effect of each makes of
+    a gain, the cost in runs, and notes: what is to be doubted of a posterior sample, which keys do not vary."""
 
     responses: list[str]
     better: Better
@@ -84,14 +85,13 @@ def check_robust(study: Study) -> None:
 def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     """Judge the pick (k,) beside the baseline. Raises InputError, RunError, KeyboardInterrupt."""
     case, goals = case_of_study(study), goals_of(study)
-    inputs, rest = screened(case, simulations)
-    joint, seed = case.joint(inputs), case.uncertain.seed
+    joint, seed = case.joint(case.every), case.uncertain.seed
     quantiles = joint.sets(study.file.robust.points, seed)
     designs = {
         "baseline": clearance.assignments(study.at(()), study.baseline),
         "pick": clearance.assignments(study, pick),
     }
-    pairs, failures = simulated(case, inputs, quantiles, designs, simulations)
+    pairs, failures = simulated(case, case.every, quantiles, designs, simulations)
     spent, allowed = 2 * len(pairs.quantiles), round(2 * len(pairs.quantiles) * (1.0 + study.file.robust.settle))
     replicates = case.replicates
     rows = in_doubt(*pairs.gains(goals))
@@ -103,18 +103,23 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
             break
         more = [f"numerics.replicates={replicates * many}"]
         seeds = (again + 1) * ROUND_SEEDS
-        new, lost = simulated(case, inputs, pairs.quantiles[rows], designs, simulations, seeds, more)
+        new, lost = simulated(case, case.every, pairs.quantiles[rows], designs, simulations, seeds, more)
         rows, spent, failures = rows[new.places], spent + 2 * many * len(rows), (*failures, *lost)
         pairs = pairs.joined(rows, new)
         still = in_doubt(*pairs.gains(goals))
         rows = still[np.isin(still, rows)]
     gains, variances = pairs.gains(goals)
-    fresh = joint.sets(FRESH, seed + 1)
+    # Of inputs outside these the gains know as scatter.
+    places, rest = strongest(case, pairs.quantiles, gains)
+    inputs, columns = [case.every[place] for place in places], [*places, -1]
+    fresh = joint.sets(FRESH, seed + 1)[:, columns]
     knowable = [place for place, each in enumerate(inputs) if each.law.kind == "unknown"]
-    found = decides(pairs.quantiles, gains, variances, fresh, seed, _read(case, inputs, fresh, seed), knowable)
+    found = decides(
+        pairs.quantiles[:, columns], gains, variances, fresh, seed, _read(case, inputs, fresh, seed), knowable
+    )
     front = None
     if study.file.robust.front != "none":
-        front, more_runs, lost = find_robust_front(study, case, inputs, joint, pick, simulations)
+        front, more_runs, lost = find_robust_front(study, case, pairs, pick, simulations)
         spent, failures = spent + more_runs, (*failures, *lost)
     deciders = [
         Decider(inputs[one.place].key, _value(case, inputs[one.place], one.flip), one.worth, one.above)
@@ -124,7 +129,8 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     judged = better(gains, variances, seed), deciders, pair, found.foretold, found.halved, front
     cost = len(gains), spent, int(in_doubt(gains, variances).size)
     wanted = [study.responses[index] for index in goals.objectives]
-    return Robust(wanted, *judged, inputs, rest, *cost, failures, case.notes)
+    notes = *case.notes, *run_notes(case, study.scene.set, "scene.set: ", "other runs of the study")
+    return Robust(wanted, *judged, case.every, rest, *cost, failures, notes)
 
 
 def case_of_study(study: Study) -> Case:

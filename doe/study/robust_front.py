@@ -1,8 +1,10 @@
 """The front of what designs gain over the baseline while inputs are not known, and a few of its points simulated.
 
-Runs spread over factors and inputs together teach emulators of the responses; the search maximises the mean, or a low quantile,
-over the inputs of the gain over the baseline at the same inputs: levels that all designs share fall out. Points that a search
-on emulators likes were also lucky, so some are simulated at input sets of which the emulators saw none.
+Runs spread over factors and inputs together, every unknown input in each, are compared with the baseline at the same input set:
+emulators learn the gains themselves, in which levels that all designs share fall out. They cover the factors and the inputs that
+matter most; what the others do to a gain is scatter, of which each input set of the search has its part. The search maximises
+the mean, or a low quantile, of the gains over the inputs. Points that a search on emulators likes were also lucky, so some are
+simulated at input sets of which the emulators saw none.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,18 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe import clearance
-from doe.arrays import Array
+from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
 from doe.running.failure import Failure
 from doe.study.goals import goals_of, region_of, rounded_within
-from doe.study.input_sets import Case, run
-from doe.study.pairs import simulated
+from doe.study.input_sets import Case, Sets, declared, run
+from doe.study.pairs import Pairs, relative_gains, simulated
 from doe.study_file import Study
 from doe.unknown.decision import Better, better, shrunk
-from doe.unknown.joint import Joint, nested
+from doe.unknown.joint import nested
 from doe.unknown.spread import Emulated, Runs, emulated
-from rbdyn.scene.unknown import Input
 
 JOINT_SEEDS = 200_000
 # Input sets over which the search averages, those at which points are simulated, and how many points.
@@ -43,7 +44,7 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class RobustFront:
-    """Points (f, k) and what emulators foretell of their gains (f, q); ``confirmed`` by name, the plain pick first; ``q2`` of
+    """Points (f, k) and what emulators predict of their gains (f, q); ``confirmed`` by name, the plain pick first; ``q2`` of
     the emulators; ``note`` where there is no front."""
 
     points: Array
@@ -54,30 +55,24 @@ class RobustFront:
 
 
 def find_robust_front(
-    study: Study, case: Case, inputs: Sequence[Input], joint: Joint, pick: Array, simulations: Simulations
+    study: Study, case: Case, pairs: Pairs, pick: Array, simulations: Simulations
 ) -> tuple[RobustFront, int, tuple[Failure, ...]]:
-    """The front, the runs that it took, and those that failed. Raises InputError, RunError, KeyboardInterrupt."""
-    settings, seed, goals = study.file.robust, case.uncertain.seed, goals_of(study)
-    reach, factors = region_of(study), len(study.factors)
+    """The front, the runs that it took, and those that failed; ``pairs``: the baseline and the pick at the study's input sets.
+
+    Raises InputError, RunError, KeyboardInterrupt.
+    """
+    settings, goals, reach = study.file.robust, goals_of(study), region_of(study)
     low, high = study.actual(-reach), study.actual(reach)
-    even = nested(factors + joint.inputs + 1, settings.points, seed + 2)
-    points, quantiles = low + (high - low) * even[:, :factors], joint.placed(even[:, factors:])
-    own = [clearance.assignments(study, point) for point in points]
-    sets = run(case, inputs, quantiles, simulations, JOINT_SEEDS, (), "runs of the robust front", own)
-    places = np.hstack([even[sets.places, :factors], sets.quantiles])
-    fitted = [
-        emulated(Runs(places, sets.outputs[:, each], sets.variances[:, each], sets.freedom[:, each]))
-        for each in range(len(study.responses))
-    ]
-    foretold = _Foretold(fitted, goals, (low, high), joint.sets(SEARCHED, seed + 3), study.baseline)
+    sets, places, rows = _runs(study, case, pairs, (low, high), simulations)
+    predicted = _emulators(case, goals, sets, places, pairs.at(rows), (low, high))
     share = settings.quantile if settings.front == "quantile" else None
-    spent, q2 = len(own), [fitted[index].q2 for index in goals.objectives]
+    spent, q2 = settings.points, [each.q2 for each in predicted.gain]
     try:
         found = front(
-            lambda wanted: foretold.kept(wanted, share),
+            lambda wanted: predicted.objectives(wanted, share),
             low,
             high,
-            goals=foretold.goals,
+            goals=predicted.goals,
             population=POPULATION,
             generations=GENERATIONS,
             seed=study.file.front.seed,
@@ -86,32 +81,85 @@ def find_robust_front(
     except InfeasibleError:
         note = "no point keeps the limits over what is not known"
         return RobustFront(low[None][:0], np.empty((0, len(q2))), {}, q2, note), spent, sets.failures
-    chosen = {"pick": (pick, "the pick"), **_choices(study, found, foretold)}
+    chosen = {"pick": (pick, "the pick"), **_choices(study, found, predicted)}
     designs = {"baseline": clearance.assignments(study.at(()), study.baseline)}
     designs |= {name: clearance.assignments(study, point) for name, (point, _) in chosen.items()}
-    pairs, lost = simulated(case, inputs, joint.sets(CONFIRMED, seed), designs, simulations)
+    rows = fresh_rows(settings.points)
+    quantiles = case.joint(case.every).sets(1 << int(rows.max()).bit_length(), case.uncertain.seed)[rows]
+    again, lost = simulated(case, case.every, quantiles, designs, simulations)
     confirmed = {}
     for number, (name, (point, reason)) in enumerate(chosen.items(), 1):
-        gains, variances = pairs.gains(goals, number)
+        gains, variances = again.gains(goals, number)
         held = _over_inputs(shrunk(gains, variances), share)
-        confirmed[name] = Held(point, reason, better(gains, variances, seed), held)
-    spent += CONFIRMED * (len(chosen) - 1)
+        confirmed[name] = Held(point, reason, better(gains, variances, case.uncertain.seed), held)
+    # The baseline and the pick were there before, but for the sets that the study's own do not hold.
+    spent += CONFIRMED * (len(chosen) - 1) + 2 * int((rows >= settings.points).sum())
     return RobustFront(found.points, found.values[:, : len(q2)], confirmed, q2), spent, (*sets.failures, *lost)
 
 
-@dataclass(frozen=True, eq=False)
-class _Foretold:
-    """What emulators of the responses foretell of gains over the baseline at ``sets`` (s, d + 1) of inputs."""
+def fresh_rows(points: int) -> Whole:
+    """Places of the input sets at which points are simulated: of the study's own the first half, of which emulators see the
+    second, then such as come after them."""
+    first = min(points // 2, CONFIRMED)
+    return np.array([*range(first), *range(points, points + CONFIRMED - first)])
 
-    fitted: Sequence[Emulated]
+
+def _runs(
+    study: Study, case: Case, pairs: Pairs, box: tuple[Array, Array], simulations: Simulations
+) -> tuple[Sets, Array, Whole]:
+    """Designs spread over the ``box`` at the second half of the study's input sets, as many as there are sets; places (n, k) of
+    these designs between 0 and 1, and the row of the pairs at the same input set."""
+    points, (low, high) = study.file.robust.points, box
+    half = np.flatnonzero(pairs.places >= points // 2)
+    even = nested(len(study.factors), points, case.uncertain.seed + 2)
+    rows = np.resize(half, points)
+    own = [clearance.assignments(study, point) for point in low + (high - low) * even]
+    title = "runs of the robust front"
+    sets = run(case, case.every, pairs.quantiles[rows], simulations, JOINT_SEEDS, (), title, own)
+    return sets, even[sets.places], rows[sets.places]
+
+
+def _emulators(
+    case: Case, goals: Goals, sets: Sets, places: Array, base: Pairs, box: tuple[Array, Array]
+) -> "_Predicted":
+    """Emulators of the gains over the baseline ``base`` at the same input sets, and of limited responses."""
+    factors = places.shape[1]
+    always = [*range(factors), *(factors + place for place in declared(case))]
+    cover = factors + case.uncertain.inputs, always
+    at = np.hstack([places, sets.quantiles])
+    gains, variances = relative_gains(
+        goals, np.stack([base.outputs[0], sets.outputs]), np.stack([base.variances[0], sets.variances])
+    )
+    freedom = (base.freedom[0] + sets.freedom)[:, goals.objectives]
+    columns = zip(gains.T, variances.T, freedom.T, strict=True)
+    gain = [emulated(Runs(at, *each), *cover, logarithms=False) for each in columns]
+    limited = [
+        emulated(Runs(at, sets.outputs[:, index], sets.variances[:, index], sets.freedom[:, index]), *cover)
+        for index, _, _ in goals.limited
+    ]
+    seed = case.uncertain.seed + 3
+    random = np.random.default_rng(seed)
+    # One row for all gains: what inputs outside the emulators do to them goes together.
+    rows = random.integers(0, len(at), SEARCHED)
+    rest = np.column_stack([each.residuals for each in gain])[rows]
+    return _Predicted(gain, limited, goals, box, case.joint(case.every).sets(SEARCHED, seed), rest)
+
+
+@dataclass(frozen=True, eq=False)
+class _Predicted:
+    """What emulators predict at ``sets`` (s, d + 1) of inputs: gains over the baseline, each set with the residual ``rest``
+    (s, q) of a run, and limited responses."""
+
+    gain: Sequence[Emulated]
+    limited: Sequence[Emulated]
     wanted: Goals
     box: tuple[Array, Array]
     sets: Array
-    baseline: Array
+    rest: Array
 
     @property
     def goals(self) -> Goals:
-        """Goals of ``kept``: gains to be large, limited responses within their limits."""
+        """Goals of ``objectives``: gains to be large, limited responses within their limits."""
         kinds = ["max"] * len(self.wanted.objectives) + ["none"] * len(self.wanted.limited)
         ends: dict[str, list[float | None]] = {side: [None] * len(kinds) for side in ("lower", "upper", "weight")}
         ends["weight"][: len(self.wanted.objectives)] = self.wanted.cost_weight.tolist()
@@ -119,27 +167,25 @@ class _Foretold:
             ends["lower" if sense == ">=" else "upper"][place] = limit
         return Goals.of(kinds, **ends)  # type: ignore[arg-type]
 
-    def responses(self, points: Array) -> Array:
-        """Responses (n, s, m) at points (n, k)."""
+    def gains(self, points: Array) -> Array:
+        """Relative gains (n, s, q) at points (n, k)."""
+        return self._at_all(self.gain, points) + self.rest
+
+    def objectives(self, points: Array, share: float | None) -> Array:
+        """Mean or quantile of the gains at points (n, k), then of each limited response the mean or the quantile towards its
+        limit."""
+        columns = [_over_inputs(self.gains(points), share, axis=1)]
+        for fitted, (_, sense, _) in zip(self.limited, self.wanted.limited, strict=True):
+            towards = share if share is None or sense == ">=" else 1.0 - share
+            columns.append(_over_inputs(self._at_all([fitted], points), towards, axis=1))
+        return np.hstack(columns)
+
+    def _at_all(self, fitted: Sequence[Emulated], points: Array) -> Array:
+        """Outputs (n, s, e) of emulators at points (n, k) and all sets."""
         low, high = self.box
         coded = np.repeat((points - low) / (high - low), len(self.sets), axis=0)
         at_all = np.hstack([coded, np.tile(self.sets, (len(points), 1))])
-        return np.stack([each(at_all).reshape(len(points), -1) for each in self.fitted], axis=-1)
-
-    def gains(self, values: Array) -> Array:
-        """Relative gains (n, s, q) of responses (n, s, m)."""
-        base = self.responses(self.baseline[None])
-        return (self.wanted.costs(base) - self.wanted.costs(values)) / np.abs(base[..., self.wanted.objectives])
-
-    def kept(self, points: Array, share: float | None) -> Array:
-        """Mean or quantile of the gains at points (n, k), then of each limited response the mean or the quantile towards its
-        limit."""
-        values = self.responses(points)
-        columns = [_over_inputs(self.gains(values), share, axis=1)]
-        for index, sense, _ in self.wanted.limited:
-            towards = share if share is None or sense == ">=" else 1.0 - share
-            columns.append(_over_inputs(values[:, :, [index]], towards, axis=1))
-        return np.hstack(columns)
+        return np.stack([each(at_all).reshape(len(points), -1) for each in fitted], axis=-1)
 
 
 def _over_inputs(values: Array, share: float | None, axis: int = 0) -> Array:
@@ -147,9 +193,9 @@ def _over_inputs(values: Array, share: float | None, axis: int = 0) -> Array:
     return values.mean(axis=axis) if share is None else np.quantile(values, share, axis=axis)
 
 
-def _choices(study: Study, found: ParetoFront, foretold: _Foretold) -> dict[str, tuple[Array, str]]:
+def _choices(study: Study, found: ParetoFront, predicted: _Predicted) -> dict[str, tuple[Array, str]]:
     """Points of the front that are worth a simulation, by name, and why."""
-    together = (foretold.gains(foretold.responses(found.points)) > 0.0).all(axis=2).mean(axis=1)
+    together = (predicted.gains(found.points) > 0.0).all(axis=2).mean(axis=1)
     rows: dict[str, int] = {"surest": int(together.argmax())}
     rows.update({str(rule): row for rule, row in found.picks.items()})
     reasons = {"surest": "the likeliest of the robust front to gain in all"}

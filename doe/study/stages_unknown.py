@@ -9,7 +9,7 @@ from doe.running.agenda import ANSWER, ANSWER_S, Stage
 from doe.study.calibration_question import Question, cases_of
 from doe.study.input_sets import Case, read_case
 from doe.study.robust import case_of_study
-from doe.study.robust_front import CONFIRMED, POINTS
+from doe.study.robust_front import CONFIRMED, POINTS, fresh_rows
 from doe.study.uncertainty import OUTPUTS
 from doe.study_file import Study
 from doe.unknown import screening
@@ -20,10 +20,11 @@ from rbdyn.scene import Scene
 def robust_stage(study: Study) -> Stage:
     """Input sets of the baseline and the pick, further replicates, a robust front and the simulations of its points."""
     settings, case = study.file.robust, case_of_study(study)
-    runs = round(2 * settings.points * (1.0 + settings.settle)) + _screening_runs(case)
+    runs = round(2 * settings.points * (1.0 + settings.settle))
     if settings.front != "none":
-        runs += settings.points + POINTS * CONFIRMED
-    return Stage.of("robust", runs, _work_of_a_set(case), "screening", "input sets", "runs of the robust front")
+        more = int((fresh_rows(settings.points) >= settings.points).sum())
+        runs += settings.points + POINTS * CONFIRMED + 2 * more
+    return Stage.of("robust", runs, _work_of_a_set(case), "input sets", "runs of the robust front")
 
 
 def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None) -> list[Stage]:
@@ -32,11 +33,10 @@ def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None)
     Raises InputError.
     """
     case = read_case(path, OUTPUTS, overrides)
-    one, screened = _work_of_a_set(case), _screening_runs(case)
+    count = case.uncertain.points if points is None else points
     return [
         Stage.of("as the scene says", 1, work_of(case.scene)),
-        *([Stage.of("screening", screened, one)] if screened else []),
-        Stage.of("input sets", case.uncertain.points if points is None else points, one),
+        Stage.of("input sets", count, _work_of_a_set(case)),
         Stage(ANSWER, besides_s=ANSWER_S),
     ]
 

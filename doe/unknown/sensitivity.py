@@ -1,9 +1,10 @@
 """Which input makes an output vary: Sobol' indices of an emulator, with intervals, beside an input that does nothing.
 
 First-order index of an input: the share of the output's variance that would vanish if the input were known; total index:
-the share that would be left if all others were. Both by scipy's Saltelli scheme on the emulator's mean. Intervals by
-parametric bootstrap: functions drawn from the emulator take the truth's place, are run with fresh noise and emulated anew;
-by how much their indices are missed is the error of ours, its mean the bias that is taken off. Of inputs that depend on each
+the share that would be left if all others were. Both by scipy's Saltelli scheme on the emulator's mean, and shares of the
+variance over all inputs: what inputs outside the emulator make, and what it misses, is in the whole. Intervals by
+parametric bootstrap: functions drawn from the emulator take the truth's place, are run with fresh noise and emulated anew
+with the same hyperparameters; by how much their indices are missed is the error of ours, its mean the bias that is taken off. Of inputs that depend on each
 other these indices mean nothing. There Shapley's effects share the variance: what an input adds to the variance explained,
 Var E[y | those known], on average over all orders in which the inputs become known.
 
@@ -23,7 +24,7 @@ from doe.arrays import Array
 from doe.emulator import fit_emulator
 from doe.threads import one_thread
 from doe.unknown.joint import Joint, nested
-from doe.unknown.spread import Emulated, Share
+from doe.unknown.spread import Emulated, Share, residual_variance
 
 # Points of an index (a power of two), refits of its interval, and the share of cases that the interval should hold.
 POINTS, POINTS_OF_REFITS, REFITS, CONFIDENCE = 1024, 256, 16, 0.9
@@ -32,6 +33,7 @@ ORDERS = 8
 
 Function = Callable[[Array], Array]  # of quantiles (n, d)
 Measure = Callable[[Function, int, int], Array]  # of a function, by so many points and a seed
+Sample = Callable[[int, int], Array]  # quantiles (n, d) of so many input sets, of a seed
 
 
 class Indices(NamedTuple):
@@ -43,37 +45,51 @@ class Indices(NamedTuple):
 
 @one_thread
 def sobol(fitted: Emulated, inputs: int, seed: int) -> Indices:
-    """Sobol' indices of independent inputs, uniform in their quantiles."""
-    ends = _with_intervals(fitted, lambda *of: np.array(_indices(inputs, *of)), seed)
+    """Sobol' indices of the independent inputs of an emulator, uniform in their quantiles."""
+    even: Sample = lambda points, seed: nested(inputs, points, seed)  # noqa: E731
+    ends = _with_intervals(fitted, lambda *of: np.array(_indices(inputs, *of)), even, seed)
     first, total = ([Share(*map(float, ends[:, kind, each])) for each in range(inputs)] for kind in (0, 1))
     return Indices(first, total)
 
 
 @one_thread
 def shapley(fitted: Emulated, joint: Joint, seed: int) -> list[Share]:
-    """Shapley's effects of inputs that depend on each other, and of one that does nothing, the last; their sum is 1."""
+    """Shapley's effects of the inputs of an emulator, which depend on each other, and of one that does nothing, the last; their
+    sum is the share of the variance that the emulator explains."""
     # Rows of a sample are no even plan: they need more of them.
-    ends = _with_intervals(fitted, lambda *of: _effects(joint, *of), seed, 4 * POINTS)
+    ends = _with_intervals(fitted, lambda *of: _effects(joint, *of), joint.sets, seed, 4 * POINTS)
     return [Share(*map(float, each)) for each in ends.T]
 
 
-def _with_intervals(fitted: Emulated, measure: Measure, seed: int, points: int = POINTS) -> Array:
-    """Shares (3, ...) of the variance, with the ends of their intervals."""
-    random = np.random.default_rng(seed)
-    emulator, whole = fitted.emulator, measure(fitted, points, seed)
+def explained(fitted: Emulated, values: Array, rest: float) -> float:
+    """Share of an output's variance over all inputs that a function makes whose outputs are ``values`` (n,) at likely input
+    sets; ``rest``: variance of what comes on top in the emulator's values."""
+    mean, square = float(values.mean()), float((values**2).mean())
+    # Of y = g exp(e) with normal e: E[y | g] = g exp(rest/2), E[y^2] = E[g^2] exp(2 rest).
+    whole = np.exp(rest) * square - mean**2 if fitted.logarithmic else square - mean**2 + rest
+    return (square - mean**2) / whole if whole > 0.0 else 0.0
+
+
+def _with_intervals(fitted: Emulated, measure: Measure, sample: Sample, seed: int, points: int = POINTS) -> Array:
+    """Shares (3, ...) of the variance over all inputs, with the ends of their intervals."""
+    random, emulator = np.random.default_rng(seed), fitted.emulator
+
+    def shares(function: Function, rest: float, count: int, seed: int) -> Array:
+        return measure(function, count, seed) * explained(fitted, function(sample(count, seed)), rest)
+
+    whole = shares(fitted.at_columns, residual_variance(emulator), points, seed)
     noise = np.sqrt(emulator.variances + emulator.hyperparameters.nugget)
-    like: dict[str, Any] = {"trend": "linear", "start": emulator.hyperparameters}
+    like: dict[str, Any] = {"trend": "linear", "start": emulator.hyperparameters, "search": False}
     misses = []
     for again in range(REFITS):
         truth = emulator.draw(1, random)
         values = truth(emulator.points)[0] + noise * random.standard_normal(noise.size)
         refit = replace(fitted, emulator=fit_emulator(emulator.points, values, emulator.variances, **like))
+        drawn: Function = lambda at, truth=truth: fitted.back(truth(at)[0])  # type: ignore[misc]  # noqa: E731
         # Both by the same points, whose own error then hardly shows in the difference.
-        ours, true = (
-            measure(function, POINTS_OF_REFITS, seed + 1 + again)
-            for function in (refit, lambda at, truth=truth: fitted.back(truth(at)[0]))
-        )
-        misses.append(ours - true)
+        by = POINTS_OF_REFITS, seed + 1 + again
+        ours = shares(refit.at_columns, residual_variance(refit.emulator), *by)
+        misses.append(ours - shares(drawn, emulator.hyperparameters.nugget, *by))
     middle = whole - np.mean(misses, axis=0)
     student = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, REFITS - 1)
     half = student * np.std(misses, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / REFITS)

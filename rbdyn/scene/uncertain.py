@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from rbdyn.faults import LONGEST_NAME, Claims, Strict, assignment_faults, one_line
+from rbdyn.faults import LONGEST_NAME, Claims, Strict, assignment_faults, key_path, one_line
 from rbdyn.fields import SMALLEST, Number, Positive, no_power_of_two, or_refuse
 
 # What each law needs beside its name, and what it may have.
@@ -27,9 +27,9 @@ NEEDS = {
 MAY = {"normal": ("low", "high"), "choices": ("weights",)}
 NUMBERS = ("low", "high", "mode", "mean", "sd", "values", "weights")
 MOST_CHOICES = 6
-# How an input set is run.
+# How an input set is run: one window of the impact a replicate, for sets tell more than turns.
 RUNS = (
-    "numerics.turns=40",
+    "numerics.turns=20",
     "numerics.discard_turns=20",
     "numerics.replicates=2",
     "numerics.extend=false",
@@ -175,10 +175,11 @@ class Uncertain(Strict):
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the input sets."""
     inputs: Annotated[int, Field(ge=1, le=30)] = 12
-    """Most inputs that vary: of more documented ones a screening keeps those that matter; declared ones all stay."""
+    """Most inputs of an emulator, those with the largest main effects and all declared ones. Every unknown input varies in every
+    input set; what the others do counts as scatter. doe calibrate looks for no more than so many."""
     set: list[str] = list(RUNS)
-    """Keys of the scene that are otherwise in the runs of input sets, as key=value: many short runs tell more of inputs
-    than few long ones. A key that stands here is known: it has neither a law nor its documented range."""
+    """Keys of the scene that differ in the runs of input sets, as key=value. A list replaces single keys of the default
+    and keeps the others. A key in it is known: it has neither a law nor its documented range."""
     sample: str | None = None
     """CSV of a posterior sample, a row an input set, whose columns are keys; replaces their laws. Its path is from the
     folder of this file."""
@@ -189,6 +190,13 @@ class Uncertain(Strict):
     def laws(self) -> Mapping[str, Law]:
         """Law by key."""
         return self.__pydantic_extra__ or {}
+
+    @field_validator("set")
+    @classmethod
+    def _merged(cls, given: list[str]) -> list[str]:
+        """The default's assignments of keys that the list leaves alone, then the list."""
+        paths = [key_path(each) for each in given]
+        return [*(each for each in RUNS if key_path(each) not in paths), *given]
 
     @model_validator(mode="before")
     @classmethod

@@ -15,8 +15,10 @@ from doe.clearance import read_scene
 from doe.cli import app
 from doe.report.steps.robust import robust_record
 from doe.study.finished import CODE, inputs_digest
-from doe.study.input_sets import read_case
+from doe.study.input_sets import ROUND_SEEDS, overriding, read_case, replicated, run
 from doe.study.robust import check_robust, judge
+from doe.study.robust_front import fresh_rows
+from doe.study.uncertainty import OUTPUTS, find_uncertainty
 from doe.study_file import Study
 from rbdyn.compiled.sources import code_behind
 from rbdyn.faults import InputError
@@ -125,6 +127,7 @@ def runs_in(folder: Path) -> int:
 def test_interrupted_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a shorter plan left in the store and what runs anew give the same bits as all of it at once."""
     monkeypatch.setattr("doe.study.uncertainty.MOST", 16)  # none is added
+    monkeypatch.setattr("doe.study.uncertainty.MOST_EFFORT", 1)
     command = [str(_scene(tmp_path)), "--json", *(f"--set={each}" for each in SHORT)]
     assert _run(*command, "--points", "16", "--out", str(tmp_path / "parts")).exit_code == 0
     assert runs_in(tmp_path / "parts") == 17
@@ -239,6 +242,11 @@ def _study(folder: Path, uncertain: str, settle: float = 0.5, front: str = "none
     return Study.load(folder / "study.toml")
 
 
+MASS = """
+[uncertain]
+defaults = "none"
+"cage.mass_g" = { law = "uniform", low = 40.0, high = 50.0 }
+"""
 IMBALANCE = """
 [uncertain]
 defaults = "none"
@@ -276,6 +284,124 @@ def test_doubtful_rows_get_more_replicates_within_the_share_allowed(tmp_path: Pa
     assert 768 < found.runs <= 1280
     assert sum(simulations.replicates) / 2 == found.runs
     assert found.better.all.value == pytest.approx(0.4, abs=0.12)
+
+
+ALL_VARY = """
+[uncertain]
+inputs = 2
+"cage.imbalance_um" = { law = "uniform", low = 0.0, high = 50.0 }
+"""
+
+
+class _Rest(_Simulations):
+    """The pick gains in whirl only with a short pocket and little oil: of these at most one is in an emulator."""
+
+    def _one(self, scene: Scene) -> _Result:
+        picked = scene.cage.pocket_clearance_mm < 0.3
+        length = scene.cage.pocket_contact_length_mm or scene.bearing.effective_length_mm
+        short = length < 0.75 * scene.bearing.effective_length_mm
+        little = scene.lubricant.oil_fraction < np.sqrt(0.005 * 0.1)
+        gain = np.array([0.02, 0.02 if short and little else -0.02, 0.02]) if picked else np.zeros(3)
+        random = np.random.default_rng([scene.numerics.seed, picked])
+        level = np.array([80.0 * np.exp(0.01 * scene.cage.imbalance_um), 0.4, 230.0])
+        return _Result((level * (1.0 - gain) * (1.0 + self.error * random.standard_normal(3))).tolist(), self.error)
+
+
+def test_inputs_without_an_effect_on_levels_still_count(tmp_path: Path) -> None:
+    """A gain that hangs on two inputs which no level shows, one of them in no emulator: its chance is a quarter all the same."""
+    study = _study(tmp_path, ALL_VARY)
+    found = judge(study, study.baseline * [1.0, 1.0, 0.8], _Rest(0.001))  # type: ignore[arg-type]
+    assert len(found.inputs) == 23 and len(found.screened) == 21 and "cage.imbalance_um" not in found.screened
+    assert found.better.all.value == pytest.approx(0.25, abs=0.04)
+    assert found.better.all.low < 0.25 < found.better.all.high
+    named = {each.key for each in found.inputs} - set(found.screened) - {"cage.imbalance_um"}
+    assert named <= {"cage.pocket_contact_length_mm", "lubricant.oil_fraction"}
+    (other,) = {"cage.pocket_contact_length_mm", "lubricant.oil_fraction"} - named
+    # Its main effect is a third of the variance: 1/16 of 3/16.
+    assert found.screened[other] == max(found.screened.values()) == pytest.approx(0.25, abs=0.12)
+    assert json.loads(json.dumps(robust_record(found, study.factors)))["screened"] == found.screened
+
+
+@pytest.mark.parametrize(("points", "first"), [(256, 128), (1024, 128), (64, 32), (16, 8)])
+def test_points_are_simulated_at_input_sets_that_no_emulator_saw(points: int, first: int) -> None:
+    rows = fresh_rows(points)
+    assert len(set(rows.tolist())) == 128 and rows[:first].tolist() == list(range(first))
+    assert not set(rows.tolist()) & set(range(points // 2, points))
+
+
+class _Outputs(_Simulations):
+    """Outputs of scenes that follow the imbalance alone, with an error of one replicate; counts what ran."""
+
+    def __init__(self, error: float) -> None:
+        super().__init__(error)
+        self.seeds = list[int]()
+
+    def run(self, scenes: Sequence[Scene], labels: Sequence[str], progress: Any) -> list[Any]:
+        return [self._output(scene) for scene in scenes]
+
+    def _output(self, scene: Scene) -> Any:
+        self.replicates.append(scene.numerics.replicates)
+        self.seeds.append(scene.numerics.seed)
+        random = np.random.default_rng(scene.numerics.seed)
+        error = self.error / np.sqrt(scene.numerics.replicates)
+        values = (10.0 + 0.1 * scene.cage.imbalance_um) * np.ones(4) + error * random.standard_normal(4)
+        half = 2.2 * error * np.sqrt(random.chisquare(8, 4) / 8.0)
+        figures = {
+            name: {"value": value, "statistical_error": wide, "numerical_error": 0.0, "effective_samples": 9.0}
+            for name, value, wide in zip(OUTPUTS, values.tolist(), half.tolist(), strict=True)
+        }
+        result = _Result((1.0, 1.0, 1.0), 0.0)
+        result.figures = figures
+        return result
+
+
+@pytest.mark.parametrize(("error", "most"), [(0.3, 2), (0.8, 4), (5.0, 8)])
+def test_replicates_follow_the_share_of_noise(tmp_path: Path, error: float, most: int) -> None:
+    """Inputs make a variance of 25/12: two replicates leave 0.02, 0.13 and 0.86 of a run's variance to noise."""
+    simulations = _Outputs(error)
+    found = find_uncertainty(_scene(tmp_path, IMBALANCE), (), simulations, 64, 1.0)  # type: ignore[arg-type]
+    # After the scene as it is; what ran before comes from the store.
+    ran = dict(zip(simulations.seeds[1:], simulations.replicates[1:], strict=True))
+    assert max(ran.values()) == max(most // 2, 2) and sum(ran.values()) == 64 * most
+    share = error**2 / most / (error**2 / most + 25.0 / 12.0)
+    assert found.outputs["impact_force_N"].spread.variance["simulation"] == pytest.approx(share, rel=0.4, abs=0.01)
+
+
+def test_more_replicates_are_the_mean_of_all(tmp_path: Path) -> None:
+    """Against all replicates by hand: means, variances of these and degrees of freedom, at every set."""
+    case = read_case(_scene(tmp_path, IMBALANCE), OUTPUTS, ())
+    quantiles = case.joint(case.every).sets(16, 1)
+    whole = replicated(case, quantiles, _Outputs(0.5), 4)  # type: ignore[arg-type]
+    seeds = (0, ROUND_SEEDS, 2 * ROUND_SEEDS)
+    more = ([], ["numerics.replicates=2"], ["numerics.replicates=4"])
+    parts = [run(case, case.every, quantiles, _Outputs(0.5), *each) for each in zip(seeds, more, strict=True)]  # type: ignore[arg-type]
+    weights = np.array([0.25, 0.25, 0.5])
+    assert whole.outputs == pytest.approx(np.einsum("p,pnm->nm", weights, [each.outputs for each in parts]))
+    assert whole.variances == pytest.approx(np.einsum("p,pnm->nm", weights**2, [each.variances for each in parts]))
+    assert (whole.freedom == sum(each.freedom for each in parts) + 2).all()
+
+
+def test_set_of_a_run_says_which_runs_it_changes(tmp_path: Path) -> None:
+    overrides = ["numerics.turns=80", "numerics.rtol=0.003", "cage.imbalance_um=3.0"]
+    case = read_case(_scene(tmp_path, MASS), OUTPUTS, overrides)
+    assert overriding(case, overrides, "the run at the scene's own inputs") == [
+        "--set numerics.turns=80 changes the run at the scene's own inputs, not the input sets: uncertain.set gives these numerics.turns=20",
+        "--set numerics.rtol=0.003 changes every run",
+    ]
+    assert overriding(case, ["numerics.turns=80"]) == [
+        "--set numerics.turns=80 changes no run: uncertain.set gives all of them numerics.turns=20"
+    ]
+    assert overriding(case, ["numerics.turns=20"]) == ["--set numerics.turns=20 changes every run"]
+    assert overriding(case, ["cage.imbalance_um=3.0"]) == []
+    found = find_uncertainty(_scene(tmp_path, IMBALANCE), overrides[:1], _Outputs(0.1), 16, 1.0)  # type: ignore[arg-type]
+    assert found.notes[0].startswith("--set numerics.turns=80 changes the run at the scene's own inputs")
+
+
+def test_a_study_says_where_input_sets_differ_from_its_runs(tmp_path: Path) -> None:
+    study = _study(tmp_path, IMBALANCE)
+    found = judge(study, study.baseline * [1.0, 1.0, 0.8], _Simulations(0.002))  # type: ignore[arg-type]
+    runs = "other runs of the study, not the input sets: uncertain.set gives these numerics.turns=20, numerics.replicates=2"
+    assert found.notes == (f"scene.set: numerics.turns=40, numerics.replicates=8 changes {runs}",)
 
 
 def test_a_factor_cannot_be_unknown_too(tmp_path: Path) -> None:

@@ -9,9 +9,9 @@ from scipy import stats
 from doe.arrays import Array
 from doe.unknown.joint import Joint, nested
 from doe.unknown.laws import ranks
-from doe.unknown.screening import kept, shares, two_levels
-from doe.unknown.sensitivity import shapley, sobol
-from doe.unknown.spread import Runs, emulated, spread_of
+from doe.unknown.screening import kept, main_effects, shares, strongest, two_levels
+from doe.unknown.sensitivity import explained, shapley, sobol
+from doe.unknown.spread import Runs, emulated, residual_variance, spread_of
 
 ISHIGAMI = 0.5 + 49.0 / 8.0 + 0.1 * np.pi**4 / 5.0 + 0.01 * np.pi**8 / 18.0
 
@@ -181,3 +181,73 @@ def test_screening_finds_the_inputs_that_matter() -> None:
     assert share[7, 1] > 0.98
     assert kept(share, [0], 4) == [0, 3, 7, 11]
     assert kept(share, [0, 1], 1) == [0, 1]
+
+
+# y = sum of c_i x_i of normals: the first two make 0.9 of the variance, the other twenty the rest.
+MANY = np.array([1.0, 0.7, *[0.09] * 20])
+
+
+def _of_many(quantiles: Array) -> Array:
+    found: Array = stats.norm.ppf(quantiles[:, : MANY.size].clip(1e-6, 1.0 - 1e-6)) @ MANY
+    return found
+
+
+def test_inputs_outside_the_emulator_widen_the_range() -> None:
+    """Two of 22 inputs in the emulator: the range is that of all, and shares are of the variance that all make."""
+    whole = float(MANY @ MANY)
+    ends, covers = [], []
+    for seed in range(3):
+        runs = _noisy(_of_many, MANY.size + 1, 128, 0.05, seed)
+        fitted = emulated(runs, 2)
+        assert fitted.columns.tolist() == [0, 1, MANY.size] and fitted.trusted
+        fresh = nested(MANY.size + 1, 2048, 50 + seed)
+        found = spread_of(runs, fitted, fresh, seed)
+        ends.append([found.low, found.high])
+        truth = _of_many(nested(MANY.size + 1, 4096, 90 + seed))
+        covers.append(((truth > found.low) & (truth < found.high)).mean())
+        assert explained(fitted, fitted(fresh), residual_variance(fitted.emulator)) == pytest.approx(0.9, abs=0.07)
+        indices = sobol(fitted, 3, seed)
+        assert [each.value for each in indices.total] == pytest.approx([1.0 / whole, 0.49 / whole, 0.0], abs=0.06)
+    assert np.mean(ends, axis=0) == pytest.approx(stats.norm.ppf([0.05, 0.95]) * np.sqrt(whole), rel=0.06)
+    assert np.mean(covers) == pytest.approx(0.9, abs=0.02)
+
+
+def test_the_share_that_an_emulator_of_logarithms_explains() -> None:
+    """y = exp(x + e) of normals of variance 0.2 and 0.3: Var E[y|x] over Var y is (e^0.2 - 1)/(e^0.5 - 1)."""
+    runs = _noisy(lambda q: np.exp(q[:, 0]), 2, 64, 1e-6, 3)
+    values = np.exp(np.sqrt(0.2) * stats.norm.ppf(nested(1, 1 << 16, 3)[:, 0]))
+    assert explained(emulated(runs), values, 0.3) == pytest.approx(np.expm1(0.2) / np.expm1(0.5), rel=0.01)
+
+
+def test_residuals_that_grow_with_the_output_bend_no_end() -> None:
+    """Added to the emulator's mean alone, residuals of all runs would put the lower end far below that of the runs."""
+    scatter = np.random.default_rng(1).random(256)
+    runs = _noisy(lambda q: 10.0 * q[:, 0] * (0.2 + 1.6 * scatter) - 1.0, 2, 256, 1e-3, 1)
+    fitted, fresh = emulated(runs), nested(2, 2048, 51)
+    found = spread_of(runs, fitted, fresh, 1)
+    plain = np.quantile(fitted(fresh) + np.random.default_rng(2).choice(fitted.residuals, 2048), 0.05)
+    end = np.quantile(runs.values, 0.05)
+    assert not fitted.logarithmic and plain < end - 1.0
+    assert found.low == pytest.approx(end, abs=0.25)
+
+
+def test_strongest_inputs_are_those_that_explain_most_of_what_others_leave() -> None:
+    """A bent effect counts, a copy of another input does not, and what must be there is."""
+    quantiles = nested(8, 128, 1)
+    quantiles[:, 5] = quantiles[:, 2]
+    values = np.column_stack([3.0 * quantiles[:, 2], (2.0 * quantiles[:, 6] - 1.0) ** 2])
+    values += 0.05 * np.random.default_rng(1).standard_normal(values.shape)
+    assert strongest(quantiles, values, 2) == [2, 6]
+    assert strongest(quantiles, values, 3, always=[0]) == [0, 2, 6]
+    assert strongest(quantiles, values, 1, always=[0, 1]) == [0, 1]
+    assert strongest(quantiles, values, 99) == list(range(8))
+    share = main_effects(quantiles, values)
+    assert share[2, 0] > 0.99 and share[6, 1] > 0.9
+    assert np.delete(share, [2, 5, 6], axis=0).max() < 0.05
+
+
+def test_few_runs_still_rank_many_inputs() -> None:
+    """Sixteen runs of thirty inputs: the only one that matters comes first; nothing varies: no input matters."""
+    quantiles = nested(30, 16, 2)
+    assert strongest(quantiles, quantiles[:, [17]], 1) == [17]
+    assert main_effects(quantiles, np.ones((16, 1))).max() == 0.0

@@ -16,7 +16,7 @@ from rbdyn.properties.materials import MATERIALS
 from rbdyn.scene import Scene
 from rbdyn.scene.ball import SingleRowScene
 from rbdyn.scene.bearing import Materials
-from rbdyn.scene.uncertain import Law, Uncertain, documented, exact
+from rbdyn.scene.uncertain import RUNS, Law, Uncertain, documented, exact
 from rbdyn.scene.unknown import documented_of, inputs_of, plain_values, value_of, with_values
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -126,6 +126,19 @@ def test_what_is_given_is_known_unless_estimated() -> None:
     assert "cage.mass_g" in {each.key for each in inputs_of(scene, data, Uncertain(estimated=["cage.mass_g"]))}
     only = Uncertain.model_validate({"defaults": "none", "cage.mass_g": {"law": "uniform", "low": 40.0, "high": 50.0}})
     assert [each.key for each in inputs_of(scene, data, only)] == ["cage.mass_g"]
+
+
+def test_set_replaces_single_keys_of_its_default() -> None:
+    """What a list leaves alone stays as it is by default; the order is the default's rest, then the list."""
+    asked = ["numerics.turns=60", "model.drag=off"]
+    found = _uncertain(set=asked).set
+    assert found == [*(each for each in RUNS if not each.startswith("numerics.turns=")), *asked]
+    assert "numerics.extend=false" in found and "numerics.turns=20" not in found
+    assert _uncertain(set=[]).set == _uncertain().set == list(RUNS)
+    assert _uncertain(set=found).set[: len(RUNS) - 1] == found[: len(RUNS) - 1]
+    assert _uncertain(set=['"numerics".turns = 60']).set == [*found[:-2], '"numerics".turns = 60']
+    with pytest.raises(InputError, match="replaces what stands before it in this list"):
+        _uncertain(set=["numerics.turns=60", "numerics.turns=70"])
 
 
 def test_relative_values_multiply_what_the_scene_has() -> None:

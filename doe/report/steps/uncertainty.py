@@ -10,7 +10,7 @@ from doe.study_file.cells import text_of
 from doe.unknown.sensitivity import CONFIDENCE
 from doe.unknown.spread import Share
 from rbdyn.cli.terminal import print_table
-from rbdyn.records.words import are, counted, quantity, shown, with_error
+from rbdyn.records.words import counted, quantity, shown, with_error
 from rbdyn.result import write_json
 
 FORMAT = "doe.uncertainty/1"
@@ -20,12 +20,11 @@ NAMED, WORTH = 2, 0.1
 
 def record_of(found: Uncertainty) -> dict[str, Any]:
     """JSON record of ``doe uncertainty``."""
-    keys = [each.key for each in found.inputs]
     sets = found.sets
     return {
         "format": FORMAT,
         "scene": str(found.path),
-        "responses": {name: _output(each, keys) for name, each in found.outputs.items()},
+        "responses": {name: _output(each) for name, each in found.outputs.items()},
         "inputs": [
             {"key": each.key, "law": each.law.model_dump(exclude_none=True), "reason": each.reason}
             for each in found.inputs
@@ -38,8 +37,8 @@ def record_of(found: Uncertainty) -> dict[str, Any]:
     }
 
 
-def _output(output: OutputRange, keys: list[str]) -> dict[str, Any]:
-    spread, indices, shapley = output.spread, output.indices, output.shapley
+def _output(output: OutputRange) -> dict[str, Any]:
+    spread, indices, shapley, keys = output.spread, output.indices, output.shapley, output.keys
     return {
         **output.nominal.as_dict(),
         "input": {"low": spread.low, "median": spread.median, "high": spread.high, "errors": list(spread.errors)},
@@ -54,36 +53,33 @@ def _output(output: OutputRange, keys: list[str]) -> dict[str, Any]:
     }
 
 
-def sentence(name: str, output: OutputRange, keys: list[str]) -> str:
-    """'impact force 87.1 ± 0.4 N; 60 to 132 N over what is not known; the bar stiffness makes 87 % of that'."""
+def sentence(name: str, output: OutputRange) -> str:
+    """'impact force 87.1 ± 0.4 N; 60 to 132 N in 90 % of the cases over the unknown inputs; the bar stiffness makes 87 %'."""
     words, unit = quantity(name)
     nominal, spread = output.nominal, output.spread
     head = f"{words} {with_error(nominal.value, nominal.error)} {unit}".rstrip()
     ends = f"{shown(spread.low)} to {shown(spread.high)} {unit}".rstrip()
     if spread.hidden:
-        return f"{head}; noise of the simulation hides what the inputs do"
-    outside = "" if spread.low <= nominal.value <= spread.high else ", which what the scene says lies outside of"
-    return f"{head}; {ends} in 90 % of the cases over what is not known{outside}; {_decides(output, keys)}"
+        return f"{head}; simulation noise exceeds the effect of the inputs"
+    outside = "" if spread.low <= nominal.value <= spread.high else ", without the scene's own value"
+    return f"{head}; {ends} in 90 % of the cases over the unknown inputs{outside}; {_decides(output)}"
 
 
-def _decides(output: OutputRange, keys: list[str]) -> str:
+def _decides(output: OutputRange) -> str:
     if output.shares is None or output.floor is None:
-        return "which input makes it cannot be told"
+        return "which input makes it is unknown"
     floor = output.floor.high
-    ranked = sorted(zip(output.shares, keys, strict=True), reverse=True)
+    ranked = sorted(zip(output.shares, output.keys, strict=True), reverse=True)
     above = [(index, key) for index, key in ranked if index.value > max(floor, WORTH)][:NAMED]
     return " and ".join(f"{key} makes {100.0 * index.value:.0f} %" for index, key in above) or "no input stands out"
 
 
 def print_uncertainty(found: Uncertainty) -> None:
-    """A sentence an output, a table of shares, what was left out."""
-    keys = [each.key for each in found.inputs]
+    """A sentence an output, a table of shares, which inputs are in no emulator."""
     for name, output in found.outputs.items():
-        print(sentence(name, output, keys))
-    rows = [
-        (key, *(_share(output.shares[place] if output.shares else None) for output in found.outputs.values()))
-        for place, key in enumerate(keys)
-    ]
+        print(sentence(name, output))
+    shares = [_by_key(output) for output in found.outputs.values()]
+    rows = [(key, *(_share(each.get(key)) for each in shares)) for key in _keys(found)]
     floor = ("an input that does nothing", *(_share(output.floor) for output in found.outputs.values()))
     title = f"{_what(found)} [%], {100.0 * CONFIDENCE:.0f} % intervals"
     print_table(title, ("input", *(quantity(name)[0] for name in found.outputs)), [*rows, floor])
@@ -94,19 +90,27 @@ def print_uncertainty(found: Uncertainty) -> None:
     print_table("what a single run's variance comes from [%]", ("output", "simulation", "integration", "inputs"), parts)
     if found.screened:
         most = max(found.screened, key=lambda key: found.screened[key])
-        print(
-            f"{counted(len(found.screened), 'further input')} {are(len(found.screened))} left at the scene's value: in a screening none made more than "
-            f"{100.0 * found.screened[most]:.2g} % of an output's variance ({most})"
-        )
+        share = f"alone none makes more than {100.0 * found.screened[most]:.2g} % of an output's variance ({most})"
+        print(f"varied in every set, but in no emulator: {counted(len(found.screened), 'further input')}; {share}")
     for note in found.notes:
         print(f"note: {note}")
+
+
+def _by_key(output: OutputRange) -> dict[str, Share]:
+    """What each input of an output's emulator makes; nothing where that is unknown."""
+    return dict(zip(output.keys, output.shares or (), strict=output.shares is not None))
+
+
+def _keys(found: Uncertainty) -> list[str]:
+    """Inputs of any emulator."""
+    return [each.key for each in found.inputs if each.key not in found.screened]
 
 
 def _what(found: Uncertainty) -> str:
     """What the shares are of."""
     if any(output.shapley for output in found.outputs.values()):
-        return "share of the variance, divided among inputs that go together (Shapley)"
-    return "share of the variance that is left while an input is unknown"
+        return "share of the variance over all inputs, divided among inputs that go together (Shapley)"
+    return "share of the variance over all inputs that is left while an input is unknown"
 
 
 def _share(share: Share | None) -> str:
@@ -130,8 +134,8 @@ def draw(found: Uncertainty, path: Path) -> None:
     """A column an output: above the runs of the input sets with the scene's own value, below what each input makes of them."""
     from rbdyn.plots.style import BLUE, GREY, ORANGE, plain, plt, save
 
-    keys = [each.key.partition(".")[2] for each in found.inputs]
-    count = len(found.outputs)
+    whole, count = _keys(found), len(found.outputs)
+    keys = [key.partition(".")[2] for key in whole]
     figure, axes = plt.subplots(2, count, figsize=(3.4 * count + 2.0, 3.0 + 0.28 * len(keys)), squeeze=False,
                                 height_ratios=(1.0, 0.14 * len(keys) + 0.3))  # fmt: skip
     for column, (name, output) in enumerate(found.outputs.items()):
@@ -143,18 +147,17 @@ def draw(found: Uncertainty, path: Path) -> None:
         above.set(xlabel=f"{words} [{unit}]" if unit else words, ylabel="input sets" if column == 0 else "")
         plain(above)
         plain(below)
-        places = range(len(keys))
+        by_key = _by_key(output)
         if output.shares is None or output.floor is None:
-            below.text(0.5, 0.5, "cannot be told", transform=below.transAxes, ha="center", color=GREY)
+            below.text(0.5, 0.5, "unknown", transform=below.transAxes, ha="center", color=GREY)
         else:
-            shares = output.shares
+            places, shares = [whole.index(key) for key in by_key], list(by_key.values())
             below.barh(places, [100.0 * each.value for each in shares], color=BLUE, alpha=0.6)
             below.hlines(
                 places, [100.0 * each.low for each in shares], [100.0 * each.high for each in shares], color=GREY
             )
             below.axvline(100.0 * output.floor.high, color=GREY, linestyle=":")
-        below.set(yticks=places, yticklabels=keys if column == 0 else [], xlim=(0.0, 100.0),
-                  xlabel="share of the variance [%]")  # fmt: skip
-        below.invert_yaxis()
+        below.set(yticks=range(len(keys)), yticklabels=keys if column == 0 else [], xlim=(0.0, 100.0),
+                  ylim=(len(keys) - 0.5, -0.5), xlabel="share of the variance [%]")  # fmt: skip
     axes[0, 0].legend(fontsize=8)
     save(figure, path)
