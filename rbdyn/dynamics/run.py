@@ -30,7 +30,7 @@ SMALLEST_STEP_TURNS = 1e-12
 class Run:
     """One replicate under way: parameters, integrator memory and where it stands.
 
-    ``longest_step`` [s] bounds the steps of explicit methods. ``method``: "auto" until its first step, where the scene
+    ``longest_step`` [s] bounds the steps. ``method``: "auto" until its first step, where the scene
     leaves it open; ``spent_s``: time that its steps took; ``pace``: what states the time that this and its like take.
     """
 
@@ -78,7 +78,7 @@ class Run:
         return Control(
             1.0 / absolute_tolerance(self.scene, self.bearing, self.rtol, method),
             SMALLEST_STEP_TURNS * self.scene.turn_s,
-            min(LARGEST_STEP_TURNS * self.scene.turn_s, self.longest_step if method in EXPLICIT else math.inf),
+            min(LARGEST_STEP_TURNS * self.scene.turn_s, self.longest_step),
             int(min(numerics.step_budget_per_turn * math.ceil(turns), 2**62)),
         )
 

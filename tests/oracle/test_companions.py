@@ -8,9 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rbdyn.dynamics.companions import DAMPED, DAMPING_SCALE, RESOLVED, companions_of, usual_companions
-from rbdyn.dynamics.integrators import dormand_prince, kutta_pair
-from rbdyn.dynamics.parameters.scales import light_contact_frequency
+from rbdyn.contact.damping import damped_load
+from rbdyn.dynamics.companions import (
+    DAMPED,
+    DAMPING_SCALE,
+    LEAST_DAMPING,
+    MOST_DAMPING,
+    companions_of,
+    longest_step,
+    numerical_damping,
+    resolved_damping,
+    usual_companions,
+)
+from rbdyn.dynamics.integrators import dormand_prince, kutta_pair, rosenbrock
+from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import light_contact
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.metrics import Replicate
 
@@ -33,6 +45,45 @@ def test_oracle_damping_of_explicit_pairs(name, weights):
         assert 1.0 - amplification(weights, x) == pytest.approx(x**6 / DAMPING_SCALE[name], rel=1.5 * x**2)
 
 
+def implicit_amplification(x):
+    """|R(i x)| of RODAS4: its six stages on y' = i x y from 1 over a step of 1, the last of which joins the new state."""
+    a, c = (np.pad(rows, ((0, 0), (0, 1))) for rows in (rosenbrock.A, rosenbrock.C))
+    stages = np.linalg.solve((1.0 / rosenbrock.GAMMA - 1j * x) * np.eye(6) - 1j * x * a - c, np.full(6, 1j * x))
+    return abs(1.0 + a[-1] @ stages + stages[-1])
+
+
+def test_oracle_damping_of_the_implicit_method():
+    """Oracle: the same of RODAS4 from its stages; beyond the leading order it damps less, so the law is a bound."""
+    for x in (0.3, 0.2):
+        assert 1.0 - implicit_amplification(x) == pytest.approx(x**6 / DAMPING_SCALE["rosenbrock"], rel=1.5 * x**2)
+    for x in (1.0, 2.0, 5.0):
+        assert 0.0 < -math.log(implicit_amplification(x)) < x**6 / DAMPING_SCALE["rosenbrock"]
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        ("model.race_damping_engagement_um=0.01",),
+        ("model.race_damping_ratio=0.2",),
+        ("model.race_damping=hunt_crossley",),
+        ("model.race_damping=off",),
+    ],
+)
+def test_oracle_damping_of_a_light_contact(law, make_scene):
+    """Oracle: the damping ratio is c/(2 sqrt(k m)), by differences of the load that the race's own law gives about the approach
+    at which it bears the centrifugal force."""
+    scene = make_scene(*SLOW, *law)
+    light, mass, force = light_contact(scene), scene.geometry.roller_mass, scene.geometry.centrifugal_force
+    stiffness = light.frequency**2 * mass
+    approach = 10.0 / 9.0 * force / stiffness
+    damping = roller_bearing(scene).outer.damping
+    rate = 1e-7
+    load = [damped_load(damping, force, math.sqrt(stiffness), approach, sign * rate) for sign in (-1.0, 1.0)]
+    viscosity = (load[1] - load[0]) / (2.0 * rate)
+    assert light.damping == pytest.approx(viscosity / (2.0 * math.sqrt(stiffness * mass)), rel=1e-6, abs=1e-15)
+    assert (light.damping > 0.0) == ("off" not in law[0])
+
+
 def runs_with(scene, step, method="rk43"):
     """Two replicates of a second each that took steps of this length [s]."""
     empty = np.zeros((1, 1))
@@ -43,21 +94,47 @@ def runs_with(scene, step, method="rk43"):
 
 
 def test_unit_companions_follow_the_steps(make_scene, outer):
-    """Unit: long steps of an explicit pair in a slow bearing ask for companions that resolve its light contacts."""
+    """Unit: steps of a slow bearing that damp its light contacts more than the race does ask for companions that do not."""
     slow = make_scene(*SLOW)
-    frequency, scale = light_contact_frequency(slow), DAMPING_SCALE["rk43"]
-    assert frequency == pytest.approx(1.69e5, rel=0.01) and light_contact_frequency(outer) is None
-    limit = (DAMPED * scale) ** 0.2 / frequency
-    long = companions_of(slow, runs_with(slow, 1.05 * limit))
-    assert long.rtol == pytest.approx(1e-3) and long.method == "rk43" and long.share == pytest.approx(10.0 / 9.0)
-    assert (long.longest_step * frequency) ** 5 / scale == pytest.approx(RESOLVED)
-    for scene, runs in (
-        (slow, runs_with(slow, 0.95 * limit)),
-        (slow, runs_with(slow, 1.05 * limit, "rosenbrock")),
-        (outer, runs_with(outer, 1.05 * limit)),
-    ):
-        assert companions_of(scene, runs) == usual_companions(scene)
+    light = light_contact(slow)
+    assert light.frequency == pytest.approx(1.69e5, rel=0.01) and light_contact(outer) is None
+    for method in DAMPING_SCALE:
+        limit = longest_step(light, DAMPED * light.damping, method)
+        assert numerical_damping(light, limit, method) == pytest.approx(DAMPED * light.damping)
+        found = companions_of(slow, runs_with(slow, 1.05 * limit, method))
+        assert found.rtol == pytest.approx(1e-3) and found.method == method and found.share == pytest.approx(10.0 / 9.0)
+        left = numerical_damping(light, found.longest_step, method)
+        assert left == pytest.approx(resolved_damping(1.05**5 * DAMPED * light.damping, light.damping), rel=1e-4)
+        assert companions_of(slow, runs_with(slow, 0.95 * limit, method)) == usual_companions(slow)
+    assert companions_of(outer, runs_with(outer, 1.0)) == usual_companions(outer)
     assert usual_companions(slow).longest_step == math.inf
+
+
+def test_unit_companions_follow_the_method_that_damps_most(make_scene):
+    """Unit: of runs by two methods, that whose steps damp light contacts most is resolved."""
+    slow = make_scene(*SLOW)
+    light = light_contact(slow)
+    long, short = (longest_step(light, share * light.damping, "rk43") for share in (2.0 * DAMPED, 0.1 * DAMPED))
+    runs = [*runs_with(slow, long, "rk43"), *runs_with(slow, short, "rosenbrock")]
+    assert companions_of(slow, runs).method == companions_of(slow, runs[::-1]).method == "rk43"
+    assert companions_of(slow, runs[2:]) == usual_companions(slow)
+
+
+def test_unit_undamped_races_ask_for_finite_steps(make_scene):
+    """Unit: where no law damps a light contact, companions still have a step."""
+    slow = make_scene(*SLOW, "model.race_damping=off")
+    light = light_contact(slow)
+    found = companions_of(slow, runs_with(slow, 5e-6))
+    left = numerical_damping(light, found.longest_step, "rk43")
+    assert left == pytest.approx(resolved_damping(MOST_DAMPING, LEAST_DAMPING), rel=1e-4)
+
+
+@pytest.mark.parametrize("race", [2e-5, 5e-4, 1.9e-2])
+def test_unit_companions_leave_a_tenth_of_a_logarithm(race):
+    """Unit: by the logarithm of the damping, companions keep a tenth of the bias; what is beyond the law's range adds none."""
+    for damping in (DAMPED * race, MOST_DAMPING, 1.0):
+        bias = math.log10(1.0 + min(damping, max(MOST_DAMPING, DAMPED * race)) / race)
+        assert math.log10(1.0 + resolved_damping(damping, race) / race) == pytest.approx(0.1 * bias)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from doe.unknown.joint import nested
 from doe.unknown.laws import copula, dependent, quantiles_of, table_of, values_of
 from doe.unknown.screening import two_levels
 from rbdyn.cli.keys import keys
+from rbdyn.dynamics.parameters.scales import light_contact
 from rbdyn.faults import InputError, read_toml, validated
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.scene import Scene
@@ -115,6 +116,21 @@ def test_unit_a_bar_is_as_stiff_as_its_cage_unless_given() -> None:
     assert scene.changed({"materials.cage": SOFT}).model.pocket_bar_stiffness_N_m == 2.5e6
     with pytest.raises(InputError, match=r"materials\.cage = 'wood': choose one of"):
         scene.changed({"materials.cage": "wood"})
+
+
+@pytest.mark.parametrize(
+    "keys", [("operation.inner_speed_rpm=2000", "operation.radial_load_N=4000"), ("operation.inner_speed_rpm=300",)]
+)
+def test_unit_the_damping_of_light_contacts_is_unknown_in_slow_bearings(keys: tuple[str, ...]) -> None:
+    """Unit: where rollers jump on the outer race, what damps them varies; where no law damps them, it does not."""
+    slow = Scene.load(SCENE, list(keys))
+    assert light_contact(slow) is not None
+    damping = {"model.race_damping_ratio": (0.02, 0.2), "model.race_damping_engagement_um": (0.03, 0.3)}
+    laws = {each.key: (each.law.low, each.law.high) for each in inputs_of(slow, read_toml(SCENE), Uncertain())
+            if each.key.startswith("model.race_damping") and isinstance(each.law, Law)}  # fmt: skip
+    assert laws == damping
+    undamped = slow.changed({"model.race_damping": "off"})
+    assert not [each for each in inputs_of(undamped, read_toml(SCENE), Uncertain()) if "race_damping" in each.key]
 
 
 def test_what_is_given_is_known_unless_estimated() -> None:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -68,12 +69,31 @@ def _frequency(load: float, approach: float, mass: float) -> float:
     return math.sqrt(10.0 / 9.0 * load / approach / mass)
 
 
-def light_contact_frequency(scene: Scene) -> float | None:
-    """Frequency [rad/s] of a roller on the outer race under its centrifugal force alone; None where that force is not light."""
-    force, mass = scene.geometry.centrifugal_force, scene.geometry.roller_mass
+class LightContact(NamedTuple):
+    """A roller on the outer race under its centrifugal force alone: frequency [rad/s] and the damping ratio of the law there."""
+
+    frequency: float
+    damping: float
+
+
+def light_contact(scene: Scene) -> LightContact | None:
+    """How a roller outside the load zone vibrates on the outer race; None where its centrifugal force is not light.
+
+    Viscous damping is a share of the critical one as far as it is engaged. Of Hunt and Crossley's, c = 3/2 alpha F, and with
+    k = 10/9 F/x the ratio c omega/(2 k) is 27/40 alpha x omega.
+    """
+    force, mass, laws = scene.geometry.centrifugal_force, scene.geometry.roller_mass, scene.model
     if not 0.0 < force < LIGHT * scales(scene).load:
         return None
-    return _frequency(force, _approach(scene, force), mass)
+    approach = _approach(scene, force)
+    frequency = _frequency(force, approach, mass)
+    engaged = min(approach * laws.race_damping_rate, 1.0)
+    damping = {
+        "viscous": laws.race_damping_ratio * engaged * engaged * (3.0 - 2.0 * engaged),
+        "hunt_crossley": 0.675 * laws.race_damping_alpha_s_m * approach * frequency,
+        "off": 0.0,
+    }
+    return LightContact(frequency, damping[laws.race_damping])
 
 
 def fastest_surface(scene: Scene) -> float:
