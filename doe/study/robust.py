@@ -21,9 +21,10 @@ from doe.study.robust_front import RobustFront, find_robust_front
 from doe.study_file import Study
 from doe.threads import one_thread
 from doe.unknown import laws
-from doe.unknown.decision import Better, better, decides, in_doubt
+from doe.unknown.decision import Better, better, in_doubt
+from doe.unknown.worth import Decides, Deciding, Interval, Verdict, decides
 from rbdyn.faults import set_key
-from rbdyn.scene.unknown import Input
+from rbdyn.scene.unknown import Input, is_number
 
 # Rounds of further replicates: each as many again as there are, so that a set gets 2, 4, 8 and 16.
 ROUNDS = 3
@@ -33,12 +34,26 @@ FRESH = 8192
 @dataclass(frozen=True)
 class Decider:
     """An unknown input that decides: the value where the better design changes, None where none does, what measuring it is
-    worth in chances of choosing rightly, and whether the pick is better above that value."""
+    worth in chances of the right choice, whether the pick is better above that value, and 95 % intervals, None of a flip that
+    is not sure to exist."""
 
     key: str
     flip: Any
     worth: float
     above: bool
+    flip_interval: tuple[Any, Any] | None
+    worth_interval: Interval
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Whether the first of the deciding inputs decides: the verdict, keys of the inputs that may, the best first, about how many
+    pairs it takes to decide between them, and the 95 % interval of what the best pair is worth, None without a pair."""
+
+    verdict: Verdict
+    rivals: list[str]
+    needed: float
+    pair_interval: Interval | None
 
 
 @dataclass(frozen=True)
@@ -47,7 +62,8 @@ class Robust:
     that are worth most together, how well inputs foretell each gain, by how much the chance of all gains changes with ranges
     half as wide, the front of points that hold over the inputs, None where the study wants none, the inputs, which all vary in
     every set, ``screened``: those that no emulator of a gain covers, with the largest share that the main effect of each makes of
-    a gain, the cost in runs, and notes: what is to be doubted of a posterior sample, which keys do not vary."""
+    a gain, the cost in runs, the ``decision`` which of the deciding inputs is first, and notes: what is to be doubted of a
+    posterior sample, which keys do not vary."""
 
     responses: list[str]
     better: Better
@@ -62,6 +78,7 @@ class Robust:
     runs: int
     doubtful: int
     failures: tuple[Failure, ...]
+    decision: Decision
     notes: tuple[str, ...] = ()
 
 
@@ -121,16 +138,12 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     if study.file.robust.front != "none":
         front, more_runs, lost = find_robust_front(study, case, pairs, pick, simulations)
         spent, failures = spent + more_runs, (*failures, *lost)
-    deciders = [
-        Decider(inputs[one.place].key, _value(case, inputs[one.place], one.flip), one.worth, one.above)
-        for one in found.inputs
-    ]
-    pair = None if found.pair is None else (inputs[found.pair[0]].key, inputs[found.pair[1]].key, found.pair[2])
+    deciders, pair, decision = _of_keys(case, inputs, found)
     judged = better(gains, variances, seed), deciders, pair, found.foretold, found.halved, front
     cost = len(gains), spent, int(in_doubt(gains, variances).size)
     wanted = [study.responses[index] for index in goals.objectives]
     notes = *case.notes, *run_notes(case, study.scene.set, "scene.set: ", "other runs of the study")
-    return Robust(wanted, *judged, case.every, rest, *cost, failures, notes)
+    return Robust(wanted, *judged, case.every, rest, *cost, failures, decision, notes)
 
 
 def case_of_study(study: Study) -> Case:
@@ -152,6 +165,26 @@ def _read(case: Case, inputs: Sequence[Input], fresh: Array, seed: int) -> Array
             values = abs(case.unit(each)) * np.array(laws.values_of(each.law, fresh[:, place]), float)
             read[:, place] = laws.ranks(values + each.law.measurable * random.standard_normal(len(values)))
     return read
+
+
+def _of_keys(
+    case: Case, inputs: Sequence[Input], found: Decides
+) -> tuple[list[Decider], tuple[str, str, float] | None, Decision]:
+    """What decides, by keys and values of the inputs."""
+
+    def decider(one: Deciding) -> Decider:
+        at, value = inputs[one.place], lambda quantile: _value(case, inputs[one.place], quantile)
+        low, high = (None, None) if one.flip_interval is None else map(value, one.flip_interval)
+        # Choices have no order, hence no interval.
+        interval = (low, high) if is_number(low) else None
+        return Decider(at.key, value(one.flip), one.worth, one.above, interval, one.worth_interval)
+
+    keys, both = [each.key for each in inputs], found.pair
+    decision = Decision(
+        found.verdict, [keys[place] for place in found.rivals], found.needed, None if both is None else both.interval
+    )
+    pair = None if both is None else (keys[both.places[0]], keys[both.places[1]], both.worth)
+    return [decider(one) for one in found.inputs], pair, decision
 
 
 def _value(case: Case, one: Input, quantile: float | None) -> Any:

@@ -6,6 +6,7 @@
 - ``spread``: what an output ranges over, and how much of that is noise
 - ``sensitivity``: which input makes it
 - ``decision``: whether one design beats another all the same
+- ``worth``: which input decides that, and what measuring it is worth
 - ``cells``, ``matching``, ``discrepancy``, ``sampler``, ``calibration``: inputs from measurements
 - ``posterior``, ``verdict``: what these taught, and whether that may be called calibrated
 """

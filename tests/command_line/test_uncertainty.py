@@ -3,6 +3,7 @@
 import json
 import sqlite3
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,14 @@ from typer.testing import CliRunner
 
 from doe.clearance import read_scene
 from doe.cli import app
-from doe.report.steps.robust import robust_record
+from doe.report.steps.robust import MOST_PAIRS, robust_record, robust_sentences
 from doe.study.finished import CODE, inputs_digest
 from doe.study.input_sets import ROUND_SEEDS, overriding, read_case, replicated, run
-from doe.study.robust import check_robust, judge
+from doe.study.robust import Decision, check_robust, judge
 from doe.study.robust_front import fresh_rows
 from doe.study.uncertainty import OUTPUTS, find_uncertainty
 from doe.study_file import Study
+from doe.study_file.front_section import Robust
 from rbdyn.compiled.sources import code_behind
 from rbdyn.faults import InputError
 from rbdyn.records.kept import digest_of
@@ -271,9 +273,43 @@ def test_the_unknown_that_decides_is_named_with_its_flip(tmp_path: Path) -> None
     assert found.better.all.value + found.halved == pytest.approx(0.3, abs=0.05)
     record = robust_record(found, study.factors)
     assert set(record) >= {"better", "all", "decides", "pairs"} and record["pairs"] == 128
-    words = "cage.imbalance_um decides most: above {:.3g} µm keep the original; measure it first"
-    assert words.format(found.decides[0].flip) in record["sentences"][1]
+    first, words = record["decides"][0], record["sentences"][1]
+    assert first["flip_interval"][0] < 20.0 < first["flip_interval"][1] < 22.0
+    assert first["worth_interval"][0] < first["worth"] < first["worth_interval"][1]
+    assert record["undecided"] is None and record["pair"] is None
+    assert words.startswith(f"Most decisive unknown: cage.imbalance_um. Above {first['flip']:.3g} (")
+    assert " µm keep the original. Measuring it raises the chance of the right choice by " in words
     assert json.loads(json.dumps(record)) == record
+
+
+def test_what_is_undecided_or_worth_nothing_is_said_so(tmp_path: Path) -> None:
+    """The words of each verdict; only a decided one lists inputs."""
+    study = _study(tmp_path, IMBALANCE)
+    found = judge(study, study.baseline * [1.0, 1.0, 0.8], _Simulations(0.002))  # type: ignore[arg-type]
+    rivals = ["cage.imbalance_um", "cage.mass_g"]
+    for needed, words in ((300.0, "About 512 pairs would decide"), (np.inf, "More than 1024 pairs, the most that")):
+        unsure = replace(found, decision=Decision("undecided", rivals, needed, None))
+        record = robust_record(unsure, study.factors)
+        assert record["decides"] == [] and words in record["undecided"]
+        assert all(key in record["undecided"] for key in rivals)
+        assert record["sentences"][1] == record["undecided"]
+    small = [replace(each, worth=0.0, worth_interval=(0.0, 0.011)) for each in found.decides]
+    never = replace(found, decides=small, decision=Decision("nothing", [], 128.0, None))
+    record = robust_record(never, study.factors)
+    assert record["decides"] == [] and record["undecided"] is None
+    assert "No measurement of one unknown is worth making: it would raise" in record["sentences"][1]
+    assert "by at most 2 points" in record["sentences"][1]
+    both = replace(never, pair=(*rivals, 0.3), decision=Decision("nothing", [], 128.0, (0.25, 0.34)))
+    record = robust_record(both, study.factors)
+    assert record["pair"] == {"keys": rivals, "worth": 0.3, "worth_interval": [0.25, 0.34]}
+    assert record["sentences"][1].endswith("together raises that chance by 30 (25 to 34) points.")
+    choice = replace(found.decides[0], flip="flooded", flip_interval=None)
+    words = robust_sentences(replace(found, decides=[choice]), study.factors)[1]
+    assert "flooded" not in words and words.startswith("Most decisive unknown: cage.imbalance_um. Measuring it")
+    loose = replace(found.decides[0], flip_interval=None)
+    words = robust_sentences(replace(found, decides=[loose]), study.factors)[1]
+    assert "From which value on it changes the choice is not known well enough to state. Measuring it" in words
+    assert Robust.model_fields["points"].metadata[-1].le == MOST_PAIRS
 
 
 def test_doubtful_rows_get_more_replicates_within_the_share_allowed(tmp_path: Path) -> None:
@@ -473,6 +509,7 @@ def test_a_study_is_not_finished_once_its_steps_change() -> None:
     """The packages themselves hold no code: their steps count."""
     assert set(code_behind(CODE)) > {
         "doe.unknown.decision",
+        "doe.unknown.worth",
         "doe.response_surface.least_squares",
         "doe.report.steps.robust",
     }

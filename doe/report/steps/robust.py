@@ -1,18 +1,22 @@
 """Whether the pick is better over what is not known: in words and as JSON."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 from doe.report.words import of_hundred
-from doe.study.robust import Robust
+from doe.study.robust import Decider, Robust
 from doe.study.robust_front import RobustFront
 from doe.unknown.decision import Better
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.words import counted, quantity, shown
+from rbdyn.scene.unknown import is_number
 
-# Gain in the chance of choosing rightly below which no measurement is proposed, and the share that is nearly all cases.
-WORTH, NEARLY_ALL = 0.02, 0.9
-# Share of a gain's variance that inputs must foretell before the lack of a deciding one means anything.
+# Share that is nearly all cases; gain in the chance of the right choice that is not worth a line.
+NEARLY_ALL, LEAST = 0.9, 1e-3
+# Inputs named where it is undecided which decides; pairs that a study may ask for at most.
+CANDIDATES, MOST_PAIRS = 4, 1024
+# Share of a gain's variance that inputs must explain before the lack of a deciding one means anything.
 FORETOLD = 0.5
 
 
@@ -21,11 +25,19 @@ def robust_record(robust: Robust, factors: Sequence[str]) -> dict[str, Any]:
     return {
         **_better(robust.responses, robust.better),
         "decides": [
-            {"key": each.key, "flip": each.flip, "worth": each.worth, "pick_above": each.above}
+            {
+                "key": each.key,
+                "flip": each.flip,
+                "worth": each.worth,
+                "pick_above": each.above,
+                "flip_interval": None if each.flip_interval is None else list(each.flip_interval),
+                "worth_interval": list(each.worth_interval),
+            }
             for each in robust.decides
-            if each.worth > 1e-3
+            if each.worth > LEAST and robust.decision.verdict == "decided"
         ],
-        "pair": None if robust.pair is None else {"keys": list(robust.pair[:2]), "worth": robust.pair[2]},
+        "undecided": _undecided(robust) if robust.decision.verdict == "undecided" else None,
+        "pair": _pair(robust),
         "halved": _halved(robust),
         "front": None if robust.front is None else _front(robust.front, robust.responses, factors),
         "foretold": dict(zip(robust.responses, robust.foretold, strict=True)),
@@ -132,26 +144,89 @@ def print_robust_front(robust: Robust, factors: Sequence[str]) -> None:
         print_table(title, header, rows)
 
 
+def _pair(robust: Robust) -> dict[str, Any] | None:
+    interval = robust.decision.pair_interval
+    if robust.pair is None or interval is None:
+        return None
+    return {"keys": list(robust.pair[:2]), "worth": robust.pair[2], "worth_interval": list(interval)}
+
+
 def _decision(robust: Robust) -> str:
-    chance, p = next(iter(robust.decides), None), robust.better.all.value
-    if chance is not None and chance.worth >= WORTH:
-        unit = quantity(chance.key)[1]
-        side = "below" if chance.above else "above"
-        # Choices have no above.
-        number = isinstance(chance.flip, float | int)
-        keep = f" {side} {shown(chance.flip, 3)} {unit}".rstrip() + " keep the original;" if number else ""
-        return (
-            f"{chance.key} decides most:{keep} measure it first, which raises the chance of choosing rightly by "
-            f"{100.0 * chance.worth:.0f} of 100."
-        )
-    if robust.pair is not None and robust.pair[2] >= WORTH:
-        return (
-            f"No input decides alone; {robust.pair[0]} and {robust.pair[1]} measured together would raise the chance of choosing "
-            f"rightly by {100.0 * robust.pair[2]:.0f} of 100."
-        )
-    if p >= NEARLY_ALL or p <= 1.0 - NEARLY_ALL:
-        return "No measurement would change the choice."
+    """Which input decides, that none is worth measuring, or that it takes more pairs to say."""
+    verdict = robust.decision.verdict
+    first = _decided if verdict == "decided" else _undecided if verdict == "undecided" else _nothing
+    return f"{first(robust)}{_together(robust)}"
+
+
+def _decided(robust: Robust) -> str:
+    best = robust.decides[0]
+    return f"Most decisive unknown: {best.key}.{_flip(best)} Measuring it raises the chance of the right choice by {_points(best)} points."
+
+
+def _flip(best: Decider) -> str:
+    """On which side of which value the original is the better one."""
+    # Choices have no above.
+    if not is_number(best.flip):
+        return ""
+    if best.flip_interval is None:
+        return " From which value on it changes the choice is not known well enough to state."
+    unit, side = quantity(best.key)[1], "Below" if best.above else "Above"
+    low, high = (shown(float(end), 3) for end in best.flip_interval)
+    return f" {side} {shown(best.flip, 3)} ({low} to {high}) {unit}".rstrip() + " keep the original."
+
+
+def _undecided(robust: Robust) -> str:
+    """Which inputs may decide, and how many pairs would say which."""
+    decision = robust.decision
+    worths = {each.key: _points(each) for each in robust.decides}
+    best, *rest = decision.rivals
+    others = "".join(f", {key} by {worths[key]}" for key in rest[: CANDIDATES - 1])
+    more = len(rest) - CANDIDATES + 1
+    if more > 0:
+        others += f", {counted(more, 'other input')} by less"
+    many = 2 ** math.ceil(math.log2(decision.needed)) if decision.needed <= MOST_PAIRS else 0
+    enough = (
+        f"About {many} pairs would decide ([robust] points = {many})"
+        if many
+        else f"More than {MOST_PAIRS} pairs, the most that [robust] points allows, would be needed to decide"
+    )
+    return (
+        "Undecided which unknown is most decisive: measuring "
+        f"{best} raises the chance of the right choice by {worths[best]} points{others}. {enough}{_lost(robust)}."
+    )
+
+
+def _nothing(robust: Robust) -> str:
+    """That no input is worth measuring, and how little any could be worth."""
+    p = robust.better.all.value
+    most = min(max((each.worth_interval[1] for each in robust.decides), default=0.0), 1.0 - max(p, 1.0 - p))
+    return (
+        "No measurement of one unknown is worth making: it would raise the chance of the right choice by at most "
+        f"{math.ceil(100.0 * most):.0f} points{_lost(robust)}."
+    )
+
+
+def _lost(robust: Robust) -> str:
+    """Which gains follow no input, so that none that decides would show."""
     foretold = zip(robust.responses, robust.foretold, strict=True)
     lost = [quantity(name)[0] for name, share in foretold if share < FORETOLD]
-    told = f": the gain in {' and '.join(lost)} follows none of the inputs" if lost else ""
-    return f"Which input decides cannot be told{told}."
+    return f"; the inputs explain less than half of the gain in {' and '.join(lost)}" if lost else ""
+
+
+def _together(robust: Robust) -> str:
+    """What measuring the best pair is worth."""
+    interval = robust.decision.pair_interval
+    if robust.pair is None or interval is None:
+        return ""
+    first, second, worth = robust.pair
+    return f" Measuring {first} and {second} together raises that chance by {_hundredths(worth, interval)} points."
+
+
+def _points(one: Decider) -> str:
+    return _hundredths(one.worth, one.worth_interval)
+
+
+def _hundredths(value: float, interval: Sequence[float]) -> str:
+    """'12 (8 to 15)': a gain in a chance, in points of a hundred, with its interval."""
+    low, high = interval
+    return of_hundred((value, low, high))

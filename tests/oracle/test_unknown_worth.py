@@ -1,0 +1,127 @@
+"""What decides, of gains whose truth is known: flips and worths in closed form or by brute force, and how sure they are."""
+
+import numpy as np
+import pytest
+from decisions import KNOWN, noisy, smooth
+from scipy import stats
+
+from doe.unknown.decision import better
+from doe.unknown.joint import nested
+from doe.unknown.worth import _about, _smooth, decides
+
+# Worths are stated in whole points of a hundred.
+POINT = 0.005
+
+
+def test_the_input_that_decides_and_where_it_flips() -> None:
+    """The pick wins below 0.4 of the second input: probability 0.4, worth 0.4, flip there; a third input does nothing."""
+    quantiles, fresh = nested(4, 256, 5), nested(4, 8192, 6)
+    truth = np.column_stack([0.4 - quantiles[:, 1], np.full(256, 1.0) + 0.2 * quantiles[:, 0]])
+    gains, variances, freedom = noisy(truth, 0.05, 5)
+    assert better(gains, variances, 1).all.value == pytest.approx(0.4, abs=0.05)
+    found = decides(quantiles, gains, smooth(quantiles, variances, freedom), fresh, 1)
+    first = found.inputs[0]
+    assert first.place == 1
+    assert first.flip == pytest.approx(0.4, abs=0.03)
+    assert first.worth == pytest.approx(0.4, abs=0.05)
+    assert all(each.worth < 0.02 and each.flip is None for each in found.inputs[1:])
+    assert min(found.foretold) > 0.9
+
+
+def test_two_inputs_that_decide_only_together() -> None:
+    """The sign of a product: neither input alone tells anything, both tell all, 0.5."""
+    quantiles, fresh = nested(4, 512, 7), nested(4, 8192, 8)
+    truth = ((quantiles[:, 0] - 0.5) * (quantiles[:, 2] - 0.5))[:, None]
+    gains, variances, freedom = noisy(truth, 0.005, 7)
+    found = decides(quantiles, gains, smooth(quantiles, variances, freedom), fresh, 1)
+    assert max(each.worth for each in found.inputs) < 0.05
+    assert found.pair is not None and found.pair.places == (0, 2)
+    assert found.pair.worth > 0.4 and found.pair.interval[0] > 0.35
+    assert found.verdict == "nothing"
+
+
+def test_what_cannot_be_foretold_is_worth_nothing() -> None:
+    """Gains of pure scatter beyond the noise: every share is a half, no input decides."""
+    random = np.random.default_rng(9)
+    gains, variances, freedom = noisy(random.standard_normal((256, 1)), 0.1, 9)
+    found = decides(nested(3, 256, 9), gains, smooth(nested(3, 256, 9), variances, freedom), nested(3, 4096, 10), 1)
+    assert found.foretold[0] < 0.2
+    assert max(each.worth for each in found.inputs) < 0.06
+
+
+def test_worth_of_knowing_a_normal_input() -> None:
+    """D = a + 3 b of normals plus 1: p = Phi(1/sqrt 10), given b Phi(1 + 3 b), whose E max(p, 1 - p) is known by quadrature."""
+    quantiles, fresh = nested(3, 512, 11), nested(3, 8192, 12)
+    gains, variances, freedom = noisy(1.0 + stats.norm.ppf(quantiles[:, :2]) @ [[1.0], [3.0]], 0.1, 11)
+    found = decides(quantiles, gains, smooth(quantiles, variances, freedom), fresh, 1)
+    b = stats.norm.ppf((np.arange(20000) + 0.5) / 20000)
+    given = stats.norm.cdf(1.0 + 3.0 * b)
+    truth = float(np.maximum(given, 1.0 - given).mean() - stats.norm.cdf(1.0 / np.sqrt(10.0)))
+    assert found.inputs[0].place == 1 and found.inputs[0].above
+    assert found.inputs[0].worth == pytest.approx(truth, abs=0.02 * 0.87)
+    assert found.inputs[0].flip == pytest.approx(stats.norm.cdf(-1.0 / 3.0), abs=0.03)
+
+
+@pytest.mark.parametrize("name", ["flip", "two"])
+def test_where_truth_is_clear_it_decides(name: str) -> None:
+    """The right input, its worth and flip within their intervals."""
+    worths, flips = KNOWN[name].truth()
+    right = int(worths.argmax())
+    found = KNOWN[name].decide(128, 1)
+    first = found.inputs[0]
+    assert found.verdict == "decided" and found.rivals == [right] and first.place == right
+    assert first.flip_interval is not None and first.flip_interval[0] <= flips[right] <= first.flip_interval[1]
+    assert first.worth_interval[0] - POINT <= worths[right] <= first.worth_interval[1] + POINT
+    assert first.flip_interval[1] - first.flip_interval[0] < 0.1
+    assert first.worth_interval[1] - first.worth_interval[0] < 0.1
+
+
+def test_inputs_that_are_worth_the_same_stay_undecided() -> None:
+    worths, _ = KNOWN["equal"].truth()
+    assert worths[0] == pytest.approx(worths[1], abs=0.003) and worths[:2].min() > 0.15
+    found = KNOWN["equal"].decide(128, 1)
+    assert found.verdict == "undecided" and sorted(found.rivals) == [0, 1]
+    assert found.needed > 128
+    assert all(each.worth_interval[0] > 0.1 for each in found.inputs[:2])
+
+
+def test_where_nothing_decides_nothing_is_worth_measuring() -> None:
+    found = KNOWN["never"].decide(128, 1)
+    assert found.verdict == "nothing" and found.rivals == [] and found.pair is None
+    assert all(each.worth_interval[1] < 0.02 and each.flip_interval is None for each in found.inputs)
+
+
+def test_resamplings_lie_about_the_estimate_and_hold_the_error_of_its_averages() -> None:
+    """Scatter of 0.3 by rows and of 0.4 by averages over 4 parts of 0.8 each: 0.5 in all, about the estimate."""
+    random = np.random.default_rng(1)
+    again, parts = random.standard_normal((400, 1)), random.standard_normal((4, 1))
+    again *= 0.3 / again.std(ddof=0)
+    parts *= 0.8 / parts.std(ddof=1)
+    found = _about(np.array([7.0]), again, parts, np.zeros((1, 1)))
+    assert found.mean() == pytest.approx(7.0) and found.std(ddof=0) == pytest.approx(0.5)
+    wider = _about(np.array([7.0]), again, parts, np.array([[0.0], [1.2]]))
+    assert wider.std(ddof=0) == pytest.approx(1.3)
+    # One that has none at half of the resamplings scatters as the others do.
+    again[::2] = np.nan
+    found = _about(np.array([7.0]), again, np.zeros((4, 1)), np.zeros((1, 1)))
+    assert np.isnan(found[::2]).all() and found[1::2].mean() == pytest.approx(7.0)
+
+
+def test_a_line_and_the_middle_of_a_step_stay_where_they_are() -> None:
+    line = np.linspace(0.1, 0.9, 64)
+    assert _smooth(line) == pytest.approx(line)
+    step = np.where(np.arange(64) < 25, 0.0, 1.0)
+    assert _smooth(step)[24] == pytest.approx(1.0 - _smooth(step)[25]) and _smooth(step)[24] < 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pairs", [128, 256])
+@pytest.mark.parametrize(("name", "places"), [("flip", (1,)), ("two", (0,)), ("pair", (0, 2))])
+def test_over_seeds_and_sizes_the_same_decides(name: str, places: tuple[int, ...], pairs: int) -> None:
+    """The right input, or pair, with each of three seeds."""
+    for seed in (1, 2, 3):
+        found = KNOWN[name].decide(pairs, seed)
+        if len(places) == 1:
+            assert found.verdict == "decided" and found.rivals == list(places)
+        else:
+            assert found.verdict == "nothing" and found.pair is not None and found.pair.places == places
