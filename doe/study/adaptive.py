@@ -161,7 +161,7 @@ def _design_at(study: Study, simulations: Simulations) -> Runs:
 def _at_levels(study: Study, front: DirectFront, levels: tuple[int, ...]) -> DirectFront:
     """The points of a front with categories at these places, in numbers alone."""
     rows = np.flatnonzero([levels_at(study, point) == levels for point in front.points])
-    parts = ("points", "values", "standard_errors", "costs", "cost_errors")
+    parts = ("points", "values", "standard_errors", "costs", "cost_errors", "freedom")
     some = {name: getattr(front, name)[rows] for name in parts}
     some["points"] = some["points"][:, : len(study.factors)]
     failures = front.failures[:, : len(study.factors)]

@@ -198,7 +198,12 @@ class _Result:
     def __init__(self, values: Sequence[float], error: float) -> None:
         names = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
         self.figures = {
-            name: {"value": value, "statistical_error": 2.4 * error * value, "effective_samples": 8.0}
+            name: {
+                "value": value,
+                "statistical_error": 2.4 * error * value,
+                "effective_samples": 8.0,
+                "degrees_of_freedom": 7,
+            }
             for name, value in zip(names, values, strict=True)
         }
 

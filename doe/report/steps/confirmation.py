@@ -53,7 +53,7 @@ def gains_record(gains: Sequence[Gain | PredictedGain]) -> dict[str, Any]:
 def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
     """The direct front beside that of the surfaces run on the simulator, and what these lose."""
     front, loss = direct.front, direct.loss
-    rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
+    rows = zip(front.points, front.values, front.half_widths, strict=True)
     surrogate = zip(direct.surrogate_points, direct.surrogate_values, 1.96 * direct.surrogate_errors, strict=True)
     points = [point_record(study, *row) for row in rows]
     return {
