@@ -18,6 +18,7 @@ from doe.study.back_off import SurfaceDoubt
 from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
+from doe.study.shares import draws_of, surviving
 from doe.study_file import Study
 from doe.threads import one_thread
 from rbdyn.faults import InputError, MethodError
@@ -71,6 +72,12 @@ def find_front(
         aware = _backed_off(
             study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt.at_share(share)), failed
         )
+    drawn = draws_of(study, surfaces)
+    aware = replace(
+        aware,
+        plain_interval=surviving(study, drawn, study.coded(found.points[found.pick]), box),
+        pick_interval=surviving(study, drawn, aware.points[aware.pick], box),
+    )
     return replace(found, tolerance_aware=_idle_at(study, np.zeros_like(study.centre), aware))
 
 

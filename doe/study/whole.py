@@ -33,6 +33,7 @@ from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
 from doe.study.reference import Beside, beside
 from doe.study.robust import Robust, check_robust, judge, robust_advice
 from doe.study.runs import STORE, Runs, run_design
+from doe.study.searched_draws import draws_about
 from doe.study.stages import FRONT, study_stages
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
@@ -237,9 +238,10 @@ def _tolerances(
     if wished is None:
         return None
     if searched is None:
-        return widest_of(study, surfaces, pick.point, wished)
+        return widest_of(study, surfaces, pick.point, wished, confirmed)
     here = neighbourhood(study, surfaces, searched, study.coded(pick.point)[None], pick.values[None])
-    return widest_of(study, surfaces, pick.point, wished, here, confirmed["baseline"].values)
+    drawn = draws_about(study, searched, here, pick, confirmed["baseline"])
+    return widest_of(study, surfaces, pick.point, wished, confirmed, here, drawn)
 
 
 def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:

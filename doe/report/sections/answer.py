@@ -5,7 +5,7 @@ from typing import Any
 
 from doe.report.sections.blocks import Block, Bullets, Section, Table, Tile, Tiles, Words
 from doe.report.sections.record import Factor, Record, factors, nearest, part, responses, scalars
-from doe.report.words import change, dimension, half_width, moved, of_hundred, rounded_down
+from doe.report.words import change, dimension, half_width, moved, of_hundred, rounded_down, share_with_interval
 from rbdyn.records.words import chance, label, quantity, shown, with_error
 
 # Characters above which a value is a sentence, to be broken.
@@ -279,13 +279,13 @@ def tolerances(summary: Record) -> Table:
         (
             label(name),
             f"± {rounded_down(each.get('half_width') or 0.0)}",
-            shown(each.get("probability")),
+            "" if each.get("probability") is None else share_with_interval(each["probability"], each.get("interval")),
             label(each.get("limited_by") or ""),
         )
         for name, each in found.items()
         if name in names and isinstance(each, Mapping)
     ]
-    header = ("factor", "tolerance", "probability", "limited by")
+    header = ("factor", "tolerance", "share of the parts (95 %)", "limited by")
     return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,))
 
 
