@@ -17,8 +17,8 @@ from scipy import special
 from doe.arrays import Array
 
 LEVEL = 0.95
-# Quantiles of the beta distribution of a draw that stand for it.
-QUANTILES = (np.arange(20) + 0.5) / 20.0
+# Shares that stand for the distribution of all draws, and of one of them at least.
+SHARES, FEWEST = 4000, 20
 
 
 class Interval(NamedTuple):
@@ -35,18 +35,21 @@ class Interval(NamedTuple):
 
 def interval_of_share(kept: Array, parts: int) -> Interval:
     """Interval of a share from the number of parts (d,), of so many, that keep it on each draw."""
-    counts, place = np.unique(kept, return_inverse=True)
-    each = special.betaincinv(counts[:, None] + 0.5, parts - counts[:, None] + 0.5, QUANTILES)
-    shares = np.sort(each[place].ravel())
-    inside = int(np.ceil(LEVEL * shares.size))
-    first = int(np.argmin(shares[inside - 1 :] - shares[: shares.size - inside + 1]))
-    low, high = shares[first], shares[first + inside - 1]
+    counts, times = np.unique(kept, return_counts=True)
+    levels = max(SHARES // counts.size, FEWEST)
+    quantiles = (np.arange(levels) + 0.5) / levels
+    each = special.betaincinv(counts[:, None] + 0.5, parts - counts[:, None] + 0.5, quantiles).ravel()
+    order = np.argsort(each, kind="stable")
+    shares, behind = each[order], np.cumsum(np.repeat(times, levels)[order])
+    # From every share the nearest one up to which the interval holds enough.
+    enough = np.searchsorted(behind, np.append(0, behind[:-1]) + LEVEL * behind[-1] * (1.0 - 1e-12))
+    whole = np.flatnonzero(enough < shares.size)
+    first = int(whole[np.argmin(shares[enough[whole]] - shares[whole])])
+    low, high = float(shares[first]), float(shares[enough[first]])
     # Where none and all keep it, the share reaches to 0 and to 1 (Brown, Cai and DasGupta).
-    none, every = (
-        special.betaincinv(0.5, parts + 0.5, QUANTILES[-1]),
-        special.betaincinv(parts + 0.5, 0.5, QUANTILES[0]),
-    )
-    return Interval(0.0 if low <= none else float(low), 1.0 if high >= every else float(high))
+    none = special.betaincinv(0.5, parts + 0.5, quantiles[-1])
+    every = special.betaincinv(parts + 0.5, 0.5, quantiles[0])
+    return Interval(0.0 if low <= none else low, 1.0 if high >= every else high)
 
 
 def percent(share: float) -> str:

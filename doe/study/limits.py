@@ -1,7 +1,7 @@
 """Limits of responses, judged by what was simulated: kept, broken or undecided."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,6 +9,7 @@ from doe.study.confirmation import Confirmed
 from doe.study.goals import goals_of
 from doe.study.intervals import chance_above, one_sided
 from doe.study_file import Study
+from doe.unknown.spread import Share
 from rbdyn.records.words import chance, with_error
 
 Verdict = Literal["kept", "undecided", "broken"]
@@ -101,6 +102,18 @@ def sentence(limits: Sequence[Limit], probability: float, tried: int) -> str:
         parts += [words[verdict].format(", ".join(group))] if group else []
     tries = "the first point simulated" if tried == 1 else f"{tried} points were tried"
     return f"{'. '.join(parts)} ({tries})."
+
+
+def odds_sentence(study: Study, odds: Mapping[str, Share] | None) -> str:
+    """How likely the pick keeps its limits over the unknown inputs, or the command that tells; empty without limits."""
+    if not goals_of(study).limited:
+        return ""
+    if odds is None:
+        return f"The odds of keeping the limits over the unknown inputs: doe study {study.path.name} --robust."
+    shares = ", ".join(
+        f"{name} {100.0 * p:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f} %)" for name, (p, low, high) in odds.items()
+    )
+    return f"Probability that the pick keeps its limits over the unknown inputs: {shares}."
 
 
 def _badness(limit: Limit) -> tuple[int, float]:

@@ -29,7 +29,7 @@ from doe.study.edge import Edge, edge_of
 from doe.study.finished import inputs_digest
 from doe.study.front import find_front
 from doe.study.goals import check_goals
-from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
+from doe.study.limits import Limit, Verdict, limits_of, odds_sentence, sentence, verdict_of
 from doe.study.reference import Beside, beside
 from doe.study.robust import Robust, check_robust, judge, robust_advice
 from doe.study.runs import STORE, Runs, run_design
@@ -114,8 +114,10 @@ class StudyResult:
 
     @property
     def limits_sentence(self) -> str:
-        """The same in words; empty without limits."""
-        return sentence(self.limits, self.study.file.confirmation.limit_probability, self.tried)
+        """The same in words, and how likely they are kept over the unknown inputs; empty without limits."""
+        judged = sentence(self.limits, self.study.file.confirmation.limit_probability, self.tried)
+        odds = None if self.robust is None else self.robust.odds
+        return f"{judged} {odds_sentence(self.study, odds)}".strip()
 
 
 @one_thread

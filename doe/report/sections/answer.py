@@ -110,12 +110,14 @@ def limits(summary: Record, names: Sequence[str] = ()) -> Table:
             with_error(limit.get("value"), limit.get("error")),
             LIMITS.get(str(limit.get("verdict")), ""),
             "" if limit.get("probability") is None else chance(limit["probability"]),
+            of_hundred(odds) if name == "pick" and (odds := part(summary, "limits", response, "odds")) else "",
         )
         for name in names or points
         for response, limit in (part(points, name, "limits") or {}).items()
     ]
-    note = "Kept or broken by more than the error; between the two a limit is undecided. The probability is that of keeping it."
-    header = ("point", "limit", "simulated", "verdict", "probability")
+    note = "Kept or broken by more than the error; between the two a limit is undecided. The probability is that of keeping it "
+    note += "by that error; over the unknown inputs, in how many of 100 cases the pick keeps it."
+    header = ("point", "limit", "simulated", "verdict", "probability", "over unknown inputs")
     return Table("Limits judged by simulation", header, rows, note, text_columns=(1, 3))
 
 

@@ -36,6 +36,14 @@ def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
     }
 
 
+def judged_limits_record(outcome: StudyResult) -> dict[str, Any]:
+    """Limits at the pick, each with the ``odds`` [p, low, high] that the pick keeps all limits of that response over the unknown
+    inputs; None where that was not asked for."""
+    odds = {} if outcome.robust is None else outcome.robust.odds
+    record = limits_record(outcome.limits)
+    return {name: {**each, "odds": list(odds[name]) if name in odds else None} for name, each in record.items()}
+
+
 def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
     """Limits judged by simulation, by response: of a lower and an upper one that with the worse verdict, or less room."""
     return {
