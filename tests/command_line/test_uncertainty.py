@@ -16,6 +16,7 @@ from doe.cli import app
 from doe.report.steps.robust import robust_record
 from doe.study.finished import CODE, inputs_digest
 from doe.study.input_sets import read_case
+from doe.study.limits import odds_sentence
 from doe.study.robust import check_robust, judge
 from doe.study_file import Study
 from rbdyn.compiled.sources import code_behind
@@ -271,6 +272,26 @@ def test_the_unknown_that_decides_is_named_with_its_flip(tmp_path: Path) -> None
     words = "cage.imbalance_um decides most: above {:.3g} µm keep the original; measure it first"
     assert words.format(found.decides[0].flip) in record["sentences"][1]
     assert json.loads(json.dumps(record)) == record
+
+
+def test_closed_form_of_the_odds_of_limits(tmp_path: Path) -> None:
+    """Closed form: the impact of the pick is 78.4 N times the mass over 45 g, uniform from 40 to 50 g; both its limits count."""
+    study = _study(tmp_path, IMBALANCE)
+    text = study.path.read_text("utf-8")
+    limits = 'name = "impact_force_N"\nmodel = "linear"\ngoal = "min"\nlower = 72.0\nupper = 80.0'
+    text = text.replace('name = "impact_force_N"\nmodel = "linear"\ngoal = "min"', limits)
+    text = text.replace('goal = "min"\n\n[front]', 'goal = "min"\nupper = 200.0\n\n[front]')
+    study.path.write_text(text, "utf-8")
+    study = Study.load(study.path)
+    found = judge(study, study.baseline * [1.0, 1.0, 0.8], _Simulations(0.002))  # type: ignore[arg-type]
+    low, high = (45.0 * each / 78.4 for each in (72.0, 80.0))
+    assert set(found.odds) == {"impact_force_N", "power_loss_W"}
+    assert found.odds["impact_force_N"].value == pytest.approx((high - low) / 10.0, abs=0.02)
+    assert found.odds["impact_force_N"].low < (high - low) / 10.0 < found.odds["impact_force_N"].high
+    assert found.odds["power_loss_W"].value == 0.0
+    words = odds_sentence(study, found.odds)
+    assert words.startswith("Probability that the pick keeps its limits over the unknown inputs: impact_force_N 4")
+    assert odds_sentence(study, None).endswith("doe study study.toml --robust.")
 
 
 def test_doubtful_rows_get_more_replicates_within_the_share_allowed(tmp_path: Path) -> None:
