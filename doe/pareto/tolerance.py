@@ -224,5 +224,5 @@ def _result(parts: _Parts, scale: float, ratios: Array) -> WidestTolerances:
     interval, (promise, open_errors) = parts.interval(half), parts.said
     within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {promise}, {parts.percent} demanded"
     rim = "Where a tolerance ends at the rim of the region, no run tells whether it may be wider."
-    said = [f"{within}; the tolerances are limited by {limit}.", open_errors, rim if at_rim.any() else ""]
+    said = [f"{within}. They are limited by {limit}.", open_errors, rim if at_rim.any() else ""]
     return WidestTolerances(half, share, error, interval, limit, at_rim, " ".join(filter(None, said)))

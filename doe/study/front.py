@@ -1,6 +1,6 @@
 """The Pareto front of a study on its response surfaces, how sure it is, and what manufacture leaves of it."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TypeVar
@@ -72,13 +72,25 @@ def find_front(
         aware = _backed_off(
             study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt.at_share(share)), failed
         )
-    drawn = draws_of(study, surfaces)
-    aware = replace(
-        aware,
-        plain_interval=surviving(study, drawn, study.coded(found.points[found.pick]), box),
-        pick_interval=surviving(study, drawn, aware.points[aware.pick], box),
+    found = replace(found, tolerance_aware=_idle_at(study, np.zeros_like(study.centre), aware))
+    return with_survival(study, surfaces, found)
+
+
+@one_thread
+def with_survival(
+    study: Study, surfaces: Sequence[Surface], found: ParetoFront, confirmed: Mapping[str, Confirmed] | None = None
+) -> ParetoFront:
+    """The front with the intervals of the shares of parts that still dominate the baseline; ``confirmed`` points, which were
+    simulated, narrow what the surfaces leave open."""
+    aware = found.tolerance_aware
+    if aware is None:
+        return found
+    drawn = draws_of(study, surfaces, confirmed)
+    plain, pick = (
+        surviving(study, drawn, point, aware.box)
+        for point in (study.coded(found.points[found.pick]), aware.points[aware.pick])
     )
-    return replace(found, tolerance_aware=_idle_at(study, np.zeros_like(study.centre), aware))
+    return replace(found, tolerance_aware=replace(aware, plain_interval=plain, pick_interval=pick))
 
 
 def _idle_at(study: Study, centre: Array, found: Found) -> Found:

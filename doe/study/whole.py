@@ -27,7 +27,7 @@ from doe.study.direct import Direct, find_direct
 from doe.study.direct_pick import DirectPick, neighbourhood
 from doe.study.edge import Edge, edge_of
 from doe.study.finished import inputs_digest
-from doe.study.front import find_front
+from doe.study.front import find_front, with_survival
 from doe.study.goals import check_goals
 from doe.study.limits import Limit, Verdict, limits_of, odds_sentence, sentence, verdict_of
 from doe.study.reference import Beside, beside
@@ -172,7 +172,7 @@ def run_study(
         design=design_of(study),
         runs=runs,
         surfaces=surfaces,
-        front=chosen.front,
+        front=with_survival(study, surfaces, chosen.front, confirmed),
         direct=searched if isinstance(searched, Direct) else None,
         adaptive=searched if isinstance(searched, Adaptive) else None,
         direct_pick=chosen.direct,

@@ -120,7 +120,7 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
     flattered = ", ".join(f"{name} {percent:+.2f} %" for name, percent in luck.items())
     print(f"the rule picks what errors flatter; luck expected in these gains: {flattered}")
     chance = with_error(sure["probability"], 1.96 * sure["standard_error"])
-    drawn = f"on {sure['draws']} surfaces drawn from their errors it dominates the baseline with probability {chance}"
+    drawn = f"on {sure['draws']} surfaces drawn from their errors it dominates the baseline with probability {chance} (error of the draws alone)"
     print(f"pick: {record['pick']['reason']}; {drawn}")
     for limit in record["constraints"]:
         print(f"limit: {limit_sentence(limit)}")
