@@ -67,26 +67,36 @@ def widest_of(
     held = np.zeros((settings.samples, len(goals.limited)))
     known = known_tolerances(study)
     ratios = np.array([known.get(name, np.nan) for name in study.factors])
-    reach = region_of(study) * study.step
-    low, high = study.centre - reach, study.centre + reach
-    if here is not None:
-        beyond = np.nan_to_num(ratios)
-        low, high = np.minimum(low, point - beyond), np.maximum(high, point + beyond)
+    low, high = _box(study, point, None if here is None else np.nan_to_num(ratios))
+    slack = 1e-9 * np.abs(gain).max()
     promise = f"keep {100.0 * settings.keep:g} % of every gain{' and all limits' if goals.limited else ''}"
     found = widest_tolerances(
         objectives,
         point[free],
-        np.hstack([reference - keep, held]) + 1e-9 * np.abs(gain).max(),
+        np.hstack([reference - keep, held]) + slack,
         (study.step if np.isnan(ratios[free]).any() else ratios)[free],
         lower=low[free],
         upper=high[free],
-        names=[
-            *(f"the gain of {study.responses[index]}" for index in goals.objectives),
-            *(f"{study.responses[index]} {sense} {limit:g}" for index, sense, limit in goals.limited),
-        ],
+        names=_names(study),
         promise=promise,
-        drawn=keeping(study, drawn_about or draws_of(study, surfaces, confirmed), point, free, keep),
+        drawn=keeping(study, drawn_about or draws_of(study, surfaces, confirmed), point, free, keep - slack),
         open_errors=open_errors(surfaces, searched=here is not None),
         **settings.model_dump(include={"probability", "distribution", "samples", "seed", "aim"}),
     )
     return found.among(free, point.size)
+
+
+def _names(study: Study) -> list[str]:
+    """Names of all that parts must keep."""
+    goals = goals_of(study)
+    gains = (f"the gain of {study.responses[index]}" for index in goals.objectives)
+    return [*gains, *(f"{study.responses[index]} {sense} {limit:g}" for index, sense, limit in goals.limited)]
+
+
+def _box(study: Study, point: Array, beyond: Array | None) -> tuple[Array, Array]:
+    """Ends (k,) of the region in which parts may lie, ``beyond`` (k,) from the point at least, if given."""
+    reach = region_of(study) * study.step
+    inside = study.centre - reach, study.centre + reach
+    if beyond is None:
+        return inside
+    return np.minimum(inside[0], point - beyond), np.maximum(inside[1], point + beyond)
