@@ -335,14 +335,13 @@ def attempt_text(text: str, version: str) -> Ran:
 
 
 def figures(names: Sequence[str], results: Sequence[SimulationResult]) -> tuple[Array, Array, Whole]:
-    """Values, 95 % statistical half-widths (NaN where there is none), and about how many independent values are behind
-    each, each of shape (runs, responses)."""
-    from rbdyn.dynamics.statistics.batch_means import MOST_BATCHES
-
+    """Values, 95 % statistical half-widths (NaN where there is none), and how many independent values are behind each
+    (0: unknown), each of shape (runs, responses)."""
     quantities = [[record[name] for name in names] for record in (result.as_dict() for result in results)]
-    keys = "value", "statistical_error", "effective_samples"
-    values, errors, samples = ([[quantity[key] for quantity in row] for row in quantities] for key in keys)
-    behind = np.minimum(np.array(samples), MOST_BATCHES).astype(np.int64)
+    keys = "value", "statistical_error", "degrees_of_freedom"
+    values, errors, freedom = ([[quantity.get(key) for quantity in row] for row in quantities] for key in keys)
+    # Student's t of a mean of n independent values has n - 1 degrees of freedom.
+    behind = np.nan_to_num(np.array(freedom, dtype=float) + 1.0).astype(np.int64)
     return np.array(values), np.array(errors, dtype=float), behind
 
 

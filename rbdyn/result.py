@@ -27,12 +27,14 @@ class Quantity(Record):
     """A figure with the half-widths of its 95 % intervals; None where an error was not estimated.
 
     ``effective_samples``: how many independent batches would tell as much of it as the correlated ones of the run.
+    ``degrees_of_freedom`` of Student's t in the statistical error; None without one.
     """
 
     value: float
     statistical_error: float | None
     numerical_error: float | None
     effective_samples: float
+    degrees_of_freedom: int | None = None
 
     @property
     def error(self) -> float | None:

@@ -359,4 +359,5 @@ class _Search:
             seed=self.plan.seed,
             goals=goals,
             searched=Samples(actual[1], self.runs.values, self.runs.errors),
+            freedom=np.where(ours.freedom > 0, ours.freedom, np.inf),
         )

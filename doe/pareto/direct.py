@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import special
 
 from doe.arrays import Array, Mask, Rows
 from doe.pareto.archive import dominance, error_aware_dominance, order, ranks, spread
@@ -52,6 +53,7 @@ class DirectFront:
     ``points`` (f, k); ``values`` and ``standard_errors`` (f, m) of ``repeats`` fresh runs each, which had no part in
     the selection, and their ``costs`` (f, q) and ``cost_errors`` (f, q). ``optimism`` (q,) is how much too small the
     search believed these to be on average, in shares of their range. ``searched`` are all runs of the search. ``pick`` is a row. ``failures`` (x, k) are the points where a run failed.
+    ``freedom`` (f, m): degrees of freedom of the standard errors, infinitely many unless given.
     """
 
     points: Array
@@ -70,6 +72,17 @@ class DirectFront:
     seed: int
     goals: Goals
     searched: Samples
+    freedom: Array | None = None
+
+    def quantile(self, probability: float) -> Array:
+        """Student's quantile (f, m) of a probability, at the degrees of freedom of the standard errors."""
+        freedom = np.full_like(self.values, np.inf) if self.freedom is None else self.freedom
+        return np.asarray(special.stdtrit(freedom, probability))
+
+    @property
+    def half_widths(self) -> Array:
+        """95 % half-widths (f, m) of the values."""
+        return self.standard_errors * self.quantile(0.975)
 
 
 def direct_front(

@@ -10,22 +10,26 @@ from scipy.optimize import minimize
 
 from doe.arrays import Array, Mask, Rows
 from doe.pareto.manufacture import Distribution, error_of_share, random_offsets
+from doe.pareto.share import Interval, interval_of_share, percent
 from rbdyn.faults import MethodError
-from rbdyn.records.words import with_error
 
 Costs = Callable[[Array], Array]
+# Parts (n, k) to the number of them that keep all limits on each draw (d,) of what judges them.
+Kept = Callable[[Array], Array]
 Aim = Literal["ratios", "product", "sum"]
 
 MARCH = 32  # steps up to the rim of the region in which the first loss is looked for
 HALVINGS = 24
 RIM = "the rim of the region"
+MOST_JUDGED = 4096  # parts that are judged on every draw
 
 
 @dataclass(frozen=True, eq=False)
 class WidestTolerances:
     """Half widths (k,) of the widest tolerances, NaN of what has none, and what they keep.
 
-    ``probability`` is the share of the parts that keep every limit, ``standard_error`` its Monte Carlo error.
+    ``probability`` is the share of the parts that keep every limit, ``standard_error`` its Monte Carlo error alone;
+    ``interval`` holds the true share with 95 %, as far as what was drawn tells.
     ``limited_by`` names the limit that parts break first beyond, or the rim of the region; ``at_rim`` (k,) the
     factors that reach it. ``sentence`` says it in words.
     """
@@ -33,13 +37,15 @@ class WidestTolerances:
     half_widths: Array
     probability: float
     standard_error: float
+    interval: Interval
     limited_by: str
     at_rim: Mask
     sentence: str
 
     def as_dict(self, factors: Sequence[str]) -> dict[str, dict[str, Any]]:
-        """JSON: factor to half width, probability with its error, and what limits it."""
-        sure = {"probability": self.probability, "standard_error": self.standard_error}
+        """JSON: factor to half width, probability with its error and interval, and what limits it."""
+        sure: dict[str, Any] = {"probability": self.probability, "standard_error": self.standard_error}
+        sure |= {"interval": list(self.interval)}
         return {
             name: {"half_width": float(width), **sure, "limited_by": RIM if rim else self.limited_by}
             for name, width, rim in zip(factors, self.half_widths, self.at_rim, strict=True)
@@ -68,6 +74,8 @@ def widest_tolerances(
     seed: int = 1,
     aim: Aim = "ratios",
     promise: str = "keep all limits",
+    drawn: Kept | None = None,
+    open_errors: str = "",
 ) -> WidestTolerances:
     """Find the widest tolerances with which a part keeps all limits with a given probability.
 
@@ -84,6 +92,9 @@ def widest_tolerances(
     aim : "ratios" keeps them; "product" maximises the product of the half widths, "sum" their sum in units of the ratios, each
         within a twentieth to twenty times the given ratios.
     promise : what the parts do that count, in words, for the sentence.
+    drawn : counts the parts that keep all limits on each draw of what judges them, for the interval; without it the
+        parts drawn alone are uncertain.
+    open_errors : sentence on what the interval holds and what it takes as exact.
 
     The widest is looked for from the pick outwards up to the first loss, so all narrower tolerances keep the limits
     too. Where even the exact pick breaks a limit, all widths are zero.
@@ -97,8 +108,10 @@ def widest_tolerances(
         raise MethodError(f"ratios = {share.tolist()}, probability = {probability}: must be positive and in (0, 1)")
     if (room < -1e-9 * (high - low)).any():
         raise MethodError(f"pick = {centre.tolist()}: lies outside the region; pick a point within it")
-    drawn = random_offsets(samples, centre.size, distribution, seed)
-    parts = _Parts(objectives, centre, np.asarray(limits, float), room.clip(0.0), drawn, names, probability, promise)
+    offsets = random_offsets(samples, centre.size, distribution, seed)
+    said = promise, open_errors
+    limit = np.asarray(limits, float)
+    parts = _Parts(objectives, centre, limit, room.clip(0.0), offsets, names, probability, said, drawn)
     exact = np.zeros(centre.size)
     if parts.kept(exact) < probability:
         worst = parts.most_broken(exact)
@@ -121,7 +134,8 @@ class _Parts:
     offsets: Array
     names: Sequence[str]
     wanted: float
-    promise: str
+    said: tuple[str, str]
+    drawn: Kept | None
 
     @property
     def percent(self) -> str:
@@ -135,6 +149,13 @@ class _Parts:
     def kept(self, half: Array) -> float:
         """Share of the parts that keep all limits."""
         return float(self.keep(half).all(axis=1).mean())
+
+    def interval(self, half: Array) -> Interval:
+        """Interval of the share that keep all limits."""
+        if self.drawn is None:
+            return interval_of_share(np.array([self.keep(half).all(axis=1).sum()]), len(self.offsets))
+        some = self.offsets[:MOST_JUDGED]
+        return interval_of_share(self.drawn(self.centre + half * some), len(some))
 
     def most_broken(self, half: Array) -> str:
         """The limit that most parts break."""
@@ -165,7 +186,7 @@ class _Parts:
         zero, share = np.zeros_like(self.centre), self.kept(np.zeros_like(self.centre))
         sentence = f"No tolerance at all: {cause}; ask for less of the gain, or for less certainty."
         error = error_of_share(share, len(self.offsets))
-        return WidestTolerances(zero, share, error, limit, zero.astype(bool), sentence)
+        return WidestTolerances(zero, share, error, self.interval(zero), limit, zero.astype(bool), sentence)
 
 
 def _best_ratios(parts: _Parts, share: Array, aim: Aim) -> Array:
@@ -200,9 +221,8 @@ def _result(parts: _Parts, scale: float, ratios: Array) -> WidestTolerances:
     limit = RIM if at_rim.all() else parts.most_broken(parts.half(ratios, scale * 1.02))
     share = parts.kept(half)
     error = error_of_share(share, len(parts.offsets))
-    within = f"Within these tolerances {with_error(100 * share, 196 * error)} % of the parts {parts.promise}"
-    rim = " Where a tolerance ends at the rim of the region, no run tells whether it may be wider."
-    sentence = f"{within}, {parts.percent} demanded; the tolerances are limited by {limit}." + (
-        rim if at_rim.any() else ""
-    )
-    return WidestTolerances(half, share, error, limit, at_rim, sentence)
+    interval, (promise, open_errors) = parts.interval(half), parts.said
+    within = f"Within these tolerances {percent(share)} % ({interval.words}) of the parts {promise}, {parts.percent} demanded"
+    rim = "Where a tolerance ends at the rim of the region, no run tells whether it may be wider."
+    said = [f"{within}. They are limited by {limit}.", open_errors, rim if at_rim.any() else ""]
+    return WidestTolerances(half, share, error, interval, limit, at_rim, " ".join(filter(None, said)))

@@ -22,6 +22,7 @@ from doe.pareto.manufacture import Distribution, error_of_share, even_offsets
 from doe.pareto.nsga2 import Doubt, Judged, check_search, search
 from doe.pareto.picks import NAMES, Rule, thinned
 from doe.pareto.quadratic import Quadratic
+from doe.pareto.share import Interval
 
 Kind = Literal["worst_case", "quantile"]
 
@@ -76,7 +77,8 @@ class ToleranceAware:
     nominal values of this front have than the plain front's; ``robust_gain_percent``: how much more hypervolume its
     robust costs have than those of the plain front. ``plain_survives``, ``pick_survives``: share of the parts made at
     the plain pick, and at this front's, that still dominate the nominal baseline; ``survival_error`` is the
-    standard error that as many random parts would have, an upper bound for even ones. Where the plain pick's box is not ``plain_inside`` the region, its figures extrapolate.
+    standard error that as many random parts would have, an upper bound for even ones; ``plain_interval`` and ``pick_interval``
+    hold these shares with what the surfaces leave open, None until that is drawn. Where the plain pick's box is not ``plain_inside`` the region, its figures extrapolate.
     """
 
     box: ToleranceBox
@@ -95,6 +97,8 @@ class ToleranceAware:
     plain_survives: float
     pick_survives: float
     survival_error: float
+    plain_interval: Interval | None = None
+    pick_interval: Interval | None = None
 
 
 def tolerance_aware_front(

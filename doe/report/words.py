@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from doe.pareto.share import Interval, percent
 from rbdyn.records.words import improvement
 
 
@@ -26,6 +27,12 @@ def of_hundred(share: Sequence[float]) -> str:
     """'87 (80 to 92)' of a share with the ends of its interval: in how many of 100 cases."""
     value, low, high = (100.0 * each for each in share)
     return f"{value:.0f} ({low:.0f} to {high:.0f})"
+
+
+def share_with_interval(share: float, interval: Sequence[float] | None) -> str:
+    """'95.0 % (71.3 to 99.8 %)' of a share with the ends of its interval."""
+    known = "" if interval is None else f" ({Interval(*interval).words})"
+    return f"{percent(share)} %{known}"
 
 
 def half_width(record: Mapping[str, Any]) -> float | None:

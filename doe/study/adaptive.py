@@ -139,6 +139,18 @@ def costs_foretold(study: Study, adaptive: Adaptive, points: Array) -> Array:
     return adaptive.front.goals.costs(means)
 
 
+def drawn_by_emulators(
+    study: Study, adaptive: Adaptive, coded: Array, draws: int, random: np.random.Generator
+) -> Array:
+    """Responses (d, n, m) at coded points (n, k), with the pick's categories, of functions drawn from the emulators; they scatter
+    about the means as much more than the emulators say as runs that were left out did."""
+    emulators = adaptive.found.emulators
+    beside = np.tile(_coded_levels(study, adaptive.study.levels), (len(coded), 1))
+    at = np.hstack([coded / region_of(study), beside])
+    means = emulators.predict(at)[0]
+    return np.asarray(means + emulators.stretch * (emulators.draws(draws, random)(at) - means))
+
+
 def levels_at(study: Study, point: Array) -> tuple[int, ...]:
     """Places of the categories' values at a point (k + c,) of the search."""
     counts = [len(each.categories) for each in study.file.category]
@@ -161,7 +173,7 @@ def _design_at(study: Study, simulations: Simulations) -> Runs:
 def _at_levels(study: Study, front: DirectFront, levels: tuple[int, ...]) -> DirectFront:
     """The points of a front with categories at these places, in numbers alone."""
     rows = np.flatnonzero([levels_at(study, point) == levels for point in front.points])
-    parts = ("points", "values", "standard_errors", "costs", "cost_errors")
+    parts = ("points", "values", "standard_errors", "costs", "cost_errors", "freedom")
     some = {name: getattr(front, name)[rows] for name in parts}
     some["points"] = some["points"][:, : len(study.factors)]
     failures = front.failures[:, : len(study.factors)]

@@ -108,8 +108,8 @@ class SurfaceDoubt:
 
 
 def standard_errors_of(simulated: Sequence[Confirmed]) -> Array:
-    """Standard errors (c, m) of simulated points from their joint half-widths."""
-    return np.nan_to_num(np.array([each.error for each in simulated])) / 1.96
+    """Standard errors (c, m) of simulated points."""
+    return np.array([each.standard_error for each in simulated])
 
 
 def _at_design(surface: Surface) -> Missed:

@@ -11,6 +11,7 @@ from doe.arrays import Array
 from doe.clearance import Simulations
 from doe.running.failure import Failure
 from doe.study.goals import goals_of
+from doe.study.intervals import LEVEL, joint_freedom, standard_errors, times_wider
 from doe.study.predicted import verdict
 from doe.study_file import Study
 from doe.threads import one_thread
@@ -33,8 +34,9 @@ class Confirmed:
     """Simulated responses (m,) at a point, with 95 % statistical and numerical half-widths.
 
     Every interval of a simulated response joins the two by `error`: the root sum square of the statistical and the
-    numerical half-width, as of independent errors; that of a gain joins those of both of its runs in the same way.
-    ``power_terms``: power losses [W] by contact; ``reason``: why the point was chosen.
+    numerical half-width, as of independent errors. ``freedom`` (m,): degrees of freedom of the statistical ones, infinitely
+    many unless given; the numerical ones have that. ``power_terms``: power losses [W] by contact; ``reason``: why the point
+    was chosen.
     """
 
     point: Array
@@ -43,6 +45,7 @@ class Confirmed:
     numerical: Array
     power_terms: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
+    freedom: Array | None = None
 
     @property
     def error(self) -> Array:
@@ -51,11 +54,30 @@ class Confirmed:
         joint: Array = np.hypot(np.nan_to_num(self.statistical), np.nan_to_num(self.numerical))
         return np.where(known, joint, np.nan)
 
+    @property
+    def parts(self) -> tuple[list[Array], list[Array]]:
+        """Statistical and numerical standard errors (m,), 0 where unknown, and the degrees of freedom of each."""
+        many = np.full_like(self.values, np.inf)
+        freedom = [many if self.freedom is None else self.freedom, many]
+        halves = (self.statistical, self.numerical)
+        return [standard_errors(*each) for each in zip(halves, freedom, strict=True)], freedom
+
+    @property
+    def standard_error(self) -> Array:
+        """Joint standard errors (m,), 0 where unknown."""
+        return np.asarray(np.hypot(*self.parts[0]))
+
+    @property
+    def joint_freedom(self) -> Array:
+        """Degrees of freedom (m,) of the joint errors."""
+        return joint_freedom(*self.parts)
+
 
 class Gain(Record):
     """Relative improvement [%] of a response at a point over the baseline, with its 95 % half-width.
 
-    ``verdict``: whether the change is larger than its error; ``goal``: what is wanted of the response.
+    ``verdict``: whether the change is larger than its error; ``goal``: what is wanted of the response; ``freedom``: degrees
+    of freedom of the error.
     """
 
     response: str = outside_json()
@@ -63,6 +85,11 @@ class Gain(Record):
     error: float = keyed("error_percent")
     goal: str = "min"
     verdict: str = derived(lambda self: verdict(self.percent, self.error))
+    freedom: float = outside_json(default=np.inf)
+
+    def error_among(self, count: int) -> float:
+        """Half-width that holds together with those of so many gains."""
+        return self.error * float(times_wider(self.freedom, count))
 
 
 @one_thread
@@ -98,20 +125,30 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Co
         np.array([np.nan if quantity[key] is None else quantity[key] for quantity in quantities])
         for key in ("value", "statistical_error", "numerical_error")
     )
-    return Confirmed(choice.point, values, statistical, numerical, result.power_terms, choice.reason)
+    behind = [quantity.get("degrees_of_freedom") or np.inf for quantity in quantities]
+    return Confirmed(choice.point, values, statistical, numerical, result.power_terms, choice.reason, np.array(behind))
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
     """Improvements of all responses with a goal, with the joint errors of both runs as independent."""
     goals = goals_of(study)
     chosen = goals.objectives
-    error = np.hypot(*(np.nan_to_num(each.error[chosen]) for each in (baseline, pick)))
+    error, freedom = error_of_difference(baseline, pick)
     scale = 100.0 / np.abs(baseline.values[chosen])
     percent = (goals.costs(baseline.values) - goals.costs(pick.values)) * scale
+    columns = zip(chosen, percent, error[chosen] * scale, freedom[chosen], strict=True)
     return [
-        Gain(study.responses[index], float(p), float(e), study.file.response[index].goal)
-        for index, p, e in zip(chosen, percent, error * scale, strict=True)
+        Gain(study.responses[index], float(p), float(e), study.file.response[index].goal, float(behind))
+        for index, p, e, behind in columns
     ]
+
+
+def error_of_difference(one: Confirmed, other: Confirmed) -> tuple[Array, Array]:
+    """95 % half-widths (m,) of the differences of two simulated points, and the degrees of freedom behind them (Welch)."""
+    errors, behind = zip(one.parts, other.parts, strict=True)
+    every, freedom = [*errors[0], *errors[1]], joint_freedom([*errors[0], *errors[1]], [*behind[0], *behind[1]])
+    total = np.sqrt(np.sum([each**2 for each in every], axis=0))
+    return total * special.stdtrit(freedom, 0.5 + 0.5 * LEVEL), freedom
 
 
 def statement(gains: Sequence[Gain]) -> str:
@@ -120,16 +157,21 @@ def statement(gains: Sequence[Gain]) -> str:
     A gain counts as real where it is more than its error with all responses judged at once: the intervals are widened
     so that together they hold with 95 % (Bonferroni).
     """
-    wider = float(special.ndtri(1.0 - 0.025 / len(gains)) / special.ndtri(0.975))
+    count = len(gains)
     by_words = {
-        "real, more than its error": [gain for gain in gains if gain.percent > wider * gain.error],
-        "a real loss, more than its error": [gain for gain in gains if -gain.percent > wider * gain.error],
-        "inside its own noise: no gain is shown": [gain for gain in gains if abs(gain.percent) <= wider * gain.error],
+        "real, more than its error": [gain for gain in gains if gain.percent > gain.error_among(count)],
+        "a real loss, more than its error": [gain for gain in gains if -gain.percent > gain.error_among(count)],
+        "inside its own noise: no gain is shown": [
+            gain for gain in gains if abs(gain.percent) <= gain.error_among(count)
+        ],
     }
     parts = [
-        f"{', '.join(f'{each.response} {improvement(each.percent, wider * each.error, each.goal)}' for each in group)}: {words}"
-        for words, group in by_words.items()
-        if group
+        f"{', '.join(_improved(each, count) for each in group)}: {words}" for words, group in by_words.items() if group
     ]
     together = f" (intervals that hold for all {len(gains)} together)" if len(gains) > 1 else ""
     return f"Simulated changes from the baseline{together}: {'; '.join(parts)}."
+
+
+def _improved(gain: Gain, count: int) -> str:
+    """A gain in words, with the error that holds together with those of so many."""
+    return f"{gain.response} {improvement(gain.percent, gain.error_among(count), gain.goal)}"

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from doe.arrays import Array
 from doe.pareto.direct_tolerance import DirectAware, Neighbourhood, direct_aware, pick_among
@@ -37,9 +36,8 @@ def direct_pick(
     """
     front, goals = direct.front, goals_of(study)
     coded = study.coded(front.points)
-    quantile = float(special.ndtri(study.file.confirmation.limit_probability))
     shift, margin = _doubt(study, direct, coded, simulated)
-    margin *= quantile * (1.0 + failed)
+    margin *= front.quantile(study.file.confirmation.limit_probability) * (1.0 + failed)
     below, above = margin - shift, margin + shift
     ran = front.baseline_values
     ran = None if ran is None or not np.isfinite(ran).all() else ran

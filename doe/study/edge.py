@@ -12,7 +12,7 @@ from doe.clearance import Simulations
 from doe.response_surface import Surface
 from doe.response_surface.model_error import REACH
 from doe.running.failure import Failure
-from doe.study.confirmation import Choice, Confirmed, confirmed_from
+from doe.study.confirmation import Choice, Confirmed, confirmed_from, error_of_difference
 from doe.study.drawn import jacobian
 from doe.study.goals import beyond_runs, goals_of, region_of
 from doe.study_file import Study
@@ -214,7 +214,7 @@ def _simulated(
             continue
         there = confirmed_from(study, Choice(point, ""), result)
         gain = (goals.costs(pick.values) - goals.costs(there.values)) / (AHEAD * study.step[index])
-        joint = np.hypot(*(np.nan_to_num(each.error[goals.objectives]) for each in (pick, there)))
+        joint = error_of_difference(pick, there)[0][goals.objectives]
         figures = zip(gain.tolist(), (joint / (AHEAD * study.step[index])).tolist(), strict=True)
         gains_beyond[index] = dict(zip(wanted, figures, strict=True))
     return gains_beyond

@@ -1,6 +1,6 @@
 """The Pareto front of a study on its response surfaces, how sure it is, and what manufacture leaves of it."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TypeVar
@@ -18,6 +18,7 @@ from doe.study.back_off import SurfaceDoubt
 from doe.study.confirmation import Confirmed
 from doe.study.drawn import draw_all, predict_all, predict_draws, quadratics
 from doe.study.goals import check_goals, goals_of, region_of, tolerance_box
+from doe.study.shares import draws_of, surviving
 from doe.study_file import Study
 from doe.threads import one_thread
 from rbdyn.faults import InputError, MethodError
@@ -71,7 +72,25 @@ def find_front(
         aware = _backed_off(
             study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt.at_share(share)), failed
         )
-    return replace(found, tolerance_aware=_idle_at(study, np.zeros_like(study.centre), aware))
+    found = replace(found, tolerance_aware=_idle_at(study, np.zeros_like(study.centre), aware))
+    return with_survival(study, surfaces, found)
+
+
+@one_thread
+def with_survival(
+    study: Study, surfaces: Sequence[Surface], found: ParetoFront, confirmed: Mapping[str, Confirmed] | None = None
+) -> ParetoFront:
+    """The front with the intervals of the shares of parts that still dominate the baseline; ``confirmed`` points, which were
+    simulated, narrow what the surfaces leave open."""
+    aware = found.tolerance_aware
+    if aware is None:
+        return found
+    drawn = draws_of(study, surfaces, confirmed)
+    plain, pick = (
+        surviving(study, drawn, point, aware.box)
+        for point in (study.coded(found.points[found.pick]), aware.points[aware.pick])
+    )
+    return replace(found, tolerance_aware=replace(aware, plain_interval=plain, pick_interval=pick))
 
 
 def _idle_at(study: Study, centre: Array, found: Found) -> Found:

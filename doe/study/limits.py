@@ -1,14 +1,15 @@
 """Limits of responses, judged by what was simulated: kept, broken or undecided."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import Literal
 
 from doe.study.confirmation import Confirmed
 from doe.study.goals import goals_of
+from doe.study.intervals import chance_above, one_sided
 from doe.study_file import Study
+from doe.unknown.spread import Share
 from rbdyn.records.words import chance, with_error
 
 Verdict = Literal["kept", "undecided", "broken"]
@@ -21,7 +22,8 @@ ORDER: tuple[Verdict, ...] = ("kept", "undecided", "broken")
 class Limit:
     """A limit of a response against its simulated ``value`` with its joint 95 % half-width ``error`` (NaN: unknown).
 
-    ``one_sided`` times the half-width is the error on one side at the probability that the study asks for.
+    ``one_sided`` times the half-width is the error on one side at the probability that the study asks for; ``freedom``:
+    degrees of freedom of the error.
     """
 
     response: str
@@ -30,6 +32,7 @@ class Limit:
     value: float
     error: float
     one_sided: float
+    freedom: float = math.inf
 
     @property
     def room(self) -> float:
@@ -48,7 +51,7 @@ class Limit:
         """With which the bound is kept, by the error of the value; NaN where that is unknown."""
         if not self.error > 0.0:
             return math.nan if math.isnan(self.error) else float(self.room >= 0.0)
-        return NormalDist().cdf(self.room / self.error * NormalDist().inv_cdf(0.975))
+        return float(chance_above(self.room, self.error, self.freedom))
 
     @property
     def shown(self) -> str:
@@ -59,11 +62,12 @@ class Limit:
 
 def every_limit(study: Study, confirmed: Confirmed) -> list[Limit]:
     """All limits of the study at a simulated point, a lower and an upper one of a response each by itself."""
-    one_sided = NormalDist().inv_cdf(study.file.confirmation.limit_probability) / NormalDist().inv_cdf(0.975)
-    values, errors = confirmed.values.tolist(), confirmed.error.tolist()
+    freedom = confirmed.joint_freedom
+    sides = one_sided(freedom, study.file.confirmation.limit_probability).tolist()
+    columns = (confirmed.values.tolist(), confirmed.error.tolist(), sides, freedom.tolist())
+    known = list(zip(*columns, strict=True))
     return [
-        Limit(study.responses[index], sense, bound, values[index], errors[index], one_sided)
-        for index, sense, bound in goals_of(study).limited
+        Limit(study.responses[index], sense, bound, *known[index]) for index, sense, bound in goals_of(study).limited
     ]
 
 
@@ -98,6 +102,18 @@ def sentence(limits: Sequence[Limit], probability: float, tried: int) -> str:
         parts += [words[verdict].format(", ".join(group))] if group else []
     tries = "the first point simulated" if tried == 1 else f"{tried} points were tried"
     return f"{'. '.join(parts)} ({tries})."
+
+
+def odds_sentence(study: Study, odds: Mapping[str, Share] | None) -> str:
+    """How likely the pick keeps its limits over the unknown inputs, or the command that tells; empty without limits."""
+    if not goals_of(study).limited:
+        return ""
+    if odds is None:
+        return f"The odds of keeping the limits over the unknown inputs: doe study {study.path.name} --robust."
+    shares = ", ".join(
+        f"{name} {100.0 * p:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f} %)" for name, (p, low, high) in odds.items()
+    )
+    return f"Probability that the pick keeps its limits over the unknown inputs: {shares}."
 
 
 def _badness(limit: Limit) -> tuple[int, float]:

@@ -52,6 +52,12 @@ class Pairs:
         smooth = [pooled_variances(self.quantiles, *each) for each in zip(once.T, freedom.T, strict=True)]
         return gains, np.column_stack(smooth) / self.effort[:, None]
 
+    def values(self, response: int, design: int = 1) -> tuple[Array, Array]:
+        """Values (n,) of a response of a design, and their variances, smoothed over the inputs as those of gains are."""
+        once = self.effort * self.variances[design][:, response]
+        smooth = pooled_variances(self.quantiles, once, self.freedom[design][:, response])
+        return self.outputs[design][:, response], smooth / self.effort
+
 
 def relative_gains(goals: Goals, outputs: Array, variances: Array) -> tuple[Array, Array]:
     """Relative gains (n, q) of the second design over the first of outputs (2, n, m), and their variances."""

@@ -4,8 +4,8 @@ Both designs are simulated at the same input sets. Sets of which a gain is in do
 nothing first, until the share of further runs that the study allows is spent.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,12 +16,14 @@ from doe.clearance import Simulations
 from doe.running.failure import Failure
 from doe.study.goals import goals_of
 from doe.study.input_sets import ROUND_SEEDS, Case, case_of, run_notes, strongest
-from doe.study.pairs import simulated
+from doe.study.pairs import Pairs, simulated
 from doe.study.robust_front import RobustFront, find_robust_front
 from doe.study_file import Study
 from doe.threads import one_thread
 from doe.unknown import laws
 from doe.unknown.decision import Better, better, in_doubt
+from doe.unknown.odds import odds
+from doe.unknown.spread import Share
 from doe.unknown.worth import Decides, Deciding, Interval, Verdict, decides
 from rbdyn.faults import set_key
 from rbdyn.scene.unknown import Input, is_number
@@ -62,8 +64,8 @@ class Robust:
     that are worth most together, how well inputs foretell each gain, by how much the chance of all gains changes with ranges
     half as wide, the front of points that hold over the inputs, None where the study wants none, the inputs, which all vary in
     every set, ``screened``: those that no emulator of a gain covers, with the largest share that the main effect of each makes of
-    a gain, the cost in runs, the ``decision`` which of the deciding inputs is first, and notes: what is to be doubted of a
-    posterior sample, which keys do not vary."""
+    a gain, the cost in runs, the ``decision`` which of the deciding inputs is first, notes: what is to be doubted of a posterior
+    sample, which keys do not vary, and the ``odds`` that the pick keeps all limits of a response, by its name."""
 
     responses: list[str]
     better: Better
@@ -80,6 +82,7 @@ class Robust:
     failures: tuple[Failure, ...]
     decision: Decision
     notes: tuple[str, ...] = ()
+    odds: Mapping[str, Share] = field(default_factory=dict)
 
 
 def robust_advice(study: Study) -> list[str]:
@@ -143,7 +146,16 @@ def judge(study: Study, pick: Array, simulations: Simulations) -> Robust:
     cost = len(gains), spent, int(in_doubt(gains, variances).size)
     wanted = [study.responses[index] for index in goals.objectives]
     notes = *case.notes, *run_notes(case, study.scene.set, "scene.set: ", "other runs of the study")
-    return Robust(wanted, *judged, case.every, rest, *cost, failures, decision, notes)
+    return Robust(wanted, *judged, case.every, rest, *cost, failures, decision, notes, limit_odds(study, pairs, seed))
+
+
+def limit_odds(study: Study, pairs: Pairs, seed: int) -> dict[str, Share]:
+    """How likely the pick, the second of the pairs, keeps all limits of each limited response over the unknown inputs."""
+    goals = goals_of(study)
+    return {
+        study.responses[index]: odds(*pairs.values(index), float(goals.lower[index]), float(goals.upper[index]), seed)
+        for index in sorted({index for index, _, _ in goals.limited})
+    }
 
 
 def case_of_study(study: Study) -> Case:

@@ -118,7 +118,9 @@ def runs_of(study: Study, ordered: Ordered, simulations: clearance.Simulations, 
         )
     values, errors, independent = clearance.figures(study.responses, sound)
     block = np.array(design.block_numbers)[left] if design.blocks > 1 else None
-    return Runs(coded[left], actual[left], values, errors, tuple(notes), independent, block, failures, turns=simulations.turns)
+    return Runs(
+        coded[left], actual[left], values, errors, tuple(notes), independent, block, failures, turns=simulations.turns
+    )
 
 
 def _each_once(notes: Iterable[str]) -> list[str]:

@@ -27,12 +27,13 @@ from doe.study.direct import Direct, find_direct
 from doe.study.direct_pick import DirectPick, neighbourhood
 from doe.study.edge import Edge, edge_of
 from doe.study.finished import inputs_digest
-from doe.study.front import find_front
+from doe.study.front import find_front, with_survival
 from doe.study.goals import check_goals
-from doe.study.limits import Limit, Verdict, limits_of, sentence, verdict_of
+from doe.study.limits import Limit, Verdict, limits_of, odds_sentence, sentence, verdict_of
 from doe.study.reference import Beside, beside
 from doe.study.robust import Robust, check_robust, judge, robust_advice
 from doe.study.runs import STORE, Runs, run_design
+from doe.study.searched_draws import draws_about
 from doe.study.stages import FRONT, study_stages
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
@@ -113,8 +114,10 @@ class StudyResult:
 
     @property
     def limits_sentence(self) -> str:
-        """The same in words; empty without limits."""
-        return sentence(self.limits, self.study.file.confirmation.limit_probability, self.tried)
+        """The same in words, and how likely they are kept over the unknown inputs; empty without limits."""
+        judged = sentence(self.limits, self.study.file.confirmation.limit_probability, self.tried)
+        odds = None if self.robust is None else self.robust.odds
+        return f"{judged} {odds_sentence(self.study, odds)}".strip()
 
 
 @one_thread
@@ -170,7 +173,7 @@ def run_study(
         design=design_of(study),
         runs=runs,
         surfaces=surfaces,
-        front=chosen.front,
+        front=with_survival(study, surfaces, chosen.front, confirmed),
         direct=searched if isinstance(searched, Direct) else None,
         adaptive=searched if isinstance(searched, Adaptive) else None,
         direct_pick=chosen.direct,
@@ -238,9 +241,10 @@ def _tolerances(
     if wished is None:
         return None
     if searched is None:
-        return widest_of(study, surfaces, pick.point, wished)
+        return widest_of(study, surfaces, pick.point, wished, confirmed)
     here = neighbourhood(study, surfaces, searched, study.coded(pick.point)[None], pick.values[None])
-    return widest_of(study, surfaces, pick.point, wished, here, confirmed["baseline"].values)
+    drawn = draws_about(study, searched, here, pick, confirmed["baseline"])
+    return widest_of(study, surfaces, pick.point, wished, confirmed, here, drawn)
 
 
 def _gains(study: Study, confirmed: Mapping[str, Confirmed]) -> dict[str, list[Gain]]:

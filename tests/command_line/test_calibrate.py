@@ -214,6 +214,7 @@ class _Result:
                 "statistical_error": 2.4 * errors[name] * value,
                 "numerical_error": 0.0,
                 "effective_samples": 8.0,
+                "degrees_of_freedom": 7,
             }
             for (name, value), noise in zip(values.items(), errors["noise"], strict=True)  # type: ignore[call-overload]
         }

@@ -17,6 +17,7 @@ from doe.cli import app
 from doe.report.steps.robust import MOST_PAIRS, robust_record, robust_sentences
 from doe.study.finished import CODE, inputs_digest
 from doe.study.input_sets import ROUND_SEEDS, overriding, read_case, replicated, run
+from doe.study.limits import odds_sentence
 from doe.study.robust import Decision, check_robust, judge
 from doe.study.robust_front import fresh_rows
 from doe.study.uncertainty import OUTPUTS, find_uncertainty
@@ -203,7 +204,12 @@ class _Result:
     def __init__(self, values: Sequence[float], error: float) -> None:
         names = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W")
         self.figures = {
-            name: {"value": value, "statistical_error": 2.4 * error * value, "effective_samples": 8.0}
+            name: {
+                "value": value,
+                "statistical_error": 2.4 * error * value,
+                "effective_samples": 8.0,
+                "degrees_of_freedom": 7,
+            }
             for name, value in zip(names, values, strict=True)
         }
 
@@ -310,6 +316,26 @@ def test_what_is_undecided_or_worth_nothing_is_said_so(tmp_path: Path) -> None:
     words = robust_sentences(replace(found, decides=[loose]), study.factors)[1]
     assert "From which value on it changes the choice is not known well enough to state. Measuring it" in words
     assert Robust.model_fields["points"].metadata[-1].le == MOST_PAIRS
+
+
+def test_closed_form_of_the_odds_of_limits(tmp_path: Path) -> None:
+    """Closed form: the impact of the pick is 78.4 N times the mass over 45 g, uniform from 40 to 50 g; both its limits count."""
+    study = _study(tmp_path, IMBALANCE)
+    text = study.path.read_text("utf-8")
+    limits = 'name = "impact_force_N"\nmodel = "linear"\ngoal = "min"\nlower = 72.0\nupper = 80.0'
+    text = text.replace('name = "impact_force_N"\nmodel = "linear"\ngoal = "min"', limits)
+    text = text.replace('goal = "min"\n\n[front]', 'goal = "min"\nupper = 200.0\n\n[front]')
+    study.path.write_text(text, "utf-8")
+    study = Study.load(study.path)
+    found = judge(study, study.baseline * [1.0, 1.0, 0.8], _Simulations(0.002))  # type: ignore[arg-type]
+    low, high = (45.0 * each / 78.4 for each in (72.0, 80.0))
+    assert set(found.odds) == {"impact_force_N", "power_loss_W"}
+    assert found.odds["impact_force_N"].value == pytest.approx((high - low) / 10.0, abs=0.02)
+    assert found.odds["impact_force_N"].low < (high - low) / 10.0 < found.odds["impact_force_N"].high
+    assert found.odds["power_loss_W"].value == 0.0
+    words = odds_sentence(study, found.odds)
+    assert words.startswith("Probability that the pick keeps its limits over the unknown inputs: impact_force_N 4")
+    assert odds_sentence(study, None).endswith("doe study study.toml --robust.")
 
 
 def test_doubtful_rows_get_more_replicates_within_the_share_allowed(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ def instant_result(scene: Scene) -> SimulationResult:
     cage, seed = scene.cage, scene.numerics.seed
     base = 100.0 * cage.pocket_clearance_mm + 30.0 * cage.guide_clearance_mm + (seed * 7 % 5) * 0.1
     figures = {
-        name: Quantity(base * scale, 0.01 * base * scale, None, 10.0)
+        name: Quantity(base * scale, 0.01 * base * scale, None, 10.0, 9)
         for name, scale in (
             ("impact_force", 1.0),
             ("impact_contact_force", 1.0),

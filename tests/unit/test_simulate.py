@@ -125,7 +125,8 @@ def test_unit_json_keys_and_values(outer_result):
     assert record.keys() >= KEYS
     assert (record["format"], record["status"]) == ("rbdyn.simulation/3", "ok")
     for name in QUANTITIES:
-        assert record[name].keys() == {"value", "statistical_error", "numerical_error", "effective_samples"}
+        keys = {"value", "statistical_error", "numerical_error", "effective_samples", "degrees_of_freedom"}
+        assert record[name].keys() == keys
     assert record["power_balance"].keys() >= {"relative_gap"}
     assert record["loads"].keys() >= {"max_inner_N", "max_outer_N"}
     assert record["cost"].keys() >= COST_KEYS

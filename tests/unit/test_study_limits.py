@@ -113,6 +113,8 @@ def test_a_pick_that_misses_is_followed_by_the_next_best_until_one_keeps_the_lim
     assert limits_of(study, outcome.confirmed["try_1"])[0].verdict != "kept"
     record = write(outcome, tmp_path)
     assert record["status"] == "ok" and record["tried"] == outcome.tried
+    assert record["limits"]["impact_force_N"]["odds"] is None
+    assert record["limits_sentence"].count("doe study study.toml --robust") == 1
     told = record["confirmation"]["pick"]["limits"]["impact_force_N"]
     assert told["verdict"] == "kept" and told["bound"] == 35.0 and {"value", "error"} <= set(told)
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from doe.report.sections.blocks import Block, Bullets, Section, Table, Tile, Tiles, Words
 from doe.report.sections.record import Factor, Record, factors, nearest, part, responses, scalars
-from doe.report.words import change, dimension, half_width, moved, of_hundred, rounded_down
+from doe.report.words import change, dimension, half_width, moved, of_hundred, rounded_down, share_with_interval
 from rbdyn.records.words import chance, label, quantity, shown, with_error
 
 # Characters above which a value is a sentence, to be broken.
@@ -110,12 +110,14 @@ def limits(summary: Record, names: Sequence[str] = ()) -> Table:
             with_error(limit.get("value"), limit.get("error")),
             LIMITS.get(str(limit.get("verdict")), ""),
             "" if limit.get("probability") is None else chance(limit["probability"]),
+            of_hundred(odds) if name == "pick" and (odds := part(summary, "limits", response, "odds")) else "",
         )
         for name in names or points
         for response, limit in (part(points, name, "limits") or {}).items()
     ]
-    note = "Kept or broken by more than the error; between the two a limit is undecided. The probability is that of keeping it."
-    header = ("point", "limit", "simulated", "verdict", "probability")
+    note = "Kept or broken by more than the error; between the two a limit is undecided. The probability is that of keeping it "
+    note += "by that error; over the unknown inputs, in how many of 100 cases the pick keeps it."
+    header = ("point", "limit", "simulated", "verdict", "probability", "over unknown inputs")
     return Table("Limits judged by simulation", header, rows, note, text_columns=(1, 3))
 
 
@@ -279,13 +281,13 @@ def tolerances(summary: Record) -> Table:
         (
             label(name),
             f"± {rounded_down(each.get('half_width') or 0.0)}",
-            shown(each.get("probability")),
+            "" if each.get("probability") is None else share_with_interval(each["probability"], each.get("interval")),
             label(each.get("limited_by") or ""),
         )
         for name, each in found.items()
         if name in names and isinstance(each, Mapping)
     ]
-    header = ("factor", "tolerance", "probability", "limited by")
+    header = ("factor", "tolerance", "share of the parts (95 %)", "limited by")
     return Table("Widest tolerances that keep the gain", header, rows, text_columns=(3,))
 
 

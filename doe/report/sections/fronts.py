@@ -162,7 +162,7 @@ def _beside(summary: Record) -> list[Block]:
         chance = with_error(sure.get("probability"), 1.96 * (sure.get("standard_error") or 0.0))
         pick = "the pick without tolerances" if aware else "the pick"
         words = f"On surfaces drawn from their errors {pick} dominates the baseline with probability"
-        blocks.append(Words(f"{words} {chance}."))
+        blocks.append(Words(f"{words} {chance} (error of the draws alone)."))
     if aware:
         blocks += _with_tolerances(aware, [each["name"] for each in responses(summary)])
     if direct := part(summary, "direct"):

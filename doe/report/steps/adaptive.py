@@ -20,7 +20,7 @@ def adaptive_record(study: Study, adaptive: Adaptive) -> dict[str, Any]:
     """``front``: finalists by their fresh runs, with 95 % half widths; ``runs`` of design and search, ``fresh`` ones apart;
     ``hypervolume`` of the front foretold, on the scale of its own ideal and nadir; ``foretold``: the 200 points of that front that have most of its hypervolume; ``points``: every run of design and search with its replicates and why it was made."""
     found, front = adaptive.found, adaptive.found.front
-    rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
+    rows = zip(front.points, front.values, front.half_widths, strict=True)
     points = [
         point_record(study, at[: len(study.factors)], *rest) | {"factors": _factors(study, at)} for at, *rest in rows
     ]

@@ -73,7 +73,9 @@ def _print_answer(chain: ChainResult) -> None:
     closing = f"closing link {low:.4f} to {high:.4f} mm in worst case, {least:.4f} to {most:.4f} mm by root sum square"
     good = with_error(chain.yields["as_given"], NORMAL * chain.standard_errors["as_given"])
     able = f", Cp {chain.cp:.2f}, Cpk {chain.cpk:.2f}" if chain.cp is not None else ""
-    ppm = f"({out['low_ppm']:.0f} ppm below, {out['high_ppm']:.0f} ppm above){able}"
+    ppm = (
+        f"({out['low_ppm']:.0f} ppm below, {out['high_ppm']:.0f} ppm above){able}; the laws of the parts count as exact"
+    )
     print(f"{'as given: ' if chain.refused else ''}{closing}, yield {good} {ppm}")
     if chain.linearisation is not None:
         bent = chain.linearisation

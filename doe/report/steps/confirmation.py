@@ -36,6 +36,14 @@ def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
     }
 
 
+def judged_limits_record(outcome: StudyResult) -> dict[str, Any]:
+    """Limits at the pick, each with the ``odds`` [p, low, high] that the pick keeps all limits of that response over the unknown
+    inputs; None where that was not asked for."""
+    odds = {} if outcome.robust is None else outcome.robust.odds
+    record = limits_record(outcome.limits)
+    return {name: {**each, "odds": list(odds[name]) if name in odds else None} for name, each in record.items()}
+
+
 def limits_record(limits: Sequence[Limit]) -> dict[str, Any]:
     """Limits judged by simulation, by response: of a lower and an upper one that with the worse verdict, or less room."""
     return {
@@ -53,7 +61,7 @@ def gains_record(gains: Sequence[Gain | PredictedGain]) -> dict[str, Any]:
 def direct_record(study: Study, direct: Direct) -> dict[str, Any]:
     """The direct front beside that of the surfaces run on the simulator, and what these lose."""
     front, loss = direct.front, direct.loss
-    rows = zip(front.points, front.values, 1.96 * front.standard_errors, strict=True)
+    rows = zip(front.points, front.values, front.half_widths, strict=True)
     surrogate = zip(direct.surrogate_points, direct.surrogate_values, 1.96 * direct.surrogate_errors, strict=True)
     points = [point_record(study, *row) for row in rows]
     return {

@@ -10,13 +10,14 @@ from doe.pareto import ParetoFront
 from doe.pareto.archive import REFERENCE, dominates
 from doe.pareto.tolerance_aware import ToleranceAware
 from doe.report.steps.confirmation import gains_record, point_record
-from doe.report.words import change
+from doe.report.words import change, share_with_interval
 from doe.response_surface import Surface
 from doe.study.back_off import SurfaceDoubt
 from doe.study.drawn import half_widths, predict_all
 from doe.study.edge import place_of
 from doe.study.goals import goals_of
 from doe.study.predicted import PredictedGain, predicted_gains, statement
+from doe.study.shares import open_errors
 from doe.study_file import Study
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.record import finite
@@ -119,7 +120,7 @@ def print_front(record: dict[str, Any], verbose: bool = False) -> None:
     flattered = ", ".join(f"{name} {percent:+.2f} %" for name, percent in luck.items())
     print(f"the rule picks what errors flatter; luck expected in these gains: {flattered}")
     chance = with_error(sure["probability"], 1.96 * sure["standard_error"])
-    drawn = f"on {sure['draws']} surfaces drawn from their errors it dominates the baseline with probability {chance}"
+    drawn = f"on {sure['draws']} surfaces drawn from their errors it dominates the baseline with probability {chance} (error of the draws alone)"
     print(f"pick: {record['pick']['reason']}; {drawn}")
     for limit in record["constraints"]:
         print(f"limit: {limit_sentence(limit)}")
@@ -242,6 +243,9 @@ def tolerance_aware_record(study: Study, surfaces: list[Surface], found: Toleran
             "plain_pick": found.plain_survives,
             "pick": found.pick_survives,
             "standard_error": found.survival_error,
+            "plain_pick_interval": None if found.plain_interval is None else list(found.plain_interval),
+            "pick_interval": None if found.pick_interval is None else list(found.pick_interval),
+            "open_errors": open_errors(surfaces),
         },
     }
 
@@ -264,8 +268,10 @@ def print_tolerance_aware(record: dict[str, Any]) -> None:
     percent, survival = record["robust_gain_percent"], record["survival"]
     more = "" if percent is None else f", and {percent:.2f} % more in what manufacture leaves"
     print(f"the tolerance-aware front has {less}{more}")
-    plain = f"{100 * survival['plain_pick']:.1f} % at the plain pick"
-    aware = f"{with_error(100 * survival['pick'], 196 * survival['standard_error'])} % at the tolerance-aware one"
-    print(f"parts that still dominate the baseline: {plain}, {aware}")
+    plain, aware = (
+        f"{share_with_interval(survival[name], survival[f'{name}_interval'])}" for name in ("plain_pick", "pick")
+    )
+    print(f"parts that still dominate the baseline: {plain} at the plain pick, {aware} at the tolerance-aware one")
+    print(survival["open_errors"])
     if not record["plain_pick_inside"]:
         print("the tolerance box of the plain pick reaches out of the region: its figures are extrapolated")

@@ -128,7 +128,7 @@ def beside_sentence(adaptive: Adaptive, compared: Compared) -> str:
             f"direct front of {compared.direct['evaluations']} evaluations, its {counted(len(compared.direct['front']), 'point')} by their fresh "
             f"runs {with_error(reached, 1.96 * doubt)}{part}"
         )
-    return f"Hypervolumes on one scale: {'; '.join(told)}."
+    return f"Hypervolumes on one scale, with the noise of their runs alone: {'; '.join(told)}."
 
 
 def _place(name: str, value: float, before: str = "") -> str:

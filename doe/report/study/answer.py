@@ -8,7 +8,7 @@ from doe.clearance import direct_run
 from doe.report.steps.chain import print_chain
 from doe.report.steps.robust import print_robust_front, robust_sentences
 from doe.report.steps.search_words import search_sentences
-from doe.report.words import rounded_down
+from doe.report.words import of_hundred, rounded_down
 from doe.running.failure import grouped
 from doe.study.confirmation import statement
 from doe.study.limits import every_limit
@@ -77,14 +77,22 @@ def _print_answer(outcome: StudyResult) -> None:
 
 
 def _print_limits(outcome: StudyResult) -> None:
-    """Every limit at the baseline and at the pick, judged by simulation."""
-    rows = []
+    """Every limit at the baseline and at the pick, judged by simulation; the odds are those of all limits of a response."""
+    rows, odds = [], {} if outcome.robust is None else outcome.robust.odds
     judged = (every_limit(outcome.study, each) for each in (outcome.baseline, outcome.pick))
     for base, limit in zip(*judged, strict=True):
         values = [(with_error(each.value, each.error), each.verdict) for each in (base, limit)]
-        rows.append((f"{limit.response} {limit.sense} {limit.bound:g}", *values[0], *values[1]))
+        over = [of_hundred(odds[limit.response])] if odds else []
+        rows.append((f"{limit.response} {limit.sense} {limit.bound:g}", *values[0], *values[1], *over))
     if rows:
-        header = ("", "baseline", "verdict", "pick", "verdict")
+        header = (
+            "",
+            "baseline",
+            "verdict",
+            "pick",
+            "verdict",
+            *(["kept in 100 cases of unknown inputs"] if odds else []),
+        )
         print_table("limits judged by simulation", header, rows)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from doe import clearance
 from doe.report.steps.adaptive import adaptive_record, compared_record
-from doe.report.steps.confirmation import confirmation_record, direct_record, gains_record, limits_record
+from doe.report.steps.confirmation import confirmation_record, direct_record, gains_record, judged_limits_record
 from doe.report.steps.design import runs_record
 from doe.report.steps.fit import fit_record
 from doe.report.steps.front import front_record, predicted_record
@@ -31,7 +31,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
     record: dict[str, Any] = {
         "format": FORMAT,
         "status": "ok" if outcome.verdict == "kept" else outcome.verdict,
-        "limits": limits_record(outcome.limits),
+        "limits": judged_limits_record(outcome),
         "limits_sentence": outcome.limits_sentence,
         "tried": outcome.tried,
         "edge": outcome.edge.as_dict(),

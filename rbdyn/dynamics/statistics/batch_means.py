@@ -34,12 +34,13 @@ ENOUGH_REPLICATES = 8
 
 
 class Estimate(NamedTuple):
-    """A figure, the half-width of its 95 % interval (None for fewer than two batches), and how many independent
-    batches would tell as much."""
+    """A figure, the half-width of its 95 % interval (None for fewer than two batches), how many independent batches
+    would tell as much, and the degrees of freedom of Student's t in the half-width (None without one)."""
 
     value: float
     half_width: float | None
     effective_samples: float
+    freedom: int | None = None
 
 
 def estimate(moments: Sequence[Array], figure: Callable[[Array], Array]) -> Estimate:
@@ -57,7 +58,7 @@ def estimate(moments: Sequence[Array], figure: Callable[[Array], Array]) -> Esti
     memory = autocorrelation_time(np.split(series, lengths))
     joined = np.concatenate([_joined(part, memory, batches, len(moments)) for part in moments])
     half_width = student_half_width(_pseudo_values(joined, total, figure))
-    return Estimate(value, half_width, min(batches / memory, float(batches)))
+    return Estimate(value, half_width, min(batches / memory, float(batches)), len(joined) - 1 or None)
 
 
 def autocorrelation_time(series: Sequence[Array]) -> float:

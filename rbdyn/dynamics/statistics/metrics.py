@@ -198,4 +198,4 @@ def quantity(figure: Figure, runs: Runs, companions: Runs, share: float, slow: f
         missing = abs(sum(run.missing_work for run in runs)) / sum(run.duration for run in runs)
         numerical = math.hypot(missing, numerical or 0.0)
     statistical, numerical = (None if x is None else unit * x for x in (statistical, numerical))
-    return Quantity(unit * ours.value, statistical, numerical, ours.effective_samples)
+    return Quantity(unit * ours.value, statistical, numerical, ours.effective_samples, ours.freedom)

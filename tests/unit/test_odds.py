@@ -1,0 +1,51 @@
+"""The odds that a design keeps a limit while inputs are unknown."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import special
+
+from doe.unknown.decision import wilson
+from doe.unknown.odds import odds
+
+COUNT, SPREAD = 2000, 3.0
+
+
+def simulated(noise, count=COUNT, seed=1):
+    """Values that scatter by SPREAD about 10 over the inputs, simulated with noise of its own variance at each."""
+    random = np.random.default_rng(seed)
+    variances = noise**2 * random.uniform(0.5, 1.5, count)
+    truth = 10.0 + SPREAD * random.standard_normal(count)
+    return truth, truth + np.sqrt(variances) * random.standard_normal(count), variances
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0, 3.0])
+def test_closed_form_of_normal_values(noise):
+    """Closed form: the normal law of the inputs alone, however much the simulation scatters; rows counted raw say less."""
+    _, values, variances = simulated(noise)
+    at = 10.0 + 1.5 * SPREAD
+    found, truth = odds(values, variances, -np.inf, at, 1), special.ndtr(1.5)
+    assert found.value == pytest.approx(truth, abs=0.015) and found.low < truth < found.high
+    if noise == 3.0:
+        assert (values <= at).mean() < truth - 0.05
+    both = odds(values, variances, 10.0 - SPREAD, 10.0 + SPREAD, 1)
+    assert both.value == pytest.approx(special.ndtr(1.0) - special.ndtr(-1.0), abs=0.04)
+
+
+def test_limit_case_without_noise_counts_the_rows():
+    """Limit case: the share of the input sets that keep both limits, with ends no nearer than Wilson's."""
+    values = np.arange(100.0)
+    found = odds(values, np.zeros(100), 5.0, 84.5, 1)
+    low, high = wilson(0.8, 100)
+    assert found.value == pytest.approx(0.8) and found.low <= low and found.high >= high
+    none, every = (odds(values, np.zeros(100), *ends, 1) for ends in ((200.0, np.inf), (-np.inf, 200.0)))
+    assert none[:2] == (0.0, 0.0) and 0.0 < none.high < 0.05 and every.value == every.high == 1.0 and every.low > 0.95
+
+
+def test_invariant_intervals_hold_the_probability():
+    """Invariant: in 90 to 99 of 100 repeats of 128 input sets."""
+    truth = special.ndtr(0.8)
+    found = [odds(*simulated(1.0, 128, seed)[1:], -np.inf, 10.0 + 0.8 * SPREAD, seed) for seed in range(100)]
+    held = np.mean([low <= truth <= high for _, low, high in found])
+    assert 0.9 <= held <= 0.995
