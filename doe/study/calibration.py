@@ -19,8 +19,8 @@ from doe.threads import one_thread
 from doe.unknown import laws
 from doe.unknown.calibration import MISSED, Batch, Matched, Unknowns, matched
 from doe.unknown.discrepancy import Measured
-from doe.unknown.posterior import Learnt, contraction, densest, learnt
-from doe.unknown.verdict import FAR, Judgement, judged, objections, reweighed
+from doe.unknown.posterior import Learnt, contraction, densest_intervals, learnt
+from doe.unknown.verdict import FAR, Judgement, judge, objections, reweighed
 from rbdyn.faults import RunError
 from rbdyn.records.words import quantity
 from rbdyn.result import SimulationResult
@@ -82,7 +82,7 @@ class Calibration:
         """Quantiles (2, d) between which the densest 90 % of the posterior of each input lie."""
         if self.found.sampled is None:
             raise RunError("calibration: no input set is left to sample")
-        return densest(self.found.quantiles(self.found.sampled.points))
+        return densest_intervals(self.found.quantiles(self.found.sampled.points))
 
     @cached_property
     def sample(self) -> list[dict[str, Any]]:
@@ -233,7 +233,7 @@ def _judged(given: Calibration) -> Calibration:
     found, seed = given.found, given.case.scene.calibrate.seed
     assert found.sampled is not None
     points = found.sampled.points
-    judgement = judged(found, [quantity(name)[0] for name in given.rig.outputs], seed)
+    judgement = judge(found, [quantity(name)[0] for name in given.rig.outputs], seed)
     quantiles = found.quantiles(points)
     prior = found.quantiles(np.random.default_rng(1).standard_normal((BEFORE, len(given.inputs))))
     taught = learnt(quantiles, _logarithms(given.inputs, quantiles), _logarithms(given.inputs, prior))

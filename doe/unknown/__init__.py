@@ -7,5 +7,6 @@
 - ``sensitivity``: which input makes it
 - ``decision``: whether one design beats another all the same
 - ``cells``, ``matching``, ``discrepancy``, ``sampler``, ``calibration``: inputs from measurements
-- ``posterior``, ``verdict``: what these taught, and whether that may be called calibrated
+- ``posterior``, ``width``, ``verdict``: what these taught, whether predictions are as wide as they state, and whether that may be
+  called calibrated
 """

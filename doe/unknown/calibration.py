@@ -92,7 +92,7 @@ def matched(
     points, volumes, refuted, batch, cells = candidates[:count], list[float](), list[int](), None, None
     for wave in range(waves):
         new = simulate(_dependent(unknowns, points), wave)
-        measured = measured.scaled(new.values) if batch is None else measured
+        measured = measured.with_scales(new.values) if batch is None else measured
         batch = new if batch is None else batch.joined(new)
         cells = _emulated(batch, measured, cells)
         apart, share = matching.implausibility(cells, measured, _dependent(unknowns, candidates))

@@ -45,7 +45,7 @@ class Errors(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Measured:
     """Measured cells, in logarithms: ``values`` (c,), ``variances`` (c,) of rig and integration, the ``output`` and the
-    ``row`` (c,) each belongs to, ``scales`` (m,) of the discrepancy that is allowed of each output (NaN until ``scaled``
+    ``row`` (c,) each belongs to, ``scales`` (m,) of the discrepancy that is allowed of each output (NaN until ``with_scales``
     where none is stated), whether a cell is ``held`` out, and what each output can vary by as ``spread`` (m,)."""
 
     values: Array
@@ -67,7 +67,7 @@ class Measured:
         spread = np.zeros(self.scales.size) if self.spread is None else self.spread
         return np.where(self.scales > 0.0, np.maximum(spread, WIDER * self.scales), 0.0)
 
-    def scaled(self, simulated: Array) -> "Measured":
+    def with_scales(self, simulated: Array) -> "Measured":
         """With the default where no scale is stated, by cells (n, c) that are simulated over the prior of the inputs: the
         standard deviation within rows, as what differs from row to row is no doubt about the inputs."""
         square = simulated.var(axis=0)

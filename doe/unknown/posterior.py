@@ -56,7 +56,7 @@ def contraction(quantiles: Array) -> Array:
     return (1.0 - quantiles.std(axis=0) / PRIOR_SD).clip(0.0)
 
 
-def densest(quantiles: Array) -> Array:
+def densest_intervals(quantiles: Array) -> Array:
     """Ends (2, d) of the shortest intervals that hold the share INSIDE of quantiles (n, d): of highest density where there is
     one mode. One that begins at the outermost particle reaches to the end of the range, which equal tails never do."""
     ordered, count = np.sort(quantiles, axis=0), len(quantiles)

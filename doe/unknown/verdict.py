@@ -2,7 +2,7 @@
 
 Rows held out are predicted from the rest; without enough of them every row is, from all others: particles of whichever
 power serve best are weighed by the likelihood of those others. Predicted are the measured values themselves, with biases as
-the other rows tell them and the errors of rig and simulation. How wide predictions are is judged in turn: half of the rows
+the other rows tell them and the errors of rig and simulation. How wide predictions are is tried in turn: half of the rows
 predict the next, these together the one after it, and so on to the rows held out.
 
 Sources: Gneiting and Raftery, Strictly proper scoring rules, J. Am. Statist. Assoc. 102 (2007) 359 (CRPS); Vehtari, Gelman
@@ -27,7 +27,7 @@ ENOUGH, INSIDE = 3, 0.9
 # Residuals beyond so many standard deviations are too large; Bayes factors from the first on tell strongly that an output is
 # not explained, and particles tell them up to the second.
 FAR, STRONG, MOST = 3.0, 10.0, 1e6
-# Draws of a cell, of a row whose width is judged, and particles of each power that they are drawn from.
+# Draws of a cell, of a row whose width is tried, and particles of each power that they are drawn from.
 DRAWS, WIDTH_DRAWS, ENOUGH_OF = 800, 2000, 2000
 ENDS = (0.5, 0.05, 0.95)
 # A bias is seen from so many of its standard deviations on, which so many particles tell.
@@ -36,7 +36,7 @@ TOLD, FEWEST = 3.0, 30
 JointAt = Callable[[Array], Joint]
 
 
-class Predicted(NamedTuple):
+class Prediction(NamedTuple):
     """Cells predicted by the others: their ``places``, draws (s, k) after and before learning, and residuals (k,) in
     standard deviations."""
 
@@ -59,16 +59,17 @@ class Trial:
     width: Width
 
 
-class Explained(NamedTuple):
+class Explanation(NamedTuple):
     """Whether the simulation explains an output: its ``name``, by how much measured values are constantly above simulated
     ones, the ``bias`` in logarithms (median, 5 and 95 %), the scale ``allowed``, the ``evidence``: the Bayes factor of an
-    error beyond that (None where the simulation is exact); and the least bias that would be ``seen``, as smaller ones pass for inputs (None: cannot be told)."""
+    error beyond that (None where the simulation is exact); and the ``resolution``: the least bias that would be seen, as
+    smaller ones pass for inputs (None: undecided)."""
 
     name: str
     bias: tuple[float, float, float]
     allowed: float
     evidence: float | None
-    seen: float | None
+    resolution: float | None
 
     @property
     def explained(self) -> bool:
@@ -90,7 +91,7 @@ class Particles:
         levels = [Level(each.power, each.points[:ENOUGH_OF], each.log_likelihood[:ENOUGH_OF]) for each in found.levels]
         return cls(levels, [at(level.points) for level in levels], measured)
 
-    def drawn(self, known: Whole, count: int, random: np.random.Generator) -> tuple[Array, Joint]:
+    def draw(self, known: Whole, count: int, random: np.random.Generator) -> tuple[Array, Joint]:
         """Particles (count, d) of the posterior by some cells alone, of the power that serves it best, and the cells there."""
         weighed = [
             joint.log_density(self.measured.values, known) - level.power * level.log_likelihood
@@ -103,41 +104,41 @@ class Particles:
 
     def predictions(self, known: Whole, asked: Whole, count: int, random: np.random.Generator) -> Array:
         """Draws (count, a) of asked cells where ``known`` ones are."""
-        mean, own, roots = self.drawn(known, count, random)[1].given(self.measured.values, known, asked)
+        mean, own, roots = self.draw(known, count, random)[1].given(self.measured.values, known, asked)
         common = (roots @ random.standard_normal((count, roots.shape[2], 1)))[:, :, 0]
         return mean + common + np.sqrt(own) * random.standard_normal(mean.shape)
 
 
-def by_others(particles: Particles, seed: int) -> Predicted:
+def by_others(particles: Particles, seed: int) -> Prediction:
     """Every row that teaches, predicted by the other rows that do."""
     random, measured = np.random.default_rng(seed), particles.measured
     row = measured.row[measured.learnt]
     parts = [
-        _predicted(particles, measured.learnt[row != each], measured.learnt[row == each], random)
+        _prediction(particles, measured.learnt[row != each], measured.learnt[row == each], random)
         for each in np.unique(row)
     ]
-    return Predicted(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
+    return Prediction(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
 
 
-def held_out(particles: Particles, seed: int) -> Predicted:
+def held_out(particles: Particles, seed: int) -> Prediction:
     """The rows held out, predicted by all that teach."""
     measured = particles.measured
-    return _predicted(particles, measured.learnt, np.flatnonzero(measured.held), np.random.default_rng(seed))
+    return _prediction(particles, measured.learnt, np.flatnonzero(measured.held), np.random.default_rng(seed))
 
 
 def reweighed(particles: Particles, known: Whole, seed: int) -> Array:
     """Particles (s, d) of the posterior by some cells alone."""
-    return particles.drawn(known, DRAWS, np.random.default_rng(seed))[0]
+    return particles.draw(known, DRAWS, np.random.default_rng(seed))[0]
 
 
-def _predicted(particles: Particles, known: Whole, asked: Whole, random: np.random.Generator) -> Predicted:
+def _prediction(particles: Particles, known: Whole, asked: Whole, random: np.random.Generator) -> Prediction:
     after = particles.predictions(known, asked, DRAWS, random)
     before = particles.predictions(known[:0], asked, DRAWS, random)
     residuals = (particles.measured.values[asked] - after.mean(axis=0)) / after.std(axis=0)
-    return Predicted(asked, after, before, residuals)
+    return Prediction(asked, after, before, residuals)
 
 
-def in_turn(particles: Particles, seed: int) -> Iterator[Scores]:
+def sequential_scores(particles: Particles, seed: int) -> Iterator[Scores]:
     """Scores of half of the rows that teach and of the rows held out, each by all rows before it, in an order by chance."""
     random, measured = np.random.default_rng(seed), particles.measured
     rows = [
@@ -151,13 +152,13 @@ def in_turn(particles: Particles, seed: int) -> Iterator[Scores]:
         yield scores_of(draws, measured.values[asked], measured.output[asked])
 
 
-def trial(predicted: Predicted, particles: Particles, seed: int, *, held: bool) -> Trial:
+def trial(predicted: Prediction, particles: Particles, seed: int, *, held: bool) -> Trial:
     """How well cells were predicted."""
     truth = particles.measured.values[predicted.places]
     low, high = np.quantile(predicted.after, [0.5 - 0.5 * INSIDE, 0.5 + 0.5 * INSIDE], axis=0)
     inside = int(((truth >= low) & (truth <= high)).sum())
     after, before = (_crps(draws, truth) for draws in (predicted.after, predicted.before))
-    return Trial(held, truth.size, inside, after, before, width(list(in_turn(particles, seed))))
+    return Trial(held, truth.size, inside, after, before, width(list(sequential_scores(particles, seed))))
 
 
 def _crps(draws: Array, truth: Array) -> float:
@@ -167,7 +168,7 @@ def _crps(draws: Array, truth: Array) -> float:
     return float((np.abs(draws - truth).mean(axis=0) - apart).mean())
 
 
-def explained(names: Sequence[str], joint: Joint, beyond: Mask, measured: Measured, seed: int) -> list[Explained]:
+def explanations(names: Sequence[str], joint: Joint, beyond: Mask, measured: Measured, seed: int) -> list[Explanation]:
     """Of each output whether the simulation explains it, by particles of the posterior: cells there, and which errors
     go ``beyond`` (n, m) what is allowed."""
     middle, root = joint.latent(measured.values, measured.learnt)
@@ -180,10 +181,10 @@ def explained(names: Sequence[str], joint: Joint, beyond: Mask, measured: Measur
         median, low, high = np.quantile(biases, ENDS).tolist()
         # A bias beyond what is allowed is known no better than this, whatever it is.
         wide = biases[beyond[:, place]]
-        seen = float(TOLD * wide.std()) if wide.size >= FEWEST else None
+        resolution = float(TOLD * wide.std()) if wide.size >= FEWEST else None
         exact = measured.scales[place] == 0.0
         factor = None if exact else bayes_factor(float(beyond[:, place].mean()), 2.0 * BEYOND)
-        listed.append(Explained(name, (median, low, high), float(measured.scales[place]), factor, seen))
+        listed.append(Explanation(name, (median, low, high), float(measured.scales[place]), factor, resolution))
     return listed
 
 
@@ -193,7 +194,7 @@ def bayes_factor(share: float, before: float) -> float:
     return float(np.clip(odds, 1.0 / MOST, MOST))
 
 
-def together(beyond: Mask) -> float:
+def joint_factor(beyond: Mask) -> float:
     """The Bayes factor of any output being beyond what is allowed, of particles (n, m)."""
     return bayes_factor(float(beyond.any(axis=1).mean()), 1.0 - (1.0 - 2.0 * BEYOND) ** beyond.shape[1])
 
@@ -204,13 +205,13 @@ class Judgement:
     being off, ``residuals`` (c,) of all cells as the others predict them, and the ``particles`` that told."""
 
     trial: Trial
-    outputs: list[Explained]
+    outputs: list[Explanation]
     any_factor: float
     residuals: Array
     particles: Particles
 
 
-def judged(found: Matched, names: Sequence[str], seed: int) -> Judgement:
+def judge(found: Matched, names: Sequence[str], seed: int) -> Judgement:
     """Judge a match that has a sample, whose outputs have names."""
     assert found.sampled is not None
     measured, points = found.measured, found.sampled.points
@@ -223,8 +224,10 @@ def judged(found: Matched, names: Sequence[str], seed: int) -> Judgement:
     for part in parts:
         residuals[part.places] = part.residuals
     beyond = found.errors(points).beyond
-    outputs = explained(names, found.joint(points), beyond, measured, seed)
-    return Judgement(trial(parts[-1], particles, seed, held=enough), outputs, together(beyond), residuals, particles)
+    outputs = explanations(names, found.joint(points), beyond, measured, seed)
+    return Judgement(
+        trial(parts[-1], particles, seed, held=enough), outputs, joint_factor(beyond), residuals, particles
+    )
 
 
 def objections(given: Judgement, *, anything: bool, emulated: bool) -> list[str]:

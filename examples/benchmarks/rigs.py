@@ -160,8 +160,8 @@ def surrogate(kind: str, number: int) -> Answer:
     """Calibrate a rig in closed form."""
     from doe.unknown.calibration import MISSED, Batch, Unknowns, matched
     from doe.unknown.discrepancy import Measured
-    from doe.unknown.posterior import densest, learnt
-    from doe.unknown.verdict import judged, objections
+    from doe.unknown.posterior import densest_intervals, learnt
+    from doe.unknown.verdict import judge, objections
 
     random = np.random.default_rng([number, KINDS.index(kind)])
     truth = hidden(kind, INPUTS, random)
@@ -182,10 +182,10 @@ def surrogate(kind: str, number: int) -> Answer:
     quantiles = found.quantiles(found.sampled.points)
     nothing = np.full((2, INPUTS), np.nan)
     taught = learnt(quantiles, np.full(quantiles.shape, np.nan), nothing)
-    judgement = judged(found, OUTPUTS, number)
+    judgement = judge(found, OUTPUTS, number)
     reasons = objections(judgement, anything=taught.anything, emulated=found.misfit < MISSED)
     reasons += ["refuted"] if found.refuted else []
-    low, high = densest(quantiles)
+    low, high = densest_intervals(quantiles)
     verdict = "not calibrated" if reasons else "calibrated"
     return Answer(kind, number, verdict, reasons, ((truth >= low) & (truth <= high)).tolist())
 
@@ -246,7 +246,11 @@ def main() -> None:
             for kind in asked.only or KINDS:
                 one = surrogate(kind, number) if asked.what == "surrogate" else simulated(folder, kind, number)
                 reasons = "; ".join(one.reasons)
-                print(f"{kind} {number}: {one.verdict} {sum(one.covered)}/{len(one.covered)} {reasons[:160]}", file=sys.stderr, flush=True)
+                print(
+                    f"{kind} {number}: {one.verdict} {sum(one.covered)}/{len(one.covered)} {reasons[:160]}",
+                    file=sys.stderr,
+                    flush=True,
+                )
                 answers.append(one)
     print("\n".join(table(answers)))
 

@@ -12,18 +12,18 @@ from doe.arrays import Array
 from doe.unknown.calibration import Batch, Matched, Unknowns, matched
 from doe.unknown.cells import fit_cells
 from doe.unknown.discrepancy import BEYOND, BY_ROW, SHARE, WIDER, Joint, Measured
-from doe.unknown.posterior import contraction, densest, learnt, seen
+from doe.unknown.posterior import contraction, densest_intervals, learnt, seen
 from doe.unknown.sampler import sampled
 from doe.unknown.verdict import (
     MOST,
-    Explained,
+    Explanation,
     Judgement,
     Particles,
     Trial,
     bayes_factor,
     by_others,
     held_out,
-    judged,
+    judge,
     objections,
     reweighed,
 )
@@ -69,7 +69,7 @@ def _found(
 
 def _covered(found: Matched, truth: Array) -> Array:
     assert found.sampled is not None
-    low, high = densest(found.quantiles(found.sampled.points))
+    low, high = densest_intervals(found.quantiles(found.sampled.points))
     covered: Array = (truth >= low) & (truth <= high)
     return covered
 
@@ -145,7 +145,7 @@ def test_errors_of_the_simulation_are_half_normal_of_three_kinds() -> None:
     count = 100_000
     scores = special.ndtri((np.arange(count) + 0.5) / count)[:, None] * [1.0, 1.0]
     spread = np.random.default_rng(1).standard_normal((500, 16))
-    measured = _measured(np.zeros(16), 0.1).scaled(spread)
+    measured = _measured(np.zeros(16), 0.1).with_scales(spread)
     errors = measured.errors(scores)
     assert errors.beyond.mean(axis=0) == pytest.approx(2.0 * BEYOND, abs=2.0 / count)
     allowed, wide = errors.level[~errors.beyond[:, 0], 0], errors.level[errors.beyond[:, 0], 0]
@@ -157,7 +157,7 @@ def test_errors_of_the_simulation_are_half_normal_of_three_kinds() -> None:
     assert np.mean(rows == wide) == pytest.approx(0.5 + 0.5 * np.mean(wide[: wide.size // 2] <= 0.1), abs=1e-3)
     assert rows[: rows.size // 2].max() == 0.1
     # An exact simulation has no errors, whatever outputs vary by.
-    none = _measured(np.zeros(16), 0.0).scaled(spread).errors(scores)
+    none = _measured(np.zeros(16), 0.0).with_scales(spread).errors(scores)
     assert not none.level.any() and not none.beyond.any()
 
 
@@ -165,20 +165,20 @@ def test_by_default_a_share_of_what_inputs_do_within_rows_is_allowed() -> None:
     random = np.random.default_rng(2)
     # The first output varies by 0.3 % over the inputs and by much over the rows, the second by 20 % over the inputs.
     simulated = np.repeat([0.003, 0.2], ROWS) * random.standard_normal((20_000, 16)) + np.arange(16.0)
-    measured = _measured(np.zeros(16), np.nan).scaled(simulated)
+    measured = _measured(np.zeros(16), np.nan).with_scales(simulated)
     assert measured.scales == pytest.approx([SHARE * 0.003, SHARE * 0.2], rel=0.02)
     assert measured.wide == pytest.approx([0.003, 0.2], rel=0.02)
-    stated = _measured(np.zeros(16), 0.1).scaled(simulated)
+    stated = _measured(np.zeros(16), 0.1).with_scales(simulated)
     assert stated.scales.tolist() == [0.1, 0.1] and stated.wide == pytest.approx([WIDER * 0.1] * 2)
 
 
 def test_densest_intervals_hold_an_end_and_agree_with_quantiles_in_the_middle() -> None:
     random = np.random.default_rng(3)
     # Of 1 - (1 - q)^4 the densest 90 % begin at 0; of a symmetric one they are its quantiles.
-    low, high = densest(np.column_stack([random.beta(1.0, 4.0, 40_000), random.beta(8.0, 8.0, 40_000)]))
+    low, high = densest_intervals(np.column_stack([random.beta(1.0, 4.0, 40_000), random.beta(8.0, 8.0, 40_000)]))
     assert low[0] == 0.0 and high[0] == pytest.approx(1.0 - 0.1**0.25, abs=0.01)
     assert [low[1], high[1]] == pytest.approx(stats.beta(8.0, 8.0).ppf([0.05, 0.95]), abs=0.02)
-    assert densest(1.0 - random.beta(1.0, 4.0, (4000, 1)))[1] == [1.0]
+    assert densest_intervals(1.0 - random.beta(1.0, 4.0, (4000, 1)))[1] == [1.0]
 
 
 def _widths(factor: float, rows: int, repeats: int, seed: int) -> Array:
@@ -265,7 +265,7 @@ def test_a_biased_simulation_needs_a_discrepancy() -> None:
 def _against(found: Matched, seed: int = 1) -> tuple[list[str], Judgement]:
     """Why a match may not be called calibrated."""
     assert found.sampled is not None
-    judgement = judged(found, ["impact", "loss"], seed)
+    judgement = judge(found, ["impact", "loss"], seed)
     return objections(judgement, anything=True, emulated=found.misfit < 2.0), judgement
 
 
@@ -322,7 +322,7 @@ def test_a_biased_sensor_is_named_with_its_bias() -> None:
     against, judgement = _against(found)
     impact, loss = judgement.outputs
     assert impact.explained and not loss.explained and loss.evidence is not None and loss.evidence > 100.0
-    assert loss.bias[1] < np.log(1.2) < loss.bias[2] and loss.seen is not None and loss.seen < np.log(1.2)
+    assert loss.bias[1] < np.log(1.2) < loss.bias[2] and loss.resolution is not None and loss.resolution < np.log(1.2)
     assert any(each.startswith("loss is not explained") and "sensor" in each for each in against)
     # Stated as allowed, it is none against.
     assert all(each.explained for each in _against(_found(values, 0.2, 8))[1].outputs)
@@ -334,7 +334,7 @@ def test_predictions_too_wide_are_a_reason_as_are_too_few_of_them() -> None:
     values = _truth(np.array([[0.6, 0.4, 0.5]]))[0] + 0.1 * RIG * random.standard_normal(RIG.size)
     against, _ = _against(_found(values, np.nan, 9))
     assert any("too wide" in each for each in against)
-    explained = Explained("loss", (0.0, 0.0, 0.0), 0.1, 0.5, None)
+    explained = Explanation("loss", (0.0, 0.0, 0.0), 0.1, 0.5, None)
     few = Trial(True, 6, 6, 0.1, 0.2, Width(6, 1.0, 0.5, None, 1.0, (0.4, 0.7)))
     (told,) = objections(
         Judgement(few, [explained], 0.5, np.zeros(6), Particles([], [], _measured(values, 0.1))),

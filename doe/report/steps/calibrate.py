@@ -92,7 +92,7 @@ def _outputs(found: Calibration) -> dict[str, Any]:
             "discrepancy": None if each is None else np.expm1(each.bias).tolist(),
             "allowed": None if each is None else each.allowed,
             "evidence": None if each is None else each.evidence,
-            "least_seen": None if each is None or each.seen is None else float(np.expm1(each.seen)),
+            "resolution": None if each is None or each.resolution is None else float(np.expm1(each.resolution)),
         }
         for name, each in zip(found.rig.outputs, outputs, strict=True)
     }
@@ -194,7 +194,7 @@ def _output_words(name: str, each: dict[str, Any]) -> str:
     words = "explained" if each["explained"] else "not explained"
     off = f"{name}: {words}, {median:+.2g} % off its level ({low:+.2g} to {high:+.2g}), {100.0 * each['allowed']:.2g} % allowed"
     least = (
-        "" if each["least_seen"] is None else f"; an offset below {100.0 * each['least_seen']:.2g} % would not be seen"
+        "" if each["resolution"] is None else f"; an offset below {100.0 * each['resolution']:.2g} % would not be seen"
     )
     return f"{off}, Bayes factor {each['evidence']:.2g}{least}"
 
