@@ -7,7 +7,9 @@ reads the loss 20 % too high; ``law`` has other physics: in closed form a land w
 changes less; where the bearing is simulated a dry land, or no rolling resistance. The first two should end "calibrated", the others "not calibrated",
 and hidden values should lie in 85 to 95 % of the 90 % intervals of the first two.
 
-``--rigs N`` of each kind, ``--only KIND``, ``--first N`` to skip rigs; ``--out FOLDER`` keeps runs and records.
+``--rigs N`` of each kind, ``--only KIND``, ``--first N`` to skip rigs; ``--out FOLDER`` keeps runs, records and answers, and
+a rig whose answer by the same code is there is not calibrated again. ``widths`` counts how often predictions of known width
+are rejected, in ``--rigs`` many tables.
 """
 
 import argparse
@@ -221,6 +223,20 @@ def table(answers: Sequence[Answer]) -> Iterator[str]:
     yield f"sound and ends together: {np.mean(covered):.3f} of {len(covered)} hidden values in their 90 % intervals"
 
 
+def answer(what: str, folder: Path, kind: str, number: int) -> Answer:
+    """What becomes of a rig, from the folder where the same code has answered before."""
+    from doe.clearance import SIMULATION
+    from rbdyn.records.kept import code_version
+
+    path = folder / f"{what}_{kind}_{number}.json"
+    version = code_version(SIMULATION, "doe.study.calibration")
+    if path.exists() and (kept := json.loads(path.read_text("utf-8")))["version"] == version:
+        return Answer(**kept["answer"])
+    one = surrogate(kind, number) if what == "surrogate" else simulated(folder, kind, number)
+    path.write_text(json.dumps({"version": version, "answer": one._asdict()}), "utf-8")
+    return one
+
+
 def main() -> None:
     """Read the arguments, calibrate, and count."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -244,7 +260,7 @@ def main() -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for number in range(asked.first, asked.first + asked.rigs):
             for kind in asked.only or KINDS:
-                one = surrogate(kind, number) if asked.what == "surrogate" else simulated(folder, kind, number)
+                one = answer(asked.what, folder, kind, number)
                 reasons = "; ".join(one.reasons)
                 print(
                     f"{kind} {number}: {one.verdict} {sum(one.covered)}/{len(one.covered)} {reasons[:160]}",
