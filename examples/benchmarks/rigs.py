@@ -220,7 +220,8 @@ def table(answers: Sequence[Answer]) -> Iterator[str]:
         counts = Counter(reason.partition(":")[0] for each in own for reason in each.reasons)
         yield from (f"{'':8} {count} x {reason}" for reason, count in counts.most_common(4))
     covered = [inside for each in answers if each.kind in (SOUND, ENDS) for inside in each.covered]
-    yield f"sound and ends together: {np.mean(covered):.3f} of {len(covered)} hidden values in their 90 % intervals"
+    if covered:
+        yield f"sound and ends together: {np.mean(covered):.3f} of {len(covered)} hidden values in their 90 % intervals"
 
 
 def answer(what: str, folder: Path, kind: str, number: int) -> Answer:
