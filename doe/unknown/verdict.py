@@ -20,7 +20,7 @@ from doe.arrays import Array, Mask, Whole
 from doe.unknown.calibration import Matched
 from doe.unknown.discrepancy import BEYOND, Joint, Measured
 from doe.unknown.sampler import Level, Sampled, effective
-from doe.unknown.width import OFTEN, Scores, Width, scores_of, width
+from doe.unknown.width import Scores, Width, scores_of, width
 
 # Rows held out that tell by themselves; share of cells that their interval is to hold.
 ENOUGH, INSIDE = 3, 0.9
@@ -239,17 +239,17 @@ def objections(given: Judgement, *, anything: bool, emulated: bool) -> list[str]
         if not each.explained:
             off = f"{100.0 * np.expm1(each.bias[0]):+.2g} % off its level, {100.0 * each.allowed:.2g} % allowed"
             cause = "its sensor is biased or physics is missing"
-            found.append(f"{each.name} is not explained: {off}, Bayes factor {each.evidence:.2g}; {cause}")
+            found.append(f"{each.name} is not explained: {off}, Bayes factor {each.evidence:.3g}; {cause}")
     if given.any_factor >= STRONG and not found:
         listed = " or ".join(each.name for each in sorted(outputs, key=lambda each: -(each.evidence or 0.0))[:2])
-        found.append(f"{listed} is not explained, which of them is undecided: Bayes factor {given.any_factor:.2g}")
+        found.append(f"{listed} is not explained, which of them is undecided: Bayes factor {given.any_factor:.3g}")
     if result.width.rejected:
         found.append(_width_words(result.width, [each.name for each in outputs]))
     elif not result.width.enough:
         wide, narrow = (100.0 * each for each in result.width.power)
         found.append(
-            f"{result.width.cells} predicted values are too few to judge intervals: twice too wide would be found in "
-            f"{wide:.0f} of 100 such tables, twice too narrow in {narrow:.0f}; {100.0 * OFTEN:.0f} are needed"
+            f"{result.width.cells} predicted values are too few to judge intervals: of tables like this, twice too wide shows in "
+            f"{wide:.0f} %, twice too narrow in {narrow:.0f} %"
         )
     if not result.crps < result.crps_before:
         found.append("measured values are predicted no better than before")

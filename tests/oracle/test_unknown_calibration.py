@@ -340,7 +340,7 @@ def test_predictions_too_wide_are_a_reason_as_are_too_few_of_them() -> None:
         Judgement(few, [explained], 0.5, np.zeros(6), Particles([], [], _measured(values, 0.1))),
         anything=True, emulated=True,
     )  # fmt: skip
-    assert "6 predicted values are too few" in told and "40 of 100" in told
+    assert "6 predicted values are too few" in told and "shows in 40 %" in told
 
 
 def test_what_no_input_set_gives_is_refuted_by_the_cells_that_do_it() -> None:

@@ -196,7 +196,7 @@ def _output_words(name: str, each: dict[str, Any]) -> str:
     least = (
         "" if each["resolution"] is None else f"; an offset below {100.0 * each['resolution']:.2g} % would not be seen"
     )
-    return f"{off}, Bayes factor {each['evidence']:.2g}{least}"
+    return f"{off}, Bayes factor {each['evidence']:.3g}{least}"
 
 
 def _interval(each: dict[str, Any]) -> tuple[str, str, str]:
