@@ -17,10 +17,10 @@ from doe.study.input_sets import NORMAL, Case, check_holes, outcomes, scattered,
 from doe.study.rig_file import Rig
 from doe.threads import one_thread
 from doe.unknown import laws
-from doe.unknown.calibration import Batch, Matched, Unknowns, matched
+from doe.unknown.calibration import MISSED, Batch, Matched, Unknowns, matched
 from doe.unknown.discrepancy import Measured
-from doe.unknown.posterior import Learnt, contraction, learnt
-from doe.unknown.verdict import ENOUGH, FAR, Foretold, Trial, by_others, held_out, objections, reweighed, trial
+from doe.unknown.posterior import Learnt, contraction, densest_intervals, learnt
+from doe.unknown.verdict import FAR, Judgement, judge, objections, reweighed
 from rbdyn.faults import RunError
 from rbdyn.records.words import quantity
 from rbdyn.result import SimulationResult
@@ -28,8 +28,6 @@ from rbdyn.scene import Scene
 from rbdyn.scene.uncertain import Law
 from rbdyn.scene.unknown import Input, value_of
 
-# By how much the simulation may err in an output unless the scene says otherwise, as a share.
-DISCREPANCY = 0.1
 # Seeds of a stage and of a condition in it.
 STAGE_SEEDS, CONDITION_SEEDS = 200_000, 1_000
 # Rows of the posterior sample, and input sets that tell what was likely before.
@@ -52,8 +50,7 @@ class Calibration:
     before: Array
     after: Array | None
     learnt: Learnt | None
-    trial: Trial | None
-    residuals: Array | None
+    judgement: Judgement | None
     without: dict[str, float] | None
     objections: tuple[str, ...]
     runs: int
@@ -80,6 +77,13 @@ class Calibration:
         points = self.found.sampled.points
         return self.found.quantiles(points[np.linspace(0, len(points) - 1, SAMPLE).astype(int)])
 
+    @property
+    def ends(self) -> Array:
+        """Quantiles (2, d) between which the densest 90 % of the posterior of each input lie."""
+        if self.found.sampled is None:
+            raise RunError("calibration: no input set is left to sample")
+        return densest_intervals(self.found.quantiles(self.found.sampled.points))
+
     @cached_property
     def sample(self) -> list[dict[str, Any]]:
         """What the scene has at each input, and at each key that multiplies one, in the input sets of ``quantiles``."""
@@ -91,8 +95,8 @@ class Calibration:
         return [{key: value_of(each, key) for key in (*inputs, *tied)} for each in scenes if not isinstance(each, str)]
 
     def outliers(self) -> list[int]:
-        """Places of the cells that the others foretell badly."""
-        return [] if self.residuals is None else np.flatnonzero(np.abs(self.residuals) > FAR).tolist()
+        """Places of the cells that the others predict badly."""
+        return [] if self.judgement is None else np.flatnonzero(np.abs(self.judgement.residuals) > FAR).tolist()
 
 
 @dataclass
@@ -166,7 +170,7 @@ def find_calibration(question: Question, simulations: Simulations) -> Calibratio
     cells = [(row.number, name) for row, name in places]
     before = found.cells.mean(found.unknowns.at(np.random.default_rng(0).standard_normal((BEFORE, len(inputs)))))
     whole = Calibration(
-        case, rig, inputs, rest, cells, nominal, found, before, None, None, None, None, None, (), rows.runs, notes
+        case, rig, inputs, rest, cells, nominal, found, before, None, None, None, None, (), rows.runs, notes
     )
     return whole if found.sampled is None else _judged(whole)
 
@@ -205,7 +209,7 @@ def _measured(rows: _Rows, rig: Rig, variances: Array, turns: Array, numerical: 
         np.array(found) + numerical,
         outputs,
         conditions,
-        np.array([0.0 if scales == "none" else scales.get(name, DISCREPANCY) for name in rig.outputs]),
+        np.array([0.0 if scales == "none" else scales.get(name, np.nan) for name in rig.outputs]),
         np.array([row.held for row, _ in cells]),
     )
 
@@ -225,43 +229,31 @@ def _unknowns(case: Case, inputs: Sequence[Input]) -> Unknowns:
 
 
 def _judged(given: Calibration) -> Calibration:
-    """What was learned, how well the rest is foretold, and what may be claimed."""
+    """What was learned, how well the rest is predicted, and what may be claimed."""
     found, seed = given.found, given.case.scene.calibrate.seed
     assert found.sampled is not None
-    points, measured = found.sampled.points, found.measured
-    others = by_others(found.sampled, found.joint, measured, seed)
-    enough = len(np.unique(measured.row[measured.held])) >= ENOUGH
-    test = held_out(found.sampled, found.joint, measured, seed) if enough else others
-    result = trial(test, measured, held=enough)
-    residuals = np.zeros(measured.values.size)
-    parts: list[Foretold] = [others, *([test] if enough else [])]
-    for part in parts:
-        residuals[part.places] = part.residuals
+    points = found.sampled.points
+    judgement = judge(found, [quantity(name)[0] for name in given.rig.outputs], seed)
     quantiles = found.quantiles(points)
     prior = found.quantiles(np.random.default_rng(1).standard_normal((BEFORE, len(given.inputs))))
     taught = learnt(quantiles, _logarithms(given.inputs, quantiles), _logarithms(given.inputs, prior))
-    medians = np.median(found.taus(points), axis=0).tolist()
-    words = [quantity(name)[0] for name in given.rig.outputs]
-    taus = dict(zip(words, zip(medians, measured.scales.tolist(), strict=True), strict=True))
-    against = objections(result, taus, anything=taught.anything, foretells=found.misfit < 2.0)
+    against = objections(judgement, anything=taught.anything, emulated=found.misfit < MISSED)
     rows = np.linspace(0, len(points) - 1, SAMPLE).astype(int)
     after = found.cells.mean(quantiles[rows])
     crowds = "the posterior crowds at an end of its range, which may be too narrow"
     notes = *given.notes, *(f"{given.inputs[place].key}: {crowds}" for place in taught.narrow)
-    whole = replace(
-        given, after=after, learnt=taught, trial=result, residuals=residuals, objections=tuple(against), notes=notes
-    )
+    whole = replace(given, after=after, learnt=taught, judgement=judgement, objections=tuple(against), notes=notes)
     return replace(whole, without=_without(whole))
 
 
 def _without(given: Calibration) -> dict[str, float] | None:
-    """Contraction by key without the cells that the others foretell badly; None where there are none that teach."""
+    """Contraction by key without the cells that the others predict badly; None where there are none that teach."""
     found = given.found
-    assert found.sampled is not None
+    assert given.judgement is not None
     left = np.setdiff1d(found.measured.learnt, given.outliers())
     if left.size in (0, found.measured.learnt.size):
         return None
-    points = reweighed(found.sampled, found.joint, found.measured, left, given.case.scene.calibrate.seed)
+    points = reweighed(given.judgement.particles, left, given.case.scene.calibrate.seed)
     shares = contraction(found.quantiles(points)).tolist()
     return dict(zip((each.key for each in given.inputs), shares, strict=True))
 

@@ -8,5 +8,6 @@
 - ``decision``: whether one design beats another all the same
 - ``worth``: which input decides that, and what measuring it is worth
 - ``cells``, ``matching``, ``discrepancy``, ``sampler``, ``calibration``: inputs from measurements
-- ``posterior``, ``verdict``: what these taught, and whether that may be called calibrated
+- ``posterior``, ``width``, ``verdict``: what these taught, whether predictions are as wide as they state, and whether that may be
+  called calibrated
 """

@@ -11,7 +11,7 @@ from scipy import special
 from doe.arrays import Array, Mask, Whole
 from doe.unknown import matching
 from doe.unknown.cells import Cells, fit_cells
-from doe.unknown.discrepancy import BY_ROW, Joint, Measured, joint
+from doe.unknown.discrepancy import BY_ROW, Errors, Joint, Measured, joint
 from doe.unknown.joint import nested
 from doe.unknown.sampler import PARTICLES, Sampled, sampled
 
@@ -62,13 +62,13 @@ class Matched:
         """Quantiles (n, d) of the inputs of particles."""
         return self.unknowns.at(points[:, : self.unknowns.inputs])
 
-    def taus(self, points: Array) -> Array:
-        """Discrepancies (n, m) of particles."""
-        return self.measured.taus(points[:, self.unknowns.inputs :])
+    def errors(self, points: Array) -> Errors:
+        """Errors of the simulation at particles, by output."""
+        return self.measured.errors(points[:, self.unknowns.inputs :])
 
     def joint(self, points: Array) -> Joint:
         """Measured cells at particles."""
-        return joint(self.cells, self.measured, self.quantiles(points), self.taus(points))
+        return joint(self.cells, self.measured, self.quantiles(points), self.errors(points))
 
 
 Simulate = Callable[[Array, int], Batch]
@@ -92,6 +92,7 @@ def matched(
     points, volumes, refuted, batch, cells = candidates[:count], list[float](), list[int](), None, None
     for wave in range(waves):
         new = simulate(_dependent(unknowns, points), wave)
+        measured = measured.with_scales(new.values) if batch is None else measured
         batch = new if batch is None else batch.joined(new)
         cells = _emulated(batch, measured, cells)
         apart, share = matching.implausibility(cells, measured, _dependent(unknowns, candidates))

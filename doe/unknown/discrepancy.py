@@ -1,14 +1,21 @@
 """How likely measured cells are at input sets, where the simulation itself may err by an unknown share.
 
 In logarithms z_cj = eta_j(c, theta) + b_j + e_cj + eps: output j is off by one bias b_j ~ N(0, tau_j^2) in all rows c and
-by e_cj ~ N(0, (0.3 tau_j)^2) in each; tau_j is half-normal of a stated scale and sampled with the inputs. The bias takes the
-level; only patterns over rows and outputs teach the inputs. Biases and errors are integrated out: cells are jointly normal
-with covariance diag(V) + U U', where U holds a column for each bias and for each component of the emulator's doubt.
+by e_cj ~ N(0, (0.3 rho_j)^2) in each. The bias takes the level; only patterns over rows and outputs identify the inputs.
+Biases and errors are integrated out: cells are jointly normal with covariance diag(V) + U U', where U holds a column for
+each bias and for each component of the emulator's doubt; the sizes tau_j and rho_j are sampled with the inputs.
 
-Source: Kennedy and O'Hagan, Bayesian calibration of computer models, J. R. Statist. Soc. B 63 (2001) 425.
+Each output is of one of three kinds, so that the sample itself weighs whether the model explains it:
+- as allowed: tau_j is half-normal of the allowed scale, rho_j = tau_j
+- off in its level: tau_j is half-normal of what the output can vary by, rho_j is at most the allowed scale; a biased sensor
+- off row by row: the same tau_j, and rho_j = tau_j; missing physics
+The share of the posterior in the last two over that of the prior is a Bayes factor.
+
+Sources: Kennedy and O'Hagan, Bayesian calibration of computer models, J. R. Statist. Soc. B 63 (2001) 425; Box and Tiao,
+A Bayesian approach to some outlier problems, Biometrika 55 (1968) 119, for the wide alternative beside the usual error.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,12 +26,27 @@ from doe.unknown.cells import Cells
 
 # What the simulation's error varies by from row to row, as a share of what all rows have in common.
 BY_ROW = 0.3
+# Allowed unless a scale is stated: this share of what the unknown inputs make an output vary by. A tenth leaves the patterns
+# of the inputs visible: an error of that size moves an input by a tenth of its range where one output alone identifies it.
+SHARE = 0.1
+# Chance of each of the two kinds that go beyond what is allowed, and their scale in allowed ones at least.
+BEYOND, WIDER = 0.05, 3.0
+
+
+class Errors(NamedTuple):
+    """Errors of the simulation at n particles by output: of the ``level`` tau (n, m) and of the ``rows`` rho (n, m), and
+    whether they go ``beyond`` (n, m) what is allowed."""
+
+    level: Array
+    rows: Array
+    beyond: Mask
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
     """Measured cells, in logarithms: ``values`` (c,), ``variances`` (c,) of rig and integration, the ``output`` and the
-    ``row`` (c,) each belongs to, ``scales`` (m,) of the discrepancy of each output, and whether a cell is ``held`` out."""
+    ``row`` (c,) each belongs to, ``scales`` (m,) of the discrepancy that is allowed of each output (NaN until ``with_scales``
+    where none is stated), whether a cell is ``held`` out, and what each output can vary by as ``spread`` (m,)."""
 
     values: Array
     variances: Array
@@ -32,15 +54,37 @@ class Measured:
     row: Whole
     scales: Array
     held: Mask
+    spread: Array | None = None
 
     @property
     def learnt(self) -> Whole:
         """Places of the cells that may teach."""
         return np.flatnonzero(~self.held)
 
-    def taus(self, scores: Array) -> Array:
-        """Discrepancies (n, m) at normal scores (n, m): half-normal."""
-        return self.scales * special.ndtri(0.5 + 0.5 * special.ndtr(scores).clip(0.0, 1.0 - 1e-15))
+    @property
+    def wide(self) -> Array:
+        """Scales (m,) of discrepancies beyond the allowed ones."""
+        spread = np.zeros(self.scales.size) if self.spread is None else self.spread
+        return np.where(self.scales > 0.0, np.maximum(spread, WIDER * self.scales), 0.0)
+
+    def with_scales(self, simulated: Array) -> "Measured":
+        """With the default where no scale is stated, by cells (n, c) that are simulated over the prior of the inputs: the
+        standard deviation within rows, as what differs from row to row is no doubt about the inputs."""
+        square = simulated.var(axis=0)
+        outputs = range(self.scales.size)
+        spread = np.sqrt([square[self.output == place].mean() for place in outputs]).clip(1e-6)
+        return replace(self, scales=np.where(np.isnan(self.scales), SHARE * spread, self.scales), spread=spread)
+
+    def errors(self, scores: Array) -> Errors:
+        """Errors of the simulation at normal scores (n, m): of each score the place in the prior of its output."""
+        quantiles = special.ndtr(scores)
+        within = 1.0 - 2.0 * BEYOND
+        beyond, rows_too = quantiles > within, quantiles > 1.0 - BEYOND
+        share = np.where(beyond, (quantiles - np.where(rows_too, 1.0 - BEYOND, within)) / BEYOND, quantiles / within)
+        size = special.ndtri(0.5 + 0.5 * share.clip(0.0, 1.0 - 1e-15))
+        level = size * np.where(beyond, self.wide, self.scales)
+        rows = np.where(beyond & ~rows_too, np.minimum(level, self.scales), level)
+        return Errors(level, rows, beyond & (self.scales > 0.0))
 
 
 class Joint(NamedTuple):
@@ -62,24 +106,27 @@ class Joint(NamedTuple):
             (off**2 / own).sum(axis=1) - (inside**2).sum(axis=1) + determinant + cells.size * np.log(2.0 * np.pi)
         )
 
-    def given(self, values: Array, known: Whole, asked: Whole) -> tuple[Array, Array]:
-        """Mean (n, a) and standard deviation (n, a) of ``asked`` cells where the values (c,) of ``known`` ones are known."""
-        if known.size == 0:
-            return self.mean[:, asked], np.sqrt(self.own + (self.roots**2).sum(axis=2))[:, asked]
-        roots = np.swapaxes(self.roots, 1, 2)
-        across = self.roots[:, asked] @ roots[:, :, known]
-        within = self.roots[:, known] @ roots[:, :, known] + self.own[:, known, None] * np.eye(known.size)
-        weights = np.linalg.solve(within, np.swapaxes(across, 1, 2))
-        mean = self.mean[:, asked] + np.einsum("nka,nk->na", weights, values[known] - self.mean[:, known])
-        told = np.einsum("nak,nka->na", across, weights)
-        variance = self.own[:, asked] + (self.roots[:, asked] ** 2).sum(axis=2) - told
-        return mean, np.sqrt(variance.clip(1e-300))
+    def latent(self, values: Array, known: Whole) -> tuple[Array, Array]:
+        """Mean (n, r) and root C (n, r, r) of the covariance CC' of what stands behind the common roots, where the values
+        (c,) of ``known`` cells (k,) are known: U times it is what cells have in common."""
+        roots = np.swapaxes(self.roots[:, known] / self.own[:, known, None], 1, 2)
+        information = np.eye(self.roots.shape[2]) + roots @ self.roots[:, known]
+        inverse = np.linalg.inv(np.linalg.cholesky(information))
+        mean = np.swapaxes(inverse, 1, 2) @ (inverse @ (roots @ (values[known] - self.mean[:, known])[:, :, None]))
+        return mean[:, :, 0], np.swapaxes(inverse, 1, 2)
+
+    def given(self, values: Array, known: Whole, asked: Whole) -> tuple[Array, Array, Array]:
+        """``asked`` cells (a,) where the values (c,) of ``known`` ones are known: their mean (n, a), variances of their own
+        (n, a) and common roots (n, a, r)."""
+        middle, root = self.latent(values, known)
+        across = self.roots[:, asked]
+        return self.mean[:, asked] + (across @ middle[:, :, None])[:, :, 0], self.own[:, asked], across @ root
 
 
-def joint(cells: Cells, measured: Measured, quantiles: Array, taus: Array) -> Joint:
-    """Measured cells at input sets (n, d) with discrepancies (n, m)."""
+def joint(cells: Cells, measured: Measured, quantiles: Array, errors: Errors) -> Joint:
+    """Measured cells at input sets (n, d) with errors of the simulation (n, m)."""
     mean, doubt = cells.predict(quantiles)
-    tau = taus[:, measured.output]
-    own = measured.variances + cells.rest + (BY_ROW * tau) ** 2
-    biases = tau[:, :, None] * (measured.output[:, None] == np.arange(measured.scales.size))
+    own = measured.variances + cells.rest + (BY_ROW * errors.rows[:, measured.output]) ** 2
+    level = errors.level[:, measured.output, None]
+    biases = level * (measured.output[:, None] == np.arange(measured.scales.size))
     return Joint(mean, own, np.concatenate([biases, doubt], axis=2))

@@ -14,6 +14,7 @@ from doe.arrays import Array
 
 # Contractions from which an input is learned, or partly; shares of the prior's variance below which a combination is known.
 LEARNED, PARTLY, KNOWN = 0.5, 0.2, 0.1
+INSIDE = 0.9  # of an interval
 # A range is too narrow where this share of the posterior lies within so much of one of its ends.
 CROWD, END = 0.2, 0.05
 # Powers below this share of the largest, in standard deviations of their inputs, are none.
@@ -53,6 +54,17 @@ def learnt(quantiles: Array, logarithms: Array, before: Array) -> Learnt:
 def contraction(quantiles: Array) -> Array:
     """1 - sd after / sd before (d,) of inputs by their quantiles (n, d), 0 where they spread more than before."""
     return (1.0 - quantiles.std(axis=0) / PRIOR_SD).clip(0.0)
+
+
+def densest_intervals(quantiles: Array) -> Array:
+    """Ends (2, d) of the shortest intervals that hold the share INSIDE of quantiles (n, d): of highest density where there is
+    one mode. One that begins at the outermost particle reaches to the end of the range, which equal tails never do."""
+    ordered, count = np.sort(quantiles, axis=0), len(quantiles)
+    span = int(np.ceil(INSIDE * count)) - 1
+    first = np.argmin(ordered[span:] - ordered[: count - span], axis=0)
+    columns = np.arange(quantiles.shape[1])
+    low = np.where(first == 0, 0.0, ordered[first, columns])
+    return np.array([low, np.where(first == count - span - 1, 1.0, ordered[first + span, columns])])
 
 
 def seen(share: float) -> str:

@@ -1,36 +1,43 @@
-"""Whether inputs that were matched to measurements foretell others, and what may be claimed.
+"""Whether inputs that were matched to measurements predict others, and what may be claimed.
 
-Rows held out are foretold from the rest; without enough of them every row is, from all others: particles of whichever
-power serve best are weighed by the likelihood of those others. Foretold are the measured values themselves, with biases as
-the other rows tell them and the errors of rig and simulation.
+Rows held out are predicted from the rest; without enough of them every row is, from all others: particles of whichever
+power serve best are weighed by the likelihood of those others. Predicted are the measured values themselves, with biases as
+the other rows tell them and the errors of rig and simulation. How wide predictions are is tried in turn: half of the rows
+predict the next, these together the one after it, and so on to the rows held out.
 
 Sources: Gneiting and Raftery, Strictly proper scoring rules, J. Am. Statist. Assoc. 102 (2007) 359 (CRPS); Vehtari, Gelman
-and Gabry, Practical Bayesian model evaluation using leave-one-out cross-validation (2017).
+and Gabry, Practical Bayesian model evaluation using leave-one-out cross-validation (2017); Kass and Raftery, Bayes factors,
+J. Am. Statist. Assoc. 90 (1995) 773.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
 
-from doe.arrays import Array, Whole
-from doe.unknown.discrepancy import Joint, Measured
+from doe.arrays import Array, Mask, Whole
+from doe.unknown.calibration import Matched
+from doe.unknown.discrepancy import BEYOND, Joint, Measured
 from doe.unknown.sampler import Level, Sampled, effective
+from doe.unknown.width import Scores, Width, scores_of, width
 
-# Rows held out that tell by themselves; share of cells inside their interval; chance below which a coverage is rejected.
-ENOUGH, INSIDE, REJECTED = 3, 0.9, 0.05
-# A discrepancy above this many scales, and residuals beyond this many standard deviations, are too large.
-GROWN, FAR = 2.0, 3.0
-# Draws of a cell, and particles of each power that they are drawn from.
-DRAWS, ENOUGH_OF = 800, 2000
+# Rows held out that tell by themselves; share of cells that their interval is to hold.
+ENOUGH, INSIDE = 3, 0.9
+# Residuals beyond so many standard deviations are too large; Bayes factors from the first on tell strongly that an output is
+# not explained, and particles tell them up to the second.
+FAR, STRONG, MOST = 3.0, 10.0, 1e6
+# Draws of a cell, of a row whose width is tried, and particles of each power that they are drawn from.
+DRAWS, WIDTH_DRAWS, ENOUGH_OF = 800, 2000, 2000
+ENDS = (0.5, 0.05, 0.95)
+# A bias is seen from so many of its standard deviations on, which so many particles tell.
+TOLD, FEWEST = 3.0, 30
 
 JointAt = Callable[[Array], Joint]
 
 
-class Foretold(NamedTuple):
-    """Cells foretold by the others: their ``places``, draws (s, k) after and before learning, and residuals (k,) in
+class Prediction(NamedTuple):
+    """Cells predicted by the others: their ``places``, draws (s, k) after and before learning, and residuals (k,) in
     standard deviations."""
 
     places: Whole
@@ -41,89 +48,117 @@ class Foretold(NamedTuple):
 
 @dataclass(frozen=True)
 class Trial:
-    """How well cells were foretold: whether ``held`` out, how many ``inside`` their 90 % interval of ``cells``, their mean
-    CRPS after and before learning, and the residual by cell."""
+    """How well cells were predicted: whether ``held`` out, how many ``inside`` their 90 % interval of ``cells``, their mean
+    CRPS after and before learning, and how wide predictions are."""
 
     held: bool
     cells: int
     inside: int
     crps: float
     crps_before: float
+    width: Width
+
+
+class Explanation(NamedTuple):
+    """Whether the simulation explains an output: its ``name``, by how much measured values are constantly above simulated
+    ones, the ``bias`` in logarithms (median, 5 and 95 %), the scale ``allowed``, the ``evidence``: the Bayes factor of an
+    error beyond that (None where the simulation is exact); and the ``resolution``: the least bias that would be seen, as
+    smaller ones pass for inputs (None: undecided)."""
+
+    name: str
+    bias: tuple[float, float, float]
+    allowed: float
+    evidence: float | None
+    resolution: float | None
 
     @property
-    def rejected(self) -> bool:
-        """Whether so few inside are hardly chance."""
-        return bool(stats.binom.cdf(self.inside, self.cells, INSIDE) < REJECTED)
+    def explained(self) -> bool:
+        """Whether there is no strong evidence of an error beyond what is allowed; none is sought where none is allowed."""
+        return self.evidence is None or self.evidence < STRONG
 
 
-def by_others(found: Sampled, at: JointAt, measured: Measured, seed: int) -> Foretold:
-    """Every row that teaches, foretold by the other rows that do."""
-    random = np.random.default_rng(seed)
-    levels, joints = _levels(found, at)
-    parts = []
-    for row in np.unique(measured.row[measured.learnt]):
-        asked = measured.learnt[measured.row[measured.learnt] == row]
-        known = measured.learnt[measured.row[measured.learnt] != row]
-        best, logs = _weighed(levels, joints, measured, known)
-        parts.append(_foretold(joints[best], logs, at, found.levels[0], measured, known, asked, random))
-    return Foretold(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
+@dataclass(frozen=True, eq=False)
+class Particles:
+    """Some particles of every power, which come in no order, and the measured cells there."""
+
+    levels: list[Level]
+    joints: list[Joint]
+    measured: Measured
+
+    @classmethod
+    def of(cls, found: Sampled, at: JointAt, measured: Measured) -> "Particles":
+        """Those of a sample."""
+        levels = [Level(each.power, each.points[:ENOUGH_OF], each.log_likelihood[:ENOUGH_OF]) for each in found.levels]
+        return cls(levels, [at(level.points) for level in levels], measured)
+
+    def draw(self, known: Whole, count: int, random: np.random.Generator) -> tuple[Array, Joint]:
+        """Particles (count, d) of the posterior by some cells alone, of the power that serves it best, and the cells there."""
+        weighed = [
+            joint.log_density(self.measured.values, known) - level.power * level.log_likelihood
+            for level, joint in zip(self.levels, self.joints, strict=True)
+        ]
+        best = int(np.argmax([effective(logs) for logs in weighed]))
+        weights = np.exp(weighed[best] - weighed[best].max())
+        rows = random.choice(len(weights), count, p=weights / weights.sum())
+        return self.levels[best].points[rows], Joint(*(each[rows] for each in self.joints[best]))
+
+    def predictions(self, known: Whole, asked: Whole, count: int, random: np.random.Generator) -> Array:
+        """Draws (count, a) of asked cells where ``known`` ones are."""
+        mean, own, roots = self.draw(known, count, random)[1].given(self.measured.values, known, asked)
+        common = (roots @ random.standard_normal((count, roots.shape[2], 1)))[:, :, 0]
+        return mean + common + np.sqrt(own) * random.standard_normal(mean.shape)
 
 
-def reweighed(found: Sampled, at: JointAt, measured: Measured, known: Whole, seed: int) -> Array:
-    """Particles (s, d) of the posterior by some cells alone."""
-    levels, joints = _levels(found, at)
-    best, logs = _weighed(levels, joints, measured, known)
-    return levels[best].points[_drawn(logs, np.random.default_rng(seed))]
-
-
-def _levels(found: Sampled, at: JointAt) -> tuple[list[Level], list[Joint]]:
-    """Some particles of every power, which come in no order, and the cells there."""
-    levels = [Level(each.power, each.points[:ENOUGH_OF], each.log_likelihood[:ENOUGH_OF]) for each in found.levels]
-    return levels, [at(level.points) for level in levels]
-
-
-def _weighed(levels: list[Level], joints: list[Joint], measured: Measured, known: Whole) -> tuple[int, Array]:
-    """Which level serves best for the posterior by some cells alone, and logarithms (n,) of its particles' weights."""
-    weighed = [
-        joint.log_density(measured.values, known) - level.power * level.log_likelihood
-        for level, joint in zip(levels, joints, strict=True)
+def by_others(particles: Particles, seed: int) -> Prediction:
+    """Every row that teaches, predicted by the other rows that do."""
+    random, measured = np.random.default_rng(seed), particles.measured
+    row = measured.row[measured.learnt]
+    parts = [
+        _prediction(particles, measured.learnt[row != each], measured.learnt[row == each], random)
+        for each in np.unique(row)
     ]
-    best = int(np.argmax([effective(logs) for logs in weighed]))
-    return best, weighed[best]
+    return Prediction(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
 
 
-def _drawn(logs: Array, random: np.random.Generator) -> Whole:
-    weights = np.exp(logs - logs.max())
-    return random.choice(len(logs), DRAWS, p=weights / weights.sum())
+def held_out(particles: Particles, seed: int) -> Prediction:
+    """The rows held out, predicted by all that teach."""
+    measured = particles.measured
+    return _prediction(particles, measured.learnt, np.flatnonzero(measured.held), np.random.default_rng(seed))
 
 
-def held_out(found: Sampled, at: JointAt, measured: Measured, seed: int) -> Foretold:
-    """The rows held out, foretold by all that teach."""
-    points = found.points
-    asked = np.flatnonzero(measured.held)
-    random = np.random.default_rng(seed)
-    return _foretold(at(points), np.zeros(len(points)), at, found.levels[0], measured, measured.learnt, asked, random)
+def reweighed(particles: Particles, known: Whole, seed: int) -> Array:
+    """Particles (s, d) of the posterior by some cells alone."""
+    return particles.draw(known, DRAWS, np.random.default_rng(seed))[0]
 
 
-def _foretold(
-    joint: Joint, logs: Array, at: JointAt, prior: Level, measured: Measured, known: Whole, asked: Whole,
-    random: np.random.Generator,
-) -> Foretold:  # fmt: skip
-    rows = _drawn(logs, random)
-    mean, sd = Joint(*(each[rows] for each in joint)).given(measured.values, known, asked)
-    after = mean + sd * random.standard_normal(mean.shape)
-    mean, sd = at(prior.points[:DRAWS]).given(measured.values, known[:0], asked)
-    before = mean + sd * random.standard_normal(mean.shape)
-    residuals = (measured.values[asked] - after.mean(axis=0)) / after.std(axis=0)
-    return Foretold(asked, after, before, residuals)
+def _prediction(particles: Particles, known: Whole, asked: Whole, random: np.random.Generator) -> Prediction:
+    after = particles.predictions(known, asked, DRAWS, random)
+    before = particles.predictions(known[:0], asked, DRAWS, random)
+    residuals = (particles.measured.values[asked] - after.mean(axis=0)) / after.std(axis=0)
+    return Prediction(asked, after, before, residuals)
 
 
-def trial(foretold: Foretold, measured: Measured, *, held: bool) -> Trial:
-    """How well cells were foretold."""
-    truth = measured.values[foretold.places]
-    low, high = np.quantile(foretold.after, [0.5 - 0.5 * INSIDE, 0.5 + 0.5 * INSIDE], axis=0)
+def sequential_scores(particles: Particles, seed: int) -> Iterator[Scores]:
+    """Scores of half of the rows that teach and of the rows held out, each by all rows before it, in an order by chance."""
+    random, measured = np.random.default_rng(seed), particles.measured
+    rows = [
+        [places[measured.row[places] == row] for row in random.permutation(np.unique(measured.row[places]))]
+        for places in (measured.learnt, np.flatnonzero(measured.held))
+    ]
+    order, start = [*rows[0], *rows[1]], (len(rows[0]) + 1) // 2
+    for place in range(start, len(order)):
+        known, asked = np.concatenate(order[:place]), order[place]
+        draws = particles.predictions(known, asked, WIDTH_DRAWS, random)
+        yield scores_of(draws, measured.values[asked], measured.output[asked])
+
+
+def trial(predicted: Prediction, particles: Particles, seed: int, *, held: bool) -> Trial:
+    """How well cells were predicted."""
+    truth = particles.measured.values[predicted.places]
+    low, high = np.quantile(predicted.after, [0.5 - 0.5 * INSIDE, 0.5 + 0.5 * INSIDE], axis=0)
     inside = int(((truth >= low) & (truth <= high)).sum())
-    return Trial(held, truth.size, inside, *(_crps(draws, truth) for draws in (foretold.after, foretold.before)))
+    after, before = (_crps(draws, truth) for draws in (predicted.after, predicted.before))
+    return Trial(held, truth.size, inside, after, before, width(list(sequential_scores(particles, seed))))
 
 
 def _crps(draws: Array, truth: Array) -> float:
@@ -133,21 +168,101 @@ def _crps(draws: Array, truth: Array) -> float:
     return float((np.abs(draws - truth).mean(axis=0) - apart).mean())
 
 
-def objections(result: Trial, taus: dict[str, tuple[float, float]], *, anything: bool, foretells: bool) -> list[str]:
-    """Why inputs may not be called calibrated; nothing where they may. ``taus``: discrepancy and its scale by output;
-    ``anything``: whether something was learned; ``foretells``: whether emulators foretell the simulation there."""
+def explanations(names: Sequence[str], joint: Joint, beyond: Mask, measured: Measured, seed: int) -> list[Explanation]:
+    """Of each output whether the simulation explains it, by particles of the posterior: cells there, and which errors
+    go ``beyond`` (n, m) what is allowed."""
+    middle, root = joint.latent(measured.values, measured.learnt)
+    random = np.random.default_rng(seed)
+    latent = middle + (root @ random.standard_normal((*middle.shape, 1)))[:, :, 0]
+    listed = []
+    for place, name in enumerate(names):
+        cell = int(np.flatnonzero(measured.output == place)[0])
+        biases = latent[:, place] * joint.roots[:, cell, place]
+        median, low, high = np.quantile(biases, ENDS).tolist()
+        # A bias beyond what is allowed is known no better than this, whatever it is.
+        wide = biases[beyond[:, place]]
+        resolution = float(TOLD * wide.std()) if wide.size >= FEWEST else None
+        exact = measured.scales[place] == 0.0
+        factor = None if exact else bayes_factor(float(beyond[:, place].mean()), 2.0 * BEYOND)
+        listed.append(Explanation(name, (median, low, high), float(measured.scales[place]), factor, resolution))
+    return listed
+
+
+def bayes_factor(share: float, before: float) -> float:
+    """Odds of a share of the posterior over those of its share before, as far as particles tell them."""
+    odds = share * (1.0 - before) / max((1.0 - share) * before, 1e-300)
+    return float(np.clip(odds, 1.0 / MOST, MOST))
+
+
+def joint_factor(beyond: Mask) -> float:
+    """The Bayes factor of any output being beyond what is allowed, of particles (n, m)."""
+    return bayes_factor(float(beyond.any(axis=1).mean()), 1.0 - (1.0 - 2.0 * BEYOND) ** beyond.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What may be claimed of a match: its ``trial``, each of the ``outputs``, the Bayes factor ``any_factor`` of any of them
+    being off, ``residuals`` (c,) of all cells as the others predict them, and the ``particles`` that told."""
+
+    trial: Trial
+    outputs: list[Explanation]
+    any_factor: float
+    residuals: Array
+    particles: Particles
+
+
+def judge(found: Matched, names: Sequence[str], seed: int) -> Judgement:
+    """Judge a match that has a sample, whose outputs have names."""
+    assert found.sampled is not None
+    measured, points = found.measured, found.sampled.points
+    particles = Particles.of(found.sampled, found.joint, measured)
+    parts = [by_others(particles, seed)]
+    enough = len(np.unique(measured.row[measured.held])) >= ENOUGH
+    if enough:
+        parts.append(held_out(particles, seed))
+    residuals = np.zeros(measured.values.size)
+    for part in parts:
+        residuals[part.places] = part.residuals
+    beyond = found.errors(points).beyond
+    outputs = explanations(names, found.joint(points), beyond, measured, seed)
+    return Judgement(
+        trial(parts[-1], particles, seed, held=enough), outputs, joint_factor(beyond), residuals, particles
+    )
+
+
+def objections(given: Judgement, *, anything: bool, emulated: bool) -> list[str]:
+    """Why inputs may not be called calibrated; nothing where they may. ``anything``: whether something was learned;
+    ``emulated``: whether emulators predict the simulation there."""
+    result, outputs = given.trial, given.outputs
     found = []
-    if result.rejected:
-        found.append(f"only {result.inside} of {result.cells} measured values lie in their 90 % interval")
+    for each in outputs:
+        if not each.explained:
+            off = f"{100.0 * np.expm1(each.bias[0]):+.2g} % off its level, {100.0 * each.allowed:.2g} % allowed"
+            cause = "its sensor is biased or physics is missing"
+            found.append(f"{each.name} is not explained: {off}, Bayes factor {each.evidence:.3g}; {cause}")
+    if given.any_factor >= STRONG and not found:
+        listed = " or ".join(each.name for each in sorted(outputs, key=lambda each: -(each.evidence or 0.0))[:2])
+        found.append(f"{listed} is not explained, which of them is undecided: Bayes factor {given.any_factor:.3g}")
+    if result.width.rejected:
+        found.append(_width_words(result.width, [each.name for each in outputs]))
+    elif not result.width.enough:
+        wide, narrow = (100.0 * each for each in result.width.power)
+        found.append(
+            f"{result.width.cells} predicted values are too few to judge intervals: of tables like this, twice too wide shows in "
+            f"{wide:.0f} %, twice too narrow in {narrow:.0f} %"
+        )
     if not result.crps < result.crps_before:
-        found.append("measured values are foretold no better than before")
-    found += [
-        f"{name} needs a discrepancy of {100.0 * tau:.0f} %, beyond twice the {100.0 * scale:.0f} % allowed: physics is missing"
-        for name, (tau, scale) in taus.items()
-        if scale > 0.0 and tau >= GROWN * scale
-    ]
+        found.append("measured values are predicted no better than before")
     if not anything:
         found.append("no input or combination of inputs was learned")
-    if not foretells:
-        found.append("emulators do not foretell the simulation at the inputs found")
+    if not emulated:
+        found.append("emulators do not predict the simulation at the inputs found")
     return found
+
+
+def _width_words(given: Width, names: list[str]) -> str:
+    """That predictions are too wide or too narrow, and where."""
+    where = "measured values" if given.output is None else names[given.output]
+    side = "wide" if given.worst < 1.0 else "narrow"
+    words = f"predictions of {where} are too {side}: residuals scatter {given.worst:.2g} times as much as predicted"
+    return f"{words} (chance {100.0 * given.chance:.2g} %)"

@@ -254,15 +254,15 @@ CONDITIONS = [(12000.0, 600.0), (12000.0, 2000.0), (18000.0, 600.0), (18000.0, 1
 HIDDEN = {"model.pocket_bar_stiffness_N_m": 3e7, "lubricant.oil_fraction": 0.03, "model.drag_coefficient": 0.6}
 
 
-def _own_rig(folder: Path, more: str = "") -> list[str]:
-    """A rig made from a hidden scene; rows 2, 5 and 7 are held out."""
+def _own_rig(folder: Path, more: str = "", reads: float = 1.0) -> list[str]:
+    """A rig made from a hidden scene, whose loss sensor ``reads`` so many times the loss; rows 2, 5 and 7 are held out."""
     random, rows = np.random.default_rng(1), []
     hidden = Scene.load(EXAMPLES / "cylindrical_roller.toml").changed(HIDDEN)
     for place, (speed, load) in enumerate(CONDITIONS):
         scene = hidden.changed({"operation.inner_speed_rpm": speed, "operation.radial_load_N": load})
         cells = [
-            f"{value * (1.0 + 0.02 * random.standard_normal()):.6g},{0.02 * value:.4g}"
-            for value in _responses(scene).values()
+            f"{by * value * (1.0 + 0.02 * random.standard_normal()):.6g},{0.02 * by * value:.4g}"
+            for by, value in zip((1.0, reads), _responses(scene).values(), strict=True)
         ]
         rows.append(f"{speed},{load},{','.join(cells)},{int(place in (1, 4, 6))}")
     header = HEADER.replace("inner_speed_rpm,", "inner_speed_rpm,operation.radial_load_N,") + ",hold"
@@ -287,6 +287,8 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path, capsys: py
     assert min(ridge["powers"].values()) > 0.8 and ridge["sd_percent"] < 0.25 * ridge["sd_percent_before"]
     assert record["inputs"]["cage.mass_g"]["seen"] == "not seen"
     assert record["held_out"]["rows"] == "held out" and record["held_out"]["values"] == 6
+    assert record["held_out"]["width"]["values"] == 10 and record["held_out"]["width"]["chance"] > 0.05
+    assert all(each["explained"] and each["allowed"] == 0.03 for each in record["outputs"].values())
     assert set(record["discrepancy"]) == {"impact_force_N", "power_loss_W"}
     print_calibration(record)
     told = capsys.readouterr().out
@@ -305,6 +307,21 @@ def test_a_rig_made_from_a_hidden_scene_gives_it_back(tmp_path: Path, capsys: py
     assert json.loads((tmp_path / "posterior.json").read_text("utf-8"))["verdict"] == "calibrated"
 
 
+def test_a_biased_sensor_ends_not_calibrated_and_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, _, rig, *_ = _own_rig(tmp_path, reads=1.2)
+    found = find_calibration(read_question(Path(scene), Path(rig), (), ()), _Simulations())  # type: ignore[arg-type]
+    record = record_of(found, "made of this")
+    assert json.loads(json.dumps(record)) == record
+    assert record["verdict"] == "not calibrated"
+    impact, loss = (record["outputs"][name] for name in ("impact_force_N", "power_loss_W"))
+    assert impact["explained"] and not loss["explained"] and loss["evidence"] > 10.0
+    # A tenth of what the unknown inputs do to each output is allowed by default.
+    assert 0.005 < loss["allowed"] < 0.05 < 0.2 < loss["discrepancy"][2]
+    assert any(reason.startswith("power loss is not explained") for reason in record["reasons"])
+    print_calibration(record)
+    assert "power loss: not explained" in capsys.readouterr().out
+
+
 def test_no_discrepancy_warns_and_a_missing_sd_is_that_of_a_run(tmp_path: Path) -> None:
     scene, _, rig, *_ = _own_rig(tmp_path, '[calibrate]\ndiscrepancy = "none"\nwaves = 1\n')
     lines = Path(rig).read_text("utf-8").splitlines()
@@ -315,6 +332,7 @@ def test_no_discrepancy_warns_and_a_missing_sd_is_that_of_a_run(tmp_path: Path) 
     Path(rig).write_text("\n".join(text), "utf-8")
     found = find_calibration(read_question(Path(scene), Path(rig), (), ()), _Simulations())  # type: ignore[arg-type]
     assert any("intervals are far too narrow" in note for note in found.notes)
+    assert all(each["evidence"] is None for each in record_of(found, "made of this")["outputs"].values())
     # Two replicates of 40 turns err by 1 %, one measurement of 20 turns by twice that.
     impact = found.found.measured.variances[found.found.measured.output == 0]
     assert np.sqrt(impact) == pytest.approx(0.02, rel=0.1)
@@ -326,7 +344,7 @@ def test_the_command_runs_and_answers_again_without_running(tmp_path: Path) -> N
     first = _run(command)
     assert first.exit_code == 0, first.output
     record = json.loads(first.stdout)
-    assert {"verdict", "learned", "combinations", "discrepancy", "held_out", "posterior"} <= set(record)
+    assert {"verdict", "learned", "combinations", "discrepancy", "outputs", "held_out", "posterior"} <= set(record)
     assert set(record["learned"]) <= {"cage.mass_g"} and record["verdict"] != "calibrated"
     store = (tmp_path / "out" / "study.sqlite").stat().st_mtime_ns
     assert json.loads(_run(command).stdout) == record

@@ -11,10 +11,23 @@ from scipy import special, stats
 from doe.arrays import Array
 from doe.unknown.calibration import Batch, Matched, Unknowns, matched
 from doe.unknown.cells import fit_cells
-from doe.unknown.discrepancy import BY_ROW, Joint, Measured
-from doe.unknown.posterior import contraction, learnt, seen
+from doe.unknown.discrepancy import BEYOND, BY_ROW, SHARE, WIDER, Joint, Measured
+from doe.unknown.posterior import contraction, densest_intervals, learnt, seen
 from doe.unknown.sampler import sampled
-from doe.unknown.verdict import by_others, held_out, objections, reweighed, trial
+from doe.unknown.verdict import (
+    MOST,
+    Explanation,
+    Judgement,
+    Particles,
+    Trial,
+    bayes_factor,
+    by_others,
+    held_out,
+    judge,
+    objections,
+    reweighed,
+)
+from doe.unknown.width import Scores, Width, scores_of, width
 
 ROWS, OUTPUTS, INPUTS = 8, 2, 3
 ACROSS = np.linspace(-1.0, 1.0, ROWS)
@@ -56,7 +69,7 @@ def _found(
 
 def _covered(found: Matched, truth: Array) -> Array:
     assert found.sampled is not None
-    low, high = np.quantile(found.quantiles(found.sampled.points), (0.05, 0.95), axis=0)
+    low, high = densest_intervals(found.quantiles(found.sampled.points))
     covered: Array = (truth >= low) & (truth <= high)
     return covered
 
@@ -105,10 +118,14 @@ def test_cells_are_jointly_normal_as_by_the_whole_covariance() -> None:
         exact = stats.multivariate_normal.logpdf(values[known], mean[place, known], whole[some])
         assert cells.log_density(values, known)[place] == pytest.approx(exact, rel=1e-12)
         weights = whole[np.ix_(asked, known)] @ np.linalg.inv(whole[some])
-        middle, sd = cells.given(values, known, asked)
+        middle, apart, common = cells.given(values, known, asked)
         assert middle[place] == pytest.approx(mean[place, asked] + weights @ (values - mean[place])[known], rel=1e-10)
         left = whole[np.ix_(asked, asked)] - weights @ whole[np.ix_(known, asked)]
-        assert sd[place] == pytest.approx(np.sqrt(np.diag(left)), rel=1e-10)
+        assert np.diag(apart[place]) + common[place] @ common[place].T == pytest.approx(left, rel=1e-10)
+        # Without any cell that is known, the whole covariance.
+        _, apart, common = cells.given(values, known[:0], asked)
+        whole_asked = whole[np.ix_(asked, asked)]
+        assert np.diag(apart[place]) + common[place] @ common[place].T == pytest.approx(whole_asked, rel=1e-12)
 
 
 def test_components_foretell_all_cells_within_their_doubt() -> None:
@@ -124,9 +141,88 @@ def test_components_foretell_all_cells_within_their_doubt() -> None:
     assert (off**2 / ((doubt**2).sum(axis=2) + cells.rest)).mean() < 2.0
 
 
-def test_half_normal_discrepancies() -> None:
-    taus = _measured(np.zeros(16), 0.1).taus(special.ndtri(np.linspace(0.05, 0.95, 19))[:, None] * [1.0, 1.0])
-    assert taus[:, 0] == pytest.approx(stats.halfnorm(scale=0.1).ppf(np.linspace(0.05, 0.95, 19)))
+def test_errors_of_the_simulation_are_half_normal_of_three_kinds() -> None:
+    count = 100_000
+    scores = special.ndtri((np.arange(count) + 0.5) / count)[:, None] * [1.0, 1.0]
+    spread = np.random.default_rng(1).standard_normal((500, 16))
+    measured = _measured(np.zeros(16), 0.1).with_scales(spread)
+    errors = measured.errors(scores)
+    assert errors.beyond.mean(axis=0) == pytest.approx(2.0 * BEYOND, abs=2.0 / count)
+    allowed, wide = errors.level[~errors.beyond[:, 0], 0], errors.level[errors.beyond[:, 0], 0]
+    assert measured.wide == pytest.approx([1.0, 1.0], rel=0.05)
+    for sizes, scale in ((allowed, 0.1), (wide, measured.wide[0])):
+        assert stats.kstest(sizes, stats.halfnorm(scale=scale).cdf).statistic < 1e-3
+    # Half of what goes beyond is an error of the level alone, whose rows err by what is allowed at most.
+    rows = errors.rows[errors.beyond[:, 0], 0]
+    assert np.mean(rows == wide) == pytest.approx(0.5 + 0.5 * np.mean(wide[: wide.size // 2] <= 0.1), abs=1e-3)
+    assert rows[: rows.size // 2].max() == 0.1
+    # An exact simulation has no errors, whatever outputs vary by.
+    none = _measured(np.zeros(16), 0.0).with_scales(spread).errors(scores)
+    assert not none.level.any() and not none.beyond.any()
+
+
+def test_by_default_a_share_of_what_inputs_do_within_rows_is_allowed() -> None:
+    random = np.random.default_rng(2)
+    # The first output varies by 0.3 % over the inputs and by much over the rows, the second by 20 % over the inputs.
+    simulated = np.repeat([0.003, 0.2], ROWS) * random.standard_normal((20_000, 16)) + np.arange(16.0)
+    measured = _measured(np.zeros(16), np.nan).with_scales(simulated)
+    assert measured.scales == pytest.approx([SHARE * 0.003, SHARE * 0.2], rel=0.02)
+    assert measured.wide == pytest.approx([0.003, 0.2], rel=0.02)
+    stated = _measured(np.zeros(16), 0.1).with_scales(simulated)
+    assert stated.scales.tolist() == [0.1, 0.1] and stated.wide == pytest.approx([WIDER * 0.1] * 2)
+
+
+def test_densest_intervals_hold_an_end_and_agree_with_quantiles_in_the_middle() -> None:
+    random = np.random.default_rng(3)
+    # Of 1 - (1 - q)^4 the densest 90 % begin at 0; of a symmetric one they are its quantiles.
+    low, high = densest_intervals(np.column_stack([random.beta(1.0, 4.0, 40_000), random.beta(8.0, 8.0, 40_000)]))
+    assert low[0] == 0.0 and high[0] == pytest.approx(1.0 - 0.1**0.25, abs=0.01)
+    assert [low[1], high[1]] == pytest.approx(stats.beta(8.0, 8.0).ppf([0.05, 0.95]), abs=0.02)
+    assert densest_intervals(1.0 - random.beta(1.0, 4.0, (4000, 1)))[1] == [1.0]
+
+
+def _widths(factor: float, rows: int, repeats: int, seed: int) -> Array:
+    """Chances (repeats,) of tables of three correlated cells a row, predicted by ``factor`` times their standard deviation."""
+    random, root = np.random.default_rng(seed), np.linalg.cholesky(0.6 + 0.4 * np.eye(3))
+    chances = []
+    for _ in range(repeats):
+        truths = random.standard_normal((rows, 3)) @ root.T / factor
+        draws = random.standard_normal((rows, 500, 3)) @ root.T
+        parts = [scores_of(one, truth, np.arange(3)) for one, truth in zip(draws, truths, strict=True)]
+        chances.append(width(parts).chance)
+    return np.array(chances)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rows", [4, 16])
+def test_width_of_right_predictions_is_rejected_in_one_of_twenty(rows: int) -> None:
+    chances = _widths(1.0, rows, 400, rows)
+    assert 0.02 <= (chances <= 0.05).mean() <= 0.08
+    assert stats.kstest(chances, "uniform").pvalue > 0.01
+
+
+def test_predictions_twice_too_wide_or_narrow_are_rejected() -> None:
+    for factor in (0.5, 2.0):
+        assert (_widths(factor, 16, 40, 5) <= 0.05).mean() >= 0.95
+
+
+def test_width_names_the_output_and_knows_what_it_cannot_tell() -> None:
+    random = np.random.default_rng(6)
+    truths, draws = random.standard_normal((16, 3)) * [1.0, 0.3, 1.0], random.standard_normal((16, 800, 3))
+    parts = [scores_of(one, truth, np.arange(3)) for one, truth in zip(draws, truths, strict=True)]
+    found = width(parts)
+    assert found.rejected and found.enough and found.output == 1 and found.worst == pytest.approx(0.3, abs=0.1)
+    # Squares of six standard normals, halved or doubled, against their limits.
+    few = width([Scores(np.zeros(6), random.standard_normal((20_000, 6)), np.zeros(6, int))])
+    low, high = stats.chi2(6).ppf([0.025, 0.975])
+    assert few.power == pytest.approx((stats.chi2(6).cdf(4.0 * low), stats.chi2(6).sf(high / 4.0)), abs=0.02)
+    assert not few.enough and few.chance < 0.001
+
+
+def test_a_factor_of_evidence_is_a_ratio_of_odds() -> None:
+    assert bayes_factor(0.5, 0.1) == pytest.approx(9.0)
+    assert bayes_factor(0.1, 0.1) == pytest.approx(1.0)
+    assert bayes_factor(1.0, 0.1) == MOST and bayes_factor(0.0, 0.1) == 1.0 / MOST
 
 
 def _of_prior(random: np.random.Generator, scale: float) -> tuple[Array, Array]:
@@ -166,29 +262,37 @@ def test_a_biased_simulation_needs_a_discrepancy() -> None:
     assert np.mean(covered[0.0]) < 0.5
 
 
-def test_a_sound_rig_is_calibrated_and_held_out_rows_are_foretold() -> None:
+def _against(found: Matched, seed: int = 1) -> tuple[list[str], Judgement]:
+    """Why a match may not be called calibrated."""
+    assert found.sampled is not None
+    judgement = judge(found, ["impact", "loss"], seed)
+    return objections(judgement, anything=True, emulated=found.misfit < 2.0), judgement
+
+
+def test_a_sound_rig_is_calibrated_and_held_out_rows_are_predicted() -> None:
     random = np.random.default_rng(6)
     truth = np.array([0.7, 0.3, 0.5])
     values = _truth(truth[None])[0] + RIG * random.standard_normal(RIG.size)
-    found = _found(values, 0.05, 6, held=(1, 4, 6))
+    found = _found(values, np.nan, 6, held=(1, 4, 6))
     assert found.sampled is not None and found.misfit < 2.0 and not found.refuted
     points = found.sampled.points
     taught = learnt(found.quantiles(points), np.full((len(points), 3), np.nan), np.full((9, 3), np.nan))
     assert [seen(each) for each in taught.contraction] == ["learned", "learned", "not seen"]
-    test = held_out(found.sampled, found.joint, found.measured, 1)
-    result = trial(test, found.measured, held=True)
-    assert result.cells == 6 and result.inside >= 4 and result.crps < 0.3 * result.crps_before
-    taus = {str(place): (tau, 0.05) for place, tau in enumerate(np.median(found.taus(points), axis=0))}
-    assert not objections(result, taus, anything=taught.anything, foretells=True)
-    # Without rows to spare each is foretold by the others.
-    others = trial(by_others(found.sampled, found.joint, found.measured, 1), found.measured, held=False)
-    assert others.cells == 10 and not others.rejected
+    particles = Particles.of(found.sampled, found.joint, found.measured)
+    against, judgement = _against(found)
+    assert not against and taught.anything
+    result = judgement.trial
+    assert result.held and result.cells == 6 and result.inside >= 4 and result.crps < 0.3 * result.crps_before
+    assert result.width.cells == 4 + 6
+    assert held_out(particles, 1).places.tolist() == np.flatnonzero(found.measured.held).tolist()
+    # Without rows to spare each is predicted by the others.
+    others = by_others(particles, 1)
+    assert others.places.size == 10 and np.abs(others.residuals).max() < 3.0
     # Particles weighed anew: by all cells the same posterior, by the second output less of the first input, by none the prior.
     learnt_cells = found.measured.learnt
     second = learnt_cells[found.measured.output[learnt_cells] == 1]
     shares = [
-        contraction(found.quantiles(reweighed(found.sampled, found.joint, found.measured, known, 1)))
-        for known in (learnt_cells, second, second[:0])
+        contraction(found.quantiles(reweighed(particles, known, 1))) for known in (learnt_cells, second, second[:0])
     ]
     assert shares[0] == pytest.approx(taught.contraction, abs=0.1)
     assert shares[1][0] < shares[0][0] - 0.01
@@ -203,13 +307,40 @@ def test_missing_physics_is_not_taken_for_inputs() -> None:
     found = _found(values, 0.1, 7)
     assert found.sampled is not None
     points = found.sampled.points
-    taus = np.median(found.taus(points), axis=0)
-    assert taus[0] > 0.2 > taus[1]
     taught = learnt(found.quantiles(points), np.full((len(points), 3), np.nan), np.full((9, 3), np.nan))
     assert not taught.narrow
-    result = trial(by_others(found.sampled, found.joint, found.measured, 1), found.measured, held=False)
-    told = objections(result, {"impact_force_N": (taus[0], 0.1)}, anything=taught.anything, foretells=True)
-    assert any("physics is missing" in each for each in told)
+    against, judgement = _against(found)
+    assert [each.explained for each in judgement.outputs] == [False, True]
+    assert any(each.startswith("impact is not explained") and "physics is missing" in each for each in against)
+
+
+def test_a_biased_sensor_is_named_with_its_bias() -> None:
+    """The second output reads 20 % too high, which no input does in all rows."""
+    random = np.random.default_rng(8)
+    values = _truth(np.array([[0.6, 0.4, 0.5]]))[0] + np.repeat([0.0, np.log(1.2)], ROWS)
+    found = _found(values + RIG * random.standard_normal(RIG.size), np.nan, 8)
+    against, judgement = _against(found)
+    impact, loss = judgement.outputs
+    assert impact.explained and not loss.explained and loss.evidence is not None and loss.evidence > 100.0
+    assert loss.bias[1] < np.log(1.2) < loss.bias[2] and loss.resolution is not None and loss.resolution < np.log(1.2)
+    assert any(each.startswith("loss is not explained") and "sensor" in each for each in against)
+    # Stated as allowed, it is none against.
+    assert all(each.explained for each in _against(_found(values, 0.2, 8))[1].outputs)
+
+
+def test_predictions_too_wide_are_a_reason_as_are_too_few_of_them() -> None:
+    """A table whose sensors are ten times as good as they state."""
+    random = np.random.default_rng(9)
+    values = _truth(np.array([[0.6, 0.4, 0.5]]))[0] + 0.1 * RIG * random.standard_normal(RIG.size)
+    against, _ = _against(_found(values, np.nan, 9))
+    assert any("too wide" in each for each in against)
+    explained = Explanation("loss", (0.0, 0.0, 0.0), 0.1, 0.5, None)
+    few = Trial(True, 6, 6, 0.1, 0.2, Width(6, 1.0, 0.5, None, 1.0, (0.4, 0.7)))
+    (told,) = objections(
+        Judgement(few, [explained], 0.5, np.zeros(6), Particles([], [], _measured(values, 0.1))),
+        anything=True, emulated=True,
+    )  # fmt: skip
+    assert "6 predicted values are too few" in told and "shows in 40 %" in told
 
 
 def test_what_no_input_set_gives_is_refuted_by_the_cells_that_do_it() -> None:

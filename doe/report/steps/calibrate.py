@@ -1,4 +1,4 @@
-"""What measurements on a rig taught of a scene's inputs, on the terminal, as JSON, as tables and as pictures."""
+"""What measurements on a rig identify of a scene's inputs, on the terminal, as JSON, as tables and as pictures."""
 
 import csv
 from collections import Counter
@@ -33,8 +33,9 @@ def record_of(found: Calibration, made_of: str) -> dict[str, Any]:
     """JSON record of ``doe calibrate``; ``made_of`` tells what it was asked of."""
     keys = [each.key for each in found.inputs]
     posterior = found.found.sampled
-    taught, tried = found.learnt, found.trial
-    taus = [] if posterior is None else np.quantile(found.found.taus(posterior.points), TAUS, axis=0).T.tolist()
+    taught, judgement = found.learnt, found.judgement
+    tried = None if judgement is None else judgement.trial
+    taus = [] if posterior is None else np.quantile(found.found.errors(posterior.points).level, TAUS, axis=0).T.tolist()
     return {
         "format": FORMAT,
         "made_of": made_of,
@@ -52,12 +53,20 @@ def record_of(found: Calibration, made_of: str) -> dict[str, Any]:
             for each in (taught.combinations if taught else ())
         ],
         "discrepancy": dict(zip(found.rig.outputs, taus, strict=False)),
+        "outputs": _outputs(found),
         "held_out": None if tried is None else {
             "rows": "held out" if tried.held else "each condition in turn",
             "values": tried.cells,
             "inside_90_percent": tried.inside,
             "crps": tried.crps,
             "crps_before": tried.crps_before,
+            "width": {
+                "values": tried.width.cells,
+                "ratio": tried.width.ratio,
+                "chance": tried.width.chance,
+                "power_too_wide": tried.width.power[0],
+                "power_too_narrow": tried.width.power[1],
+            },
         },
         "posterior": None if posterior is None else SAMPLE,
         "inputs": {} if posterior is None else _inputs(found),
@@ -73,24 +82,41 @@ def record_of(found: Calibration, made_of: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _outputs(found: Calibration) -> dict[str, Any]:
+    """Of each output whether the model explains it: shares by which it is off its level, allowed and seen at least."""
+    refuted = {found.cells[place][1] for place in found.found.refuted}
+    outputs = found.judgement.outputs if found.judgement else [None] * len(found.rig.outputs)
+    return {
+        name: {
+            "explained": name not in refuted and each is not None and each.explained,
+            "discrepancy": None if each is None else np.expm1(each.bias).tolist(),
+            "allowed": None if each is None else each.allowed,
+            "evidence": None if each is None else each.evidence,
+            "resolution": None if each is None or each.resolution is None else float(np.expm1(each.resolution)),
+        }
+        for name, each in zip(found.rig.outputs, outputs, strict=True)
+    }
+
+
 def _inputs(found: Calibration) -> dict[str, Any]:
-    listed, values = dict[str, dict[str, Any]](), found.sample
+    listed, values, ends = dict[str, dict[str, Any]](), found.sample, found.ends
     for place, each in enumerate(found.inputs):
         column = [row[each.key] for row in values]
         if each.law.law == "choices":
             listed[each.key] = {"shares": {str(value): count / len(column) for value, count in Counter(column).items()}}
         else:
-            listed[each.key] = dict(zip(("low", "median", "high"), np.quantile(column, ENDS).tolist(), strict=True))
-            listed[each.key]["before"] = list(_range(found, place, ENDS[0]))
+            low, high = _between(found, place, ends[:, place])
+            listed[each.key] = {"low": low, "median": float(np.median(column)), "high": high}
+            listed[each.key]["before"] = list(_between(found, place, np.array([ENDS[0], ENDS[-1]])))
         assert found.learnt is not None
         listed[each.key]["seen"] = seen(float(found.learnt.contraction[place]))
     return listed
 
 
-def _range(found: Calibration, place: int, cut: float) -> tuple[float, float]:
-    """What the scene has at an input's quantiles ``cut`` and 1 - ``cut``."""
+def _between(found: Calibration, place: int, quantiles: Array) -> tuple[float, float]:
+    """What the scene has at two quantiles of an input's law."""
     each = found.inputs[place]
-    low, high = (found.case.unit(each) * value for value in laws.values_of(each.law, np.array([cut, 1.0 - cut])))
+    low, high = (found.case.unit(each) * value for value in laws.values_of(each.law, quantiles))
     return low, high
 
 
@@ -106,7 +132,7 @@ def _cell(found: Calibration, place: int) -> dict[str, Any]:
         "as_the_scene_says": float(np.exp(found.nominal[place])),
         "before": _ends(found.before[:, place]),
         "after": None if found.after is None else _ends(found.after[:, place]),
-        "residual": None if found.residuals is None else float(found.residuals[place]),
+        "residual": None if found.judgement is None else float(found.judgement.residuals[place]),
     }
 
 
@@ -115,7 +141,7 @@ def _ends(logarithms: Array) -> list[float]:
 
 
 def print_calibration(record: dict[str, Any]) -> None:
-    """The verdict with its reasons, a table of inputs, what goes together, how well the rest is foretold."""
+    """The verdict with its reasons, a table of inputs, combinations, each output, how well the rest is predicted."""
     reasons = record["reasons"]
     print(f"{record['verdict']}{': ' if reasons else ''}{'; '.join(reasons)}")
     rows = [
@@ -124,21 +150,28 @@ def print_calibration(record: dict[str, Any]) -> None:
     ]
     if rows:
         print_table(
-            "inputs, 5 to 95 % of what is likely",
+            "inputs: 5 to 95 % before, the densest 90 % after, which may reach an end of the range",
             ("input", "before", "after", "median", "contraction", ""),
             [(key, *_interval(each), f"{share:.2f}", each["seen"]) for key, share, each in rows],
         )
     for each in record["combinations"]:
         powers = " · ".join(f"{key}^{power:.2g}" for key, power in each["powers"].items())
         print(f"known together: {powers} to {each['sd_percent']:.2g} % (before {each['sd_percent_before']:.2g} %)")
-    for name, (median, low, high) in record["discrepancy"].items():
+    for name, each in record["outputs"].items():
+        if each["evidence"] is not None:
+            print(_output_words(quantity(name)[0], each))
+    if record["inputs"]:
         print(
-            f"{quantity(name)[0]}: the simulation errs by {100.0 * median:.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f}); "
-            "such an error takes the level, only patterns over rows and outputs teach inputs"
+            "a constant offset is absorbed by the discrepancy; only differences between rows and outputs identify inputs"
         )
     if tried := record["held_out"]:
         inside = f"{tried['inside_90_percent']} of {tried['values']} values in their 90 % interval"
         print(f"{tried['rows']}: {inside}, CRPS {tried['crps']:.2g} (before {tried['crps_before']:.2g})")
+        width = tried["width"]
+        print(
+            f"width of predictions: residuals of {counted(width['values'], 'value')} scatter {width['ratio']:.2g} times as "
+            f"much as predicted (chance {100.0 * width['chance']:.2g} %)"
+        )
     for each in record["outliers"]:
         far = f"{each['residual']:.1f} standard deviations"
         print(f"{quantity(each['output'])[0]} of row {each['row']} is {far} off the others")
@@ -153,6 +186,17 @@ def print_calibration(record: dict[str, Any]) -> None:
         )
     for note in record["notes"]:
         print(f"note: {note}")
+
+
+def _output_words(name: str, each: dict[str, Any]) -> str:
+    """By how much an output is off its level, what is allowed, and what would be seen."""
+    median, low, high = (100.0 * value for value in each["discrepancy"])
+    words = "explained" if each["explained"] else "not explained"
+    off = f"{name}: {words}, {median:+.2g} % off its level ({low:+.2g} to {high:+.2g}), {100.0 * each['allowed']:.2g} % allowed"
+    least = (
+        "" if each["resolution"] is None else f"; an offset below {100.0 * each['resolution']:.2g} % would not be seen"
+    )
+    return f"{off}, Bayes factor {each['evidence']:.3g}{least}"
 
 
 def _interval(each: dict[str, Any]) -> tuple[str, str, str]:
@@ -206,7 +250,7 @@ def draw_corner(found: Calibration, record: dict[str, Any], path: Path) -> None:
     ranked = sorted(range(len(found.inputs)), key=lambda place: -record["learned"][found.inputs[place].key])
     chosen = [place for place in ranked if found.inputs[place].law.law != "choices"][:SHOWN]
     columns = [[row[found.inputs[place].key] for row in found.sample] for place in chosen]
-    ranges = [_range(found, place, END) for place in chosen]
+    ranges = [_between(found, place, np.array([END, 1.0 - END])) for place in chosen]
     count = max(len(chosen), 1)
     figure, axes = plt.subplots(count, count, figsize=(1.7 * count + 1.5, 1.7 * count + 0.8), squeeze=False)
     for (down, across), axis in np.ndenumerate(axes):
