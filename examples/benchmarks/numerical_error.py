@@ -248,7 +248,7 @@ def main() -> None:
     parser.add_argument(
         "--size", type=size_of, default=Size(16, 20.0, 10.0), help="replicates,turns,discarded (16,20,10)"
     )
-    parser.add_argument("--dear", type=size_of, default=Size(8, 15.0, 5.0), help="the same of dear scenes (8,15,5)")
+    parser.add_argument("--dear", type=size_of, default=Size(8, 6.0, 2.0), help="the same of dear scenes (8,6,2)")
     parser.add_argument("--truths", type=Path, default=TRUTHS, help="JSON file that keeps truths (beside this script)")
     parser.add_argument("--out", type=Path, help="CSV file of all cells")
     parser.add_argument("--workers", type=int, default=2, help="threads (2)")
@@ -265,7 +265,7 @@ def main() -> None:
         truth = kept_truth(asked.truths, case, scene, asked.workers)
         cells, costs[case.name] = rows_of(case, scene, truth, asked.workers)
         for row in cells:
-            numbers = f"{row.truth:10.5g} {row.bias:+9.3f} {row.noise:8.3f} {row.stated:8.3f} {row.plain:8.3f}"
+            numbers = f"{row.truth:10.5g} {row.bias:+9.2g} {row.noise:8.2g} {row.stated:8.2g} {row.plain:8.2g}"
             verdict = ("no", "yes")[row.holds] + ", resolved" * row.resolved
             print(f"{row.scene:24} {row.figure:22} {numbers} {verdict}", flush=True)
         rows += cells

@@ -9,8 +9,8 @@ which damps less where x is above 1.
 
 What counts is this damping compared with that of the race at so light a load, which engages over an approach that light contacts
 hardly make. At 2000 rpm and 4 kN the bearing of Chen et al. 2022 has a damping ratio of 4.9e-4 there. Its loss rises with
-the logarithm of the damping, by 1.5 % a decade from 2e-5 to 2e-3 and hardly beyond, whether the law or the method
-damps: by 1.2 % at a numerical damping ratio of 8e-3, by 0.5 % at 6e-4, by 0.08 % at 2e-5 to 7e-5. Companions of such
+the logarithm of the damping, by 1.5 % a decade from 2e-5 to 2e-3, by 0.4 +- 0.4 % below and hardly beyond, whether the law or
+the method damps: by 1.2 % at a numerical damping ratio of 8e-3, by 0.5 % at 6e-4, by 0.08 % at 2e-5 to 7e-5. Companions of such
 runs take steps so short that a tenth of this bias is left, so ten ninths of their difference from the runs count.
 """
 
@@ -27,8 +27,8 @@ from rbdyn.scene import Scene
 DAMPING_SCALE = {"rk45": 3600.0, "rk43": 144.0, "rosenbrock": 11_500.0}
 # Numerical damping of a light contact that counts, over that of the race.
 DAMPED = 0.2
-# Damping ratios between which the loss depends on them: below the first something else ends the jumps, beyond the other
-# rollers no longer jump.
+# Damping ratios between which the loss depends on them most: below the first something else ends the jumps, beyond the other
+# rollers hardly jump.
 LEAST_DAMPING, MOST_DAMPING = 2e-5, 2e-3
 # Tolerance over that of runs whose steps stability holds, at which the tolerance itself makes them short enough.
 TIGHT = 1e-4

@@ -175,7 +175,10 @@ def recording_of(
     """The recording of a replicate, or of the companion of it that is integrated so."""
     if companions is None:
         return Recording(Run(scene, bearing, replicate, scene.numerics.rtol, stop, pace))
-    companion = with_numerics(scene, method=companions.method)
+    # Where the longest step asks for more steps than the scene allows a turn, they are allowed twice what it asks for.
+    needed = math.ceil(2.0 * scene.turn_s / companions.longest_step)
+    budget = max(scene.numerics.step_budget_per_turn, needed)
+    companion = with_numerics(scene, method=companions.method, step_budget_per_turn=budget)
     return Recording(Run(companion, bearing, replicate, companions.rtol, stop, pace, companions.longest_step))
 
 

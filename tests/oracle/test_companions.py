@@ -20,9 +20,11 @@ from rbdyn.dynamics.companions import (
     resolved_damping,
     usual_companions,
 )
+from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.integrators import dormand_prince, kutta_pair, rosenbrock
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import light_contact
+from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.simulate import simulate
 from rbdyn.dynamics.statistics.metrics import Replicate
 
@@ -135,6 +137,16 @@ def test_unit_companions_leave_a_tenth_of_a_logarithm(race):
     for damping in (DAMPED * race, MOST_DAMPING, 1.0):
         bias = math.log10(1.0 + min(damping, max(MOST_DAMPING, DAMPED * race)) / race)
         assert math.log10(1.0 + resolved_damping(damping, race) / race) == pytest.approx(0.1 * bias)
+
+
+def test_unit_companions_may_take_the_steps_they_need(make_scene):
+    """Unit: a budget of steps that replicates keep is no reason for companions of short steps to give up."""
+    scene = make_scene(*SLOW, "numerics.step_budget_per_turn=100", "numerics.turns=0.01", "numerics.discard_turns=0")
+    plan = usual_companions(scene)._replace(method="rk43", longest_step=1e-3 * scene.turn_s)
+    bearing = roller_bearing(scene)
+    short, usual = (recording_of(scene, bearing, None, 0, one, Stop()) for one in (plan, None))
+    assert short.run.control.step_budget == 2000 and usual.run.control.step_budget == 100
+    assert short.run.control.largest_step == pytest.approx(1e-3 * scene.turn_s)
 
 
 @pytest.mark.slow

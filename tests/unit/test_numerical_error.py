@@ -85,3 +85,12 @@ def test_invariant_truths_are_kept_as_long_as_the_laws(benchmark, scenes, tmp_pa
     other = scene.changed({"model.rolling_resistance_factor": 1.001})
     benchmark.kept_truth(path, case, other, 1)
     assert len(simulated) == 2
+
+
+def test_invariant_shipped_truths_are_of_the_scenes(benchmark):
+    """Invariant: each truth of the file beside the script is of one of its scenes and has every figure, of sixty cells at least."""
+    kept = json.loads(benchmark.TRUTHS.read_text(encoding="utf-8"))
+    names = {case.name for case in benchmark.CASES}
+    assert {name.rpartition(", ")[0] for name in kept} <= names
+    assert all(set(one["figures"]) == set(benchmark.JUDGED) for one in kept.values())
+    assert sum(len(one["figures"]) for one in kept.values()) >= 60
