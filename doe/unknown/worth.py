@@ -286,8 +286,9 @@ class _Figures(NamedTuple):
         """Ends (2, i) of the 95 % intervals; a bias lengthens its own side only."""
         known = np.where(np.isfinite(self.again), self.again, self.values)
         low, high = np.quantile(known, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], axis=0) - self.values
-        below, above = ((side**2).sum(axis=0) for side in (self.biases.clip(max=0.0), self.biases.clip(min=0.0)))
-        return np.array([self.values - np.sqrt(low**2 + below), self.values + np.sqrt(high**2 + above)])
+        # Biases add up; scatter is independent of them.
+        below, above = (side.sum(axis=0) for side in (self.biases.clip(max=0.0), self.biases.clip(min=0.0)))
+        return np.array([self.values - np.hypot(low, below), self.values + np.hypot(high, above)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -129,3 +129,23 @@ def test_over_seeds_and_sizes_the_same_decides(name: str, places: tuple[int, ...
             assert found.verdict == "decided" and found.rivals == list(places)
         else:
             assert found.verdict == "nothing" and found.pair is not None and found.pair.places == places
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["two", "equal", "rig"])
+def test_intervals_cover_and_a_wrong_input_is_rarely_named(name: str) -> None:
+    """Over 40 repeats of 128 pairs: worths above 0.02 and flips of the first input, and at most one wrong input in ten."""
+    worths, flips = KNOWN[name].truth()
+    right, worthy = int(worths.argmax()), np.flatnonzero(worths > 0.02)
+    held, crossed, wrong = [], [], 0
+    for seed in range(40):
+        found = KNOWN[name].decide(128, seed)
+        for each in found.inputs:
+            if each.place in worthy:
+                held.append(each.worth_interval[0] - POINT <= worths[each.place] <= each.worth_interval[1] + POINT)
+            if each.place == right and each.flip_interval is not None and np.isfinite(flips[right]):
+                crossed.append(each.flip_interval[0] <= flips[right] <= each.flip_interval[1])
+        wrong += found.verdict == "decided" and worths[found.rivals[0]] < worths[right] - POINT
+    assert np.mean(held) >= 0.85
+    assert len(crossed) < 10 or np.mean(crossed) >= 0.85
+    assert wrong <= 4
