@@ -10,8 +10,9 @@ Intervals are by resampling: half of the rows without replacement, emulated by t
 from n/2 of n rows scatters about that from all of them as this does about the truth (the delete-d jackknife at d = n/2), and
 no row comes twice, which an emulator would take for a replicate. Fewer rows foretell less, so the resamplings count by their
 scatter about their mean; how far that lies from the estimate by all rows is the bias of this one, as of errors that fall
-with the rows, and widens the interval. So do the error of the averages over fresh input sets, what slices blur, and what
-the worth would be without the emulators' own errors, which are no scatter where they go together along the input. An input decides where it, and no other,
+with the rows, and lengthens the interval on its side. So do what slices blur, and what the worth would be without the
+emulators' own errors, which are no scatter where they go together along the input. The error of averages over fresh
+input sets widens both sides. An input decides where it, and no other,
 is worth most in nearly all resamplings, the input that does nothing counted.
 
 Sources: Strong, Oakley and Brennan, Medical Decision Making 34 (2014) 311 (expected value of partial perfect information by
@@ -273,70 +274,76 @@ class _Estimates(NamedTuple):
     parts: list[_Estimate]
 
 
+class _Figures(NamedTuple):
+    """Values (i,), what resamplings make of them (b, i), not a number where one has none, and known biases (r, i)."""
+
+    values: Array
+    again: Array
+    biases: Array
+
+    @property
+    def ends(self) -> Array:
+        """Ends (2, i) of the 95 % intervals; a bias lengthens its own side only."""
+        known = np.where(np.isfinite(self.again), self.again, self.values)
+        low, high = np.quantile(known, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], axis=0) - self.values
+        # Biases add up; scatter is independent of them.
+        below, above = (side.sum(axis=0) for side in (self.biases.clip(max=0.0), self.biases.clip(min=0.0)))
+        return np.array([self.values - np.hypot(low, below), self.values + np.hypot(high, above)])
+
+
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """Worths and flips of inputs at ``places`` by all rows, and by resamplings: ``worths`` and ``flips`` (b, i) of inputs, worths of
-    ``pairs`` (b, p)."""
+    """Worths and flips (i,) of inputs at ``places``, whether the new design is better above, and worths of pairs (p,)."""
 
     places: Sequence[int]
-    whole: _Estimate
-    worths: Array
-    flips: Array
-    pairs: Array
+    worths: _Figures
+    flips: _Figures
+    above: Array
+    pairs: _Figures
 
     @property
     def order(self) -> list[int]:
         """The inputs by their worth, the best first; of equal ones the first."""
-        return np.argsort(-self.whole.worths.clip(0.0), kind="stable").tolist()
+        return np.argsort(-self.worths.values.clip(0.0), kind="stable").tolist()
 
     @property
     def inputs(self) -> list[Deciding]:
         """The inputs by their worth, the best first."""
-        low, high = _ends(self.worths).clip(0.0).tolist()
-        worths, flips, above = (
-            each.tolist() for each in (self.whole.worths.clip(0.0), self.whole.flips, self.whole.above)
-        )
+        worths, flips = self.worths.values.clip(0.0).tolist(), self.flips.values.tolist()
+        (low, high), (first, last) = self.worths.ends.clip(0.0).tolist(), self.flips.ends.clip(0.0, 1.0).tolist()
+        # A flip that few resamplings have is none to rely on.
+        sure = (np.isfinite(self.flips.again).mean(axis=0) >= SURE).tolist()
         return [
             Deciding(
                 self.places[i],
                 flips[i] if np.isfinite(flips[i]) else None,
                 worths[i],
-                above[i],
-                self._flip_interval(i),
+                bool(self.above[i]),
+                (first[i], last[i]) if sure[i] else None,
                 (low[i], high[i]),
             )
             for i in self.order
         ]
 
-    def _flip_interval(self, place: int) -> Interval | None:
-        """Of a flip that nearly all resamplings have."""
-        again = self.flips[:, place]
-        there = again[np.isfinite(again)]
-        if there.size < SURE * again.size or not np.isfinite(self.whole.flips[place]):
-            return None
-        low, high = _ends(there).clip(0.0, 1.0).tolist()
-        return low, high
-
     @property
     def pair(self) -> Together | None:
-        """The pair worth most, where it is that and worth more than its best input in nearly all resamplings."""
-        if not self.whole.pairs.size:
+        """The pair worth most, where it is that and worth more than any input in nearly all resamplings."""
+        if not self.pairs.values.size:
             return None
-        best = int(self.whole.pairs.argmax())
-        most = self.pairs.argmax(axis=1) == best
-        more = self.pairs[:, best] > self.worths.max(axis=1) + WORTH
-        if (most & more).mean() < SURE:
+        best, again = int(self.pairs.values.argmax()), self.pairs.again
+        more = again[:, best] > self.worths.again.max(axis=1) + WORTH
+        if ((again.argmax(axis=1) == best) & more).mean() < SURE:
             return None
-        low, high = _ends(self.pairs[:, best]).clip(0.0).tolist()
-        return Together(list(combinations(self.places, 2))[best], float(self.whole.pairs[best]), (low, high))
+        low, high = self.pairs.ends[:, best].clip(0.0).tolist()
+        return Together(list(combinations(self.places, 2))[best], float(self.pairs.values[best]), (low, high))
 
     def verdict(self, p: float, count: int) -> tuple[Verdict, list[int], float]:
         """Whether one input decides at the probability ``p`` that all gains are positive; places of those that may; about how
         many rows of ``count`` ones it takes."""
-        if not self.places or _ends(self.worths)[1].max() < WORTH:
+        if not self.places or self.worths.ends[1].max() < WORTH:
             return "nothing", [], float(count)
         # The last is the input that does nothing.
-        again = np.column_stack([self.worths, np.zeros(len(self.worths))])
+        again = np.column_stack([self.worths.again, np.zeros(len(self.worths.again))])
         most = np.bincount(again.argmax(axis=1), minlength=again.shape[1]) / len(again)
         best = self.order[0]
         rivals = [place for place in self.order if most[place] > 1.0 - SURE or place == best]
@@ -345,7 +352,7 @@ class _Measured:
         if max(p, 1.0 - p) >= NEARLY_ALL:
             return "nothing", [], float(count)
         # The error of a difference falls as the root of the rows.
-        less = self.whole.worths[best] - np.append(self.whole.worths, 0.0)
+        less = self.worths.values[best] - np.append(self.worths.values, 0.0)
         error = (again[:, [best]] - again).std(axis=0, ddof=1)
         ratio = np.divide(SURE_Z * error, less, out=np.full(less.size, np.inf), where=less > 0.0)
         ratio[[best, *np.flatnonzero(most <= 0.0)]] = 0.0
@@ -361,21 +368,23 @@ def _measured(places: Sequence[int], by: _Estimates) -> _Measured:
         for many in (by.again, by.parts)
     )
 
-    def about(name: str) -> Array:
+    def about(name: str) -> _Figures:
         value, wide, sharp, fewer = (getattr(each, name) for each in (whole, by.wide, by.sharp, by.fewer))
         scatter, averages = (np.array([getattr(each, name) for each in many]) for many in (again, parts))
-        return _about(value, scatter, averages, np.nan_to_num([value - wide, value - sharp, fewer - _mean(scatter)]))
+        # Slices only ever blur a worth.
+        blur = value - wide if name == "flips" else (value - wide).clip(0.0)
+        biases = np.nan_to_num([blur, sharp - value, fewer - _mean(scatter)])
+        return _Figures(value, _about(value, scatter, averages), biases)
 
-    return _Measured(places, whole, about("worths"), about("flips"), about("pairs"))
+    return _Measured(places, about("worths"), about("flips"), whole.above, about("pairs"))
 
 
-def _about(values: Array, again: Array, parts: Array, biases: Array) -> Array:
+def _about(values: Array, again: Array, parts: Array) -> Array:
     """Resamplings (b, i) moved so that their mean is the value (i,), and widened by the error of averages over fresh sets, which
-    the scatter of parts (q, i) of these shows, and by ``biases`` (r, i); what is not a number stays so."""
+    the scatter of parts (q, i) of these shows; what is not a number stays so."""
     off = again - _mean(again)
     variance = _mean(off**2)
     error = np.where(np.isfinite(parts).all(axis=0), parts, 0.0).var(axis=0, ddof=1) / len(parts)
-    error += (biases**2).sum(axis=0)
     widening = np.sqrt(1.0 + np.divide(error, variance, out=np.zeros_like(error), where=variance > 0.0))
     return np.asarray(values + off * widening)
 
@@ -384,11 +393,6 @@ def _mean(again: Array) -> Array:
     """Mean (i,) of what is a number in resamplings (b, i), 0 where nothing is."""
     there = np.isfinite(again)
     return np.asarray(np.where(there, again, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1))
-
-
-def _ends(again: Array) -> Array:
-    """Ends (2, ...) of the 95 % interval of resamplings (b, ...)."""
-    return np.quantile(again, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], axis=0)
 
 
 def _chances(gains: Sequence[tuple[Array, Array]]) -> Array:
