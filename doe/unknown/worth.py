@@ -12,8 +12,8 @@ no row comes twice, which an emulator would take for a replicate. Fewer rows for
 scatter about their mean; how far that lies from the estimate by all rows is the bias of this one, as of errors that fall
 with the rows, and lengthens the interval on its side. So do what slices blur, and what the worth would be without the
 emulators' own errors, which are no scatter where they go together along the input. The error of averages over fresh
-input sets widens both sides. An input decides where it, and no other,
-is worth most in nearly all resamplings, the input that does nothing counted.
+input sets widens both sides. An input decides where it, and no other, is worth most in nearly all resamplings, the input that
+does nothing counted, and where its interval leaves out 0.
 
 Sources: Strong, Oakley and Brennan, Medical Decision Making 34 (2014) 311 (expected value of partial perfect information by
 regression); Shao and Wu, Annals of Statistics 17 (1989) 1176 (the delete-d jackknife).
@@ -347,7 +347,8 @@ class _Measured:
         most = np.bincount(again.argmax(axis=1), minlength=again.shape[1]) / len(again)
         best = self.order[0]
         rivals = [place for place in self.order if most[place] > 1.0 - SURE or place == best]
-        if most[best] >= SURE:
+        value, low = float(self.worths.values[best]), float(self.worths.ends[0][best])
+        if most[best] >= SURE and low > 0.0:
             return "decided", [self.places[best]], float(count)
         if max(p, 1.0 - p) >= NEARLY_ALL:
             return "nothing", [], float(count)
@@ -356,6 +357,8 @@ class _Measured:
         error = (again[:, [best]] - again).std(axis=0, ddof=1)
         ratio = np.divide(SURE_Z * error, less, out=np.full(less.size, np.inf), where=less > 0.0)
         ratio[[best, *np.flatnonzero(most <= 0.0)]] = 0.0
+        if low <= 0.0 < value:
+            ratio[-1] = max(float(ratio[-1]), (value - low) / value)
         return "undecided", [self.places[place] for place in rivals], float(count * ratio.max() ** 2)
 
 
