@@ -148,7 +148,7 @@ def row(name: str, replicates: int, repeats: int, workers: int | None) -> tuple[
             for each, error in zip(figures, errors, strict=True)
         ]
         shares.append(float(np.mean(held)))
-        cells.append(f"{shares[-1]:.2f} ± {100.0 * float(np.mean(errors)) / abs(exact):.2g} %")
+        cells.append(f"{shares[-1]:.2f} ({100.0 * float(np.mean(errors)) / abs(exact):.2g} %)")
     longer = float(np.mean(np.array(lengths) > LONGER))
     spent = f"{len(pool)} x {length * (TURNS + DISCARD):g}, {time.perf_counter() - started:.0f} s"
     in_vain = f"{float(np.mean(vain)):.3f}" if vain else ""
@@ -166,7 +166,7 @@ def main() -> None:
     if alien := [name for name in asked.scenes if name not in SCENES]:
         parser.error(f"{', '.join(alien)}: no such scene")
     print(
-        f"{TEAM} replicates of {TURNS:g} turns after {DISCARD:g}; {asked.repeats} repeats; share that holds the truth, mean half-width"
+        f"{TEAM} replicates of {TURNS:g} turns after {DISCARD:g}; {asked.repeats} repeats; share that holds the truth (mean half-width)"
     )
     print("\n| scene | impact | whirl | loss | cage speed | length | lengthened | in vain | pool |")
     print("|---|---|---|---|---|---|---|---|---|", flush=True)

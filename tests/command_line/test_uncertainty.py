@@ -409,7 +409,13 @@ class _Outputs(_Simulations):
         values = (10.0 + 0.1 * scene.cage.imbalance_um) * np.ones(4) + error * random.standard_normal(4)
         half = 2.2 * error * np.sqrt(random.chisquare(8, 4) / 8.0)
         figures = {
-            name: {"value": value, "statistical_error": wide, "numerical_error": 0.0, "effective_samples": 9.0}
+            name: {
+                "value": value,
+                "statistical_error": wide,
+                "numerical_error": 0.0,
+                "effective_samples": 9.0,
+                "degrees_of_freedom": 8,
+            }
             for name, value, wide in zip(OUTPUTS, values.tolist(), half.tolist(), strict=True)
         }
         result = _Result((1.0, 1.0, 1.0), 0.0)
