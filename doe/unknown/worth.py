@@ -44,6 +44,8 @@ RESAMPLES, POINTS, FEWER_BINS, PARTS = 200, 2048, 32, 8
 SURE, SURE_Z = 0.95, 1.645
 # Worth below which no measurement is proposed, and a probability so near 1 (or 0) that none could be worth much.
 WORTH, NEARLY_ALL = 0.02, 0.9
+# Share of the worth of the best pair below which an input alone decides nothing: it takes both.
+ALONE = 0.5
 
 Interval = tuple[float, float]
 Verdict = Literal["decided", "nothing", "undecided"]
@@ -75,7 +77,7 @@ class Decides:
     each gain's variance that the inputs foretell, of what noise leaves; by how much the probability that all gains are positive
     changes with ranges half as wide.
 
-    ``verdict``: "decided" where the first input decides, "nothing" where none is worth measuring, else "undecided".
+    ``verdict``: "decided" where the first input decides, "nothing" where none alone is worth measuring, else "undecided".
     ``rivals``: places of the inputs that may be worth most, the best first; ``needed``: about how many rows would decide
     between them, infinite where they are worth the same.
     """
@@ -347,7 +349,9 @@ class _Measured:
         most = np.bincount(again.argmax(axis=1), minlength=again.shape[1]) / len(again)
         best = self.order[0]
         rivals = [place for place in self.order if most[place] > 1.0 - SURE or place == best]
-        value, low = float(self.worths.values[best]), float(self.worths.ends[0][best])
+        value, low, pair = float(self.worths.values[best]), float(self.worths.ends[0][best]), self.pair
+        if pair is not None and value < ALONE * pair.worth:
+            return "nothing", [], float(count)
         if most[best] >= SURE and low > 0.0:
             return "decided", [self.places[best]], float(count)
         if max(p, 1.0 - p) >= NEARLY_ALL:

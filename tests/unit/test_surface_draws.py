@@ -153,7 +153,7 @@ def stated_and_true(study, random, noise, samples):
 def test_invariant_the_interval_holds_the_true_share_of_parts(tmp_path, noise):
     """Invariant: in more than 90 of 100 repeats of the design, where the count of the parts alone held it in fewer than 40."""
     study, random = Study.load(short_study(tmp_path)), np.random.default_rng(11)
-    rows = [stated_and_true(study, random, noise, 2048) for _ in range(200)]
+    rows = [stated_and_true(study, random, noise, 2048) for _ in range(120)]
     held = np.mean([low <= true <= high for _, _, (low, high), true in rows])
     before = np.mean([abs(share - true) <= half for share, half, _, true in rows])
     assert 0.9 <= held <= 0.995 and before < 0.4
