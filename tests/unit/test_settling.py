@@ -335,9 +335,9 @@ def test_command_line_coverage(command, monkeypatch):
 
 
 @pytest.mark.slow
-def test_oracle_a_slow_regime_is_seen(outer):
-    """Oracle: at loose clearances the cage changes its regime until turn 60 and later; a short run goes on by itself, and
-    its loss holds that of turns 120 to 480 of 24 replicates, which one that may not go on misses.
+def test_oracle_a_slow_regime_is_held(outer):
+    """Oracle: at loose clearances the cage changes its regime until turn 60 and later; a run of 40 turns goes on where that is
+    worth its turns, and its errors hold impact and loss of turns 120 to 480 of 24 replicates either way.
     """
     clearances = {
         "bearing": outer.bearing.model_copy(update={"radial_clearance_mm": 0.028}),
@@ -352,8 +352,11 @@ def test_oracle_a_slow_regime_is_seen(outer):
         numerics = outer.numerics.model_copy(update=changes)
         return simulate(outer.model_copy(update=clearances | {"numerics": numerics}))
 
-    truth = run(**truth_numbers, extend=False).power_loss
-    longer, short = run(**numbers, extend=True), run(**numbers, extend=False)
-    assert longer.counted_turns >= 120.0 and short.counted_turns == pytest.approx(40.0)
-    assert abs(longer.power_loss.value - truth.value) <= math.hypot(longer.power_loss.error, truth.statistical_error)
-    assert abs(short.power_loss.value - truth.value) > abs(longer.power_loss.value - truth.value)
+    truth = run(**truth_numbers, extend=False)
+    held = [
+        abs(ours.value - exact.value) <= math.hypot(ours.error, exact.statistical_error)
+        for result in (run(**numbers, seed=seed) for seed in range(1, 11))
+        for ours, exact in ((result.impact_force, truth.impact_force), (result.power_loss, truth.power_loss))
+    ]
+    # Of 20 intervals at 95 % fewer than 17 hold by chance in 2 of 100 cases.
+    assert sum(held) >= 17
