@@ -4,7 +4,7 @@ First-order index of an input: the share of the output's variance that would van
 the share that would be left if all others were. Both by scipy's Saltelli scheme on the emulator's mean, and shares of the
 variance over all inputs: what inputs outside the emulator make, and what it misses, is in the whole. Intervals by
 parametric bootstrap: functions drawn from the emulator take the truth's place, are run with fresh noise and emulated anew
-with the same hyperparameters; by how much their indices are missed is the error of ours, its mean the bias that is taken off. Of inputs that depend on each
+from the last hyperparameters on; by how much their indices are missed is the error of ours, its mean the bias that is taken off. Of inputs that depend on each
 other these indices mean nothing. There Shapley's effects share the variance: what an input adds to the variance explained,
 Var E[y | those known], on average over all orders in which the inputs become known.
 
@@ -79,7 +79,7 @@ def _with_intervals(fitted: Emulated, measure: Measure, sample: Sample, seed: in
 
     whole = shares(fitted.at_columns, residual_variance(emulator), points, seed)
     noise = np.sqrt(emulator.variances + emulator.hyperparameters.nugget)
-    like: dict[str, Any] = {"trend": "linear", "start": emulator.hyperparameters, "search": False}
+    like: dict[str, Any] = {"trend": "linear", "start": emulator.hyperparameters}
     misses = []
     for again in range(REFITS):
         truth = emulator.draw(1, random)
