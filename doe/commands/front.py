@@ -37,7 +37,7 @@ def front(
     """Find the Pareto front on the response surfaces."""
     with guarded(as_json), keeping_runs(out, path):
         from doe.report.steps.front import front_record, given_point_record, print_front
-        from doe.study.front import find_front
+        from doe.study.front import find_front, with_survival
         from doe.study.goals import check_goals
         from doe.study_file import Study
 
@@ -46,7 +46,7 @@ def front(
         values = None if point is None else _point(loaded, point)
         effort = Effort(out, workers, scheduler, retry, quiet or as_json)
         surfaces = fitted(loaded, data, effort)
-        found = find_front(loaded, surfaces)
+        found = with_survival(loaded, surfaces, find_front(loaded, surfaces))
         record = front_record(loaded, surfaces, found)
         if values is not None:
             import numpy as np

@@ -72,8 +72,7 @@ def find_front(
         aware = _backed_off(
             study, lambda share: _tolerance_aware(study, surfaces, found, box, doubt.at_share(share)), failed
         )
-    found = replace(found, tolerance_aware=_idle_at(study, np.zeros_like(study.centre), aware))
-    return with_survival(study, surfaces, found)
+    return replace(found, tolerance_aware=_idle_at(study, np.zeros_like(study.centre), aware))
 
 
 @one_thread

@@ -8,6 +8,7 @@ that all true gains are positive; its interval is by resampling rows. Responses 
 Sources: Efron and Morris, Journal of the American Statistical Association 68 (1973) 117; Wilson, ibid. 22 (1927) 209.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,16 +34,22 @@ class Better:
 def better(gains: Array, variances: Array, seed: int) -> Better:
     """How likely the true gains (n, m) are positive, given what was simulated and its variances (n, m)."""
     random = np.random.default_rng(seed)
-    whole, count = _shares(gains, variances, random), len(gains)
     # Every resampling shrinks anew: how much is noise is known no better than the rows tell it.
-    again = [_shares(gains[rows], variances[rows], random) for rows in random.integers(0, count, (RESAMPLES, count))]
+    *each, every = resampled(lambda rows: _shares(gains[rows], variances[rows], random), len(gains), random)
+    return Better(each, every)
+
+
+def resampled(shares: Callable[[Whole], Array], count: int, random: np.random.Generator) -> list[Share]:
+    """``shares`` (m,) of all of so many rows, with 95 % intervals by drawing rows anew."""
+    whole = shares(np.arange(count))
+    again = [shares(rows) for rows in random.integers(0, count, (RESAMPLES, count))]
     ends = np.quantile(again, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], axis=0)
     found = []
     for value, low, high in zip(whole.tolist(), *ends.tolist(), strict=True):
         # Resampled rows that all agree show no scatter; Wilson's interval still has one.
         least, most = wilson(value, count)
         found.append(Share(value, min(low, least), max(high, most)))
-    return Better(found[:-1], found[-1])
+    return found
 
 
 def wilson(share: float, count: int) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from scipy import special
 
 from doe.arrays import Array
 from doe.threads import one_thread
-from doe.unknown.decision import CONFIDENCE, RESAMPLES, wilson
+from doe.unknown.decision import resampled
 from doe.unknown.spread import Share
 
 
@@ -19,14 +19,12 @@ from doe.unknown.spread import Share
 def odds(values: Array, variances: Array, lower: float, upper: float, seed: int) -> Share:
     """Probability that the true value of an input set lies from ``lower`` to ``upper``, from simulated ``values`` (n,) with
     ``variances`` (n,); an end may be infinite."""
-    random, count = np.random.default_rng(seed), len(values)
-    share = _share(values, variances, lower, upper)
-    again = [
-        _share(values[rows], variances[rows], lower, upper) for rows in random.integers(0, count, (RESAMPLES, count))
-    ]
-    low, high = np.quantile(again, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE]).tolist()
-    least, most = wilson(share, count)
-    return Share(share, min(low, least), max(high, most))
+    (found,) = resampled(
+        lambda rows: np.array([_share(values[rows], variances[rows], lower, upper)]),
+        len(values),
+        np.random.default_rng(seed),
+    )
+    return found
 
 
 def _share(values: Array, variances: Array, lower: float, upper: float) -> float:

@@ -27,7 +27,7 @@ from rbdyn.scene.laws import MOST_OF_A_RUN
 
 # Long enough that the step cut at a batch's end costs nothing, short against any memory worth finding.
 BATCH_TURNS = 1.0
-# Batches after which the decay of slow motions is read, of runs that may be lengthened: the rollers have been round twice.
+# Batches after which the decay of slow motions is read: the rollers have been round twice.
 READ_AFTER = (5, 10, 15, 20)
 
 
@@ -75,9 +75,12 @@ def batches_of(scene: Scene) -> Batches:
 
 
 class Recording:
-    """A run under way and what is kept of it, batch by batch; it can always go on."""
+    """A run under way and what is kept of it, batch by batch; it can always go on.
 
-    def __init__(self, run: Run) -> None:
+    ``reads_decay``: whether the decay of slow motions is read on the way.
+    """
+
+    def __init__(self, run: Run, reads_decay: bool = False) -> None:
         self.run, self.batches = run, batches_of(run.scene)
         self._begin = run.clock_angles()
         # Of each batch whirl, work and largest loads in turn, as plain numbers: an array each would weigh twice as much.
@@ -86,7 +89,7 @@ class Recording:
         # Places of the cage's centre, x and y in turn, and how many samples there were at the end of each batch.
         self._places, self._sampled = array("d"), list[int]()
         self._cpu_s = 0.0
-        self._linearised = Linearised(run) if run.scene.extends else None
+        self._linearised = Linearised(run) if reads_decay else None
         self._decay_rates = list[Array]()
 
     def to(self, counted: float) -> Replicate:
@@ -172,14 +175,21 @@ class Recording:
 def recording_of(
     scene: Scene, bearing: RollerBearing, pace: Pace | None, replicate: int, companions: Companions | None, stop: Stop
 ) -> Recording:
-    """The recording of a replicate, or of the companion of it that is integrated so."""
+    """The recording of a replicate, which reads decay rates where it may be lengthened, or of the companion of it that is
+    integrated so."""
+    return Recording(_run_of(scene, bearing, pace, replicate, companions, stop), scene.extends and companions is None)
+
+
+def _run_of(
+    scene: Scene, bearing: RollerBearing, pace: Pace | None, replicate: int, companions: Companions | None, stop: Stop
+) -> Run:
     if companions is None:
-        return Recording(Run(scene, bearing, replicate, scene.numerics.rtol, stop, pace))
+        return Run(scene, bearing, replicate, scene.numerics.rtol, stop, pace)
     # Where the longest step asks for more steps than the scene allows a turn, they are allowed twice what it asks for.
     needed = math.ceil(2.0 * scene.turn_s / companions.longest_step)
     budget = max(scene.numerics.step_budget_per_turn, needed)
     companion = with_numerics(scene, method=companions.method, step_budget_per_turn=budget)
-    return Recording(Run(companion, bearing, replicate, companions.rtol, stop, pace, companions.longest_step))
+    return Run(companion, bearing, replicate, companions.rtol, stop, pace, companions.longest_step)
 
 
 def record(run: Run) -> Replicate:
@@ -196,7 +206,7 @@ def run_one(
     pace: Pace | None = None,
 ) -> Replicate:
     """Run a replicate, or the companion of it, the transient included. Raises RunError or CancelledError."""
-    return recording_of(scene, bearing, pace, replicate, companions, stop).to(scene.numerics.turns)
+    return record(_run_of(scene, bearing, pace, replicate, companions, stop))
 
 
 def run_replicate(

@@ -51,8 +51,8 @@ def test_invariant_reading_changes_no_bit(outer):
     """Invariant: a recording that reads decay rates has the bits of one that does not."""
     scene = with_numerics(outer, turns=13.0, discard_turns=0.0, replicates=1)
     read, plain = (
-        Recording(Run(each, roller_bearing(each), 0, 0.01, Stop())).to(13.0)
-        for each in (with_numerics(scene, extend=True), with_numerics(scene, extend=False))
+        Recording(Run(scene, roller_bearing(scene), 0, 0.01, Stop()), reads_decay).to(13.0)
+        for reads_decay in (True, False)
     )
     assert read.decay_rates.shape == (2, 3) and plain.decay_rates.shape == (0, 3)
     assert np.array_equal(read.work, plain.work) and np.array_equal(read.cage_angle, plain.cage_angle)

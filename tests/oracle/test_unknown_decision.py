@@ -2,31 +2,18 @@
 
 import numpy as np
 import pytest
+from decisions import noisy, smooth
 from scipy import stats
 
-from doe.arrays import Array
-from doe.emulator import pooled_variances
 from doe.unknown.decision import better, in_doubt, wilson
 from doe.unknown.joint import nested
 from doe.unknown.worth import decides
 
 
-def _noisy(truth: Array, sd: float, seed: int) -> tuple[Array, Array, Array]:
-    """Gains (n, m) with noise of a known size, their variances from seven degrees of freedom."""
-    random = np.random.default_rng(seed)
-    variances = sd**2 * random.chisquare(7, truth.shape) / 7.0
-    return truth + sd * random.standard_normal(truth.shape), variances, np.full(truth.shape, 7)
-
-
-def _smooth(quantiles: Array, variances: Array, freedom: Array) -> Array:
-    columns = zip(variances.T, freedom.T, strict=True)
-    return np.column_stack([pooled_variances(quantiles, *each) for each in columns])
-
-
 def test_noise_is_taken_off_the_share_of_cases() -> None:
     """Gains normal about 1 with sd 1: 84 % positive; noise of sd 2 would make 67 % of it."""
     truth = 1.0 + stats.norm.ppf(nested(1, 1024, 1))
-    gains, variances, _ = _noisy(truth, 2.0, 1)
+    gains, variances, _ = noisy(truth, 2.0, 1)
     assert float((gains > 0.0).mean()) == pytest.approx(0.67, abs=0.03)
     found = better(gains, variances, 1)
     assert found.each[0].value == pytest.approx(stats.norm.cdf(1.0), abs=0.04)
@@ -36,7 +23,7 @@ def test_noise_is_taken_off_the_share_of_cases() -> None:
 def test_gains_that_go_together_are_not_multiplied() -> None:
     """Two gains of one sign always: all is as likely as each, a half, not a quarter."""
     one = stats.norm.ppf(nested(1, 256, 2))
-    gains, variances, _ = _noisy(np.hstack([one, 2.0 * one]), 0.05, 2)
+    gains, variances, _ = noisy(np.hstack([one, 2.0 * one]), 0.05, 2)
     found = better(gains, variances, 1)
     assert found.all.value == pytest.approx(0.5, abs=0.03)
     assert [each.value for each in found.each] == pytest.approx([0.5, 0.5], abs=0.03)
@@ -47,17 +34,17 @@ def test_intervals_of_shares_cover() -> None:
     held = []
     for seed in range(60):
         random = np.random.default_rng(seed)
-        gains, variances, _ = _noisy(0.5 + random.standard_normal((128, 1)), 0.5, seed)
+        gains, variances, _ = noisy(0.5 + random.standard_normal((128, 1)), 0.5, seed)
         share = better(gains, variances, seed).each[0]
         held.append(share.low <= stats.norm.cdf(0.5) <= share.high)
     assert np.mean(held) >= 0.9
 
 
 def test_a_design_that_always_wins_is_sure_within_its_rows() -> None:
-    gains, variances, freedom = _noisy(np.full((256, 2), 0.2), 0.02, 3)
+    gains, variances, freedom = noisy(np.full((256, 2), 0.2), 0.02, 3)
     found = better(gains, variances, 1)
     assert found.all.value > 0.98 and found.all.low > 0.97
-    sure = decides(nested(3, 256, 3), gains, _smooth(nested(3, 256, 3), variances, freedom), nested(3, 4096, 4), 1)
+    sure = decides(nested(3, 256, 3), gains, smooth(nested(3, 256, 3), variances, freedom), nested(3, 4096, 4), 1)
     assert all(each.worth < 0.01 for each in sure.inputs)
     assert in_doubt(gains, variances).size == 0
 

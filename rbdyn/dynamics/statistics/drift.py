@@ -234,6 +234,6 @@ def slow_change(figure: Figure, tested: Figure, runs: Runs, since: int, *, movin
 
     ``moving``: whether any figure of the runs is ``drifting``; then the transient is not over for this one either.
     """
-    drifts = (drift_of(one, runs) for one in (figure, tested))
+    drifts = (drift_of(one, runs) for one in {figure, tested})
     bias = max((drift.bias(moving) for drift in drifts if drift is not None), default=0.0)
     return math.hypot(bias, unseen_regime(figure, runs, since))
