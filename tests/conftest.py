@@ -170,9 +170,11 @@ def state_near_contact(scene: Scene, seed: int) -> NDArray[np.float64]:
         y[parts.support : parts.support + 4] = (*support, *draw.uniform(-0.1, 0.1, 2))
         place, cage_xy, ring_xy = place + support[:, np.newaxis], cage_xy + support, ring_xy + support
     if parts.clock is not None:
-        y[parts.clock :] = (draw.uniform(0.0, 4.0) * scene.turn_s, *draw.uniform(-20.0, 20.0, 2))
+        y[parts.clock : parts.clock + 3] = (draw.uniform(0.0, 4.0) * scene.turn_s, *draw.uniform(-20.0, 20.0, 2))
     y[: 5 * z] = np.concatenate((*place, *velocity, motion.roller_spin * draw.uniform(0.8, 1.1, z)))
     y[5 * z : 5 * z + 10] = (*cage_xy, cage_angle, *cage_motion, *ring_xy, *ring_motion)
+    if parts.coefficients is not None:
+        y[parts.coefficients :] = draw.uniform(-0.05, 0.05, 2 * z)
     return y
 
 

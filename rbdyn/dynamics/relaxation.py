@@ -36,20 +36,31 @@ class Linearised:
         self.run, self.reading_s = run, READING * scale.length / scale.speed
         self.motions = ([cage + CAGE_SPEED], [cage + CAGE_VX, cage + CAGE_VY], list(range(4 * z, 5 * z)))
         self.increments = INCREMENT * absolute_tolerance(scene, run.bearing, 1.0)
+        first = state.coefficients
+        self.coefficients = [] if first is None else list(range(first, state.size))
         self.book = empty_tally()
 
     def decay_rates(self) -> Array:
         """Rates [1/s] at which each of ``MOTIONS`` decays in the present state of the run, which stays as it is."""
-        at_rest, rates = self._accelerations([]), []
+        at_rest, following, rates = self._accelerations([]), self.coefficients, []
+        if following:
+            # Each coefficient follows its steady value at a rate of its own.
+            alone = (at_rest - self._accelerations(following))[following] / self.increments[following]
         for places in self.motions:
-            change = self._accelerations(places)[places] - at_rest[places]
-            rates.append(-float(np.mean(change / self.increments[places])))
+            change = self._accelerations(places) - at_rest
+            if following:
+                change = self._accelerations(places, change[following] / alone) - at_rest
+            rates.append(-float(np.mean(change[places] / self.increments[places])))
         return np.array(rates)
 
-    def _accelerations(self, places: Sequence[int]) -> Array:
-        """Rates of change of the state where the speeds at some places are larger by their increments."""
+    def _accelerations(self, places: Sequence[int], coefficients: Array | None = None) -> Array:
+        """Rates of change of the state where the speeds at some places are larger by their increments, and the traction
+        coefficients, where they are states, by ``coefficients``.
+        """
         run, y = self.run, self.run.carry.y.copy()
         y[places] += self.increments[places]
+        if coefficients is not None:
+            y[self.coefficients] += coefficients
         probe = carry_from(y, run.bearing.rollers, self.reading_s, run.carry.method)
         advance(run.bearing, run.control, probe, self.book, self.reading_s, run.scene.turn_s)
         return probe.k[0]

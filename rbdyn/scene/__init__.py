@@ -115,6 +115,9 @@ class Scene(SceneFile):
                     f"model.land_film_floor_um = {laws.land_film_floor_um:g}: not below the radial guide clearance of "
                     f"{radial_um:g} um; lower it, widen cage.guide_clearance_mm or set model.guide_land = 'dry'"
                 )
+        if self.traction.elasticity and self.numerics.method == "rosenbrock":
+            what = "numerics.method = 'rosenbrock' and traction.elasticity = true contradict each other"
+            yield f"{what}: the implicit method knows no traction coefficients as states; set the method to 'auto'"
         touching = cage.pocket_contact_length_mm
         if touching is not None and touching > bearing.roller_length_mm:
             yield (

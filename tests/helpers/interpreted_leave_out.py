@@ -178,6 +178,7 @@ NEUTRAL = {
 }  # fmt: skip
 # Options without a neutral value.
 OTHERS = {
+    "tangential elasticity": "its coefficients are states; test_tangential_elasticity holds its limit",
     "contact law of ISO/TS 16281": "the plain law with another constant",
     "contact law of Dowson and Higginson": "a logarithm is no power at any value",
 }

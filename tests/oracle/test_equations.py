@@ -16,6 +16,7 @@ from numpy_twin import POWERS, twin
 from rbdyn.dynamics.forces.equations import LOADS, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT, pocket_loads
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.dynamics.parameters.scales import needs_clock
 
 # Position round-off of 3e-18 m over the smallest approaches of the random states (some 1e-8 m) is 3e-10 of that
 # contact's load, and 1e-10 of the largest force on a body.
@@ -127,6 +128,13 @@ MEETINGS = {
         "model.rolling_resistance_factor=0.8",
         "model.open_contact_film=true",
     ),
+    "tangential elasticity, clock": (
+        "traction.elasticity=true",
+        "model.open_contact_film=true",
+        "bearing.roller_diameter_spread_um=0.7",
+        "operation.rotating_load_N=300.0",
+        *SUPPORT,
+    ),
     "rotating load": ("operation.rotating_load_N=700.0", "operation.radial_load_N=100.0"),
 }
 TABLES = {
@@ -141,6 +149,7 @@ class Blocks:
 
     rollers: int
     supported: bool = False
+    clocked: bool = False
 
     def __getitem__(self, name: str) -> slice:
         z, end = self.rollers, 5 * self.rollers + 10
@@ -156,7 +165,8 @@ class Blocks:
             "ring acceleration": (5 * z + 8, 5 * z + 10),
             "support velocity": (end, clock - 2 * self.supported),
             "support acceleration": (clock - 2 * self.supported, clock),
-            "clock": (clock, None),
+            "clock": (clock, clock + 3 * self.clocked),
+            "coefficients": (clock + 3 * self.clocked, None),
         }
         return slice(*ends[name])
 
@@ -168,7 +178,10 @@ def twin_errors(scene, bearing, y, outcome):
     and of the single forces that act on that body.
     """
     expected = twin(scene, y)
-    blocks, (wall, at_outer, at_inner, land, _) = (Blocks(bearing.rollers, scene.support is not None), expected.loads)
+    blocks, (wall, at_outer, at_inner, land, _) = (
+        Blocks(bearing.rollers, scene.support is not None, needs_clock(scene)),
+        expected.loads,
+    )
     lever = np.hypot(y[0], y[bearing.rollers])
     support = scene.support.outer_ring_mass_kg if scene.support else np.inf
     acting = {
@@ -183,6 +196,7 @@ def twin_errors(scene, bearing, y, outcome):
         "support velocity": 0.0,
         "support acceleration": at_outer / support,
         "clock": 0.0,
+        "coefficients": 0.0,
     }
     errors = {}
     for name, size in acting.items():

@@ -15,6 +15,7 @@ import numpy as np
 from film_oracle import quadrature_shape
 from numpy_twin_laws import (
     alpha_of,
+    follow,
     hunt_crossley,
     oil_of,
     open_film,
@@ -24,6 +25,7 @@ from numpy_twin_laws import (
     race_traction,
     raceways,
     roller_errors,
+    roller_mass,
     rolling_resistance,
     scheduled,
     wall_load,
@@ -84,8 +86,8 @@ def race_overlap(scene, encloses, radius, between, ring_angle):
     return distance + radius - surface if encloses else surface + radius - distance
 
 
-def race(scene, mass, ring, roller, radius, encloses):
-    """One race and one roller. Returns (load, powers in traction, rolling, damping)."""
+def race(scene, mass, ring, roller, radius, encloses, coefficient):
+    """One race and one roller. Returns (load, powers in traction, rolling, damping, rate of the traction coefficient)."""
     between = roller.centre - ring.centre
     distance = math.hypot(*between)
     outward = between / distance
@@ -100,7 +102,7 @@ def race(scene, mass, ring, roller, radius, encloses):
     if scene.model.open_contact_film and not encloses and middle < 0.0:
         film = open_contact(scene, ring, roller, radius, -middle)
     if elastic == 0.0:
-        return 0.0, *film, 0.0
+        return 0.0, *film, 0.0, follow(scene, encloses, 0.0, 0.0, coefficient, 0.0)
     if scene.bearing.outer_waviness if encloses else scene.bearing.inner_waviness:
         # Virtual work: the load times how the overlap changes with the centre and with the angle of the ring, each by
         # a step of 1e-30 along the imaginary axis, which loses no digits.
@@ -117,7 +119,8 @@ def race(scene, mass, ring, roller, radius, encloses):
 
     point = roller.centre + to_race * (radius - 0.5 * approach)
     slip = float((ring.velocity_at(point) - roller.velocity_at(point)) @ tangent)
-    traction = race_traction(scene, encloses, slip, load) * load
+    steady = race_traction(scene, encloses, slip, load)
+    traction = (coefficient if scene.traction.elasticity else steady) * load
     roller.push(traction * tangent, point)
     ring.push(-traction * tangent, point)
 
@@ -135,7 +138,8 @@ def race(scene, mass, ring, roller, radius, encloses):
     roller.push(pressure * tangent, roller.centre)
     ring.push(-held * tangent, point)
     ring.push((2.0 * held - pressure) * tangent, ring.centre)
-    return load, traction * slip + film[0], 2.0 * held * mean_speed + film[1], (load - elastic) * rate
+    following = follow(scene, encloses, load, steady, coefficient, abs(mean_speed))
+    return load, traction * slip + film[0], 2.0 * held * mean_speed + film[1], (load - elastic) * rate, following
 
 
 def open_contact(scene, ring, roller, radius, gap):
@@ -321,7 +325,9 @@ def twin(scene: Scene, y: Any) -> Twin:
     down = math.radians(operation.gravity_direction_deg)
     gravity = operation.gravity_m_s2 * np.array([math.cos(down), math.sin(down)])
 
-    rest = list(y[5 * z + 10 :])
+    elastic = scene.traction.elasticity
+    coefficients = y[-2 * z :].reshape(2, z) if elastic else np.zeros((2, z))
+    rest = list(y[5 * z + 10 : -2 * z] if elastic else y[5 * z + 10 :])
     ring = [rest.pop(0) for _ in range(4)] if support is not None else [0.0] * 4
     clocked = len(rest) == 3
     time, inner_angle, outer_angle = rest if clocked else (0.0, 0.0, 0.0)
@@ -332,6 +338,7 @@ def twin(scene: Scene, y: Any) -> Twin:
     outer = Body(ring[:2], ring[2:], operation.outer_speed_rpm * math.pi / 30.0, outer_angle)
 
     power, loads, dy = np.zeros(len(POWERS)), np.zeros(5), np.zeros(y.size)
+    following = np.zeros((2, z))
     for j in range(z):
         roller = Body(y[[j, z + j]], y[[2 * z + j, 3 * z + j]], y[4 * z + j])
         angle = cage.angle + 2.0 * math.pi * j / z
@@ -339,7 +346,8 @@ def twin(scene: Scene, y: Any) -> Twin:
         loads[[0, 4]] = np.maximum(loads[[0, 4]], wall[:2])
         power[4:7] += wall[2:]
         for term, body, encloses in ((0, outer, True), (1, inner, False)):
-            load, slipping, rolling, damping = race(scene, mass, body, roller, radii[j], encloses)
+            contact = race(scene, mass, body, roller, radii[j], encloses, coefficients[term, j])
+            load, slipping, rolling, damping, following[term, j] = contact
             loads[1 + term] = max(loads[1 + term], load)
             power[[term, 2, 3]] += slipping, rolling, damping
             power[POWERS["inner_rolling"]] += 0.0 if encloses else rolling
@@ -370,11 +378,6 @@ def twin(scene: Scene, y: Any) -> Twin:
         held = outer.force - support.stiffness_N_m * outer.centre - support.damping_N_s_m * outer.velocity
         extra = [*outer.velocity, *(held / support.outer_ring_mass_kg + gravity)]
         power[POWERS["support_damping"]] = support.damping_N_s_m * float(outer.velocity @ outer.velocity)
-    dy[5 * z + 10 :] = extra + ([1.0, inner.spin, outer.spin] if clocked else [])
+    extra += [1.0, inner.spin, outer.spin] if clocked else []
+    dy[5 * z + 10 :] = [*extra, *following.ravel()] if elastic else extra
     return Twin(dy, power, loads)
-
-
-def roller_mass(scene):
-    drawing = scene.bearing
-    volume = math.pi * (drawing.roller_diameter_mm * 1e-3) ** 2 / 4.0 * drawing.roller_length_mm * 1e-3
-    return scene.material("roller").density * volume

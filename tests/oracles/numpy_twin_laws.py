@@ -271,6 +271,31 @@ def rolling_resistance(scene, encloses, load, speed):
     return thermal * rigid / (1.0 + (rigid / elastic) ** 10) ** 0.1 * e * radius * length
 
 
+def roller_mass(scene):
+    drawing = scene.bearing
+    volume = math.pi * (drawing.roller_diameter_mm * 1e-3) ** 2 / 4.0 * drawing.roller_length_mm * 1e-3
+    return scene.material("roller").density * volume
+
+
+def follow(scene, encloses, load, steady, coefficient, entrainment):
+    """Rate of a traction coefficient: it follows over Carter's slope 2 R Q/(a u) over a stiffness of 10/9 Q/x, which at the
+    most loaded roller is exact and elsewhere goes as the root of the load."""
+    if not scene.traction.elasticity:
+        return 0.0
+    length, radius = scene.bearing.effective_length_mm * 1e-3, reduced_radius(scene, encloses)
+    most = 5.0 * max(scene.operation.largest_load_N, 1.0) / scene.bearing.rollers
+    half_width = math.sqrt(8.0 * radius * most / (math.pi * modulus(scene, "roller", "rings") * length))
+    approach = (most / palmgren_stiffness(scene, "roller", "rings", length)) ** 0.9
+    slope, stiffness = 2.0 * radius * most / half_width, 10.0 / 9.0 * most / approach  # slope times the speed
+    outer, inner = raceways(scene)
+    shaft, housing = (s * math.pi / 30.0 for s in (scene.operation.inner_speed_rpm, scene.operation.outer_speed_rpm))
+    orbit = (shaft * inner + housing * outer) / (inner + outer)
+    centrifugal = roller_mass(scene) * 0.5 * (inner + outer) * orbit**2
+    lightest = max(centrifugal, 1e-3 * most)
+    relaxation = slope / stiffness * math.sqrt(max(load, lightest) / most)
+    return (steady - coefficient) * max(entrainment, 0.05 * nominal_entrainment(scene)) / relaxation
+
+
 def open_film(scene, gap):
     """Rolling force per surface over the entrainment speed, and sliding force over the slip, of the film in an open inner
     contact [N s/m]: Reynolds's equation by quadrature."""

@@ -173,8 +173,9 @@ def test_unit_seeds(outer):
 def test_unit_state_names():
     """Unit: components have the names of the layout, rollers counted from 1."""
     plain, full = state.layout(10, False, False), state.layout(10, True, True)
-    assert plain == (10, 60, None, None) and full == (10, 67, 60, 64)
-    assert state.layout(10, False, True) == (10, 63, None, 60)
+    assert plain == (10, 60, None, None, None) and full == (10, 67, 60, 64, None)
+    assert state.layout(10, False, True) == (10, 63, None, 60, None)
+    assert state.layout(10, False, True, True) == (10, 83, None, 60, 63)
     for parts in (plain, full):
         assert [state.name(i, parts) for i in (0, 29, 43, 52, 59)] == [
             "roller 1 x", "roller 10 vx", "roller 4 spin", "cage angle", "inner ring vy",
@@ -215,7 +216,7 @@ def test_invariant_what_a_scene_fixes_is_worked_out_once(monkeypatch):
     for module, name in ((fits, "operating_clearance"), (scale_module, "slip_scale")):
         real = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given, name=name, real=real: [calls.append(name), real(*given)][1])
-    scene = Scene.load(ROOT / "examples" / "all_options.toml")
+    scene = Scene.load(ROOT / "examples" / "all_options.toml", ["traction.elasticity=false"])
     bearing = roller_bearing(scene)
     for replicate in range(3):
         run = Run(scene, bearing, replicate, 1e-2, Stop())
@@ -225,7 +226,7 @@ def test_invariant_what_a_scene_fixes_is_worked_out_once(monkeypatch):
     tighter = scene.bearing.model_copy(update={"radial_clearance_mm": scene.bearing.radial_clearance_mm - 0.01})
     copied = scene.model_copy(update={"bearing": tighter})
     assert scene.geometry.clearance - copied.geometry.clearance == pytest.approx(1e-5, rel=1e-9)
-    assert scene == Scene.load(ROOT / "examples" / "all_options.toml") != copied, (
+    assert scene == Scene.load(ROOT / "examples" / "all_options.toml", ["traction.elasticity=false"]) != copied, (
         "what was worked out is no part of a scene"
     )
 

@@ -1,6 +1,7 @@
 """What happens at every contact in recorded states: loads, slips, heat. Compiled only where a history is asked for."""
 
 from rbdyn.compiled.kernel import entry, kernel
+from rbdyn.contact.tangential_elasticity import coefficient_of
 from rbdyn.dynamics.forces.equations import motions, roller_pocket
 from rbdyn.dynamics.forces.guide_land import guide_forces
 from rbdyn.dynamics.forces.races import race_contact, roller_radius
@@ -27,6 +28,7 @@ def race_observed(race, side, bearing, y, j, ring):
         ring.speed,
         ring.cos,
         ring.sin,
+        coefficient_of(race.tangential, y, j),
     )
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from rbdyn.compiled.kernel import kernel, law
 from rbdyn.contact.open_contact import OpenFilm, film_forces
+from rbdyn.contact.tangential_elasticity import RigidContact
 from rbdyn.dynamics.forces.race_form import form_at
 from rbdyn.dynamics.forces.race_lanes import LANES, add_to_ring, add_to_roller, keep_lane
 from rbdyn.dynamics.forces.races import RaceWrench, roller_radius
@@ -42,6 +43,7 @@ def open_contact(film, race, radius, ring, dx, dy, dvx, dvy, roller_spin):
         2.0 * rolling * entrainment,
         0.0,
         slip,
+        0.0,
     )
 
 
@@ -68,7 +70,7 @@ def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
             dx, dy_ = y[j] - ring.x, y[rollers + j] - ring.y
             dvx, dvy = y[2 * rollers + j] - ring.vx, y[3 * rollers + j] - ring.vy
             radius, spin = roller_radius(sizes, j), y[4 * rollers + j]
-            keep_lane(lanes, i, open_contact(film, race, radius, ring, dx, dy_, dvx, dvy, spin))
+            keep_lane(RigidContact(), lanes, i, open_contact(film, race, radius, ring, dx, dy_, dvx, dvy, spin))
         for i in range(count):
             add_to_roller(lanes, i, start + i, rollers, row, dy)
             sums = add_to_ring(lanes, i, sums)

@@ -17,6 +17,12 @@ from rbdyn.contact.hertz_line import (
     SlicedLineContact,
     TiltedLineContact,
 )
+from rbdyn.contact.tangential_elasticity import (
+    add_coefficient_rate,
+    coefficient_of,
+    keep_coefficient_rate,
+    relax_coefficients,
+)
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
     CoulombTraction,
@@ -30,12 +36,15 @@ from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers, race_conta
 from rbdyn.dynamics.forces.state import PARTS
 
 # Contacts are worked through in blocks of LANES, VECTOR at a time; each quantity is a row of a block. Rollers that are
-# picked out bring their coordinates, their radii and, as the last row, the side of the race: +1 outer, -1 inner.
-LANES, OUTPUTS = 16, 8
+# picked out bring their coordinates, their radii, the side of the race (+1 outer, -1 inner) and their traction coefficients.
+LANES, OUTPUTS = 16, 9
 RADII = PARTS * LANES
 SIDES = RADII + LANES
+COEFFICIENTS = SIDES + LANES
 # Where the rows of what is found of a contact begin: the fields of ``RaceWrench`` but for the slip.
-FORCE_X, FORCE_Y, ROLLER_MOMENT, RING_MOMENT, LOAD, TRACTION, ROLLING, DAMPING = range(0, OUTPUTS * LANES, LANES)
+FORCE_X, FORCE_Y, ROLLER_MOMENT, RING_MOMENT, LOAD, TRACTION, ROLLING, DAMPING, COEFFICIENT_RATE = range(
+    0, OUTPUTS * LANES, LANES
+)
 
 
 class OnRing(NamedTuple):
@@ -53,7 +62,7 @@ class OnRing(NamedTuple):
 class Scratch(NamedTuple):
     """Work space of one thread."""
 
-    packed: NDArray[np.float64]  # ((PARTS + 2) * LANES,)
+    packed: NDArray[np.float64]  # ((PARTS + 3) * LANES,)
     lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
     gap: NDArray[np.float64]  # (rollers,) way that each has left in its pocket [m]
@@ -63,7 +72,7 @@ class Scratch(NamedTuple):
 def scratch(rollers: int) -> Scratch:
     """Work space for the contacts of so many rollers."""
     return Scratch(
-        np.ones((PARTS + 2) * LANES),
+        np.ones((PARTS + 3) * LANES),
         np.empty(OUTPUTS * LANES),
         np.zeros(LANES, np.int64),
         np.empty(rollers),
@@ -150,7 +159,7 @@ def lanes_to_fill(race, count):
 
 
 @kernel
-def keep_lane(lanes, i, wrench):
+def keep_lane(tangential, lanes, i, wrench):
     """Write a ``RaceWrench`` to lane ``i``."""
     lanes[FORCE_X + i] = wrench.x
     lanes[FORCE_Y + i] = wrench.y
@@ -160,10 +169,11 @@ def keep_lane(lanes, i, wrench):
     lanes[TRACTION + i] = wrench.traction
     lanes[ROLLING + i] = wrench.rolling
     lanes[DAMPING + i] = wrench.damping
+    keep_coefficient_rate(tangential, wrench.coefficient_rate, lanes, COEFFICIENT_RATE + i)
 
 
 @kernel
-def contact_in_lane(race, side, radius, ring, source, j, stride):
+def contact_in_lane(race, side, radius, ring, source, j, stride, coefficient):
     """``race_contact`` of the roller whose x, y, vx, vy and spin stand at ``source[j + row * stride]``."""
     return race_contact(
         race,
@@ -177,6 +187,7 @@ def contact_in_lane(race, side, radius, ring, source, j, stride):
         ring.speed,
         ring.cos,
         ring.sin,
+        coefficient,
     )
 
 
@@ -190,7 +201,8 @@ def outer_block(race, sizes, ring, y, first, rollers, lanes, count):
     for i in range(lanes_to_fill(race, count)):
         j = first + i
         radius = lane_radius(sizes, radii, j)
-        keep_lane(lanes, i, contact_in_lane(race, 1.0, radius, ring, y, j, rollers))
+        coefficient = coefficient_of(race.tangential, y, j)
+        keep_lane(race.tangential, lanes, i, contact_in_lane(race, 1.0, radius, ring, y, j, rollers, coefficient))
 
 
 @kernel
@@ -200,16 +212,22 @@ def picked_block(outer, inner, sizes, outer_ring, inner_ring, packed, lanes, cou
         side = packed[SIDES + i]
         race, ring = either(side > 0.0, outer, inner), either(side > 0.0, outer_ring, inner_ring)
         radius = lane_radius(sizes, packed, RADII + i)
-        keep_lane(lanes, i, contact_in_lane(race, side, radius, ring, packed, i, LANES))
+        keep_lane(
+            race.tangential,
+            lanes,
+            i,
+            contact_in_lane(race, side, radius, ring, packed, i, LANES, packed[COEFFICIENTS + i]),
+        )
 
 
 @kernel
-def pack(sizes, rollers, y, j, side, scratch, lane):
-    """Copy the state of roller ``j`` to a lane."""
+def pack(race, sizes, rollers, y, j, side, scratch, lane):
+    """Copy the state of roller ``j`` at a race to a lane."""
     for row in range(PARTS):
         scratch.packed[row * LANES + lane] = y[row * rollers + j]
     scratch.packed[RADII + lane] = roller_radius(sizes, j)
     scratch.packed[SIDES + lane] = side
+    scratch.packed[COEFFICIENTS + lane] = coefficient_of(race.tangential, y, j)
     scratch.roller[lane] = j
 
 
@@ -242,6 +260,7 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
     Returns ``OnRing`` of the outer and of the inner ring. Nearly every roller touches the outer race; only those of the
     load zone touch the inner one and are picked out first.
     """
+    relax_coefficients(inner.tangential, rollers, y, row, dy)
     lanes, index = scratch.lanes, scratch.roller
     on_outer = on_inner = OnRing(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     in_order = rollers // VECTOR * VECTOR if share_vectors(outer, inner) else rollers
@@ -251,6 +270,7 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
         outer_block(outer, sizes, outer_ring, y, start, rollers, lanes, count)
         for i in range(count):
             add_to_roller(lanes, i, start + i, rollers, row, dy)
+            add_coefficient_rate(outer.tangential, lanes[COEFFICIENT_RATE + i], start + i, row, dy)
         for i in range(count):
             on_outer = add_to_ring(lanes, i, on_outer)
         start += LANES
@@ -260,14 +280,14 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
     while start < rollers or left < rollers:
         count = 0
         while start < rollers and count < LANES:
-            pack(sizes, rollers, y, start, 1.0, scratch, count)
+            pack(outer, sizes, rollers, y, start, 1.0, scratch, count)
             start += 1
             count += 1
         outer_count = count
         while left < rollers and count < LANES:
             dx, dy_ = y[left] - inner_ring.x, y[rollers + left] - inner_ring.y
             if dx * dx + dy_ * dy_ < reach2:
-                pack(sizes, rollers, y, left, -1.0, scratch, count)
+                pack(inner, sizes, rollers, y, left, -1.0, scratch, count)
                 count += 1
             left += 1
         if count > 0:
@@ -275,7 +295,9 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
         for i in range(count):
             add_to_roller(lanes, i, index[i], rollers, row, dy)
         for i in range(outer_count):
+            add_coefficient_rate(outer.tangential, lanes[COEFFICIENT_RATE + i], index[i], row, dy)
             on_outer = add_to_ring(lanes, i, on_outer)
         for i in range(outer_count, count):
+            add_coefficient_rate(inner.tangential, lanes[COEFFICIENT_RATE + i], index[i], row, dy)
             on_inner = add_to_ring(lanes, i, on_inner)
     return on_outer, on_inner

@@ -14,6 +14,7 @@ from rbdyn.compiled.kernel import VECTOR, kernel, law
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.hertz_line import around, line_load, root_stiffness
 from rbdyn.contact.rolling_resistance import rolling_force
+from rbdyn.contact.tangential_elasticity import acting_coefficient, coefficient_rate
 from rbdyn.contact.traction import traction
 from rbdyn.dynamics.forces.race_form import form_at, sloped
 
@@ -31,6 +32,7 @@ class Race(NamedTuple):
     damping: Any
     traction: Any
     rolling: Any
+    tangential: Any
 
 
 class EqualRollers(NamedTuple):
@@ -68,7 +70,8 @@ def _(sizes, number):
 class RaceWrench(NamedTuple):
     """What a race does to a roller: force [N]; moments on the roller and on the ring about its centre [N m].
 
-    Then the load [N], the powers lost [W] and the slip [m/s]. The force on the ring is the opposite.
+    Then the load [N], the powers lost [W], the slip [m/s] and the rate of the traction coefficient [1/s]. The force on the
+    ring is the opposite.
     """
 
     x: float
@@ -80,14 +83,15 @@ class RaceWrench(NamedTuple):
     rolling: float
     damping: float
     slip: float
+    coefficient_rate: float
 
 
 @kernel
-def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin):
+def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin, coefficient):
     """``RaceWrench`` of one race on one roller; zero, but for round-off, where they do not touch.
 
     ``dx, dy, dvx, dvy``: position [m] and velocity [m/s] of the roller's centre less those of the ring's centre;
-    spins [rad/s]; ``ring_cos, ring_sin``: direction of the ring's mark.
+    spins [rad/s]; ``ring_cos, ring_sin``: direction of the ring's mark; ``coefficient``: that of the traction, where it is a state.
 
     Load: Chen et al. 2022, eq 5-6; slip at the point that halves the approach: eq 7-10; rolling resistance with
     the pressure offset 2 F_R R_x/R_b: Biboulet and Houpert 2010. On a wavy race the load points along the gradient of
@@ -112,13 +116,15 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
     roller_lever = side * (radius - 0.5 * approach)
     ring_lever = distance + roller_lever
     slip = ring_speed * ring_lever - tangential - roller_spin * roller_lever
-    traction_force = traction(race.traction, slip, load) * load
+    steady = traction(race.traction, slip, load)
+    traction_force = acting_coefficient(race.tangential, steady, coefficient) * load
 
     # Seen from the line of centres both surfaces run the same way at the entrainment speed.
     roller_surface = (roller_spin - orbit_rate) * roller_lever
     ring_surface = (ring_speed - orbit_rate) * ring_lever
     entrainment = 0.5 * (roller_surface + ring_surface)
-    resistance = rolling_force(race.rolling, load, max(abs(entrainment), SMALLEST_SPEED))
+    speed = max(abs(entrainment), SMALLEST_SPEED)
+    resistance = rolling_force(race.rolling, load, speed)
     rolling = math.copysign(resistance, entrainment)
     normal = -side * load
     along = traction_force + rolling * (ring_lever + roller_lever) * inverse
@@ -133,4 +139,5 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
         2.0 * rolling * entrainment,
         (load - elastic) * approach_rate,
         slip,
+        coefficient_rate(race.tangential, steady, coefficient, load, speed),
     )

@@ -39,6 +39,8 @@ BODIES = (*CAGE, *_body("inner ring", *PLACE, *VELOCITY))
 # With an outer ring on a support; where something depends on time or on a ring's angle.
 SUPPORT = _body("outer ring", *PLACE, *VELOCITY)
 CLOCK = _body("clock", ("time", "s"), ("inner ring angle", "rad"), ("outer ring angle", "rad"))
+# With tangential elasticity, of every roller: first all at the outer, then all at the inner race.
+CONTACTS = _body("contact", ("outer traction coefficient", "1"), ("inner traction coefficient", "1"))
 PARTS = len(ROLLER)
 # Places within BODIES, SUPPORT and CLOCK.
 CAGE_X, CAGE_Y, CAGE_ANGLE, CAGE_VX, CAGE_VY, CAGE_SPEED, RING_X, RING_Y, RING_VX, RING_VY = range(len(BODIES))
@@ -53,6 +55,7 @@ class Layout(NamedTuple):
     size: int
     support: int | None
     clock: int | None
+    coefficients: int | None
 
     @property
     def first_body(self) -> int:
@@ -63,7 +66,8 @@ class Layout(NamedTuple):
     def bodies(self) -> tuple[Component, ...]:
         """Components behind those of the rollers."""
         supported, clocked = self.support is not None, self.clock is not None
-        return (*BODIES, *(SUPPORT if supported else ()), *(CLOCK if clocked else ()))
+        contacts = [part for part in CONTACTS for _ in range(self.rollers) if self.coefficients is not None]
+        return (*BODIES, *(SUPPORT if supported else ()), *(CLOCK if clocked else ()), *contacts)
 
     @property
     def components(self) -> tuple[Component, ...]:
@@ -75,18 +79,21 @@ class Layout(NamedTuple):
         return np.array([value(part) for part in self.components])
 
 
-def layout(rollers: int, supported: bool, clocked: bool) -> Layout:
-    """Layout for a number of rollers, with an outer ring on a support or not, with a clock or not."""
+def layout(rollers: int, supported: bool, clocked: bool, elastic: bool = False) -> Layout:
+    """Layout for a number of rollers, with an outer ring on a support, a clock, tangential elasticity or not."""
     size = PARTS * rollers + len(BODIES)
     support = size if supported else None
     size += len(SUPPORT) * supported
     clock = size if clocked else None
-    return Layout(rollers, size + len(CLOCK) * clocked, support, clock)
+    size += len(CLOCK) * clocked
+    coefficients = size if elastic else None
+    return Layout(rollers, size + len(CONTACTS) * rollers * elastic, support, clock, coefficients)
 
 
 def name(index: int, layout: Layout) -> str:
     """What a state component is, in words: 'roller 3 spin', 'cage vx'. Rollers count from 1."""
     part = layout.components[index]
-    if part in ROLLER:
+    if part in (*ROLLER, *CONTACTS):
+        index -= 0 if part in ROLLER else layout.coefficients or 0
         return f"roller {index % layout.rollers + 1} {part.name}"
     return part.name if part in CLOCK else f"{part.body} {part.name}"

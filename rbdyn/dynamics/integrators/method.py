@@ -15,6 +15,7 @@ from rbdyn.dynamics.integrators.advance import advance
 from rbdyn.dynamics.integrators.records import FINISHED, STEP_BUDGET, Carry, Control, Tally
 from rbdyn.dynamics.integrators.runge_kutta import DormandPrince, Kutta
 from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.faults import MethodError
 from rbdyn.scene import Scene
 
 EXPLICIT = ("rk45", "rk43")
@@ -47,6 +48,10 @@ def explicit_method(method: str, rtol: float) -> str:
 def method_of(name: str, scene: Scene, bearing: RollerBearing) -> Any:
     """The method "rk45", "rk43" or "rosenbrock" for this bearing."""
     if name == "rosenbrock":
+        if scene.traction.elasticity:
+            raise MethodError(
+                "the implicit method knows no traction coefficients as states; leave out traction.elasticity"
+            )
         from rbdyn.dynamics.integrators.implicit import rodas
 
         return rodas(scene, bearing)
@@ -67,6 +72,8 @@ def cheaper_method(
 
     ``control_by(method)`` is the step control; ``carry`` and ``tally`` stand at the start of the run and are left as they are.
     """
+    if scene.traction.elasticity:
+        return pair, np.zeros(at.STIFFNESS)
     trial_s = TRIAL_TURNS * scene.turn_s
     short = control_by(pair)._replace(step_budget=TRIAL_STEPS)
     run, book = _copy(carry), Tally(*(kept.copy() for kept in tally))

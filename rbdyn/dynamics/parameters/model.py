@@ -14,6 +14,7 @@ from rbdyn.contact.film import short_journal_film
 from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, sliced
 from rbdyn.contact.open_contact import OpenFilm, open_film, touching_gap
 from rbdyn.contact.rolling_resistance import NoRollingResistance, aihara_thermal_factor, biboulet_houpert, starved
+from rbdyn.contact.tangential_elasticity import ElasticContact, RigidContact, elastic_contact
 from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.forces.cage_body import BalancedCage, UnbalancedCage
 from rbdyn.dynamics.forces.drag import NoDrag, cylinder_drag
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
 
 # The largest contact load that a traction surface must cover, in multiples of the largest load on the shaft.
 TRACTION_RANGE = 4.0
+# Load and speed below which the relaxation length stays, over those of the most loaded roller and of rolling: there is little
+# traction to speak of.
+LIGHTEST, SLOWEST = 1e-3, 0.05
 
 
 def roller_bearing(scene: Scene) -> RollerBearing:
@@ -88,7 +92,23 @@ def _race(scene: Scene, oil: Oil, which: str) -> Race:
         damping=_race_damping(scene),
         traction=race_traction(scene, rolling_contacts(scene)[which], oil, largest_load),
         rolling=rolling_law(scene, oil, reduced),
+        tangential=_tangential(scene, place),
     )
+
+
+def _tangential(scene: Scene, place: int) -> RigidContact | ElasticContact:
+    """Whether the traction coefficients of the outer (0) or inner race (1) are states, and how they follow the steady law."""
+    start = layout_of(scene).coefficients
+    if start is None:
+        return RigidContact()
+    drawing, radius = scene.bearing, scene.geometry.reduced_radii[place]
+    modulus, length = _modulus(scene, "roller", "rings"), drawing.effective_length
+    # Of the most loaded roller (Stribeck).
+    load = 5.0 * max(scene.operation.largest_load_N, 1.0) / drawing.rollers
+    half_width_scale = math.sqrt(8.0 * radius / (math.pi * modulus * length))
+    approach = (load / palmgren(modulus, length).stiffness) ** 0.9
+    smallest = max(scene.geometry.centrifugal_force, LIGHTEST * load), SLOWEST * abs(scene.geometry.motion.entrainment)
+    return elastic_contact(start + place * drawing.rollers, radius, half_width_scale, load, approach, *smallest)
 
 
 def _form(harmonics: list[Harmonic]) -> Any:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 LARGEST_SLIP_RATIO = 2.0
 # A table starts at the load where the film turns elastohydrodynamic, but spans at least this ratio of loads.
 SMALLEST_RANGE = 10.0
+# Entrainment speed [m/s] that is round-off of none.
+ROLLING = 1e-9
 # It ends at the static capacity of a roller contact (ISO 76: 4 GPa), past which no oil law holds.
 LARGEST_PRESSURE = 4e9
 # Error of a table, as a share of its largest coefficient, that is refused.
@@ -30,9 +32,11 @@ def race_traction(scene: Scene, contact: film_thickness.RollingContact, oil: Oil
     pure rolling. Raises InputError where a model needs a film and nothing rolls.
     """
     table = scene.traction
+    if table.elasticity and not contact.entrainment_speed > ROLLING:
+        raise InputError(["traction.elasticity = true: needs contacts that roll, but the races do not; leave it out"])
     if table.model not in RHEOLOGIES and table.friction == "film":
         return _load_independent(scene)
-    if not contact.entrainment_speed > 0.0:
+    if not contact.entrainment_speed > ROLLING:
         key = f"model = '{table.model}'" if table.model in RHEOLOGIES else "friction = 'mixed'"
         raise InputError([f"traction.{key}: needs a film, but the races do not roll; choose another"])
     law = _surface(scene, contact, oil, largest_load) if table.model in RHEOLOGIES else _load_independent(scene)

@@ -25,6 +25,8 @@ SPEED_SHARES = {"rk45": 0.05, "rk43": 0.05, "rosenbrock": 1.0}
 CAGE_SHARES = {"rk45": 0.01, "rk43": 0.01, "rosenbrock": 0.1}
 # Centrifugal force over the mean load share, below which rollers outside the load zone lie lightly and jump.
 LIGHT = 0.05
+# Traction coefficient by which errors are measured: a fifth of a usual peak.
+COEFFICIENT_SCALE = 0.01
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,8 @@ def needs_clock(scene: Scene) -> bool:
 
 def layout_of(scene: Scene) -> Layout:
     """Layout of the state vector."""
-    return scene.once("layout", lambda: layout(scene.bearing.rollers, scene.support is not None, needs_clock(scene)))
+    present = scene.support is not None, needs_clock(scene), scene.traction.elasticity
+    return scene.once("layout", lambda: layout(scene.bearing.rollers, *present))
 
 
 def scales(scene: Scene) -> Scales:
@@ -122,13 +125,15 @@ def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method
 
     In a slow bearing the contact speed is at most the method's share of the speed of the faster race, and the approach
     shrinks with it. The spin of a roller counts by the slip it makes, at most the scale of the traction curve at the load
-    of the most loaded roller (Stribeck). Speeds of the cage count by the method's share of a contact's. Infinite for the
+    of the most loaded roller (Stribeck), unless traction coefficients are states with a scale of their own. Speeds of the cage count by the method's share of a contact's. Infinite for the
     clock, which the method integrates exactly.
     """
     scale, state = scales(scene), layout_of(scene)
     speed = min(scale.speed, SPEED_SHARES[method] * fastest_surface(scene))
     length = scale.length * speed / scale.speed
-    slip = min(speed, scene.once("slip_scale", lambda: slip_scale(bearing, 5.0 * scale.load)))
+    slip = speed
+    if not scene.traction.elasticity:
+        slip = min(speed, scene.once("slip_scale", lambda: slip_scale(bearing, 5.0 * scale.load)))
     roller, cage = scene.geometry.roller_radius, 0.5 * scene.bearing.pitch_diameter
     sizes = {"m": length, "m/s": speed}
     own = CAGE_SHARES[method] * speed
@@ -137,6 +142,7 @@ def absolute_tolerance(scene: Scene, bearing: RollerBearing, rtol: float, method
         "cage": {"m": length, "rad": length / cage, "m/s": own, "rad/s": own / cage},
         "inner ring": sizes,
         "outer ring": sizes,
+        "contact": {"1": COEFFICIENT_SCALE},
         "clock": {"s": math.inf, "rad": math.inf},
     }
     return rtol * state.each(lambda part: sizes_of[part.body][part.unit])
