@@ -4,18 +4,19 @@ A steady law of creep and film answers a change of slip at once. Real material h
 microseconds, while the bodies give way tangentially (Kalker 1990, Three-Dimensional Elastic Bodies in Rolling Contact;
 Johnson 1985, Contact Mechanics, 8). To first order the traction coefficient follows the steady one by
 
-    d mu/dt = (mu_steady - mu)/tau,    tau = C/k,
+    (tau + beta) d mu/dt = mu_steady - mu,    tau = C/k,
 
 with Carter's creep slope C = 2 R Q/(a u) and the tangential stiffness k of the contact, which for plane contact of like
 materials is its normal one, dQ/dx = 10/9 Q/x: tau u = 1.8 R x/a, x being the approach, a the half-width and u the
-entrainment speed. The coefficient stays within those of the steady law, and traction ends with the load. What the contact
-does on the slip counts as lost, the elastic energy that it stores, some microjoules, with it.
+entrainment speed. Material damping c beside the spring lets the share beta/(tau + beta), beta = c/k, of the steady traction
+act at once. The coefficient that acts stays within those of the steady law, and traction ends with the load. What the
+contact does on the slip counts as lost, the elastic energy that it stores, some microjoules, with it.
 """
 
 import math
 from typing import NamedTuple
 
-from rbdyn.compiled.kernel import law
+from rbdyn.compiled.kernel import kernel, law
 
 # Of tau u = 1.8 R x/a: Carter's 2 over 10/9.
 RELAXATION = 1.8
@@ -32,6 +33,7 @@ class ElasticContact(NamedTuple):
     length_scale: float  # relaxation length over sqrt(load) [m/sqrt(N)]
     smallest_load: float  # the length stays below it [N]
     smallest_speed: float  # entrainment counts no less [m/s]
+    damping_time: float  # beta [s]
 
 
 def elastic_contact(
@@ -42,13 +44,14 @@ def elastic_contact(
     approach: float,
     smallest_load: float,
     smallest_speed: float,
+    damping_time: float,
 ) -> ElasticContact:
     """Law of a race of reduced ``radius`` [m], whose half-width is ``half_width_scale`` sqrt(load) [m/sqrt(N)].
 
     The relaxation length goes as load^0.4; it is exact at ``load`` [N], of ``approach`` [m], and taken as sqrt(load).
     """
     scale = RELAXATION * radius * approach / (half_width_scale * load)
-    return ElasticContact(start, scale, smallest_load, smallest_speed)
+    return ElasticContact(start, scale, smallest_load, smallest_speed, damping_time)
 
 
 @law
@@ -66,24 +69,33 @@ def _(tangential, y, j):
     return y[tangential.start + j]
 
 
+@kernel
+def relaxation_rate(tangential, load, entrainment_speed):
+    """1/tau [1/s] at a load [N] and an entrainment speed [m/s]; without load that of the smallest."""
+    length = tangential.length_scale * math.sqrt(max(load, tangential.smallest_load))
+    speed = entrainment_speed if load > 0.0 else 0.0
+    return max(speed, tangential.smallest_speed) / length
+
+
 @law
-def acting_coefficient(tangential, steady, coefficient):
-    """Traction coefficient that acts, of the steady law's and the state's."""
+def acting_coefficient(tangential, steady, coefficient, load, entrainment_speed):
+    """Traction coefficient that acts, of the steady law's and the state's, at a load [N] and entrainment speed [m/s] >= 0."""
 
 
 @acting_coefficient.body(RigidContact)
-def _(tangential, steady, coefficient):
+def _(tangential, steady, coefficient, load, entrainment_speed):
     return steady
 
 
 @acting_coefficient.body(ElasticContact)
-def _(tangential, steady, coefficient):
-    return coefficient
+def _(tangential, steady, coefficient, load, entrainment_speed):
+    damped = tangential.damping_time * relaxation_rate(tangential, load, entrainment_speed)
+    return coefficient + (steady - coefficient) * damped / (1.0 + damped)
 
 
 @law
 def coefficient_rate(tangential, steady, coefficient, load, entrainment_speed):
-    """Rate at which the coefficient follows the steady one [1/s], at a load [N] and an entrainment speed [m/s] >= 0."""
+    """Rate at which the state follows the steady coefficient [1/s]; arguments as above. Without load it dies away."""
 
 
 @coefficient_rate.body(RigidContact)
@@ -93,9 +105,9 @@ def _(tangential, steady, coefficient, load, entrainment_speed):
 
 @coefficient_rate.body(ElasticContact)
 def _(tangential, steady, coefficient, load, entrainment_speed):
-    length = tangential.length_scale * math.sqrt(max(load, tangential.smallest_load))
-    target, speed = (steady, entrainment_speed) if load > 0.0 else (0.0, 0.0)
-    return (target - coefficient) * max(speed, tangential.smallest_speed) / length
+    rate = relaxation_rate(tangential, load, entrainment_speed)
+    target = steady if load > 0.0 else 0.0
+    return (target - coefficient) * rate / (1.0 + tangential.damping_time * rate)
 
 
 @law
@@ -140,6 +152,5 @@ def _(tangential, rollers, y, row, dy):
 
 @relax_coefficients.body(ElasticContact)
 def _(tangential, rollers, y, row, dy):
-    rate = tangential.smallest_speed / (tangential.length_scale * math.sqrt(tangential.smallest_load))
     for j in range(rollers):
-        dy[row, tangential.start + j] = -rate * y[tangential.start + j]
+        dy[row, tangential.start + j] = coefficient_rate(tangential, 0.0, y[tangential.start + j], 0.0, 0.0)

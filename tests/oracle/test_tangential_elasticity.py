@@ -10,7 +10,7 @@ import pytest
 from conftest import ROOT
 from numpy_twin import twin
 
-from rbdyn.contact.tangential_elasticity import coefficient_rate, elastic_contact
+from rbdyn.contact.tangential_elasticity import acting_coefficient, coefficient_rate, elastic_contact
 from rbdyn.contact.traction import traction
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces import state
@@ -28,7 +28,7 @@ ELASTIC = "traction.elasticity=true"
 def test_unit_relaxation_is_creep_over_stiffness():
     """Unit: the time is Carter's slope 2 R Q/(a u) over 10/9 Q/x, at the load of the scale and as its root elsewhere."""
     radius, load, approach, half_width, speed = 4.6e-3, 2000.0, 6e-6, 90e-6, 5.0
-    law = elastic_contact(0, radius, half_width / math.sqrt(load), load, approach, 10.0, 0.1)
+    law = elastic_contact(0, radius, half_width / math.sqrt(load), load, approach, 10.0, 0.1, 0.0)
     time = 2.0 * radius * load / (half_width * speed) / (10.0 / 9.0 * load / approach)
     assert coefficient_rate(law, 0.03, 0.01, load, speed) == pytest.approx(0.02 / time, rel=1e-12)
     assert coefficient_rate(law, 0.03, 0.01, 0.25 * load, speed) == pytest.approx(0.04 / time, rel=1e-12)
@@ -37,9 +37,24 @@ def test_unit_relaxation_is_creep_over_stiffness():
     assert alone == pytest.approx(-0.01 / time * 0.1 / speed * math.sqrt(load / 10.0), rel=1e-12)
 
 
+def test_unit_material_damping():
+    """Unit: creep, spring and damper in series and parallel, T = C s (1 + beta p)/(1 + (beta + tau) p) of a slip's change:
+    of a step the share beta/(tau + beta) acts at once, the rest in the time tau + beta; undamped nothing does.
+    """
+    beta, steady, speed = 4e-6, 0.03, 5.0
+    undamped, damped = (elastic_contact(0, 4.6e-3, 2e-6, 2000.0, 6e-6, 10.0, 0.1, each) for each in (0.0, beta))
+    tau = steady / coefficient_rate(undamped, steady, 0.0, 2000.0, speed)
+    assert acting_coefficient(undamped, steady, 0.0, 2000.0, speed) == 0.0
+    assert acting_coefficient(damped, steady, 0.0, 2000.0, speed) == pytest.approx(
+        steady * beta / (tau + beta), rel=1e-12
+    )
+    assert coefficient_rate(damped, steady, 0.0, 2000.0, speed) == pytest.approx(steady / (tau + beta), rel=1e-12)
+    assert acting_coefficient(damped, steady, steady, 2000.0, speed) == steady
+
+
 def test_invariant_coefficients_stay_within_the_steady_ones():
     """Invariant: under any history of slip the coefficient stays within the extremes of the steady law and ends on it."""
-    law, draw = elastic_contact(0, 4.6e-3, 2e-6, 2000.0, 6e-6, 10.0, 0.1), np.random.default_rng(3)
+    law, draw = elastic_contact(0, 4.6e-3, 2e-6, 2000.0, 6e-6, 10.0, 0.1, 0.0), np.random.default_rng(3)
     steady, mu, step = draw.uniform(-0.05, 0.05, 4000), 0.0, 1e-6
     for target in steady:
         mu += step * coefficient_rate(law, target, mu, draw.uniform(1.0, 3000.0), 5.0)

@@ -15,7 +15,7 @@ import numpy as np
 from film_oracle import quadrature_shape
 from numpy_twin_laws import (
     alpha_of,
-    follow,
+    elastic_traction,
     hunt_crossley,
     oil_of,
     open_film,
@@ -102,7 +102,7 @@ def race(scene, mass, ring, roller, radius, encloses, coefficient):
     if scene.model.open_contact_film and not encloses and middle < 0.0:
         film = open_contact(scene, ring, roller, radius, -middle)
     if elastic == 0.0:
-        return 0.0, *film, 0.0, follow(scene, encloses, 0.0, 0.0, coefficient, 0.0)
+        return 0.0, *film, 0.0, elastic_traction(scene, encloses, 0.0, 0.0, coefficient, 0.0)[1]
     if scene.bearing.outer_waviness if encloses else scene.bearing.inner_waviness:
         # Virtual work: the load times how the overlap changes with the centre and with the angle of the ring, each by
         # a step of 1e-30 along the imaginary axis, which loses no digits.
@@ -119,11 +119,6 @@ def race(scene, mass, ring, roller, radius, encloses, coefficient):
 
     point = roller.centre + to_race * (radius - 0.5 * approach)
     slip = float((ring.velocity_at(point) - roller.velocity_at(point)) @ tangent)
-    steady = race_traction(scene, encloses, slip, load)
-    traction = (coefficient if scene.traction.elasticity else steady) * load
-    roller.push(traction * tangent, point)
-    ring.push(-traction * tangent, point)
-
     # Rolling resistance, seen from the line of centres: both surfaces drag the film along at mean speed u, and it
     # holds each back with F_R. Pressure on a round surface points to its centre, so its resultants P on roller and
     # ring make no moment of their own. Equilibrium of the film: P_roller + P_ring = 2 F_R; moments about the ring's
@@ -132,13 +127,17 @@ def race(scene, mass, ring, roller, radius, encloses, coefficient):
     lever = float((point - ring.centre) @ outward)
     roller_surface = (roller.spin - line_spin) * float((point - roller.centre) @ outward)
     mean_speed = 0.5 * (roller_surface + (ring.spin - line_spin) * lever)
+    steady = race_traction(scene, encloses, slip, load)
+    acting, following = elastic_traction(scene, encloses, load, steady, coefficient, abs(mean_speed))
+    traction = acting * load
+    roller.push(traction * tangent, point)
+    ring.push(-traction * tangent, point)
     held = math.copysign(rolling_resistance(scene, encloses, load, abs(mean_speed)), mean_speed)
     pressure = 2.0 * held * lever / distance
     roller.push(-held * tangent, point)
     roller.push(pressure * tangent, roller.centre)
     ring.push(-held * tangent, point)
     ring.push((2.0 * held - pressure) * tangent, ring.centre)
-    following = follow(scene, encloses, load, steady, coefficient, abs(mean_speed))
     return load, traction * slip + film[0], 2.0 * held * mean_speed + film[1], (load - elastic) * rate, following
 
 

@@ -116,14 +116,14 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
     roller_lever = side * (radius - 0.5 * approach)
     ring_lever = distance + roller_lever
     slip = ring_speed * ring_lever - tangential - roller_spin * roller_lever
-    steady = traction(race.traction, slip, load)
-    traction_force = acting_coefficient(race.tangential, steady, coefficient) * load
 
     # Seen from the line of centres both surfaces run the same way at the entrainment speed.
     roller_surface = (roller_spin - orbit_rate) * roller_lever
     ring_surface = (ring_speed - orbit_rate) * ring_lever
     entrainment = 0.5 * (roller_surface + ring_surface)
     speed = max(abs(entrainment), SMALLEST_SPEED)
+    steady = traction(race.traction, slip, load)
+    traction_force = acting_coefficient(race.tangential, steady, coefficient, load, speed) * load
     resistance = rolling_force(race.rolling, load, speed)
     rolling = math.copysign(resistance, entrainment)
     normal = -side * load

@@ -108,7 +108,11 @@ def _tangential(scene: Scene, place: int) -> RigidContact | ElasticContact:
     half_width_scale = math.sqrt(8.0 * radius / (math.pi * modulus * length))
     approach = (load / palmgren(modulus, length).stiffness) ** 0.9
     smallest = max(scene.geometry.centrifugal_force, LIGHTEST * load), SLOWEST * abs(scene.geometry.motion.entrainment)
-    return elastic_contact(start + place * drawing.rollers, radius, half_width_scale, load, approach, *smallest)
+    # Damping of a roller between two races against its critical one, as that of the approach.
+    ratio = 0.0 if scene.model.race_damping == "off" else scene.model.race_damping_ratio
+    damping_time = 2.0 * ratio * math.sqrt(scene.geometry.roller_mass / 3.0 * approach / (10.0 / 9.0 * load))
+    first = start + place * drawing.rollers
+    return elastic_contact(first, radius, half_width_scale, load, approach, *smallest, damping_time)
 
 
 def _form(harmonics: list[Harmonic]) -> Any:
