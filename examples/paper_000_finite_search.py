@@ -209,24 +209,21 @@ def table_4() -> tuple[DoubleOutcome, ...]:
     for axial, speed, their_searches, their_seconds in TABLE_4:
         scene = double_decker_scene(axial, speed)
         model, load = double_decker_of(scene), load_of(scene)
-        searched, search_s = _fastest(lambda model=model, load=load: double_decker_search.solve(model.stack, load))
-        convex, convex_s = _fastest(
-            lambda model=model, load=load, given=given_of(scene): solve_double_decker(
-                model.stack, load, given, model.middle_given
-            )
-        )
+        searched, search_s = _fastest(double_decker_search.solve, model.stack, load)
+        task = (model.stack, load, given_of(scene), model.middle_given)
+        convex, convex_s = _fastest(solve_double_decker, *task)
         outcomes.append(
             DoubleOutcome(axial, speed, their_searches, their_seconds, searched, search_s, convex, convex_s)
         )
     return tuple(outcomes)
 
 
-def _fastest(solve: Callable[[], Any]) -> tuple[Any, float]:
+def _fastest(solve: Callable[..., Any], *task: Any) -> tuple[Any, float]:
     """What a solver returns, and its shortest time of ``REPEATS`` [s], compilation left out."""
-    found, times = solve(), []
+    found, times = solve(*task), []
     for _ in range(REPEATS):
         began = time.perf_counter()
-        solve()
+        solve(*task)
         times.append(time.perf_counter() - began)
     return found, min(times)
 

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-
 import paper_000_finite_search as hu
 import paper_003_preload as sensors
+
 from published.common import Check, Finding, Table, Verdict, canvas, findings_table, percent, save, tally
 from published.lundberg_palmgren import plain_capacities
 from rbdyn import BallScene
@@ -273,7 +273,7 @@ def angular_findings(frame: pd.DataFrame, tilted: pd.DataFrame) -> tuple[Finding
         Finding(
             f"largest ball load {LARGEST_LOAD_N:g} N at 100 N radial (Fig 9)", SENSORS, text,
             f"{load:.1f} N held axially ({percent(load / LARGEST_LOAD_N - 1.0)}), {working:.1f} N under 40 N axial; "
-            f"equilibrium allows none below {least:.1f} N", agrees(LARGEST_LOAD_N >= least),
+            f"equilibrium allows none below {least:.1f} N", agrees(least <= LARGEST_LOAD_N),
         ),
         Finding(
             "ball loads rise with radial load (Fig 9)", SENSORS, "trend",

@@ -18,6 +18,7 @@ from rbdyn.dynamics.parameters.race_report import race_notes, race_report
 from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
+from rbdyn.dynamics.statistics.cage_orbit import orbit_radius_share, whirl_notes
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.metrics import work_done
 from rbdyn.result import SimulationResult, versions
@@ -84,6 +85,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
     inner_load, outer_load = (max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD))
     tighter = TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
     races = race_report(scene, inner_load, outer_load)
+    orbit = orbit_radius_share(scene, runs, companions, ensemble.plan.share)
     return SimulationResult(
         status="ok",
         impact_force=figures["impact_force_N"],
@@ -122,6 +124,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
             *race_notes(scene, races),
             *heat_notes(scene, figures["power_loss_W"].value),
             *_notes(scene, power_gap),
+            *whirl_notes(scene, orbit),
             *left_out_notes(scene, figures["power_loss_W"].value),
             *ensemble.notes,
             *error_notes(scene, figures, ensemble.fault, tighter),
@@ -129,6 +132,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         ),
         versions=versions(),
         scene=scene.model_dump(mode="json"),
+        cage_orbit_radius_share=orbit,
     )
 
 
