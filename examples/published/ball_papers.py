@@ -139,9 +139,8 @@ def search_findings(frame: pd.DataFrame) -> tuple[Finding, ...]:
 def least_ball_load(radial: float, balls: int) -> float:
     """Least load of the most loaded ball [N] that any equilibrium under a radial load [N] allows.
 
-    sum Q cos a cos psi = F_r with Q >= 0 and cos a <= 1, so F_r <= Q_max times the sum of the positive cosines, which is
-    largest with a ball in the load direction: 1/sin(pi/Z) for an even Z, cot(pi/(2 Z))/2 for an odd one, or with two balls
-    astride it 1/(2 sin(pi/(2 Z))).
+    sum Q cos a cos psi = F_r with Q >= 0 and cos a <= 1, so F_r is at most Q_max times the sum of the positive cosines. That is
+    largest with a ball in the load direction or two astride it: 1/sin(pi/Z) for an even Z, 1/(2 sin(pi/(2 Z))) for an odd one.
     """
     cosines = [
         np.maximum(np.cos(2.0 * np.pi * (np.arange(balls) + share) / balls), 0.0).sum() for share in (0.0, 0.25, 0.5)

@@ -175,9 +175,10 @@ def solve(stack: Stack, load: Array, search: Search = SEARCH, damping: Damping =
     below, above = best[: inner.size], best[inner.size :]
     push = _on_middle_ring(stack.inner.control, inner, np.ascontiguousarray(below)).sum(axis=0)
     carrying = system_of(stack.outer.row, np.array([push[0], 0.0, push[1], 0.0, 0.0]), SQUARE)
+    end = Stop(below, status, steps, least)
     ends = (
-        solution_at(layer.control, system, Stop(part, status, steps, least))
-        for layer, system, part in ((stack.inner, inner, below), (stack.outer, carrying, above))
+        solution_at(stack.inner.control, inner, end),
+        solution_at(stack.outer.control, carrying, end._replace(u=above)),
     )
     starts_of_all = np.concatenate(points, axis=1).mean(axis=1)
     places = np.concatenate([part[:-2].reshape(-1, 2) for part in (below, above)]).mean(axis=0)
