@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from short_studies import short_study
 
-from doe.study.confirmation import Confirmed, whirl_sentence
+from doe.study.confirmation import Choice, confirmed_from, whirl_sentence
+from doe.study_file import Study
 from rbdyn.dynamics.forces.equations import LOADS, POWERS
 from rbdyn.dynamics.integrators.booking import book_whirl
 from rbdyn.dynamics.integrators.records import WHIRL
@@ -133,29 +135,23 @@ def test_unit_circling_cage_has_no_note(make_scene):
     assert not any("does not whirl" in note for note in result.notes)
 
 
-def test_unit_study_says_whose_whirl_is_a_jitter():
+def test_unit_study_says_whose_whirl_is_a_jitter(tmp_path, outer_result):
     """Unit: only a study with a goal for the whirl speaks of it, and names the points."""
-
-    def study(goal):
-        response = SimpleNamespace(goal=goal, limit=None, upper=None, lower=None, weight=1.0)
-        return SimpleNamespace(responses=["whirl_deviation_ratio"], file=SimpleNamespace(response=[response]))
+    study = Study.load(short_study(tmp_path))
+    idle = Study.load(short_study(tmp_path, replace=('"quadratic"\ngoal = "min"', '"quadratic"\ngoal = "none"')))
 
     def point(share):
-        return Confirmed(np.zeros(1), np.ones(1), np.zeros(1), np.zeros(1), orbit_share=share)
+        orbit = None if share is None else Quantity(share, 0.1 * share, None, 10.0, 9)
+        result = replace(outer_result, cage_orbit_radius_share=orbit)
+        return confirmed_from(study, Choice(study.baseline, "a test"), result)
 
     both = {"baseline": point(0.016), "pick": point(0.02)}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("doe.study.confirmation.goals_of", lambda one: SimpleNamespace(
-            objectives=[] if one.file.response[0].goal == "none" else [0]
-        ))  # fmt: skip
-        found = whirl_sentence(study("min"), both)
-        assert (
-            "that of a jitter" in found
-            and "0.016 of its play at the baseline and 0.02 of its play at the pick" in found
-        )
-        assert whirl_sentence(study("min"), both | {"pick": point(None)}).endswith("0.016 of its play at the baseline.")
-        assert whirl_sentence(study("none"), both) == ""
-        assert whirl_sentence(study("min"), dict.fromkeys(both, point(None))) == ""
+    found = whirl_sentence(study, both)
+    assert "that of a jitter" in found and "0.016 of its play at the baseline and 0.02 of its play at the pick" in found
+    assert whirl_sentence(study, both | {"pick": point(0.9)}).endswith("0.016 of its play at the baseline.")
+    assert whirl_sentence(study, dict.fromkeys(both, point(0.9))) == ""
+    assert whirl_sentence(study, dict.fromkeys(both, point(None))) == ""
+    assert whirl_sentence(idle, both) == ""
 
 
 def test_unit_unknown_share_is_no_jitter(outer_result):
