@@ -135,13 +135,15 @@ class Recording:
         booked = np.array(self._booked).reshape(self._batches, -1)
         parts = np.split(booked, np.cumsum((tally.whirl.size, tally.work.size)), axis=1)
         motion, work, largest = (np.ascontiguousarray(part) for part in parts)
+        # Contiguous too: the order of memory decides the last bit of sums.
+        speeds, places = (np.ascontiguousarray(motion[:, columns]) for columns in (SPEED_SUMS, PLACE_SUMS))
         cage, rolling, energy = np.array(self._looks).T
         return Replicate(
             first=self.batches.first,
             per_window=self.batches.per_window,
             durations=np.diff(self._ends) * run.scene.turn_s,
-            whirl=self._filtered_whirl() if self._places else motion[:, SPEED_SUMS],
-            orbit=motion[:, PLACE_SUMS],
+            whirl=self._filtered_whirl() if self._places else speeds,
+            orbit=places,
             work=work,
             largest=largest,
             cage_angle=np.diff(cage),
