@@ -74,8 +74,8 @@ class SavedRecord(Record):
 
 
 # Share of the cage's radial play below which the radius of its orbit is that of a jitter. Of five catalogue bearings at 1700 to
-# 13000 rpm, 0.1 to 10 % of C and all guidances, and of the example: cages that a film holds at one place move by 0.01 to 0.1 of
-# their play and none goes round its guide (whirl rate within 0.015 of 0), those that rollers throw about by 0.1 to 0.35, and the
+# 12000 rpm, 0.1 to 10 % of C and all guidances, and of the example: cages that a film holds at one place move by 0.01 to 0.1 of
+# their play and none goes round its guide (whirl rate within 0.015 of 0), those that rollers throw about by 0.1 to 0.36, and the
 # two that go round (rates of 0.15 and 0.84 of the cage speed) by 0.51 and 0.25.
 JITTER = 0.1
 
