@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from published.ball_papers import angular_contact, double_decker_search
+from published.cage_speed import cage_speed
 from published.common import Check, Effort, Finding, tally_table
 from published.friction_totals import friction_totals
 from published.operating import figure14, friction
@@ -40,6 +42,9 @@ FULL: dict[str, Callable[[], Check]] = {
     "totals": lambda: friction_totals(STEADY),
     "sensitivity": lambda: sensitivity(SHORT),
     "whirl": lambda: whirl(MEDIUM),
+    "cage_speed": lambda: cage_speed(SHORT),
+    "search": double_decker_search,
+    "angular": angular_contact,
 }
 BRIEF: dict[str, Callable[[], Check]] = {
     "table4": lambda: table4(SHORT),
@@ -51,6 +56,9 @@ BRIEF: dict[str, Callable[[], Check]] = {
     "totals": lambda: friction_totals(),
     "sensitivity": lambda: sensitivity(SHORT, QUICK, whole_design=False),
     "whirl": lambda: whirl(SHORT, (1.0, 0.1, 0.01, 0.001), ("four_constant",), 5.0),
+    "cage_speed": lambda: cage_speed(SHORT, (20000, 26000, 32000)),
+    "search": double_decker_search,
+    "angular": angular_contact,
 }  # fmt: skip
 
 

@@ -20,6 +20,8 @@ from rbdyn.records.record import Record, derived, keyed, outside_json
 from rbdyn.records.words import improvement
 from rbdyn.result import SimulationResult
 
+WHIRL = "whirl_deviation_ratio"
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -36,7 +38,7 @@ class Confirmed:
     Every interval of a simulated response joins the two by `error`: the root sum square of the statistical and the
     numerical half-width, as of independent errors. ``freedom`` (m,): degrees of freedom of the statistical ones, infinitely
     many unless given; the numerical ones have that. ``power_terms``: power losses [W] by contact; ``reason``: why the point
-    was chosen.
+    was chosen; ``orbit_share``: radius of the cage's orbit over its play where that is of a jitter, else None.
     """
 
     point: Array
@@ -46,6 +48,7 @@ class Confirmed:
     power_terms: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
     freedom: Array | None = None
+    orbit_share: float | None = None
 
     @property
     def error(self) -> Array:
@@ -126,7 +129,17 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Co
         for key in ("value", "statistical_error", "numerical_error")
     )
     behind = [quantity.get("degrees_of_freedom") or np.inf for quantity in quantities]
-    return Confirmed(choice.point, values, statistical, numerical, result.power_terms, choice.reason, np.array(behind))
+    orbit = result.cage_orbit_radius_share
+    return Confirmed(
+        choice.point,
+        values,
+        statistical,
+        numerical,
+        result.power_terms,
+        choice.reason,
+        np.array(behind),
+        orbit.value if orbit is not None and result.jitters else None,
+    )
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:
@@ -149,6 +162,17 @@ def error_of_difference(one: Confirmed, other: Confirmed) -> tuple[Array, Array]
     every, freedom = [*errors[0], *errors[1]], joint_freedom([*errors[0], *errors[1]], [*behind[0], *behind[1]])
     total = np.sqrt(np.sum([each**2 for each in every], axis=0))
     return total * special.stdtrit(freedom, 0.5 + 0.5 * LEVEL), freedom
+
+
+def whirl_sentence(study: Study, confirmed: Mapping[str, Confirmed]) -> str:
+    """Where a study has a goal for the whirl deviation ratio and that is of a jitter, at baseline or pick; else empty."""
+    wanted = [study.responses[index] for index in goals_of(study).objectives]
+    shares = {name: confirmed[name].orbit_share for name in ("baseline", "pick")}
+    known = {name: share for name, share in shares.items() if share is not None}
+    if WHIRL not in wanted or not known:
+        return ""
+    radii = " and ".join(f"{share:.2g} of its play at the {name}" for name, share in known.items())
+    return f"{WHIRL} is that of a jitter, not of a whirl: the cage's orbit has a radius of {radii}."
 
 
 def statement(gains: Sequence[Gain]) -> str:

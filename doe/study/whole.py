@@ -21,7 +21,7 @@ from doe.study.chains import solve_chains
 from doe.study.checked import check_study
 from doe.study.chosen import Chosen, choose
 from doe.study.compared import Compared, compared, kept_direct
-from doe.study.confirmation import Confirmed, Gain, gains
+from doe.study.confirmation import Confirmed, Gain, gains, whirl_sentence
 from doe.study.design import check_given, design_of
 from doe.study.direct import Direct, find_direct
 from doe.study.direct_pick import DirectPick, neighbourhood
@@ -111,6 +111,11 @@ class StudyResult:
     def verdict(self) -> Verdict:
         """What became of the limits at the pick; a study that did not keep them has failed."""
         return verdict_of(self.limits)
+
+    @property
+    def whirl_sentence(self) -> str:
+        """That the whirl which the study improves is a jitter; empty where it is none, or not asked for."""
+        return whirl_sentence(self.study, self.confirmed)
 
     @property
     def limits_sentence(self) -> str:

@@ -250,10 +250,12 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         return "not estimated" if error is None else error_alone(error)
 
     contact = {"largest of it by contact alone, without the film [N]": result.impact_contact_force}
+    orbit = result.cage_orbit_radius_share
     figures = {
         f"largest roller/cage force in {counted(result.impact_window_turns, 'shaft turn')} [N]": result.impact_force,
         **({} if result.impact_contact_force == result.impact_force else contact),
         "whirl deviation ratio": result.whirl_deviation_ratio,
+        **({} if orbit is None else {"radius of the cage's orbit over its radial play": orbit}),
         "power loss [W]": result.power_loss,
         "cage speed [rpm]": result.cage_speed_rpm,
         "cage slip": result.cage_slip,

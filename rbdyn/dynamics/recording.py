@@ -15,7 +15,17 @@ from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
-from rbdyn.dynamics.integrators.records import ACCEPTED, DERIVATIVES, REJECTED
+from rbdyn.dynamics.integrators.records import (
+    ACCEPTED,
+    DERIVATIVES,
+    PLACE_SQUARES,
+    PLACES_X,
+    PLACES_Y,
+    REJECTED,
+    SAMPLES,
+    SPEEDS,
+    SQUARES,
+)
 from rbdyn.dynamics.pace import Notice, Pace
 from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.relaxation import MOTIONS, Linearised
@@ -25,6 +35,8 @@ from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import MOST_OF_A_RUN
 
+# Columns of a tally's whirl that make up a replicate's ``whirl`` and its ``orbit``.
+SPEED_SUMS, PLACE_SUMS = (SAMPLES, SPEEDS, SQUARES), (SAMPLES, PLACES_X, PLACES_Y, PLACE_SQUARES)
 # Long enough that the step cut at a batch's end costs nothing, short against any memory worth finding.
 BATCH_TURNS = 1.0
 # Batches after which the decay of slow motions is read: the rollers have been round twice.
@@ -122,13 +134,16 @@ class Recording:
         run, scale, tally = self.run, scales(self.run.scene), self.run.tally
         booked = np.array(self._booked).reshape(self._batches, -1)
         parts = np.split(booked, np.cumsum((tally.whirl.size, tally.work.size)), axis=1)
-        whirl, work, largest = (np.ascontiguousarray(part) for part in parts)
+        motion, work, largest = (np.ascontiguousarray(part) for part in parts)
+        # Contiguous too: the order of memory decides the last bit of sums.
+        speeds, places = (np.ascontiguousarray(motion[:, columns]) for columns in (SPEED_SUMS, PLACE_SUMS))
         cage, rolling, energy = np.array(self._looks).T
         return Replicate(
             first=self.batches.first,
             per_window=self.batches.per_window,
             durations=np.diff(self._ends) * run.scene.turn_s,
-            whirl=self._filtered_whirl() if self._places else whirl,
+            whirl=self._filtered_whirl() if self._places else speeds,
+            orbit=places,
             work=work,
             largest=largest,
             cage_angle=np.diff(cage),

@@ -18,6 +18,7 @@ from rbdyn.dynamics.parameters.race_report import race_notes, race_report
 from rbdyn.dynamics.recording import recording_of
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
+from rbdyn.dynamics.statistics.cage_orbit import orbit_radius_share, whirl_notes
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.metrics import work_done
 from rbdyn.result import SimulationResult, versions
@@ -87,6 +88,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
     weights = [run.duration for run in runs]
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in LOSSES}
     inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
+    orbit = orbit_radius_share(scene, runs, companions, ensemble.plan.share)
     return SimulationResult(
         status="ok",
         impact_force=figures["impact_force_N"],
@@ -124,6 +126,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
             *race_notes(scene, races),
             *heat_notes(scene, figures["power_loss_W"].value),
             *_notes(scene, power_gap),
+            *whirl_notes(scene, orbit),
             *left_out_notes(scene, figures["power_loss_W"].value),
             *ensemble.notes,
             *error_notes(scene, figures, ensemble.fault, tighter),
@@ -131,6 +134,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         ),
         versions=versions(),
         scene=scene.model_dump(mode="json"),
+        cage_orbit_radius_share=orbit,
     )
 
 

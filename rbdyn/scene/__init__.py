@@ -257,6 +257,12 @@ class Scene(SceneFile):
         return None if landless or clearance is None else 0.5 * clearance
 
     @property
+    def cage_play_m(self) -> float | None:
+        """Radial play of the cage [m]: in its land, or in the pocket lips of the rollers that guide it; None without either."""
+        lips = self.cage.lip_clearance
+        return lips if self.guide_clearance_m is None else self.guide_clearance_m
+
+    @property
     def turn_s(self) -> float:
         """Duration of one shaft turn [s]."""
         return self.operation.turn_s

@@ -34,6 +34,7 @@ from rbdyn.result import Quantity, SimulationResult
 KEYS = {
     "format", "status", "impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip",
     "power_balance", "power_terms_W", "loads", "cost", "replicates", "seed", "versions", "transient_turns", "target",
+    "cage_orbit_radius_share",
 }  # fmt: skip
 QUANTITIES = (
     "impact_force_N", "impact_contact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip",

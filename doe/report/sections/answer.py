@@ -32,7 +32,8 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
         blocks.append(Tiles([_tile(summary, each, pick) for each in factors(summary) if each.name in pick]))
         if plays := [CLEARANCES[each.key] for each in factors(summary) if each.key in CLEARANCES]:
             blocks.append(Words(f"Clearances: {', '.join(plays)}.", "note"))
-    blocks += [Words(statement(summary), "statement"), _gains(summary), limits(summary, ("baseline", "pick"))]
+    blocks += [Words(statement(summary), "statement"), Words(part(summary, "whirl_sentence") or "", "statement")]
+    blocks += [_gains(summary), limits(summary, ("baseline", "pick"))]
     blocks.append(_held(summary))
     blocks += [Words(part(summary, "edge", "sentence") or ""), Bullets(searched[1:]), part_dimensions(summary)]
     reason = part(summary, "confirmation", "pick", "reason") or part(summary, "front", "pick", "reason")

@@ -63,6 +63,8 @@ def _print_answer(outcome: StudyResult) -> None:
         rows.append((gain.response, *cells, improvement(gain.percent, gain.error, gain.goal), gain.verdict))
     print_table("confirmed by simulation (95 % intervals)", ("", "baseline", "pick", "change", "verdict"), rows)
     print(statement(outcome.gains["pick"]))
+    if outcome.whirl_sentence:
+        print(outcome.whirl_sentence)
     if outcome.robust is not None:
         print_robust_front(outcome.robust, study.factors)
     _print_limits(outcome)

@@ -44,6 +44,7 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "confirmation": confirmation_record(outcome),
         "gains": gains_record(gains),
         "statement": statement(gains),
+        "whirl_sentence": outcome.whirl_sentence,
         "chains": {name: chain.as_dict() for name, chain in outcome.chains.items()},
         "beside_reference": {row.response: row.as_dict() for row in outcome.beside},
         "notes": list(outcome.notes),

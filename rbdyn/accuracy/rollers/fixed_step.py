@@ -42,10 +42,11 @@ def all_finite(y):
 
 @kernel
 def book(tally, y, body, loads):
-    """Take up the largest loads at a step's end, and the speed of the cage's centre as a sample of its whirl."""
+    """Take up the largest loads at a step's end, and place and speed of the cage's centre as a sample of its whirl."""
     for force in range(LOADS):
         tally.largest[force] = max(tally.largest[force], loads[0, force])
-    book_whirl(tally.whirl, y[body + state.CAGE_VX], y[body + state.CAGE_VY])
+    x, y_place = y[body + state.CAGE_X], y[body + state.CAGE_Y]
+    book_whirl(tally.whirl, x, y_place, y[body + state.CAGE_VX], y[body + state.CAGE_VY])
 
 
 @entry

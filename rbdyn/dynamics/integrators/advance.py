@@ -6,7 +6,7 @@ import numpy as np
 
 from rbdyn.compiled.kernel import entry, kernel, routine
 from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD, POWERS, pocket_loads, roller_count
-from rbdyn.dynamics.forces.state import CAGE_VX, CAGE_VY, PARTS
+from rbdyn.dynamics.forces.state import CAGE_VX, CAGE_VY, CAGE_X, CAGE_Y, PARTS
 from rbdyn.dynamics.integrators import method_laws as laws
 from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators.booking import PEAK_POINTS, book_peaks, book_point, book_whirl
@@ -52,9 +52,11 @@ def keep(method, body, y, stage, k, power, loads, clock, work, largest, largest_
             largest_time[force] = time + h
     while clock[at.SAMPLE] <= time + h:
         theta = (clock[at.SAMPLE] - time) / h
+        cage_x = laws.interpolate(method, y, stage, k, h, theta, body + CAGE_X)
+        cage_y = laws.interpolate(method, y, stage, k, h, theta, body + CAGE_Y)
         vx = laws.interpolate(method, y, stage, k, h, theta, body + CAGE_VX)
         vy = laws.interpolate(method, y, stage, k, h, theta, body + CAGE_VY)
-        book_whirl(whirl, vx, vy)
+        book_whirl(whirl, cage_x, cage_y, vx, vy)
         clock[at.SAMPLE] += sample_step
     return on_wall > largest[POCKET_LOAD] or contact > largest[POCKET_CONTACT_LOAD]
 

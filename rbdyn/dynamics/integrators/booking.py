@@ -1,21 +1,24 @@
-"""What every method keeps of a step: samples of the cage's speed, and the largest pocket loads within it."""
+"""What every method keeps of a step: samples of the cage's speed and place, and the largest pocket loads within it."""
 
 import math
 
 from rbdyn.compiled.kernel import kernel, routine
 from rbdyn.dynamics.forces.equations import POCKET_CONTACT_LOAD, POCKET_LOAD
-from rbdyn.dynamics.integrators.records import SAMPLES, SPEEDS, SQUARES
+from rbdyn.dynamics.integrators.records import PLACE_SQUARES, PLACES_X, PLACES_Y, SAMPLES, SPEEDS, SQUARES
 
 PEAK_POINTS = 8  # interior points at which a step that holds a new largest pocket load is looked at
 
 
 @kernel
-def book_whirl(whirl, vx, vy):
-    """Take a sample of the velocity of the cage's centre [m/s]."""
+def book_whirl(whirl, x, y, vx, vy):
+    """Take a sample of place [m] and velocity [m/s] of the cage's centre."""
     square = vx * vx + vy * vy
     whirl[SAMPLES] += 1.0
     whirl[SPEEDS] += math.sqrt(square)
     whirl[SQUARES] += square
+    whirl[PLACES_X] += x
+    whirl[PLACES_Y] += y
+    whirl[PLACE_SQUARES] += x * x + y * y
 
 
 @kernel

@@ -16,8 +16,9 @@ NOW, STEP, ERROR, SAMPLE, FRAME, CLOCK = range(6)
 ACCEPTED, REJECTED, DERIVATIVES, WORST, COUNTS = range(5)
 # In ``Carry.stiffness``: steps looked at, those held by stability, sum of their |eigenvalue| [1/s].
 LOOKED_AT, HELD, EIGENVALUES, STIFFNESS = range(4)
-# In ``Tally.whirl``: samples, sum and sum of squares of the speed of the cage's centre.
-SAMPLES, SPEEDS, SQUARES, WHIRL = range(4)
+# In ``Tally.whirl``: samples, sum and sum of squares of the speed of the cage's centre, sums of its places x and y and of
+# x^2 + y^2.
+SAMPLES, SPEEDS, SQUARES, PLACES_X, PLACES_Y, PLACE_SQUARES, WHIRL = range(7)
 # Rows of stages: of the longest method, its end of the step and a free one included.
 ROWS = 8
 PI_START_ERROR = 1e-4

@@ -21,8 +21,9 @@ class Replicate:
     """One run in batches. Times in s, works and energies in J, loads in N, angles in rad.
 
     Arrays over batches, from the start on; figures count from the batch ``first``, and ``per_window`` batches make an
-    impact window. ``whirl``: samples, sum and sum of squares of the cage centre's speed; ``work``: integrals of the
-    loss powers, of those that come in by shafts and loads, and of the rolling resistance of the inner race; ``largest``: loads; ``energy``: kinetic, elastic and
+    impact window. ``whirl``: samples, sum and sum of squares of the cage centre's speed; ``orbit``: samples, sums of the
+    centre's places x, y and of x^2 + y^2; ``work``: integrals of the loss powers, of those that come in by shafts and loads,
+    and of the rolling resistance of the inner race; ``largest``: loads; ``energy``: kinetic, elastic and
     load energy together at the ends of batches; ``energy_scale``: contact load times approach;
     ``stiffness``: as in ``runge_kutta.Carry``; ``decay_rates``: (states, motions) as in ``relaxation`` [1/s].
     """
@@ -44,6 +45,7 @@ class Replicate:
     method: str = "rk45"
     stiffness: Array = field(default_factory=lambda: np.zeros(3))
     decay_rates: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    orbit: Array = field(default_factory=lambda: np.zeros((0, 4)))
 
     def counted_from(self, first: int) -> "Replicate":
         """The same run, counted from another batch."""
@@ -158,12 +160,22 @@ def _timed(values: Callable[[Replicate], Array]) -> Callable[[Replicate], Array]
     return lambda run: np.column_stack((run.durations, values(run)))[run.first :]
 
 
+def _about_its_place(run: Replicate) -> Array:
+    """Samples of the cage's centre in each batch, and the sum of their squared distances from its mean place in the run."""
+    samples, x, y, squares = run.orbit[run.first :].T
+    mean_x, mean_y = (place.sum() / max(samples.sum(), 1.0) for place in (x, y))
+    about = squares - 2.0 * (mean_x * x + mean_y * y) + samples * (mean_x**2 + mean_y**2)
+    return np.column_stack((samples, np.maximum(about, 0.0)))
+
+
 IMPACT_FORCE = Figure(_windowed(POCKET_LOAD), mean)
 IMPACT_CONTACT_FORCE = Figure(_windowed(POCKET_CONTACT_LOAD), mean)
 WHIRL_DEVIATION_RATIO = Figure(lambda run: run.whirl[run.first :], _deviation_ratio)
 POWER_LOSS = Figure(_timed(lambda run: run.work[:, :SHAFT].sum(axis=1)), mean)
 CAGE_SPEED = Figure(_timed(lambda run: run.cage_angle), mean)
 CAGE_SLIP = Figure(_timed(lambda run: np.column_stack((run.kinematic_angle, run.cage_angle))), _slip)
+# Root mean square distance of the cage's centre from its mean place in a replicate [m].
+ORBIT_RADIUS = Figure(_about_its_place, lambda sums: np.sqrt(sums[..., 1] / np.maximum(sums[..., 0], 1.0)))
 
 
 def mean_gap(runs: Sequence[Replicate]) -> float:

@@ -141,12 +141,12 @@ def rival(search: Callable[..., Stop]) -> Callable[..., Solution]:
         row: Row, control: Control, load: Array, given: Array | None = None, start: Any = None, **options: Any
     ) -> Solution:
         system = system_of(row, load, given)
-        return _solution_at(control, system, search(control, system, start, **options))
+        return solution_at(control, system, search(control, system, start, **options))
 
     return solve
 
 
-def _solution_at(control: Control, system: System, stop: Stop) -> Solution:
+def solution_at(control: Control, system: System, stop: Stop) -> Solution:
     row, z, u = system.row, system.row.cosine.size, stop.u
     at, figures = space(z), np.zeros((z, FIGURES))
     at.counts[STEPS] = stop.steps
