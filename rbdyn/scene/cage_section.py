@@ -50,10 +50,11 @@ def section_of(bearing: Bearing, cage: Cage) -> "CageSection | None":
     """Section of the cage in SI; None where the scene gives none."""
     from rbdyn.contact.cage_bar import CageSection
 
-    sizes = cage.bar_width, cage.bar_thickness, cage.bar_length, cage.side_ring_width
-    if any(size is None for size in sizes):
+    width, thickness = cage.bar_width, cage.bar_thickness
+    length, ring = cage.bar_length, cage.side_ring_width
+    if width is None or thickness is None or length is None or ring is None:
         return None
-    return CageSection(*(float(size or 0.0) for size in sizes), bearing.pitch_diameter, bearing.rollers)
+    return CageSection(width, thickness, length, ring, bearing.pitch_diameter, bearing.rollers)
 
 
 def section_misfits(bearing: Bearing, cage: Cage) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """Values that look like another unit: outside what is usual for the bearing, with what may have been meant."""
 
 import math
+from collections.abc import Mapping
 
 from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import Bearing, Cage
@@ -58,7 +59,9 @@ def unit_notes(
     ]
     warm = {} if mounting is None else mounting.model_dump()
     usual += [(f"mounting.{key}", value, RING_C) for key, value in warm.items() if key.endswith("_C")]
-    return tuple(_note(key, value, *ends) for key, value, ends in usual if value is not None and not ends[0] <= value <= ends[1])
+    return tuple(
+        _note(key, value, *ends) for key, value, ends in usual if value is not None and not ends[0] <= value <= ends[1]
+    )
 
 
 def _of_cage(bearing: Bearing, cage: Cage, material: Material, bar_stiffness: float | str) -> list[Usual]:
@@ -99,8 +102,13 @@ def _note(key: str, value: float, low: float, high: float) -> str:
     meant = {other: factor * value for other, factor in FACTORS.get(unit, {}).items()}
     meant |= {"K": value - ZERO_C_K} if key.endswith("_C") else {}
     likely = {other: number for other, number in meant.items() if low <= number <= high}
-    # Of units that would all do, the one nearest to the middle.
-    nearest = min(likely, key=lambda other: abs(math.log(likely[other] ** 2 / (low * high)))) if len(likely) > 1 else None
-    other = nearest or next(iter(likely), None)
+    other = _nearest(likely, low, high)
     mend = "check its unit" if other is None else f"if {value:g} {other} are meant, write {likely[other]:.4g}"
     return f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}; {mend}"
+
+
+def _nearest(likely: Mapping[str, float], low: float, high: float) -> str | None:
+    """Of units that would all do, the one whose number is nearest to the middle of the range; None of none."""
+    if len(likely) < 2:
+        return next(iter(likely), None)
+    return min(likely, key=lambda other: abs(math.log(likely[other] ** 2 / (low * high))))
