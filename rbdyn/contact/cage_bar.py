@@ -126,8 +126,7 @@ def side_ring_flexibility(section: CageSection, material: Elastic) -> Array:
     stiffness[6:12, 6:12] += _next_bar(section, material, pitch)
     free = [*FREE_BY_SYMMETRY, *range(6, 12)]
     # Each side of the bar bears half of what the bar's end brings.
-    flexibility: Array = np.linalg.inv(stiffness[np.ix_(free, free)])
-    return 0.5 * flexibility[:2, :2]
+    return np.asarray(0.5 * np.linalg.inv(stiffness[np.ix_(free, free)])[:2, :2], float)
 
 
 def _next_bar(section: CageSection, material: Elastic, angle: float) -> Array:
