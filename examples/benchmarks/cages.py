@@ -99,8 +99,8 @@ def bars() -> str:
         section = CageSection(*(1e-3 * each for each in lengths), 1e-3 * inside.pitch_diameter, inside.rollers)
         clamped = 1.0 / bar_compliance(bar_beam(section, brass), contact, np.zeros((2, 2)))
         cells = bar_stiffness(section, brass, contact), clamped, bar_stiffness(section, soft, contact)
-        drawn = "{:.2f} x {:.2f} x {:.1f}, {:.2f}".format(*lengths)
-        lines.append(f"| {named.name} | {drawn} | {' | '.join(f'{each:.2g}' for each in cells)} |")
+        shape = "{:.2f} x {:.2f} x {:.1f}, {:.2f}".format(*lengths)
+        lines.append(f"| {named.name} | {shape} | {' | '.join(f'{each:.2g}' for each in cells)} |")
     return "\n".join(lines)
 
 

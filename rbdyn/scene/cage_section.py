@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 STIFFNESS = "pocket_bar_stiffness_N_m"
 # What the stiffness by a section is multiplied by at the ends of its error (unknown_inputs.toml has the reason).
-STIFFNESS_ERROR = (0.6, 1.3)
+STIFFNESS_ERROR = (0.55, 1.25)
 # In roller diameters. A width that is estimated may be that of one roller more or less: only what is far off is refused.
 NARROWEST_POCKET = 0.75
 

@@ -103,8 +103,8 @@ def _note(key: str, value: float, low: float, high: float) -> str:
     meant |= {"K": value - ZERO_C_K} if key.endswith("_C") else {}
     likely = {other: number for other, number in meant.items() if low <= number <= high}
     other = _nearest(likely, low, high)
-    mend = "check its unit" if other is None else f"if {value:g} {other} are meant, write {likely[other]:.4g}"
-    return f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}; {mend}"
+    fix = "check its unit" if other is None else f"if {value:g} {other} are meant, write {likely[other]:.4g}"
+    return f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}; {fix}"
 
 
 def _nearest(likely: Mapping[str, float], low: float, high: float) -> str | None:

@@ -2,7 +2,7 @@
 
 Independent of ``rbdyn.contact.cage_bar`` but for what is asked: the middle bar is pushed along the circumference, evenly over the
 volume of its loaded length, and its stiffness is the load over the mean displacement of that volume, so that no local field of a
-contact enters. Walls of pockets are parallel. The cage is held half-way to the next pockets, one and a half pitches off.
+contact enters. Walls of pockets are parallel. The cage is held in the middle of a pocket, one and a half pitches off or farther.
 A quarter is meshed: the plane across the middle of the bars mirrors it, the plane along the middle of the loaded bar mirrors it with
 the other sign. Hexahedra of 27 nodes.
 """
@@ -16,12 +16,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 from skfem import Basis, ElementHex2, MeshHex, MeshHex2
 
-PITCHES = 1.5
-
 
 @dataclass(frozen=True)
 class Divisions:
-    """Elements across half a bar, a pocket and the thickness, along half of the load, beyond it, across a side ring."""
+    """Elements across half a bar, a pocket and the thickness, along half of the load, beyond it, across a side ring; bars on
+    each side of the loaded one.
+    """
 
     half_bar: int = 1
     pocket: int = 6
@@ -29,6 +29,7 @@ class Divisions:
     load: int = 3
     beyond: int = 2
     ring: int = 3
+    bars: int = 1
 
 
 def bar_stiffness_by_elements(section, modulus, ratio, load, divisions=Divisions()) -> float:
@@ -56,7 +57,7 @@ def bar_stiffness_by_elements(section, modulus, ratio, load, divisions=Divisions
     held = np.zeros((basis.N, 3), bool)
     held[np.abs(basis.doflocs[2]) < 1e-9, 2] = True
     held[np.abs(angle) < 1e-9, 1:] = True
-    held[np.abs(angle - 2.0 * np.pi / section.bars * PITCHES) < 1e-9] = True
+    held[np.abs(angle - 2.0 * np.pi / section.bars * (divisions.bars + 0.5)) < 1e-9] = True
     free = np.nonzero(~held.ravel())[0]
     solver = splu(
         matrix[free][:, free], permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
@@ -95,11 +96,10 @@ def _columns(section, radius, divisions) -> tuple[np.ndarray, np.ndarray]:
     pitch, wide, pocket = 2.0 * np.pi / section.bars, divisions.half_bar, divisions.pocket
     # Parallel walls: the bar is as much wider as the pitch.
     edge = (0.5 * section.bar_width + (radius - 0.5 * section.pitch_diameter) * 0.5 * pitch) / radius
-    parts = [
-        (0.0, edge, wide, True),
-        (edge, pitch - edge, pocket, False),
-        (pitch - edge, pitch + edge, 2 * wide, True),
-        (pitch + edge, PITCHES * pitch, pocket // 2, False),
-    ]
+    parts = [(0.0, edge, wide, True)]
+    for bar in range(1, divisions.bars + 1):
+        parts.append(((bar - 1) * pitch + edge, bar * pitch - edge, pocket, False))
+        parts.append((bar * pitch - edge, bar * pitch + edge, 2 * wide, True))
+    parts.append((divisions.bars * pitch + edge, (divisions.bars + 0.5) * pitch, pocket // 2, False))
     angles = [np.linspace(start, end, count + 1)[1:] for start, end, count, _ in parts]
     return np.concatenate([[0.0], *angles]), np.repeat([bar for *_, bar in parts], [count for *_, count, _ in parts])
