@@ -77,14 +77,14 @@ class SimulationResult(Brief, SavedRecord):
     """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input.
 
     ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of
-    the contact alone; ``races``: pressure, half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and
+    the contact alone; ``rolling_resistance``: the loss of that name by race, "outer" and "inner"; ``races``: pressure, half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and
     operating diametral clearance [um], with what fits, temperature and rotation take of it where a mounting is given;
     ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not tell;
     ``counted_turns``: those that each replicate counts, more than asked for where it was lengthened;
     ``target``: what a run to a target accuracy chose, reached and cost, None for any other.
     """
 
-    FORMAT = "rbdyn.simulation/3"
+    FORMAT = "rbdyn.simulation/4"
     WHAT = "simulation result"
     impact_force: Quantity = keyed("impact_force_N")
     impact_contact_force: Quantity = keyed("impact_contact_force_N")
@@ -98,6 +98,7 @@ class SimulationResult(Brief, SavedRecord):
     max_land_load: float = keyed("loads", "max_land_N")
     notes: tuple[str, ...]
     power_terms: dict[str, float] = keyed("power_terms_W")
+    rolling_resistance: dict[str, float] = keyed("rolling_resistance_W")
     clearance: dict[str, float] = keyed("clearance_um")
     status: str
     races: dict[str, dict[str, float]]

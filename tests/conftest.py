@@ -69,6 +69,7 @@ EVERYTHING = (
     "bearing.inner_tilt_share=0.4",
     "model.line_contact=dowson_higginson",
     "model.pocket_film=true",
+    "model.open_contact_film=true",
     "traction.model=thermal_newtonian",
     "traction.friction=mixed",
 )

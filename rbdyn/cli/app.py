@@ -282,6 +282,9 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         if result.transient_turns is not None:
             print(f"transient: {counted(result.transient_turns, 'shaft turn')}")
         terms = [(term.replace("_", " "), f"{power:.4g}") for term, power in result.power_terms.items()]
+        terms += [
+            (f"rolling resistance, {race} race", f"{power:.4g}") for race, power in result.rolling_resistance.items()
+        ]
         gap = result.power_gap * result.power_loss.value
         terminal.print_table(f"power lost; the power balance closes to {gap:.2g} W", ("term", "W"), terms)
         terminal.print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])

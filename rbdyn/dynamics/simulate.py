@@ -12,7 +12,7 @@ from rbdyn.dynamics.ensemble import Reporter, Stop, threads_of
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
 from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.pace import Notice, Pace, log
-from rbdyn.dynamics.parameters.left_out import heat_notes, left_out_notes, light_load_notes
+from rbdyn.dynamics.parameters.left_out import film_drive_notes, heat_notes, left_out_notes, light_load_notes
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.race_report import race_notes, race_report
 from rbdyn.dynamics.recording import recording_of
@@ -84,6 +84,9 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
     inner_load, outer_load = (max(run.largest_load(race) for run in runs) for race in (INNER_LOAD, OUTER_LOAD))
     tighter = TIGHT * scene.numerics.rtol if ensemble.plan.resolve_more else None
     races = race_report(scene, inner_load, outer_load)
+    weights = [run.duration for run in runs]
+    terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in LOSSES}
+    inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
     return SimulationResult(
         status="ok",
         impact_force=figures["impact_force_N"],
@@ -93,10 +96,8 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         cage_speed_rpm=figures["cage_speed_rpm"],
         cage_slip=figures["cage_slip"],
         power_gap=power_gap,
-        power_terms={
-            term: float(np.average([run.power(term) for run in runs], weights=[run.duration for run in runs]))
-            for term in LOSSES
-        },
+        power_terms=terms,
+        rolling_resistance={"outer": terms["rolling_resistance"] - inner_rolling, "inner": inner_rolling},
         max_inner_load=inner_load,
         max_outer_load=outer_load,
         max_land_load=max(run.largest_load(LAND_LOAD) for run in runs),
@@ -120,6 +121,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
             *scene.lubricant.estimates,
             *scene.section_notes,
             *light_load_notes(scene),
+            *film_drive_notes(scene),
             *race_notes(scene, races),
             *heat_notes(scene, figures["power_loss_W"].value),
             *_notes(scene, power_gap),

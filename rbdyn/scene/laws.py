@@ -97,6 +97,9 @@ class Laws(Consistent):
     contact put 1 at 0.97 to 1.15 (2 F u is lost a contact: F is a force per surface); SKF's rolling moments of ten
     catalogue bearings want 0.5 to 1.3, the less the faster, the lighter loaded and the thicker the oil
     (examples/published/friction_totals.py)."""
+    open_contact_film: bool = False
+    """Oil film between race and rollers that do not touch it, with rolling resistance and shear of a rigid pair at the gap
+    (Reynolds' equation). It draws on the inlet of lubricant.inlet_distance and drives rollers and cage where no load does."""
     drag: Literal["cylinder", "off"] = "cylinder"
     """Drag of the rollers in the mixture of oil and air, as cylinders across a flow, or none."""
     drag_coefficient: NonNegative = 1.0
@@ -116,6 +119,9 @@ class Laws(Consistent):
                 yield f"model.{keys[0]} and model.{keys[1]} contradict each other: give one of them"
         if self.pocket == "off" and self.pocket_film:
             what = "model.pocket = 'off' and model.pocket_film = true contradict each other"
+            yield f"{what}: drop the film or the 'off'"
+        if self.rolling_resistance == "off" and self.open_contact_film:
+            what = "model.rolling_resistance = 'off' and model.open_contact_film = true contradict each other"
             yield f"{what}: drop the film or the 'off'"
 
     def alpha(self, part: str) -> float:

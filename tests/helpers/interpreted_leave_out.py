@@ -17,6 +17,7 @@ from rbdyn.accuracy.rollers.option_cost import OPTIONS
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.film import ShortJournalFilm
 from rbdyn.contact.hertz_line import LineContact, LineContactOnBar, PowerLineContact
+from rbdyn.contact.open_contact import OpenFilm
 from rbdyn.contact.pocket_film import PocketFilm
 from rbdyn.contact.rolling_resistance import NoRollingResistance, RollingResistance, StarvedRollingResistance
 from rbdyn.contact.traction import (
@@ -126,6 +127,7 @@ NEUTRAL = {
             b, rolling=lambda race: StarvedRollingResistance(*race.rolling, 1.0, 0.0, 0.0, 0.0)
         ),
     ),
+    "films at open inner contacts": (itself, lambda b: b._replace(open_film=OpenFilm(0.0, 0.0, 1e-6))),
     "pocket film": (
         itself,
         pocket(lambda p: LubricatedPocket(p, NO_POCKET_FILM, p.half_clearance, p.nominal_radius)),

@@ -122,7 +122,11 @@ MEETINGS = {
         "mounting.inner_interference_um=12.0",
         "model.land_fill=0.4",
     ),
-    "starved inlets": ("lubricant.inlet_distance=3.0", "model.rolling_resistance_factor=0.8"),
+    "starved inlets, open films": (
+        "lubricant.inlet_distance=3.0",
+        "model.rolling_resistance_factor=0.8",
+        "model.open_contact_film=true",
+    ),
     "rotating load": ("operation.rotating_load_N=700.0", "operation.radial_load_N=100.0"),
 }
 TABLES = {
@@ -204,7 +208,7 @@ def refused(scene, outcomes, random_state, tolerances):
 
 def test_unit_twin_names_the_powers():
     """Unit: the twin's own list of powers is that of the equations."""
-    assert (*LOSSES, "shaft", "load") == tuple(POWERS)
+    assert (*LOSSES, "shaft", "load", "inner_rolling") == tuple(POWERS)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)

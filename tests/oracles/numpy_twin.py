@@ -17,6 +17,7 @@ from numpy_twin_laws import (
     alpha_of,
     hunt_crossley,
     oil_of,
+    open_film,
     palmgren_stiffness,
     race_damped,
     race_load,
@@ -34,7 +35,7 @@ GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(300)
 NAMES = (
     "outer_race_traction", "inner_race_traction", "rolling_resistance", "race_damping", "pocket_friction",
     "pocket_damping", "pocket_film", "land_film", "land_friction", "land_damping", "roller_drag", "support_damping",
-    "shaft", "load",
+    "shaft", "load", "inner_rolling",
 )  # fmt: skip
 POWERS = {name: index for index, name in enumerate(NAMES)}
 
@@ -95,8 +96,11 @@ def race(scene, mass, ring, roller, radius, encloses):
 
     middle = float(overlap(np.zeros(2), 0.0))
     elastic, stiffness, approach, lean = race_load(scene, encloses, middle, math.atan2(between[1], between[0]))
+    film = (0.0, 0.0)
+    if scene.model.open_contact_film and not encloses and middle < 0.0:
+        film = open_contact(scene, ring, roller, radius, -middle)
     if elastic == 0.0:
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, *film, 0.0
     if scene.bearing.outer_waviness if encloses else scene.bearing.inner_waviness:
         # Virtual work: the load times how the overlap changes with the centre and with the angle of the ring, each by
         # a step of 1e-30 along the imaginary axis, which loses no digits.
@@ -131,7 +135,29 @@ def race(scene, mass, ring, roller, radius, encloses):
     roller.push(pressure * tangent, roller.centre)
     ring.push(-held * tangent, point)
     ring.push((2.0 * held - pressure) * tangent, ring.centre)
-    return load, traction * slip, 2.0 * held * mean_speed, (load - elastic) * rate
+    return load, traction * slip + film[0], 2.0 * held * mean_speed + film[1], (load - elastic) * rate
+
+
+def open_contact(scene, ring, roller, radius, gap):
+    """Film between the inner ring and a roller that does not touch it. Returns its powers by sliding and by rolling."""
+    between = roller.centre - ring.centre
+    distance = math.hypot(*between)
+    outward = between / distance
+    tangent, point = turned(outward), roller.centre - radius * outward
+    rolling, sliding = open_film(scene, gap)
+    slip = float((ring.velocity_at(point) - roller.velocity_at(point)) @ tangent)
+    roller.push(sliding * slip * tangent, point)
+    ring.push(-sliding * slip * tangent, point)
+    line_spin = float((roller.velocity - ring.velocity) @ tangent) / distance
+    mean_speed = 0.5 * ((ring.spin - line_spin) * (distance - radius) - (roller.spin - line_spin) * radius)
+    held = rolling * mean_speed
+    # As under load: shear holds both surfaces back, pressure on each points to its centre.
+    pressure = 2.0 * held * (distance - radius) / distance
+    roller.push(-held * tangent, point)
+    roller.push(pressure * tangent, roller.centre)
+    ring.push(-held * tangent, point)
+    ring.push((2.0 * held - pressure) * tangent, ring.centre)
+    return sliding * slip**2, 2.0 * held * mean_speed
 
 
 def touch(scene, roller, cage, point, to_wall, along, approach):
@@ -316,6 +342,7 @@ def twin(scene: Scene, y: Any) -> Twin:
             load, slipping, rolling, damping = race(scene, mass, body, roller, radii[j], encloses)
             loads[1 + term] = max(loads[1 + term], load)
             power[[term, 2, 3]] += slipping, rolling, damping
+            power[POWERS["inner_rolling"]] += 0.0 if encloses else rolling
         if scene.model.drag == "cylinder":
             density = scene.lubricant.oil_fraction * oil.density + (1.0 - scene.lubricant.oil_fraction) * 1.2
             area = drawing.roller_diameter_mm * drawing.roller_length_mm * 1e-6

@@ -6,9 +6,11 @@ one thing taken from the package is the traction coefficient of a rheology, whic
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
+from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from rbdyn.contact import film_thickness, rheology
@@ -267,6 +269,42 @@ def rolling_resistance(scene, encloses, load, speed):
         tension = elastic * oil.pressure_coefficient * e / wide
         elastic /= 1.0 + 2.0 * dynamic / (math.pi * tension * math.sqrt(gap)) + 0.3 * math.pi * tension / gap
     return thermal * rigid / (1.0 + (rigid / elastic) ** 10) ** 0.1 * e * radius * length
+
+
+def open_film(scene, gap):
+    """Rolling force per surface over the entrainment speed, and sliding force over the slip, of the film in an open inner
+    contact [N s/m]: Reynolds's equation by quadrature."""
+    oil, length, radius = oil_of(scene), scene.bearing.effective_length_mm * 1e-3, reduced_radius(scene, False)
+    lubricant, speed = scene.lubricant, nominal_entrainment(scene)
+    meniscus = lubricant.inlet_distance or 1e12
+    end = film_end(meniscus)
+    passing = 1.0 + end * end
+    # With h = 1 + x^2 and the flow of the film's end: pressure gradient (h - passing)/h^3; streamers fill passing/h.
+    rolling = quad(lambda s: ((x := math.sinh(s)) ** 2 - end**2) / (1.0 + x * x) ** 2 * math.cosh(s),
+                   math.asinh(-meniscus), math.asinh(end), epsabs=1e-14, limit=400)[0]  # fmt: skip
+    film = quad(lambda s: 1.0 / math.cosh(s), math.asinh(-meniscus), math.asinh(end), epsabs=1e-14, limit=400)[0]
+    streamers = quad(lambda x: passing / (1.0 + x * x) ** 2, end, math.inf, epsabs=1e-14)[0]
+    heating = oil.viscosity_slope * speed**2 / oil.conductivity
+    thermal = scene.model.rolling_resistance_factor / (1.0 + 0.29 * heating**0.78)
+    stiffness = palmgren_stiffness(scene, "roller", "rings", length)
+    bearing = 4.895 * oil.viscosity * speed * radius * length
+    oil_gap = brentq(lambda h: stiffness * h ** (10.0 / 9.0) - bearing / h, 1e-12, 1e-3, **EXACT)
+    touching = max(oil_gap, math.hypot(lubricant.roller_roughness_um, lubricant.race_roughness_um) * 1e-6)
+    root = gap / (gap**2 + touching**2) ** 0.75
+    scale = math.sqrt(2.0 * radius) * oil.viscosity * length * root
+    return 6.0 * scale * thermal * rolling, scale * (film + streamers)
+
+
+@functools.cache
+def film_end(meniscus):
+    """Where the pressure of a rigid pair ends with its gradient, in sqrt(2 R h), from the meniscus on."""
+
+    def left(end):
+        ends = math.asinh(-meniscus), math.asinh(end)
+        return quad(lambda s: ((x := math.sinh(s)) ** 2 - end**2) / (1.0 + x * x) ** 3 * math.cosh(s), *ends,
+                    epsabs=1e-14, limit=400)[0]  # fmt: skip
+
+    return brentq(left, 1e-3 * min(meniscus, 1.0), min(meniscus, 0.6), xtol=1e-14)
 
 
 def scheduled(scene, key, time):

@@ -23,10 +23,12 @@ from rbdyn.accuracy.rollers.footprint import added_modules, parameter_bytes
 from rbdyn.accuracy.rollers.option_cost import OPTIONS, with_options
 from rbdyn.contact.film import journal_film_force
 from rbdyn.contact.hertz_line import sum_of_slices
+from rbdyn.contact.open_contact import film_forces
 from rbdyn.contact.pocket_film import wall_film
 from rbdyn.contact.traction import asperity_load_share, bicubic
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.guide_land import journal_wrench
+from rbdyn.dynamics.forces.open_contact import open_contact
 from rbdyn.dynamics.forces.pocket import dry_walls, film_on_wall
 from rbdyn.dynamics.forces.race_form import turned_multiple
 from rbdyn.dynamics.forces.schedule import segment
@@ -63,6 +65,7 @@ LAWS = {
     "without race damping": ("outer.damping", "NoDamping"),
     "without rolling resistance": ("outer.rolling", "NoRollingResistance"),
     "starved inlets": ("outer.rolling", "StarvedRollingResistance"),
+    "films at open inner contacts": ("open_film", "OpenFilm"),
     "pocket film": ("pocket", "LubricatedPocket"),
     "rigid pocket bars": ("pocket.contact", "LineContact"),
     "without pockets": ("pocket", "NoPocket"),
@@ -80,7 +83,8 @@ LAWS = {
 }
 # Kernels that only these options call.
 KERNELS_OF_OPTIONS = (
-    sum_of_slices, turned_multiple, bicubic, asperity_load_share, wall_film, film_on_wall, segment,
+    sum_of_slices, turned_multiple, bicubic, asperity_load_share, film_forces, open_contact, wall_film, film_on_wall,
+    segment,
 )  # fmt: skip
 # Numbers that an option adds to the state: a ring's place and velocity, or time and two angles.
 STATE = {

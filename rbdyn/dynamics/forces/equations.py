@@ -17,13 +17,14 @@ from rbdyn.dynamics.forces.drag import drag_forces
 from rbdyn.dynamics.forces.drive import action, load_power, tick
 from rbdyn.dynamics.forces.gravity import add_weight
 from rbdyn.dynamics.forces.guide_land import guide_forces
+from rbdyn.dynamics.forces.open_contact import with_open_films
 from rbdyn.dynamics.forces.pocket import pocket_contact, pocket_gap
 from rbdyn.dynamics.forces.race_lanes import race_forces
 from rbdyn.dynamics.forces.races import Race, roller_radius
 from rbdyn.dynamics.forces.ring_motion import RingMotion, outer_motion, support_motion
 
 # Powers lost, in the order of the power vector; behind them stand the powers that come in by the shafts and by loads
-# without a potential.
+# without a potential, and last the inner race's part of the rolling resistance.
 LOSSES = (
     "outer_race_traction",
     "inner_race_traction",
@@ -40,8 +41,8 @@ LOSSES = (
 )
 (
     OUTER_TRACTION, INNER_TRACTION, ROLLING, RACE_DAMPING, POCKET_FRICTION, POCKET_DAMPING, POCKET_FILM,
-    LAND_FILM, LAND_FRICTION, LAND_DAMPING, DRAG, SUPPORT_DAMPING, SHAFT, LOAD, POWERS,
-) = range(len(LOSSES) + 3)  # fmt: skip
+    LAND_FILM, LAND_FRICTION, LAND_DAMPING, DRAG, SUPPORT_DAMPING, SHAFT, LOAD, INNER_ROLLING, POWERS,
+) = range(len(LOSSES) + 4)  # fmt: skip
 # Extremes, in the order of the load vector. On a pocket wall: contact and film together, and contact alone.
 POCKET_LOAD, OUTER_LOAD, INNER_LOAD, LAND_LOAD, POCKET_CONTACT_LOAD, LOADS = range(6)
 
@@ -55,6 +56,7 @@ class RollerBearing(NamedTuple):
     roller_inertia: float
     outer: Race
     inner: Race
+    open_film: Any
     pocket: Any
     pocket_cos: NDArray[np.float64]
     pocket_sin: NDArray[np.float64]
@@ -241,6 +243,9 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     land = guide_forces(bearing.guide, cage, inner, outer)
     pockets = pocket_forces(bearing, cage, touching, y, row, dy, scratch)
     on_outer, on_inner = race_forces(bearing.outer, bearing.inner, bearing.sizes, outer, inner, z, y, row, dy, scratch)
+    on_inner = with_open_films(
+        bearing.open_film, on_inner, bearing.inner, bearing.sizes, inner, z, y, row, dy, scratch.lanes
+    )
     accelerate_rollers(bearing, row, dy)
     accelerate_cage(bearing, cage, pockets, land, row, dy)
     ring_fx, ring_fy = on_inner.x + land.inner_x + acting.load_x, on_inner.y + land.inner_y + acting.load_y
@@ -262,6 +267,7 @@ def derivative(bearing, y, row, dy, power, loads, scratch):
     inner_moment, outer_moment = on_inner.moment + land.inner_moment, on_outer.moment + land.outer_moment
     power[row, SHAFT] = -inner_moment * inner.speed - outer_moment * outer.speed
     power[row, LOAD] = load_power(bearing.drive, acting, inner.vx, inner.vy)
+    power[row, INNER_ROLLING] = on_inner.rolling
     loads[row, POCKET_LOAD] = pockets.load
     loads[row, OUTER_LOAD] = on_outer.load
     loads[row, INNER_LOAD] = on_inner.load

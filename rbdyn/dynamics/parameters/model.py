@@ -12,6 +12,7 @@ from rbdyn.arrays import Array
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
 from rbdyn.contact.film import short_journal_film
 from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, sliced
+from rbdyn.contact.open_contact import OpenFilm, open_film, touching_gap
 from rbdyn.contact.rolling_resistance import NoRollingResistance, aihara_thermal_factor, biboulet_houpert, starved
 from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.forces.cage_body import BalancedCage, UnbalancedCage
@@ -20,6 +21,7 @@ from rbdyn.dynamics.forces.drive import SteadyDrive, TwoSpeedDrive
 from rbdyn.dynamics.forces.equations import RollerBearing
 from rbdyn.dynamics.forces.gravity import Gravity, NoGravity
 from rbdyn.dynamics.forces.guide_land import DryContact, InnerGuide, NoFilm, NoGuide, OuterGuide
+from rbdyn.dynamics.forces.open_contact import NoOpenFilm
 from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, NoPocket, Pocket
 from rbdyn.dynamics.forces.race_form import RoundRace, largest_rise, wavy_race
 from rbdyn.dynamics.forces.races import EqualRollers, Race, unequal_rollers
@@ -52,6 +54,7 @@ def roller_bearing(scene: Scene) -> RollerBearing:
         roller_inertia=mass * drawing.roller_diameter**2 / 8.0,
         outer=_race(scene, oil, "outer"),
         inner=_race(scene, oil, "inner"),
+        open_film=_open_film(scene, oil),
         pocket=_pocket(scene, oil),
         pocket_cos=np.cos(angles),
         pocket_sin=np.sin(angles),
@@ -159,15 +162,31 @@ def _hunt_crossley(alpha: float) -> NoDamping | HuntCrossleyDamping:
     return HuntCrossleyDamping(alpha) if alpha > 0.0 else NoDamping()
 
 
+def _rolling_reduction(scene: Scene, oil: Oil) -> float:
+    """Heating of the inlet times the scene's factor. The entrainment speed varies little: it is the kinematic one."""
+    heating = aihara_thermal_factor(oil.viscosity_slope, oil.conductivity, abs(scene.geometry.motion.entrainment))
+    return heating * scene.model.rolling_resistance_factor
+
+
+def _open_film(scene: Scene, oil: Oil) -> NoOpenFilm | OpenFilm:
+    """Film of the inner race and a roller that does not touch it."""
+    if not scene.model.open_contact_film:
+        return NoOpenFilm()
+    lubricant, length, radius = scene.lubricant, scene.bearing.effective_length, scene.geometry.reduced_radii[1]
+    stiffness = palmgren(_modulus(scene, "roller", "rings"), length).stiffness
+    roughness = math.hypot(lubricant.roller_roughness, lubricant.race_roughness)
+    speed = abs(scene.geometry.motion.entrainment)
+    touching = touching_gap(oil.viscosity, radius, length, speed, stiffness, roughness)
+    reduction = _rolling_reduction(scene, oil)
+    return open_film(oil.viscosity, radius, length, lubricant.inlet_distance, reduction, touching)
+
+
 def rolling_law(scene: Scene, oil: Oil, reduced_radius: float) -> Any:
     """Rolling resistance of a race contact of this reduced radius [m]."""
     if scene.model.rolling_resistance == "off":
         return NoRollingResistance()
-    # The entrainment speed varies little: the heating of the inlet is that at the kinematic speed.
-    entrainment = abs(scene.geometry.motion.entrainment)
-    heating = aihara_thermal_factor(oil.viscosity_slope, oil.conductivity, entrainment)
+    reduction = _rolling_reduction(scene, oil)
     modulus, length = _modulus(scene, "roller", "rings"), scene.bearing.effective_length
-    reduction = heating * scene.model.rolling_resistance_factor
     flooded = biboulet_houpert(oil.viscosity, modulus, reduced_radius, length, reduction)
     distance = scene.lubricant.inlet_distance
     if distance is None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.arrays import Array
-from rbdyn.dynamics.forces.equations import LOAD, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
+from rbdyn.dynamics.forces.equations import INNER_ROLLING, LOAD, LOSSES, POCKET_CONTACT_LOAD, POCKET_LOAD, SHAFT
 from rbdyn.dynamics.statistics.batch_means import estimate
 from rbdyn.dynamics.statistics.bias import companion_error
 from rbdyn.result import Quantity
@@ -22,7 +22,7 @@ class Replicate:
 
     Arrays over batches, from the start on; figures count from the batch ``first``, and ``per_window`` batches make an
     impact window. ``whirl``: samples, sum and sum of squares of the cage centre's speed; ``work``: integrals of the
-    loss powers, then of those that come in by shafts and loads; ``largest``: loads; ``energy``: kinetic, elastic and
+    loss powers, of those that come in by shafts and loads, and of the rolling resistance of the inner race; ``largest``: loads; ``energy``: kinetic, elastic and
     load energy together at the ends of batches; ``energy_scale``: contact load times approach;
     ``stiffness``: as in ``runge_kutta.Carry``; ``decay_rates``: (states, motions) as in ``relaxation`` [1/s].
     """
@@ -107,6 +107,11 @@ class Replicate:
     def power(self, term: str) -> float:
         """Mean power [W] of one loss."""
         return float(self.work[self.first :, LOSSES.index(term)].sum() / self.duration)
+
+    @property
+    def inner_rolling_resistance(self) -> float:
+        """Mean power [W] of the rolling resistance at the inner race."""
+        return float(self.work[self.first :, INNER_ROLLING].sum() / self.duration)
 
     def largest_load(self, force: int) -> float:
         """Largest load counted [N], by its place in the load vector."""

@@ -1,0 +1,97 @@
+"""Films of open inner contacts: the law against Reynolds's equation, its limits, and bearings that it drives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from line_film_oracle import rigid
+
+from rbdyn.contact.open_contact import film_forces, inlet, open_film, touching_gap
+from rbdyn.dynamics.parameters.left_out import film_drive_notes, left_out_notes
+from rbdyn.dynamics.simulate import simulate
+from rbdyn.faults import InputError
+
+OIL, RADIUS, LENGTH, SPEED = 0.01, 4.6e-3, 0.01, 5.0
+
+
+@pytest.mark.parametrize("meniscus", [0.2, 1.0, 2.0, 5.0, 10.0, 100.0])
+def test_oracle_rolling_force_of_a_starved_pair(meniscus):
+    """Oracle: half the integral of (h - h_e) p' by quadrature, with the film's end by root finding."""
+    assert inlet(meniscus).rolling == pytest.approx(2.0 * rigid(meniscus)[1], rel=1e-7)
+
+
+def test_literature_flooded_pair():
+    """Literature: 4.601 eta u l sqrt(R/h) for each surface (Martin 1916), the film's end at 0.475 sqrt(2 R h); film and
+    streamers together shear between 3/4 and the whole of a full gap's pi.
+    """
+    flooded = inlet(math.inf)
+    assert 6.0 * math.sqrt(2.0) * flooded.rolling == pytest.approx(4.601, abs=5e-4)
+    assert flooded.end == pytest.approx(0.4751, abs=5e-5)
+    assert 0.75 * math.pi < flooded.shear < math.pi
+
+
+def test_rate_short_inlet():
+    """Rate: a short film of length M ends at M/2, where the mean of X^2 - X_e^2 vanishes, and rolls as M^5."""
+    near, nearer = inlet(2e-3), inlet(1e-3)
+    assert nearer.end == pytest.approx(0.5e-3, rel=1e-5)
+    assert near.rolling < 1e-8 and nearer.rolling < 0.2 * near.rolling
+
+
+def test_unit_scales_of_the_film():
+    """Unit: far above the touching gap both forces go as 1/sqrt(gap) by the closed form; in contact there are none; between
+    they rise and fall without a jump.
+    """
+    film = open_film(OIL, RADIUS, LENGTH, None, 0.8, 1e-7)
+    rolling, sliding = film_forces(film, -20e-6, SPEED, 2.0)
+    assert rolling == pytest.approx(0.8 * 4.601 * OIL * SPEED * LENGTH * math.sqrt(RADIUS / 20e-6), rel=2e-4)
+    full = math.pi * OIL * 2.0 * LENGTH * math.sqrt(2.0 * RADIUS / 20e-6)
+    assert 0.75 * full < sliding < full
+    assert film_forces(film, 1e-6, SPEED, 2.0) == film_forces(film, 0.0, SPEED, 2.0) == (0.0, 0.0)
+    gaps = np.geomspace(1e-10, 1e-4, 400)
+    forces = np.array([film_forces(film, -gap, SPEED, 2.0)[0] for gap in gaps])
+    peak = int(forces.argmax())
+    assert np.all(np.diff(forces[: peak + 1]) > 0.0) and np.all(np.diff(forces[peak:]) < 0.0)
+    assert 0.5e-7 < gaps[peak] < 2e-7
+    assert film_forces(film, -1e-5, -SPEED, -2.0) == tuple(-force for force in film_forces(film, -1e-5, SPEED, 2.0))
+
+
+def test_unit_touching_gap():
+    """Unit: there Martin's load equals Palmgren's; roughness is the least."""
+    stiffness = 1.3e9
+    gap = touching_gap(OIL, RADIUS, LENGTH, SPEED, stiffness, 1e-9)
+    assert 4.895 * OIL * SPEED * RADIUS * LENGTH / gap == pytest.approx(stiffness * gap ** (10.0 / 9.0), rel=1e-9)
+    assert touching_gap(OIL, RADIUS, LENGTH, SPEED, stiffness, 1e-6) == 1e-6
+
+
+def test_invariant_a_concentric_unloaded_bearing_is_driven_by_films(make_scene):
+    """Invariant: without load and films the cage of a concentric bearing slows down; films drive it; power balances to 1e-4
+    and the rolling resistance of both races adds up.
+    """
+    unloaded = (
+        "operation.radial_load_N=0.0", "bearing.inner_ring_mass_kg=1e5", "lubricant.viscosity_mPas=30.0",
+        "operation.inner_speed_rpm=4000.0", "numerics.discard_turns=20",
+    )  # fmt: skip
+    driven = simulate(make_scene(*unloaded, "model.open_contact_film=true"), workers=1)
+    assert driven.power_gap < 1e-4
+    assert driven.rolling_resistance["inner"] > 0.0
+    assert sum(driven.rolling_resistance.values()) == pytest.approx(driven.power_terms["rolling_resistance"], rel=1e-12)
+    alone = simulate(make_scene(*unloaded), workers=1)
+    assert alone.rolling_resistance["inner"] == alone.power_terms["inner_race_traction"] == 0.0
+    assert driven.cage_slip.value < alone.cage_slip.value - 0.02
+
+
+def test_unit_notes_and_refusal(make_scene, outer):
+    """Unit: below 1 % of C a note says what slip rests on; the films are no longer left out; no film without its law."""
+    light = "operation.radial_load_N=50.0"
+    (off,) = film_drive_notes(make_scene(light))
+    assert "set model.open_contact_film = true" in off
+    (on,) = film_drive_notes(make_scene(light, "model.open_contact_film=true"))
+    assert "lubricant.inlet_distance" in on
+    assert film_drive_notes(outer) == ()
+    assert any("oil films" in note for note in left_out_notes(outer, 20.0))
+    assert not any("oil films" in note for note in left_out_notes(make_scene("model.open_contact_film=true"), 20.0))
+    assert any("times as much as the power loss" in note for note in left_out_notes(outer, 1e-3))
+    with pytest.raises(InputError, match="open_contact_film = true contradict"):
+        make_scene("model.open_contact_film=true", "model.rolling_resistance=off")
