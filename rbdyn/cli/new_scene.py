@@ -5,21 +5,21 @@ import math
 from typing import Any, NamedTuple
 
 from rbdyn.life.roller_capacity import REFERENCE_SPEED_FACTOR
-from rbdyn.properties.catalogue import Envelope, ball_interior, radial_clearance, roller_interior
+from rbdyn.properties.cages import cage_estimate
+from rbdyn.properties.catalogue import Envelope, RollerInterior, ball_interior, radial_clearance, roller_interior
 from rbdyn.properties.designation import CAGES, Designation
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.properties.oils import NamedOil
-from rbdyn.scene.laws import POLYMER_BAR_STIFFNESS
 
-# Glass-filled polyamide as [materials] takes it, and its density [g/mm^3]; a bar of it has 5e5 to 1e7 N/m.
+# Glass-filled polyamide as [materials] takes it, and its density [g/mm^3].
 POLYAMIDE = (
     "{ elastic_modulus_GPa = 5.0, poisson_ratio = 0.35, density_kg_m3 = 1300.0, thermal_expansion_1e_6_K = 40.0 }"
 )
 POLYAMIDE_DENSITY = 1.3e-3
 # Where no suffix names a cage.
 USUAL_CAGE = "MA"
-# Share of the bearing's width; clearances in roller and pitch diameters. A cage is half a roller thick, as scenes estimate it.
-CAGE_WIDTH, POCKET_CLEARANCE, GUIDE_CLEARANCE, SMALLEST_CLEARANCE_MM = 0.95, 0.03, 0.004, 0.05
+# Guide clearance in pitch diameters.
+GUIDE_CLEARANCE, SMALLEST_CLEARANCE_MM = 0.004, 0.05
 # SKF's friction model: K_rs of grease and K_Z of cylindrical roller bearings.
 GREASE_STARVATION, ROLLER_GEOMETRY = 6e-8, 5.1
 OIL_FRACTION, GREASE_FRACTION = 0.02, 0.005
@@ -61,7 +61,7 @@ def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) ->
         **inside._asdict(),
         **common,
         **_clearance(sizes.bore, point.clearance, named.kind),
-        **_cage(named, sizes.width, inside.roller_length, inside.rollers, diameter, pitch),
+        **_cage(named, sizes.width, inside),
         "ratings": ratings,
         "ring_mass": 1e-9 * MATERIALS["bearing_steel"].density * volume,
         "listed_capacity": listed,
@@ -123,26 +123,23 @@ def _clearance(bore: float, name: str, kind: str) -> Values:
     return dict(zip(CLEARANCE_VALUES, (round(0.5 * (lower + upper), 4), name, lower, upper), strict=True))
 
 
-def _cage(named: Designation, width: float, length: float, rollers: int, diameter: float, pitch: float) -> Values:
+def _cage(named: Designation, width: float, inside: RollerInterior) -> Values:
     """A cage of the kind that the suffix names, about the pitch circle."""
     suffix = named.stated("cage")
     guidance, material = CAGES[suffix or USUAL_CAGE]
     soft, landed = material == "polyamide", guidance != "roller"
     density = POLYAMIDE_DENSITY if soft else 1e-6 * MATERIALS[material].density
-    pocket = max(round(POCKET_CLEARANCE * diameter, 2), SMALLEST_CLEARANCE_MM)
-    across = CAGE_WIDTH * width
-    area = math.pi * pitch * across - rollers * (diameter + pocket) * length
-    guide = max(round(GUIDE_CLEARANCE * pitch, 2), SMALLEST_CLEARANCE_MM)
+    sizes = inside.rollers, inside.roller_diameter, inside.roller_length, inside.pitch_diameter
+    cage = cage_estimate(named.series, width, *sizes)
+    guide = max(round(GUIDE_CLEARANCE * inside.pitch_diameter, 2), SMALLEST_CLEARANCE_MM)
     return {
+        **cage._asdict(),
         "cage_by": f"{f'of suffix {suffix}' if suffix else 'assumed'}: {material}, guided by the {guidance}{' ring' if landed else 's'}",
         "guidance": guidance,
         "guide_clearance": guide if landed else None,
-        "pocket_clearance": pocket,
-        "cage_mass": 0.5 * diameter * area * density,
-        "land_width": max(round(0.5 * (across - length), 2), 0.5) if landed else None,
+        "cage_mass": cage.volume * density,
+        "land_width": round(cage.side_ring_width, 2) if landed else None,
         "cage_material": POLYAMIDE if soft else json.dumps(material),
-        "bar_stiffness": POLYMER_BAR_STIFFNESS if soft else None,
-        "bar_stiffness_by": "assumed: polyamide, 5e5 to 1e7",
     }
 
 

@@ -157,6 +157,7 @@ def _record(request: Request, motion: "History") -> dict[str, Any]:
             "standard_deviation": float(eccentricity.std()) * 1e6,
             "guide_clearance": None if clearance is None else clearance * 1e6,
         },
+        "pocket_bar_stiffness_N_m": motion.scene.model.pocket_bar_stiffness_N_m,
         "largest": {name: _largest(orbit.largest(motion, getattr(motion, loads))) for name, loads in LOADS.items()},
         "races": {race: _race(motion, race) for race in get_args(orbit.Race)},
         "life": _life(motion),
@@ -199,11 +200,13 @@ def _peaks(spectrum: "Spectrum", unit: float) -> list[dict[str, float]]:
 def print_record(record: dict[str, Any], quiet: bool, verbose: bool) -> None:
     """The figures a person looks for first; verbosely, the peaks of the spectra too."""
     quantiles, away = record["whirl_ratio_quantiles"], record["eccentricity_um"]
+    stiff = record["pocket_bar_stiffness_N_m"]
     of = "" if away["guide_clearance"] is None else f" of {away['guide_clearance']:.4g}"
     rows = [
         ("whirl speed over cage speed, mean", f"{record['whirl_ratio']:.4g}"),
         ("  median, and 5 % to 95 %", f"{quantiles['50%']:.3g}, {quantiles['5%']:.3g} to {quantiles['95%']:.3g}"),
         ("eccentricity of the cage [µm]", f"{with_error(away['mean'], away['standard_deviation'])}{of}"),
+        ("stiffness of the cage's bars [N/m]", stiff if isinstance(stiff, str) else f"{stiff:.3g}"),
     ]
     for name, hit in record["largest"].items():
         where = "" if hit["roller"] is None else f", roller {hit['roller']}"

@@ -2,6 +2,7 @@
 
 - ``hertz_line``: load of a line contact against approach (Palmgren and rivals), whole, in slices, on an elastic bar
 - ``hertz_point``: load of a point contact against approach, its ellipse and pressure (exact Hertz); ``static_limit``: dents
+- ``cage_bar``: stiffness of a cross-bar of a window cage, in series with the contact on it
 - ``profile``: roller profiles as drops over the length
 - ``damping``: what a closing or opening contact adds to the elastic load; restitution
 - ``traction``: friction coefficient against sliding speed and load, as compiled

@@ -121,6 +121,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         notes=(
             *scene.unit_notes,
             *scene.lubricant.estimates,
+            *scene.section_notes,
             *light_load_notes(scene),
             *film_drive_notes(scene),
             *race_notes(scene, races),

@@ -17,6 +17,7 @@ from rbdyn.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
+from rbdyn.scene.cage_section import STIFFNESS, section_misfits, section_notes, with_bar_stiffness_of_section
 from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics, with_bar_stiffness_of_cage
 from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
 from rbdyn.scene.mounting import Mounting, material_of, misfits
@@ -89,7 +90,7 @@ class Scene(SceneFile):
             name: table.model_dump(exclude_unset=True) if isinstance(table, BaseModel) else table
             for name, table in data.items()
         }
-        return with_bar_stiffness_of_cage(with_traction_of_oil(tables))
+        return with_bar_stiffness_of_cage(with_bar_stiffness_of_section(with_traction_of_oil(tables)))
 
     def faults(self) -> list[str]:
         """What does not go together, each with a slip of the unit that may be its cause."""
@@ -108,6 +109,7 @@ class Scene(SceneFile):
                 f"cage.pocket_clearance_mm = {cage.pocket_clearance_mm:g}: leaves no cross-bar between "
                 f"{bearing.rollers} pockets ({web:.4g} mm); make it smaller or take fewer rollers"
             )
+        yield from section_misfits(bearing, cage)
         if laws.guide_land == "film" and cage.guidance != "roller":
             radial_um = 500.0 * (cage.guide_clearance_mm or 0.0)
             if laws.land_film_floor_um >= radial_um:
@@ -229,7 +231,15 @@ class Scene(SceneFile):
     @property
     def unit_notes(self) -> tuple[str, ...]:
         """Sentences on values that look like another unit."""
-        return unit_notes(self.bearing, self.cage, self.lubricant, self.mounting, self.material("cage").density)
+        cage, stiffness = self.material("cage"), self.model.pocket_bar_stiffness_N_m
+        return unit_notes(self.bearing, self.cage, self.lubricant, self.mounting, cage, stiffness)
+
+    @property
+    def section_notes(self) -> tuple[str, ...]:
+        """The stiffness of the cage's bars in a sentence, where it follows from their section."""
+        if STIFFNESS in self._tables.get("model", {}):
+            return ()
+        return section_notes(self.bearing, self.cage, self.model.pocket_bar_stiffness_N_m)
 
     @property
     def needs_slices(self) -> bool:

@@ -16,6 +16,10 @@ from rbdyn.records.words import counted
 PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "table": "profile_table_mm_um"}
 
 
+# Keys of [cage], without their unit, that make a section together.
+SECTION_KEYS = ("bar_width", "bar_thickness", "bar_length", "side_ring_width")
+
+
 class Harmonic(Strict):
     """One harmonic of a raceway's radius: amplitude cos(order (angle - phase)), angle and phase counted on the ring."""
 
@@ -193,6 +197,16 @@ class Cage(Consistent):
     """Number of guide lands side by side."""
     land_width_mm: Positive = 3.0
     """Width of one guide land."""
+    bar_width_mm: Positive | None = None
+    """Width of a cross-bar along the circumference, at the pitch circle. Width, thickness and length of a bar with the width of
+    a side ring are the section of a window cage, from which the stiffness of a bar follows (rbdyn/contact/cage_bar.py) unless
+    model.pocket_bar_stiffness_N_m is given. It does not follow cage.pocket_clearance_mm."""
+    bar_thickness_mm: Positive | None = None
+    """Radial thickness of the cross-bars and of the side rings."""
+    bar_length_mm: Positive | None = None
+    """Axial length of a cross-bar, which is that of a pocket."""
+    side_ring_width_mm: Positive | None = None
+    """Axial width of one side ring."""
 
     @field_validator("guide_clearance_mm")
     @classmethod
@@ -203,6 +217,7 @@ class Cage(Consistent):
 
     guide_clearance, pocket_clearance, lip_clearance = OptionalSI("mm"), SI("mm"), OptionalSI("mm")
     pocket_contact_length, land_width = OptionalSI("mm"), SI("mm")
+    bar_width, bar_thickness, bar_length, side_ring_width = (OptionalSI("mm") for _ in SECTION_KEYS)
     mass, inertia, imbalance = SI("g"), OptionalSI("kg_mm2"), SI("um")
 
     def faults(self) -> Iterator[str]:
@@ -212,6 +227,9 @@ class Cage(Consistent):
             what = f"cage.pocket_radial_clearance_mm and cage.guidance = {self.guidance!r} contradict each other"
             why = "lips hold the cage only under guidance by the rollers"
             yield f"{what}: {why}; take away the one or set the other to 'roller'"
+        missing = [f"cage.{key}_mm" for key in SECTION_KEYS if getattr(self, f"{key}_mm") is None]
+        if 0 < len(missing) < len(SECTION_KEYS):
+            yield f"{', '.join(missing)}: missing; the stiffness of a bar needs its whole section, so give all four or none"
 
     @property
     def lip_clearance_mm(self) -> float | None:

@@ -53,12 +53,13 @@ class Laws(Consistent):
     pocket: Literal["contact", "off"] = "contact"
     """Contact of rollers and pocket walls; "off" lets rollers and cage pass through each other."""
     pocket_bar_stiffness_N_m: Positive | Literal["rigid"] = METAL_BAR_STIFFNESS  # noqa: N815
-    """Stiffness of a cross-bar, in series with the contact; 2.5e6 N/m where left out of a scene whose cage is of polymer
-    (elastic modulus below 20 GPa), which has a twentieth of the modulus of metals. That of metals rests on the 1e7 to 1e8 N/m stated for metal cages, which
-    count the cage's rims and ring in. A drawing gives, for a clamped bar of length L pushed in its middle, 192 E I/L^3
-    (384 for an even push; I = thickness width^3/12) and, in series, 10/3 G A/L of shear, which rules in short bars: 5e8
-    N/m in the bearing of Chen et al. 2022. With 1e7, 5e7 and 2e8 N/m that has impacts of 47, 86 and 118 N and a whirl
-    of 0.42, 0.41 and 0.38."""
+    """Stiffness of a cross-bar, in series with the contact. Where left out it follows from the section of the cage
+    (cage.bar_width_mm and its three fellows); without a section it is 5e7 N/m, and 2.5e6 N/m where the cage is of polymer
+    (elastic modulus below 20 GPa), which has a twentieth of the modulus of metals. That of metals rests on the 1e7 to 1e8
+    N/m stated for metal cages. By the section a bar clamped at its ends has 192 E I/L^3 under a roller that touches its
+    middle (I = thickness width^3/12), 720 all along it, and shear in series; the side rings give way too and leave a
+    quarter to a half of it. With 1e7, 5e7 and 2e8 N/m the bearing of Chen et al. 2022 has impacts of 47, 86 and 118 N and a
+    whirl of 0.42, 0.41 and 0.38."""
     pocket_damping_alpha_s_m: NonNegative | None = None
     """Hunt and Crossley's alpha of the pocket walls; 0.75 where left out (restitution 1 - alpha v: 0.5 to 0.7 for steel
     on wetted bronze at 0.5 m/s), 0 is undamped."""

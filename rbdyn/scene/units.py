@@ -1,51 +1,114 @@
 """Values that look like another unit: outside what is usual for the bearing, with what may have been meant."""
 
 import math
+from collections.abc import Mapping
 
+from rbdyn.properties.materials import Material
 from rbdyn.scene.bearing import Bearing, Cage
 from rbdyn.scene.lubricant import Lubricant
 from rbdyn.scene.mounting import Mounting
 
+# A key, its value or None, the ends of what is usual.
+Usual = tuple[str, float | None, tuple[float, float]]
 # By the unit of a key, what a number in another unit is multiplied by; kelvin are shifted.
-FACTORS = {"mm": {"m": 1e3, "um": 1e-3}, "um": {"mm": 1e3, "nm": 1e-3}, "g": {"kg": 1e3}, "mPas": {"Pa s": 1e3}}
+FACTORS = {
+    "mm": {"m": 1e3, "um": 1e-3},
+    "um": {"mm": 1e3, "nm": 1e-3},
+    "g": {"kg": 1e3},
+    "kg_mm2": {"kg m2": 1e6, "g mm2": 1e-3},
+    "mPas": {"Pa s": 1e3},
+    "1_GPa": {"1/Pa": 1e9, "1/MPa": 1e3},
+    "N_m": {"N/um": 1e6, "N/mm": 1e3},
+}
 ZERO_C_K = 273.15
 # Ester oils bear some 200 C and stiffen towards -54 C; bearing steels lose their hardness beyond 300 C, tool steels later.
 OIL_C, RING_C = (-60.0, 220.0), (-60.0, 300.0)
 
 
+# Of a lubricant [1/GPa]: water has less than 1, the thickest mineral oils in the cold 60.
+PRESSURE_COEFFICIENT = (2.0, 80.0)
+# Stiffness of a bar over modulus and length of the roller: 0.005 of long slender bars, 0.3 of stubby ones, by the finite elements
+# of tests/oracle/test_cage_bar.py; a cage of another material than the scene says has a fortieth or forty times that.
+BAR_STIFFNESS = (1e-4, 20.0)
+
+
 def unit_notes(
-    bearing: Bearing, cage: Cage, oil: Lubricant, mounting: Mounting | None, cage_density: float
+    bearing: Bearing,
+    cage: Cage,
+    oil: Lubricant,
+    mounting: Mounting | None,
+    cage_material: Material,
+    bar_stiffness: float | str,
 ) -> tuple[str, ...]:
-    """One sentence a suspicious value; ``cage_density`` [kg/m^3] tells a cage that fills half the rollers' height."""
-    pitch, roller = bearing.pitch_diameter_mm, bearing.roller_diameter_mm
-    width = bearing.roller_length_mm + cage.lands * cage.land_width_mm
-    cage_g = 1e-6 * cage_density * math.pi * pitch * 0.5 * roller * width
-    guide = None if cage.guidance == "roller" else cage.guide_clearance_mm
+    """One sentence a suspicious value; ``cage_material``: its density tells a cage that fills half the rollers' height, its
+    modulus how stiff a bar may be; ``bar_stiffness`` [N/m] or "rigid".
+    """
+    usual = [*_of_cage(bearing, cage, cage_material, bar_stiffness), *_of_section(bearing, cage)]
     # The least clearances are below any grade of manufacture, the largest some times the loosest class.
-    usual = [
-        ("bearing.radial_clearance_mm", max(bearing.radial_clearance_mm, 0.0) or None, (5e-4, 5e-3 * pitch)),
-        ("cage.guide_clearance_mm", guide, (5e-4, 0.03 * pitch)),
-        ("cage.pocket_clearance_mm", cage.pocket_clearance_mm, (5e-4, 0.25 * roller)),
-        ("cage.mass_g", cage.mass_g, (cage_g / 20.0, cage_g * 20.0)),
+    usual += [
+        (
+            "bearing.radial_clearance_mm",
+            max(bearing.radial_clearance_mm, 0.0) or None,
+            (5e-4, 5e-3 * bearing.pitch_diameter_mm),
+        ),
         ("lubricant.roller_roughness_um", oil.roller_roughness_um, (3e-3, 5.0)),
         ("lubricant.race_roughness_um", oil.race_roughness_um, (3e-3, 5.0)),
         ("lubricant.viscosity_mPas", oil.viscosity_mPas, (0.3, 1e5)),
+        ("lubricant.pressure_coefficient_1_GPa", oil.pressure_coefficient_1_GPa, PRESSURE_COEFFICIENT),
         ("lubricant.temperature_C", oil.temperature_C, OIL_C),
     ]
     warm = {} if mounting is None else mounting.model_dump()
     usual += [(f"mounting.{key}", value, RING_C) for key, value in warm.items() if key.endswith("_C")]
-    notes = []
-    for key, value, (low, high) in usual:
-        if value is None or low <= value <= high:
-            continue
-        unit = key.rpartition("_")[2]
-        meant = {other: factor * value for other, factor in FACTORS.get(unit, {}).items()}
-        meant |= {"K": value - ZERO_C_K} if unit == "C" else {}
-        likely = [
-            f"if {value:g} {other} are meant, write {number:.4g}"
-            for other, number in meant.items()
-            if low <= number <= high
-        ]
-        what = f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}"
-        notes.append(f"{what}; {(likely or ['check its unit'])[0]}")
-    return tuple(notes)
+    return tuple(
+        _note(key, value, *ends) for key, value, ends in usual if value is not None and not ends[0] <= value <= ends[1]
+    )
+
+
+def _of_cage(bearing: Bearing, cage: Cage, material: Material, bar_stiffness: float | str) -> list[Usual]:
+    """Values of a cage and of the stiffness of its bars, with what is usual."""
+    pitch, roller, length = bearing.pitch_diameter_mm, bearing.roller_diameter_mm, bearing.roller_length_mm
+    mass_g = 1e-6 * material.density * math.pi * pitch * 0.5 * roller * (length + cage.lands * cage.land_width_mm)
+    inertia = 1e-3 * mass_g * (0.5 * pitch) ** 2
+    guide = None if cage.guidance == "roller" else cage.guide_clearance_mm
+    stiff = material.elastic_modulus * 1e-3 * length
+    bar = None if isinstance(bar_stiffness, str) else bar_stiffness
+    return [
+        ("cage.guide_clearance_mm", guide, (5e-4, 0.03 * pitch)),
+        ("cage.pocket_clearance_mm", cage.pocket_clearance_mm, (5e-4, 0.25 * roller)),
+        ("cage.mass_g", cage.mass_g, (mass_g / 20.0, mass_g * 20.0)),
+        ("cage.inertia_kg_mm2", cage.inertia_kg_mm2, (inertia / 20.0, inertia * 20.0)),
+        ("model.pocket_bar_stiffness_N_m", bar, (BAR_STIFFNESS[0] * stiff, BAR_STIFFNESS[1] * stiff)),
+    ]
+
+
+def _of_section(bearing: Bearing, cage: Cage) -> list[Usual]:
+    """Sizes of the section of a cage, with what is usual."""
+    roller, length = bearing.roller_diameter_mm, bearing.roller_length_mm
+    return [
+        (
+            "cage.bar_width_mm",
+            cage.bar_width_mm,
+            (0.02 * roller, math.pi * bearing.pitch_diameter_mm / bearing.rollers),
+        ),
+        ("cage.bar_thickness_mm", cage.bar_thickness_mm, (0.02 * roller, roller)),
+        ("cage.bar_length_mm", cage.bar_length_mm, (length, 2.0 * length)),
+        ("cage.side_ring_width_mm", cage.side_ring_width_mm, (0.02 * length, 2.0 * length)),
+    ]
+
+
+def _note(key: str, value: float, low: float, high: float) -> str:
+    """The sentence on a value outside its usual range, with the unit that may have been meant."""
+    unit = next((unit for unit in FACTORS if key.endswith(f"_{unit}")), "")
+    meant = {other: factor * value for other, factor in FACTORS.get(unit, {}).items()}
+    meant |= {"K": value - ZERO_C_K} if key.endswith("_C") else {}
+    likely = {other: number for other, number in meant.items() if low <= number <= high}
+    other = _nearest(likely, low, high)
+    fix = "check its unit" if other is None else f"if {value:g} {other} are meant, write {likely[other]:.4g}"
+    return f"{key} = {value:g}: outside the usual {low:.3g} to {high:.3g}; {fix}"
+
+
+def _nearest(likely: Mapping[str, float], low: float, high: float) -> str | None:
+    """Of units that would all do, the one whose number is nearest to the middle of the range; None of none."""
+    if len(likely) < 2:
+        return next(iter(likely), None)
+    return min(likely, key=lambda other: abs(math.log(likely[other] ** 2 / (low * high))))

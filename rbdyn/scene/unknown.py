@@ -23,6 +23,8 @@ DERIVED: Mapping[str, Callable[[Scene], float | None]] = {
     "lubricant.viscosity_mPas": lambda scene: 1e3 * scene.lubricant.in_service.viscosity,
     "lubricant.pressure_coefficient_1_GPa": lambda scene: 1e9 * scene.lubricant.in_service.pressure_coefficient,
 }
+# Keys that follow from other inputs where a scene leaves them out.
+FOLLOWING = frozenset({*DERIVED, "model.pocket_bar_stiffness_N_m"})
 
 
 class Input(NamedTuple):
@@ -172,7 +174,7 @@ def with_values(
         roots = {
             key: base
             for key, base in relative.items()
-            if (base == key or base not in values) and late == (base in DERIVED and not _given(tables, base))
+            if (base == key or base not in values) and late == (base in FOLLOWING and not _given(tables, base))
         }
         scene = Scene.from_dict(tables, source) if roots else None
         numbers = {key: _number(scene, base, key, source) * values[key] for key, base in roots.items()}

@@ -23,7 +23,7 @@ from doe.study_file.study import StudyFile
 from doe.unknown import laws
 from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, key_path, read_toml, validated
 from rbdyn.scene import Scene
-from rbdyn.scene.unknown import DERIVED, value_of
+from rbdyn.scene.unknown import FOLLOWING, value_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCENE, STUDY = EXAMPLES / "cylindrical_roller.toml", EXAMPLES / "clearance_study.toml"
@@ -199,9 +199,9 @@ def check_scene(case: Case, scene: Scene, values: dict[str, Any], design: list[s
         key, base, value = each.key, each.law.times, values[each.key]
         if base is None:
             assert value_of(scene, key) == value, key
-        elif base != key and (base in values or base not in DERIVED):
+        elif base != key and (base in values or base not in FOLLOWING):
             assert value_of(scene, key) == pytest.approx(value * value_of(scene, base), rel=1e-12), key
-        elif base == key and not {*DERIVED} & {*values} - {key}:
+        elif base == key and not FOLLOWING & {*values} - {key}:
             before = copy.deepcopy(scene._tables)
             table, _, name = key.rpartition(".")
             if name in given.get(table, {}):

@@ -31,6 +31,15 @@ FITS = "mounting={bore_mm=27.0, outside_diameter_mm=60.0, housing_diameter_mm=80
         ("lubricant.race_roughness_um=50.0", "if 50 nm are meant, write 0.05"),
         ("lubricant.viscosity_mPas=0.0029", "if 0.0029 Pa s are meant, write 2.9"),
         (FITS, "if 383 K are meant, write 109.9"),
+        (
+            "model.pocket_bar_stiffness_N_m=50.0",
+            "outside the usual 5.5e+04 to 1.1e+10; if 50 N/um are meant, write 5e+07",
+        ),
+        ("model.pocket_bar_stiffness_N_m=5000.0", "if 5000 N/mm are meant, write 5e+06"),
+        ("lubricant.pressure_coefficient_1_GPa=1e-8", "outside the usual 2 to 80; if 1e-08 1/Pa are meant, write 10"),
+        ("lubricant.pressure_coefficient_1_GPa=0.0125", "if 0.0125 1/MPa are meant, write 12.5"),
+        ("cage.inertia_kg_mm2=2.2e-5", "outside the usual 1.41 to 563; if 2.2e-05 kg m2 are meant, write 22"),
+        ("cage.inertia_kg_mm2=22000.0", "if 22000 g mm2 are meant, write 22"),
     ],
 )
 def test_unit_a_value_in_another_unit_says_which(make_scene, assignment, mend):
@@ -50,6 +59,9 @@ def test_unit_ordinary_values_are_not_suspected(make_scene):
         changes = (f"cage.pocket_clearance_mm={clearance}", "cage.guide_clearance_mm=1.0", "cage.guidance=roller")
         assert make_scene(*changes).unit_notes == ()
     assert make_scene("materials.cage=peek", "cage.mass_g=7.0").unit_notes == ()
+    for stiffness in ("rigid", "1e6", "1e9"):
+        assert make_scene(f"model.pocket_bar_stiffness_N_m={stiffness}").unit_notes == ()
+    assert make_scene("cage.inertia_kg_mm2=15.0", "lubricant.pressure_coefficient_1_GPa=5.0").unit_notes == ()
     assert make_scene("lubricant.temperature_C=-40.0", "lubricant.roller_roughness_um=1.0").unit_notes == ()
 
 
