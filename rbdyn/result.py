@@ -78,7 +78,8 @@ class SimulationResult(Brief, SavedRecord):
 
     ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of
     the contact alone; ``races``: pressure, half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and
-    operating diametral clearance [um], with what fits, temperature and rotation take of it where a mounting is given;
+    operating diametral clearance [um], with what fits, temperature and rotation take of it where a mounting is given, and
+    under "radial", "guide" and "pocket" the drawn, fit, temperature, rotation and operating share of each;
     ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not tell;
     ``counted_turns``: those that each replicate counts, more than asked for where it was lengthened;
     ``target``: what a run to a target accuracy chose, reached and cost, None for any other.
@@ -98,7 +99,7 @@ class SimulationResult(Brief, SavedRecord):
     max_land_load: float = keyed("loads", "max_land_N")
     notes: tuple[str, ...]
     power_terms: dict[str, float] = keyed("power_terms_W")
-    clearance: dict[str, float] = keyed("clearance_um")
+    clearance: dict[str, Any] = keyed("clearance_um")
     status: str
     races: dict[str, dict[str, float]]
     impact_window_turns: float
