@@ -35,10 +35,10 @@ def mounting_values(sizes: Envelope, shaft: str | None, housing: str | None, tem
         "housing_diameter": round(HOUSING_SHARE * sizes.outside, 1),
         "outer_temperature": temperature,
         "inner_temperature": temperature + INNER_RISE,
-        "inner_interference": round(inner.mean, 2),
+        "inner_interference": round(inner.mean, 2) + 0.0,
         "inner_fit_by": _reason(inner),
         "inner_law": _law(inner),
-        "outer_interference": round(outer.mean, 2),
+        "outer_interference": round(outer.mean, 2) + 0.0,
         "outer_fit_by": _reason(outer),
         "outer_law": _law(outer),
     }
@@ -53,5 +53,5 @@ def _law(fit: Interference) -> str | None:
     """Law of an interference; None where all of the fits are loose and none has any effect."""
     if fit.high <= 0.0:
         return None
-    numbers = f"mean = {fit.mean:.2f}, sd = {fit.sd:.2f}, low = {fit.low:.2f}, high = {fit.high:.2f}"
+    numbers = f"mean = {fit.mean + 0.0:.2f}, sd = {fit.sd:.2f}, low = {fit.low:.2f}, high = {fit.high:.2f}"
     return f'{{ law = "normal", {numbers}, kind = "varies" }}'
