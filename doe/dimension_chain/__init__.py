@@ -12,3 +12,19 @@ from doe.dimension_chain.reading import chain_from, is_several, read_chains
 from doe.dimension_chain.solution import ChainResult, solve
 from rbdyn.properties.iso286 import fit_limits, grade_tolerances, tolerance_unit
 from rbdyn.properties.iso492 import ring_limits
+
+__all__ = [
+    "Chain",
+    "ChainResult",
+    "Link",
+    "Part",
+    "chain_from",
+    "faults",
+    "fit_limits",
+    "grade_tolerances",
+    "is_several",
+    "read_chains",
+    "ring_limits",
+    "solve",
+    "tolerance_unit",
+]
