@@ -101,8 +101,8 @@ def test_unit_fits_write_a_mounting():
         90.0,
         135.0,
     )
-    warm = [mounting[f"{part}_temperature_C"] for part in ("outer_ring", "inner_ring", "roller")]
-    assert warm == [80.0, 87.5, 87.5] and "mounting.inner_ring_temperature_C" in uncertain["estimated"]
+    warm = [mounting[f"{part}_temperature_C"] for part in ("outer_ring", "inner_ring", "roller", "shaft")]
+    assert warm == [80.0, 87.5, 87.5, 79.1] and "mounting.inner_ring_temperature_C" in uncertain["estimated"]
     law = uncertain["mounting.inner_interference_um"]
     assert law["kind"] == "varies" and law["sd"] == pytest.approx(math.hypot(11, 12) / 6, abs=0.01)
     assert (law["low"], law["mean"], law["high"]) == pytest.approx((7.25, 18.75, 30.25), abs=0.01)

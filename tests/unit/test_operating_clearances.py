@@ -87,6 +87,7 @@ def by_hand(
     across = land + guide
     # Pressure at which bore and shaft, which spin and touch, meet again.
     overlap = 0.5e-6 * scene.mounting.inner_interference_um
+    overlap += ALPHA * (scene.mounting.shaft_temperature_C - scene.mounting.inner_ring_temperature_C) * bore
     overlap += RHO * inner**2 * (1.0 - NU) * bore**3 / (4.0 * E) - spun(bore, race, bore, inner)
     pressure = overlap / (lame(1.0, bore, race, bore, True) + (1.0 - NU) * bore / E)
     changes["guide_fit"] = -2.0 * lame(max(pressure, 0.0), bore, race, 0.5 * land, True)
