@@ -35,7 +35,10 @@ def operating_clearances(study: Study, points: Mapping[str, Scene]) -> Operating
         if factor.key in CLEARANCES and all(_changes(scene, factor.key) for scene in points.values())
     }
     radial = any(factor.key == RADIAL for factor in study.file.factor)
-    return OperatingClearances(operating, class_sentence(points["pick"]) if radial else "")
+    pick = points["pick"]
+    bore, drawn_um = bore_of(pick), 1e3 * pick.bearing.radial_clearance_mm
+    named = "" if bore is None or not radial else class_sentence(bore, drawn_um, pick.bearing.kind)
+    return OperatingClearances(operating, named)
 
 
 def scenes_of(study: Study, baseline: Array, pick: Array) -> dict[str, Scene]:
@@ -46,14 +49,16 @@ def scenes_of(study: Study, baseline: Array, pick: Array) -> dict[str, Scene]:
     }
 
 
-def class_sentence(scene: Scene) -> str:
-    """Which classes of ISO 5753-1 hold the drawn radial clearance of a scene; empty where no bore is known."""
-    if scene.mounting is None:
-        return ""
-    bore, drawn_um = scene.mounting.bore_mm, 1e3 * scene.bearing.radial_clearance_mm
+def bore_of(scene: Scene) -> float | None:
+    """Bore of the bearing [mm]; None where the scene does not state it."""
+    return None if scene.mounting is None else scene.mounting.bore_mm
+
+
+def class_sentence(bore: float, drawn_um: float, kind: str) -> str:
+    """Which classes of ISO 5753-1 hold a drawn radial clearance [um] at a bore [mm]; empty beyond the table of bores."""
     where = f"ISO 5753-1 at a bore of {bore:g} mm: the pick's radial clearance of {drawn_um:.3g} um"
     try:
-        classes = classes_at(bore, drawn_um, scene.bearing.kind)
+        classes = classes_at(bore, drawn_um, kind)
     except MethodError:
         return ""
     if not classes:
