@@ -77,7 +77,7 @@ def new(
         box = _read(lambda text: _envelope(named, sizes), "DESIGNATION", words, faults)
         inside: Any = None if box is None else _read(lambda text: fill(named, box, point), "DESIGNATION", words, faults)
         refuse(faults)
-        values = {**inside, **_mounting(box, shaft, housing, temperature)}
+        values = inside | _mounting(box, shaft, housing, temperature)
         template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
         text = filled(template.read_text(encoding="utf-8"), values)
         data = tomllib.loads(text)
