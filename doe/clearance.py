@@ -104,14 +104,31 @@ def assignments(study: Study, factors: Array) -> list[str]:
 
 
 def design_scenes(study: Study, points: Array, order: Sequence[int] | None = None) -> list[Scene]:
-    """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError.
+    """A scene a design run (n, k); runs at one point differ by their seed only. Raises InputError, which names the point where a
+    factor has a value that is impossible there.
 
     ``order``: place of each run in the standard order, which sets its seed; as given unless told.
     """
     data, first, overrides = read_scene(study), study.file.design.seed, study.scene.set
     places = range(len(points)) if order is None else order
     numbered = zip(places, points, strict=True)
-    return [scene_at(study, data, point, first + place, overrides) for place, point in numbered]
+    return [_scene_in_region(study, data, point, first + place, overrides) for place, point in numbered]
+
+
+def _scene_in_region(study: Study, data: dict[str, Any], point: Array, seed: int, overrides: Sequence[str]) -> Scene:
+    try:
+        return scene_at(study, data, point, seed, overrides)
+    except InputError as error:
+        keys = [factor.key for factor in study.file.factor]
+        place = ", ".join(f"{name} = {value:.4g}" for name, value in study.by_factor(point).items())
+        where = f"{study.path}: the region of the design reaches {place}, where "
+        faults = [str(fault) for fault in error.faults]
+        raise InputError(
+            [
+                f"{where}{fault}, or narrow the region" if any(key in fault for key in keys) else fault
+                for fault in faults
+            ]
+        ) from None
 
 
 def confirmation_scene(study: Study, point: Array) -> Scene:

@@ -84,8 +84,10 @@ class SimulationResult(Brief, SavedRecord):
     """Outcome of one scene. Forces in N, powers in W, cage speed in rpm; ``scene`` is the resolved input.
 
     ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of
-    the contact alone; ``rolling_resistance``: the loss of that name by race, "outer" and "inner"; ``races``: pressure, half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and
-    operating diametral clearance [um], with what fits, temperature and rotation take of it where a mounting is given;
+    the contact alone; ``rolling_resistance``: the loss of that name by race, "outer" and "inner"; ``races``: pressure,
+    half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and operating diametral clearance
+    [um], with what fits, temperature and rotation take of it where a mounting is given, and under "radial", "guide" and
+    "pocket" the drawn, fit, temperature, rotation and operating share of each;
     ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not tell;
     ``counted_turns``: those that each replicate counts, more than asked for where it was lengthened;
     ``target``: what a run to a target accuracy chose, reached and cost, None for any other; ``cage_orbit_radius_share``:
@@ -107,7 +109,7 @@ class SimulationResult(Brief, SavedRecord):
     notes: tuple[str, ...]
     power_terms: dict[str, float] = keyed("power_terms_W")
     rolling_resistance: dict[str, float] = keyed("rolling_resistance_W")
-    clearance: dict[str, float] = keyed("clearance_um")
+    clearance: dict[str, Any] = keyed("clearance_um")
     status: str
     races: dict[str, dict[str, float]]
     impact_window_turns: float

@@ -7,10 +7,10 @@ from functools import partial
 from doe.dimension_chain.allocation import Allocation
 from doe.dimension_chain.closing import NoValueError, interval, is_part, press_fit_factor, used_links
 from doe.dimension_chain.expressions import shown
-from doe.dimension_chain.iso286 import LARGEST, positioned
 from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link
 from doe.dimension_chain.parts import coded_limits
 from rbdyn.faults import MethodError
+from rbdyn.properties.iso286 import LARGEST, positioned
 
 
 def faults(chain: Chain) -> list[str]:

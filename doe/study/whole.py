@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from doe.arrays import Array
@@ -30,6 +31,7 @@ from doe.study.finished import inputs_digest
 from doe.study.front import find_front, with_survival
 from doe.study.goals import check_goals
 from doe.study.limits import Limit, Verdict, limits_of, odds_sentence, sentence, verdict_of
+from doe.study.operating import OperatingClearances, operating_clearances, scenes_of
 from doe.study.reference import Beside, beside
 from doe.study.robust import Robust, check_robust, judge, robust_advice
 from doe.study.runs import STORE, Runs, run_design
@@ -101,6 +103,12 @@ class StudyResult:
     def pick(self) -> Confirmed:
         """The chosen design, simulated."""
         return self.confirmed["pick"]
+
+    @cached_property
+    def clearances(self) -> OperatingClearances:
+        """Clearances among the factors in operation, at baseline and pick."""
+        points = scenes_of(self.study, self.baseline.point, self.pick.point)
+        return operating_clearances(self.study, points)
 
     @property
     def limits(self) -> list[Limit]:

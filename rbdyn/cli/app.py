@@ -277,9 +277,8 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         film = f", film {at['central_film_um']:.2g} um, lambda {at['lambda_ratio']:.2g}" if "lambda_ratio" in at else ""
         pressed = f"{at['max_pressure_MPa']:.0f} MPa over {at['half_width_um']:.0f} um each way"
         print(f"{race} race at its largest load: {pressed}{film}")
-    if len(result.clearance) > 2:
-        parts = ", ".join(f"{name.replace('_', ' ')} {value:+.1f} um" for name, value in result.clearance.items())
-        print(f"clearance: {parts}")
+    if result.scene.get("mounting"):
+        _print_clearances(result.clearance)
     if verbose:
         if result.transient_turns is not None:
             print(f"transient: {counted(result.transient_turns, 'shaft turn')}")
@@ -291,6 +290,19 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         terminal.print_table(f"power lost; the power balance closes to {gap:.2g} W", ("term", "W"), terms)
         terminal.print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
     terminal.print_notes(result.notes, quiet)
+
+
+def _print_clearances(clearance: dict[str, Any]) -> None:
+    """What makes each clearance in operation, the radial one with its fits one by one."""
+    plays = {
+        "clearance": clearance,
+        "guide clearance": clearance.get("guide"),
+        "pocket clearance": clearance.get("pocket"),
+    }
+    for name, play in plays.items():
+        if play is not None:
+            numbers = {part.replace("_", " "): value for part, value in play.items() if isinstance(value, float)}
+            print(f"{name}: {', '.join(f'{part} {value:+.1f} um' for part, value in numbers.items())}")
 
 
 def _print_target(target: dict[str, Any]) -> None:

@@ -46,6 +46,12 @@ def new(
     bore: Annotated[float | None, valued("MM", "Bore, where the table lacks the bearing.", LISTED)] = None,
     outside: Annotated[float | None, valued("MM", "Outside diameter.", LISTED)] = None,
     width: Annotated[float | None, valued("MM", "Width.", LISTED)] = None,
+    shaft: Annotated[
+        str | None, valued("CLASS", "Tolerance class of the shaft: k5. Writes [mounting].", "loose")
+    ] = None,
+    housing: Annotated[
+        str | None, valued("CLASS", "Tolerance class of the housing: H7. Writes [mounting].", "loose")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write a commented scene of a catalogue bearing, its interior estimated, on standard output."""
@@ -68,8 +74,10 @@ def new(
         wanted = chosen or named.stated("clearance") or CLEARANCE
         point = new_scene.OperatingPoint(speed, load, preload, lubricant, temperature, wanted)
         fill = new_scene.roller_values if rollers else new_scene.ball_values
-        values = _read(lambda text: fill(named, _envelope(named, sizes), point), "DESIGNATION", words, faults)
+        box = _read(lambda text: _envelope(named, sizes), "DESIGNATION", words, faults)
+        inside: Any = None if box is None else _read(lambda text: fill(named, box, point), "DESIGNATION", words, faults)
         refuse(faults)
+        values = inside | _mounting(box, shaft, housing, temperature)
         template = Path(__file__).with_name("roller_scene.toml" if rollers else "ball_scene.toml")
         text = filled(template.read_text(encoding="utf-8"), values)
         data = tomllib.loads(text)
@@ -82,6 +90,20 @@ def new(
             print_json(data)
         else:
             print(text)
+
+
+def _mounting(sizes: "Envelope", shaft: str | None, housing: str | None, temperature: float) -> dict[str, Any]:
+    """Values of [mounting], none of them without a class. Raises InputError for a class or a size that is not listed."""
+    from rbdyn.cli.new_mounting import mounting_values
+    from rbdyn.properties.seats import housing_interference, shaft_interference
+
+    faults = list[str]()
+    if shaft is not None:
+        _read(lambda zone: shaft_interference(sizes.bore, zone), "--shaft", shaft, faults)
+    if housing is not None:
+        _read(lambda zone: housing_interference(sizes.outside, zone), "--housing", housing, faults)
+    refuse(faults)
+    return mounting_values(sizes, shaft, housing, temperature)
 
 
 def _fault(option: str, value: float) -> str | None:

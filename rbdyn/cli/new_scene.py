@@ -4,6 +4,7 @@ import json
 import math
 from typing import Any, NamedTuple
 
+from rbdyn.cli.new_mounting import mounting_values
 from rbdyn.life.roller_capacity import REFERENCE_SPEED_FACTOR
 from rbdyn.properties.cages import cage_estimate
 from rbdyn.properties.catalogue import Envelope, RollerInterior, ball_interior, radial_clearance, roller_interior
@@ -89,7 +90,7 @@ def ball_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> V
 
 
 def _common(named: Designation, sizes: Envelope, point: OperatingPoint, reference: float, capacity: float) -> Values:
-    """What both kinds of bearing have: name, boundary dimensions, oil, speed [rpm] and load [N]."""
+    """What both kinds of bearing have: name, boundary dimensions, oil, speed [rpm] and load [N]; no mounting."""
     oil, base, grease = point.oil
     speed, load = point.speed, point.load
     speed = float(f"{USUAL_SPEED * reference:.2g}") if speed is None else speed
@@ -112,6 +113,7 @@ def _common(named: Designation, sizes: Envelope, point: OperatingPoint, referenc
         "load": load,
         "load_by": "not told: " if point.load is None else "",
         "load_share": load / capacity,
+        **mounting_values(sizes, None, None, point.temperature),
     }
 
 

@@ -21,6 +21,7 @@ from rbdyn.dynamics.settling import Ensemble, run_until_settled, whole_windows
 from rbdyn.dynamics.statistics.cage_orbit import orbit_radius_share, whirl_notes
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.metrics import work_done
+from rbdyn.mounting.cage import OperatingClearance
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene, rollers_only
 
@@ -139,14 +140,27 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
     )
 
 
-def clearance_report(scene: Scene) -> dict[str, float]:
-    """Diametral clearance as drawn and in operation, and what changed it [um]."""
+def clearance_report(scene: Scene) -> dict[str, Any]:
+    """Diametral clearances as drawn and in operation, and what changed them [um].
+
+    The radial one by itself; under "radial", "guide" and "pocket" each with drawn, fit, temperature, rotation and operating,
+    None for the guide of a cage that no ring guides.
+    """
     drawn = scene.bearing.radial_clearance_mm * 1e3
-    mounted = scene.mounted_clearance
-    if mounted is None:
-        return {"drawn": drawn, "operating": drawn}
-    parts = ("inner_fit", "outer_fit", "temperature", "rotation", "operating")
-    return {"drawn": drawn, **{part: getattr(mounted, part) * 1e6 for part in parts}}
+    flat, mounted = {"operating": drawn}, scene.mounted_clearance
+    if mounted is not None:
+        parts = ("inner_fit", "outer_fit", "temperature", "rotation", "operating")
+        flat = {part: getattr(mounted, part) * 1e6 for part in parts}
+    return {"drawn": drawn, **flat, **{name: _shares(each) for name, each in scene.clearances.items()}}
+
+
+def _shares(clearance: OperatingClearance | None) -> dict[str, float] | None:
+    if clearance is None:
+        return None
+    # A sum with 0 has no negative zero.
+    return {
+        part: 1e6 * value + 0.0 for part, value in {**clearance._asdict(), "operating": clearance.operating}.items()
+    }
 
 
 def _notes(scene: Scene, power_gap: float) -> tuple[str, ...]:

@@ -1,9 +1,20 @@
-"""From the mounting table of a scene to rings, fits and the clearance in operation."""
+"""From the mounting table of a scene to rings, fits and the clearances in operation."""
 
+from typing import NamedTuple
+
+from rbdyn.mounting.cage import CageBody, CageClearances, guide_clearance, pocket_circle_shift, pocket_clearance
 from rbdyn.mounting.rings import MountedClearance, MountedRings, Ring, mounted_clearance
 from rbdyn.properties.materials import Material
-from rbdyn.scene.bearing import Bearing, Materials
+from rbdyn.scene.bearing import Bearing, Cage, Materials
 from rbdyn.scene.mounting import Mounting, Raceways, material_of, raceway_radii
+
+
+class RunningSpeeds(NamedTuple):
+    """Speeds of inner ring, outer ring and cage [rad/s]."""
+
+    inner: float
+    outer: float
+    cage: float
 
 
 def mounted_rings(
@@ -50,6 +61,37 @@ def operating_clearance(
     material = material_of(materials.rings)
     rings = mounted_rings(mounting, bearing, material, material, inner_speed, outer_speed)
     return mounted_clearance(bearing.radial_clearance, rings, bearing.roller_diameter, material_of(materials.roller))
+
+
+def cage_temperature_rise(mounting: Mounting, guidance: str, rings: MountedRings) -> float:
+    """Rise of a cage above the drawing [K]: as given, else the mean of the rollers and of the ring that guides it."""
+    rollers = rings.element_temperature_rise
+    by = {"outer": rings.outer_ring.temperature_rise, "inner": rings.inner_ring.temperature_rise, "roller": rollers}
+    return _rise(mounting.cage_temperature_C, mounting.reference_temperature_C, 0.5 * (rollers + by[guidance]))
+
+
+def cage_clearances(
+    mounting: Mounting, bearing: Bearing, cage: Cage, materials: Materials, land_diameter: float, speeds: RunningSpeeds
+) -> CageClearances:
+    """Clearances of a scene's cage as mounted, with its land on a ring at ``land_diameter`` [m].
+
+    The keys of ``cage`` are clearances of the drawing. Raises ValueError as ``mounted_rings``.
+    """
+    material, roller = material_of(materials.rings), material_of(materials.roller)
+    rings = mounted_rings(mounting, bearing, material, material, speeds.inner, speeds.outer)
+    rise = cage_temperature_rise(mounting, cage.guidance, rings)
+    turning = speeds.cage if mounting.rotation else 0.0
+    body = CageBody(material_of(materials.cage), cage.hoop_modulus_share, rise, turning)
+    hot_roller = bearing.roller_diameter, roller, rings.element_temperature_rise
+    play, lip = cage.guide_clearance, cage.lip_clearance
+    return CageClearances(
+        None
+        if cage.guidance == "roller" or play is None
+        else guide_clearance(play, 0.5 * land_diameter, cage.guidance, rings, body),
+        pocket_clearance(cage.pocket_clearance, *hot_roller, body),
+        None if lip is None else pocket_clearance(lip, *hot_roller, body),
+        pocket_circle_shift(0.5 * bearing.pitch_diameter, rings, body),
+    )
 
 
 def _rise(temperature: float | None, reference: float, otherwise: float) -> float:

@@ -160,7 +160,7 @@ def _sizes(history: "History") -> dict[str, Any]:
     outer, inner = (1e3 * radius for radius in scene.geometry.raceways)
     roller = ROLLER_SHARE * true_roller
     cage_half = CAGE_SHARE * roller
-    pocket_gap = 0.5 * scene.cage.pocket_clearance_mm
+    pocket_gap = 0.5e3 * scene.pocket_clearance_m
     clearance = scene.guide_clearance_m
     guide_gap = 0.0 if clearance is None else 1e3 * clearance
     # The pockets must leave a cross-bar at the inner rim, and the land must stay on its side of the raceway.

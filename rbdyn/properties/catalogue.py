@@ -103,6 +103,24 @@ def radial_clearance(bore: float, name: str, kind: str) -> tuple[float, float]:
     raise MethodError(f"{reach}; take a smaller bearing or another class")
 
 
+class ClearanceClass(NamedTuple):
+    """A class of ISO 5753-1 and its limits [um]."""
+
+    name: str
+    lower: float
+    upper: float
+
+
+def classes_at(bore: float, clearance: float, kind: str) -> list[ClearanceClass]:
+    """Classes of ISO 5753-1 that hold a radial clearance [um] at a bore [mm], the one whose middle is nearest first.
+
+    Neighbours overlap; beyond C2 and C5 there is none. Raises MethodError where the table does not reach the bore.
+    """
+    classes = [ClearanceClass(name, *radial_clearance(bore, name, kind)) for name in CLEARANCE_CLASSES]
+    around = [each for each in classes if each.lower <= clearance <= each.upper]
+    return sorted(around, key=lambda each: abs(clearance - 0.5 * (each.lower + each.upper)))
+
+
 def roller_interior(sizes: Envelope, narrow: bool) -> RollerInterior:
     """Interior of a cylindrical roller bearing; ``narrow``: of series 10. Raises MethodError for impossible dimensions."""
     height = 0.5 * (sizes.outside - sizes.bore)

@@ -27,6 +27,7 @@ from rbdyn.scene.uncertain import Calibrate, Uncertain
 from rbdyn.scene.units import unit_notes
 
 if TYPE_CHECKING:
+    from rbdyn.mounting.cage import CageClearances, OperatingClearance
     from rbdyn.mounting.rings import MountedClearance
     from rbdyn.scene.geometry import Geometry
 
@@ -57,7 +58,7 @@ class Scene(SceneFile):
     operation: Operation
     """Speeds and loads."""
     mounting: Mounting | None = None
-    """Fits, temperatures, shaft and housing; without it the clearance is that in operation."""
+    """Fits, temperatures, shaft and housing; without it all clearances are those in operation."""
     support: Support | None = None
     """Flexible, damped support of the outer ring; without it the ring is held."""
     materials: Materials = Materials()
@@ -97,6 +98,9 @@ class Scene(SceneFile):
         faults = list(self._misfits())
         faults += misfits(self.mounting, self.bearing) if self.mounting is not None else ()
         faults += self._overload_faults()
+        if not faults and (seizures := list(self._seizures())):
+            warm = [note for note in self.unit_notes if note.startswith("mounting.")]
+            return ["; ".join([seizure, *warm]) for seizure in seizures]
         slips = {note.partition(" = ")[0]: note for note in (self.unit_notes if faults else ())}
         return ["; ".join([fault, *(slips[key] for key in slips if key in fault)]) for fault in faults]
 
@@ -165,6 +169,33 @@ class Scene(SceneFile):
                 f"memory for {MOST_SAMPLES:g} in all; lower it or take fewer turns or replicates"
             )
 
+    def _seizures(self) -> Iterator[str]:
+        """Clearances of the cage of which fits, heat and rotation leave no more than the floor of their film."""
+        cage, laws, clearances = self.cage, self.model, self.cage_clearances
+        if clearances is None:
+            return
+        lands = {"film": laws.land_film_floor_um, "dry": 0.0}
+        checks = [("pocket", clearances.pocket, laws.pocket_film_floor_um if laws.pocket_film else 0.0)]
+        checks = checks if laws.pocket == "contact" else []
+        if clearances.guide is not None and laws.guide_land in lands:
+            checks.append(("guide", clearances.guide, lands[laws.guide_land]))
+        for name, play, floor_um in checks:
+            left_um = 1e6 * play.operating
+            if left_um <= 2.0 * floor_um:
+                floor = f", not above twice model.{'land' if name == 'guide' else name}_film_floor_um = {floor_um:g}"
+                yield (
+                    f"cage.{name}_clearance_mm = {getattr(cage, f'{name}_clearance_mm'):g}: fits {1e6 * play.fit:+.1f} um, heat "
+                    f"{1e6 * play.temperature:+.1f} um and rotation {1e6 * play.rotation:+.1f} um leave {left_um:.1f} um"
+                    f"{floor if floor_um else ''}: the cage seizes; widen it or check the temperatures of mounting"
+                )
+        lip = clearances.lip
+        if laws.pocket == "contact" and lip is not None and 0.5 * lip.operating <= abs(clearances.shift):
+            yield (
+                f"cage.pocket_radial_clearance_mm = {1e3 * lip.drawn:g}: the circle of pockets grows {1e6 * clearances.shift:+.1f} um "
+                f"against that of the rollers, whose lips leave {0.5e6 * lip.operating:.1f} um; widen it or check the temperatures "
+                "of mounting"
+            )
+
     def _overload_faults(self) -> Iterator[str]:
         """Whether the most loaded roller, by Stribeck 5 F/Z, would be flattened over more than its diameter."""
         bearing, load = self.bearing, self.operation.largest_load_N
@@ -228,6 +259,33 @@ class Scene(SceneFile):
 
         return operating_clearance(self.mounting, self.bearing, self.materials, *self.operation.speeds)
 
+    @cached_property
+    def cage_clearances(self) -> "CageClearances | None":
+        """What fits, temperatures and rotation do to the clearances of the cage; None where the scene states no mounting."""
+        if self.mounting is None:
+            return None
+        from rbdyn.mounting.fits import RunningSpeeds, cage_clearances
+
+        speeds = RunningSpeeds(*self.operation.speeds, self.geometry.motion.cage_speed)
+        land = 1e-3 * self.land_diameter_mm
+        return cage_clearances(self.mounting, self.bearing, self.cage, self.materials, land, speeds)
+
+    @property
+    def clearances(self) -> "dict[str, OperatingClearance | None]":
+        """Diametral clearances "radial", "guide" (None where the rollers guide the cage) and "pocket", drawn and in operation [m]."""
+        from rbdyn.mounting.cage import OperatingClearance
+
+        radial, cage = self.mounted_clearance, self.cage_clearances
+        if radial is None or cage is None:
+            play = None if self.cage.guidance == "roller" else self.cage.guide_clearance
+            drawn = self.bearing.radial_clearance, play, self.cage.pocket_clearance
+            plays = [None if each is None else OperatingClearance(each) for each in drawn]
+        else:
+            fit = radial.inner_fit + radial.outer_fit
+            bearing = OperatingClearance(radial.initial, fit, radial.temperature, radial.rotation)
+            plays = [bearing, cage.guide, cage.pocket]
+        return dict(zip(("radial", "guide", "pocket"), plays, strict=True))
+
     @property
     def unit_notes(self) -> tuple[str, ...]:
         """Sentences on values that look like another unit."""
@@ -261,16 +319,49 @@ class Scene(SceneFile):
 
     @property
     def guide_clearance_m(self) -> float | None:
-        """Radial play of the cage in its land [m]; None where no land guides it."""
-        clearance = self.cage.guide_clearance
+        """Radial play of the cage in its land in operation [m]; None where no land guides it."""
+        clearance = self.guide_play_m
         landless = self.cage.guidance == "roller" or self.model.guide_land == "off"
         return None if landless or clearance is None else 0.5 * clearance
 
     @property
     def cage_play_m(self) -> float | None:
         """Radial play of the cage [m]: in its land, or in the pocket lips of the rollers that guide it; None without either."""
-        lips = self.cage.lip_clearance
-        return lips if self.guide_clearance_m is None else self.guide_clearance_m
+        lips = self.lip_clearance_m
+        if self.guide_clearance_m is None:
+            return None if lips is None else 0.5 * lips
+        return self.guide_clearance_m
+
+    @property
+    def guide_play_m(self) -> float | None:
+        """Diametral clearance of the cage in its guide in operation, whether its land acts or not [m]; None without one."""
+        mounted = self.cage_clearances
+        if mounted is None or mounted.guide is None:
+            return self.cage.guide_clearance
+        return mounted.guide.operating
+
+    @property
+    def pocket_clearance_m(self) -> float:
+        """Pocket width less roller diameter in operation [m]."""
+        mounted = self.cage_clearances
+        return self.cage.pocket_clearance if mounted is None else mounted.pocket.operating
+
+    @property
+    def lip_clearance_m(self) -> float | None:
+        """Radial play between roller and lips in operation, both ways together [m]; None where a ring guides the cage."""
+        mounted = self.cage_clearances
+        return self.cage.lip_clearance if mounted is None or mounted.lip is None else mounted.lip.operating
+
+    @property
+    def cage_temperature_C(self) -> float | None:  # noqa: N802
+        """Temperature of the cage, given or by default [C]; None where the scene states no mounting."""
+        if self.mounting is None:
+            return None
+        from rbdyn.mounting.fits import cage_temperature_rise, mounted_rings
+
+        material = self.material("rings")
+        rings = mounted_rings(self.mounting, self.bearing, material, material, 0.0)
+        return self.mounting.reference_temperature_C + cage_temperature_rise(self.mounting, self.cage.guidance, rings)
 
     @property
     def turn_s(self) -> float:

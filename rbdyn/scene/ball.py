@@ -274,6 +274,8 @@ def _unmounted_faults(scene: BallScene) -> Iterator[str]:
 def _mounted_faults(mounting: Mounting, scene: BallScene) -> Iterator[str]:
     inner, outer = scene.outermost_rows
     yield from mounting_faults(mounting, scene.bearing)
+    if mounting.cage_temperature_C is not None:
+        yield f"mounting.cage_temperature_C = {mounting.cage_temperature_C:g}: a ball bearing has no cage here; leave it out"
     for key, mounted, row in (
         ("bore_mm", mounting.bore_mm, inner),
         ("outside_diameter_mm", mounting.outside_diameter_mm, outer),

@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
 
 from rbdyn.faults import Consistent, Strict
-from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive
+from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive, Share
 from rbdyn.records.words import counted
 
 # Keys that belong to one roller profile each.
@@ -166,7 +166,7 @@ class Bearing(Consistent):
 
 
 class Cage(Consistent):
-    """Cage and guide land. Clearances are diametral."""
+    """Cage and guide land. Clearances are diametral, and with [mounting] those of the drawing."""
 
     guidance: Literal["outer", "inner", "roller"]
     """What guides the cage: a land of the outer ring, of the inner ring, or the rollers in their pockets."""
@@ -214,6 +214,11 @@ class Cage(Consistent):
         if value is None and given.data.get("guidance") != "roller":
             raise PydanticKnownError("missing")
         return value
+
+    hoop_modulus_share: Share = 0.65
+    """Share of the material's modulus that the cage, a hoop with pockets, keeps against its own rotation: 0.5 to 0.8. Side rings
+    alone carry the hoop between the bars, and the mass of these too: side rings of a quarter to a third of the cage's width
+    give 0.75 to 0.85, less what they bend from bar to bar. 1 is a hoop without pockets. Only [mounting] reads it."""
 
     guide_clearance, pocket_clearance, lip_clearance = OptionalSI("mm"), SI("mm"), OptionalSI("mm")
     pocket_contact_length, land_width = OptionalSI("mm"), SI("mm")

@@ -30,7 +30,8 @@ def raceway_radii(bearing: Raceways) -> tuple[float, float]:
 
 
 class Mounting(Consistent):
-    """Fits, temperatures, shaft and housing. With this table, bearing.radial_clearance_mm is that of the loose parts.
+    """Fits, temperatures, shaft and housing. With this table, bearing.radial_clearance_mm is that of the loose parts, and the
+    clearances of the cage are those of its drawing: fits, heat and rotation change all of them.
 
     Each temperature is that of a whole part.
     """
@@ -55,6 +56,9 @@ class Mounting(Consistent):
     """Temperature of the outer ring; the reference temperature where left out."""
     roller_temperature_C: Celsius | None = None  # noqa: N815
     """Temperature of rollers or balls; the mean of the rings where left out."""
+    cage_temperature_C: Celsius | None = None  # noqa: N815
+    """Temperature of the cage; where left out the mean of the rollers and of the ring that guides it, that of the rollers
+    where they guide it. Of roller bearings."""
     shaft_temperature_C: Celsius | None = None  # noqa: N815
     """Temperature of the shaft; that of the inner ring where left out."""
     housing_temperature_C: Celsius | None = None  # noqa: N815
@@ -64,7 +68,7 @@ class Mounting(Consistent):
     housing_material: MaterialName | CustomMaterial = "bearing_steel"
     """Material of the housing."""
     rotation: bool = True
-    """Whether rotation widens the rings."""
+    """Whether rotation widens the rings and the cage."""
 
     bore, outside_diameter, shaft_bore, housing_diameter = SI("mm"), SI("mm"), SI("mm"), SI("mm")
     inner_interference, outer_interference = SI("um"), SI("um")

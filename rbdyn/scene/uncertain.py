@@ -270,7 +270,10 @@ class Calibrate(Strict):
 
 
 class Documented(Strict):
-    """Documented range of a key: its law and the circumstances in which it counts."""
+    """Documented range of a key: its law and the circumstances in which it counts.
+
+    ``times``: the numbers multiply the value of that key; ``plus``: they are added to it.
+    """
 
     key: str
     law: Literal["uniform", "log_uniform", "choices"]
@@ -279,6 +282,7 @@ class Documented(Strict):
     values: list[str] | None = None
     weights: list[float] | None = None
     times: str | None = None
+    plus: str | None = None
     when: dict[str, list[str | bool | float]] = {}
     unless: dict[str, list[str | bool | float]] = {}
     at_least: dict[str, float] = Field({}, alias="from")
@@ -292,12 +296,19 @@ class Documented(Strict):
         names = ("law", "low", "high", "values", "weights", "times")
         return Law(**{name: getattr(self, name) for name in names})
 
+    def about(self, value: float) -> Self:
+        """The range about what the key of ``plus`` is worth."""
+        ends = {"low": value + (self.low or 0.0), "high": value + (self.high or 0.0)}
+        return self.model_copy(update={**ends, "plus": None})
+
     @property
     def words(self) -> str:
         """The range in words."""
         if self.law == "choices":
             return f"choices {', '.join(self.values or ())}"
         of = "" if self.times is None else " times the value" if self.times == self.key else f" times {self.times}"
+        if self.plus is not None:
+            of = f" added to {'the value' if self.plus == self.key else self.plus}"
         return f"{self.law.replace('_', '-')} from {self.low:g} to {self.high:g}{of}"
 
     def counts(self, values: Mapping[str, Any]) -> bool:

@@ -19,6 +19,7 @@ DERIVED: Mapping[str, Callable[[Scene], float | None]] = {
     "cage.land_diameter_mm": lambda scene: scene.land_diameter_mm,
     "cage.inertia_kg_mm2": lambda scene: 1e6 * scene.geometry.cage_inertia,
     "cage.pocket_contact_length_mm": lambda scene: scene.bearing.effective_length_mm,
+    "mounting.cage_temperature_C": lambda scene: scene.cage_temperature_C,
     "cage.pocket_radial_clearance_mm": lambda scene: scene.cage.lip_clearance_mm,
     "lubricant.viscosity_mPas": lambda scene: 1e3 * scene.lubricant.in_service.viscosity,
     "lubricant.pressure_coefficient_1_GPa": lambda scene: 1e9 * scene.lubricant.in_service.pressure_coefficient,
@@ -240,7 +241,8 @@ def documented_of(scene: Scene) -> list[Documented]:
         f"materials.{part}.elastic_modulus_GPa": 1e-9 * scene.material(part).elastic_modulus
         for part in type(scene.materials).model_fields
     }
-    return [each for each in documented() if each.key in values and each.counts({**values, **moduli})]
+    counting = [each for each in documented() if each.key in values and each.counts({**values, **moduli})]
+    return [each if each.plus is None else each.about(float(value_of(scene, each.plus))) for each in counting]
 
 
 def _given(data: Mapping[str, Any], key: str) -> bool:

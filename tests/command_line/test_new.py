@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 import tomllib
@@ -11,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rbdyn.cli.app import app
+from rbdyn.scene import Scene
 
 QUICK = ("turns=3", "discard_turns=2", "replicates=2", "impact_window_turns=1", "companion=false", "extend=false")
 SET = [part for assignment in QUICK for part in ("--set", f"numerics.{assignment}")]
@@ -81,6 +83,45 @@ def test_command_line_suffixes_and_grease(command):
     assert ball["bearing"]["radial_clearance_mm"] == 0.024 and "contact_angle_deg" not in ball["bearing"]
 
 
+def test_unit_fits_write_a_mounting():
+    """Unit: classes of shaft and housing give interferences with their spread, warm rings, and clearances that they change."""
+
+    def scene(*arguments):
+        written = CliRunner().invoke(app, ["new", *arguments])
+        assert written.exit_code == 0, written.output
+        return tomllib.loads(written.stdout)
+
+    fitted = scene("NU210", "--shaft", "m5", "--housing", "K7", "--temperature", "80")
+    mounting, uncertain = fitted["mounting"], fitted["uncertain"]
+    # Shaft 9 to 20 um, bore -12 to 0; outside -15 to 0, housing -25 to 10: less 1.75 um of smoothing where tight.
+    assert mounting["inner_interference_um"] == pytest.approx(0.5 * (9 + 20) + 6 - 1.75)
+    assert mounting["outer_interference_um"] == pytest.approx(0.0, abs=0.01)
+    assert (mounting["bore_mm"], mounting["outside_diameter_mm"], mounting["housing_diameter_mm"]) == (
+        50.0,
+        90.0,
+        135.0,
+    )
+    warm = [mounting[f"{part}_temperature_C"] for part in ("outer_ring", "inner_ring", "roller", "shaft")]
+    assert warm == [80.0, 87.5, 87.5, 79.1] and "mounting.inner_ring_temperature_C" in uncertain["estimated"]
+    law = uncertain["mounting.inner_interference_um"]
+    assert law["kind"] == "varies" and law["sd"] == pytest.approx(math.hypot(11, 12) / 6, abs=0.01)
+    assert (law["low"], law["mean"], law["high"]) == pytest.approx((7.25, 18.75, 30.25), abs=0.01)
+    running = Scene.from_dict(fitted)
+    assert running.mounted_clearance_mm < 0.9 * running.bearing.radial_clearance_mm
+    assert running.clearances["guide"].operating < running.clearances["guide"].drawn
+    # What is loose throughout has no effect, so no law; the seat that is not stated is the usual one.
+    loose = scene("NU210", "--shaft", "k5")
+    assert loose["mounting"]["outer_interference_um"] == -25.0
+    assert (
+        "mounting.outer_interference_um" not in loose["uncertain"]
+        and "mounting.inner_interference_um" in loose["uncertain"]
+    )
+    plain = CliRunner().invoke(app, ["new", "NU210"]).stdout
+    assert "mounting" not in tomllib.loads(plain) and "--shaft k5 --housing H7" in plain and "mounting." not in plain
+    assert "--shaft" not in CliRunner().invoke(app, ["new", "NU210", "--housing", "H7"]).stdout
+    assert scene("6208", "--housing", "N7")["mounting"]["inner_interference_um"] > 0.0
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -120,6 +161,9 @@ def test_command_line_bad_input(command, arguments, words):
         (("7208B", "C3"), "suffix C3: an angular contact bearing has a contact angle instead"),
         (("NU210", "--oil", "VG " + "9" * 5000), "is no oil known here"),
         (("NU210", "--speed", "1e400"), "--speed inf: is not a finite number"),
+        (("NU210", "--shaft", "x9"), '--shaft x9: is no tolerance class of a shaft such as "k5"; take g, h, j, js, k, m, n, p or r'),
+        (("NU210", "--housing", "k7"), '--housing k7: is no tolerance class of a housing such as "H7"; take G, H'),
+        (("NU210", "--bore", "520", "--outside", "700", "--width", "80", "--shaft", "k5"), "not of 520 mm"),
         (("NU210", "--temperature", "-300"), "--temperature -300: must be from -60 to 220 C; fix it"),
     ],
 )  # fmt: skip

@@ -31,7 +31,13 @@ def answer(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     if pick := part(summary, "pick"):
         blocks.append(Tiles([_tile(summary, each, pick) for each in factors(summary) if each.name in pick]))
         if plays := [CLEARANCES[each.key] for each in factors(summary) if each.key in CLEARANCES]:
-            blocks.append(Words(f"Clearances: {', '.join(plays)}.", "note"))
+            drawn = (
+                " Those in operation are what fits, heat and rotation leave."
+                if part(summary, "operating_clearances_mm")
+                else ""
+            )
+            blocks.append(Words(f"Clearances: {', '.join(plays)}.{drawn}", "note"))
+        blocks.append(Words(part(summary, "clearance_class") or "", "note"))
     blocks += [Words(statement(summary), "statement"), Words(part(summary, "whirl_sentence") or "", "statement")]
     blocks += [_gains(summary), limits(summary, ("baseline", "pick"))]
     blocks.append(_held(summary))
@@ -66,6 +72,8 @@ def _kept(gain: float | None, share: Sequence[float] | None) -> str:
 
 def _tile(summary: Record, factor: Factor, pick: Record) -> Tile:
     beneath = []
+    if running := part(summary, "operating_clearances_mm", factor.name):
+        beneath.append(f"in operation {factor.text(running.get('pick'))} {factor.unit}".strip())
     if tolerance := tolerance_of(summary, factor):
         beneath.append(f"± {rounded_down(tolerance)} {factor.unit}".strip())
     baseline = part(summary, "confirmation", "baseline", "factors") or part(summary, "front", "baseline", "factors")

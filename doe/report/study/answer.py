@@ -102,12 +102,23 @@ def _print_clearances(outcome: StudyResult) -> None:
     found = outcome.tolerances
     half_widths = [None] * len(outcome.study.factors) if found is None else found.half_widths.tolist()
     points = outcome.baseline.point, outcome.pick.point
+    running = outcome.clearances
     rows = []
     for name, base, pick, half in zip(outcome.study.factors, *points, half_widths, strict=True):
         widest = [] if half is None else ["" if half != half else f"± {rounded_down(half)}"]
         rows.append((name, f"{base:.4g}", f"{pick:.4g}", *widest))
+        if plays := running.operating.get(name):
+            rows.append(
+                (
+                    "  in operation",
+                    *(f"{plays[point]:.4g}" for point in ("baseline", "pick")),
+                    *([""] if widest else []),
+                )
+            )
     header = ("", "baseline", "pick", *([] if found is None else ["widest tolerance"]))
     print_table("chosen clearances", header, rows)
+    if running.class_sentence:
+        print(running.class_sentence)
     if found is not None:
         print(f"tolerances: {found.sentence}")
 

@@ -41,6 +41,8 @@ def summary(outcome: StudyResult) -> dict[str, Any]:
         "front": front_record(study, outcome.surfaces, outcome.front),
         "pick_on_surfaces": predicted_record(study, outcome.surfaces, outcome.pick.point),
         "pick": study.by_factor(outcome.pick.point) | study.categories,
+        "operating_clearances_mm": outcome.clearances.operating,
+        "clearance_class": outcome.clearances.class_sentence,
         "confirmation": confirmation_record(outcome),
         "gains": gains_record(gains),
         "statement": statement(gains),

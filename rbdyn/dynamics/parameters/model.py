@@ -227,7 +227,7 @@ def _pocket(scene: Scene, oil: Oil) -> Any:
     bar = laws.pocket_bar_stiffness_N_m
     contact = plain if bar == "rigid" else LineContactOnBar(plain.stiffness, float(bar))
     damping, friction = _hunt_crossley(laws.alpha("pocket")), _friction(scene, laws.pocket_friction)
-    clearance, radius = 0.5 * cage.pocket_clearance, scene.geometry.roller_radius
+    clearance, radius = 0.5 * scene.pocket_clearance_m, scene.geometry.roller_radius
     pocket: Any = Pocket(clearance, radius, contact, damping, friction)
     if laws.pocket_film:
         from rbdyn.contact.pocket_film import pocket_film
@@ -237,10 +237,12 @@ def _pocket(scene: Scene, oil: Oil) -> Any:
         film = pocket_film(oil.viscosity, radius, covered, floor, laws.pocket_fill)
         walls = Pocket(clearance - floor, radius, contact, damping, friction)
         pocket = LubricatedPocket(walls, film, clearance, radius)
-    if cage.lip_clearance is None:
+    lip, mounted = scene.lip_clearance_m, scene.cage_clearances
+    if lip is None:
         return pocket
     outer, inner = scene.geometry.raceways
-    return LippedPocket(pocket, 0.5 * (outer + inner), 0.5 * cage.lip_clearance, radius, contact, damping, friction)
+    circle = 0.5 * (outer + inner) + (0.0 if mounted is None else mounted.shift)
+    return LippedPocket(pocket, circle, 0.5 * lip, radius, contact, damping, friction)
 
 
 def _guide(scene: Scene, oil: Oil) -> NoGuide | OuterGuide | InnerGuide:

@@ -26,11 +26,11 @@ def start_state(scene: Scene, bearing: RollerBearing, generator: np.random.Gener
     y = np.zeros(state.size)
     acting = action(bearing.drive, y)
     motion = scene.geometry.rolling(acting.inner_speed, acting.outer_speed)
-    pocket = scene.cage.pocket_clearance
+    pocket = scene.pocket_clearance_m
     offsets = generator.uniform(-0.2, 0.2, z) * pocket / (0.5 * scene.bearing.pitch_diameter)
     direction, cage_angle = generator.uniform(0.0, 2.0 * np.pi, 2)
     angles = cage_angle + 2.0 * np.pi * np.arange(z) / z + offsets
-    guide = scene.cage.guide_clearance
+    guide = scene.guide_play_m
     offset = 0.1 * (0.5 * pocket if guide is None else min(0.5 * guide, 0.5 * pocket))
     radii = np.empty(z)
     ring_x = static_share(bearing, angles, motion.cage_speed, acting.load_x, radii)
