@@ -81,8 +81,8 @@ def test_unit_threshold(make_scene):
 
 
 def test_unit_play_of_other_guidances(make_scene):
-    """Unit: rollers guide a cage within the play of their pocket lips; without a land there is no play and no share."""
-    lips = make_scene("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.15")  # both ways together
+    """Unit: rollers guide a cage within half the play of their pocket lips, which counts both ways; without a land there is no play and no share."""
+    lips = make_scene("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.30")
     assert lips.guide_clearance_m is None and lips.cage_play_m == pytest.approx(RADIUS)
     share = orbit_radius_share(lips, [run_at(noise(2e-6, (0.0, 0.0)))], [], 0.0)
     assert share.value == pytest.approx(2e-6 / RADIUS, rel=0.01)
