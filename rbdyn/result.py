@@ -79,6 +79,8 @@ class SimulationResult(Brief, SavedRecord):
     ``impact_force``: largest force of a roller on a pocket wall, contact and film together; ``impact_contact_force``: of
     the contact alone; ``races``: pressure, half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and
     operating diametral clearance [um], with what fits, temperature and rotation take of it where a mounting is given;
+    ``friction_check``: SKF's power [W] and moments [N mm], the heat of ISO 15312 [W] and the ratio of the power loss to SKF's,
+    None where the scene states no designation;
     ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not tell;
     ``counted_turns``: those that each replicate counts, more than asked for where it was lengthened;
     ``target``: what a run to a target accuracy chose, reached and cost, None for any other.
@@ -99,6 +101,7 @@ class SimulationResult(Brief, SavedRecord):
     notes: tuple[str, ...]
     power_terms: dict[str, float] = keyed("power_terms_W")
     clearance: dict[str, float] = keyed("clearance_um")
+    friction_check: dict[str, float | None] | None
     status: str
     races: dict[str, dict[str, float]]
     impact_window_turns: float

@@ -278,6 +278,8 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
     if len(result.clearance) > 2:
         parts = ", ".join(f"{name.replace('_', ' ')} {value:+.1f} um" for name, value in result.clearance.items())
         print(f"clearance: {parts}")
+    if result.friction_check is not None:
+        print(_friction_line(result.friction_check))
     if verbose:
         if result.transient_turns is not None:
             print(f"transient: {counted(result.transient_turns, 'shaft turn')}")
@@ -286,6 +288,16 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         terminal.print_table(f"power lost; the power balance closes to {gap:.2g} W", ("term", "W"), terms)
         terminal.print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
     terminal.print_notes(result.notes, quiet)
+
+
+def _friction_line(check: dict[str, float | None]) -> str:
+    """The maker's friction in a line; [N mm] and [W]."""
+    power, rolling, sliding, heat, ratio = check.values()
+    model = (
+        f"SKF's model {power:.3g} W (rolling {rolling:.3g}, sliding {sliding:.3g} N mm), ISO 15312 heat {heat:.3g} W"
+    )
+    share = "no ratio at zero load or speed" if ratio is None else f"power loss is {ratio:.2f} of SKF's"
+    return f"maker's friction: {model}; {share}"
 
 
 def _print_target(target: dict[str, Any]) -> None:

@@ -17,6 +17,7 @@ from rbdyn.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
+from rbdyn.scene.catalogue_notes import catalogue_notes
 from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics, with_bar_stiffness_of_cage
 from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
 from rbdyn.scene.mounting import Mounting, material_of, misfits
@@ -227,6 +228,11 @@ class Scene(SceneFile):
     def unit_notes(self) -> tuple[str, ...]:
         """Sentences on values that look like another unit."""
         return unit_notes(self.bearing, self.cage, self.lubricant, self.mounting, self.material("cage").density)
+
+    @property
+    def catalogue_notes(self) -> tuple[str, ...]:
+        """A sentence on dimensions that disagree with the designation; none where it states none."""
+        return catalogue_notes(self.bearing, self.mounting)
 
     @property
     def needs_slices(self) -> bool:
