@@ -36,7 +36,7 @@ class Confirmed:
     Every interval of a simulated response joins the two by `error`: the root sum square of the statistical and the
     numerical half-width, as of independent errors. ``freedom`` (m,): degrees of freedom of the statistical ones, infinitely
     many unless given; the numerical ones have that. ``power_terms``: power losses [W] by contact; ``reason``: why the point
-    was chosen.
+    was chosen; ``friction_check``: the maker's friction, None without a designation.
     """
 
     point: Array
@@ -46,6 +46,7 @@ class Confirmed:
     power_terms: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
     freedom: Array | None = None
+    friction_check: Mapping[str, float | None] | None = None
 
     @property
     def error(self) -> Array:
@@ -126,7 +127,9 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Co
         for key in ("value", "statistical_error", "numerical_error")
     )
     behind = [quantity.get("degrees_of_freedom") or np.inf for quantity in quantities]
-    return Confirmed(choice.point, values, statistical, numerical, result.power_terms, choice.reason, np.array(behind))
+    errors = statistical, numerical
+    terms, check = result.power_terms, result.friction_check
+    return Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(behind), check)
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:

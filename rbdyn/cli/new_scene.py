@@ -76,7 +76,7 @@ def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) ->
         "supply_by": SUPPLY_WORDS[point.supply],
         "inlet_distance": None if flooded else INLET_DISTANCE,
         "oil_fraction": SCARCE_FRACTION if scarce else OIL_FRACTION,
-        "oil_fraction_by": "0.001 to 0.01 where little oil enters" if scarce else "0.005 to 0.1",
+        "oil_fraction_by": "0.001 to 0.02 where little oil enters" if scarce else "0.005 to 0.1",
     }
 
 

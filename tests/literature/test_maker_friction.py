@@ -7,6 +7,7 @@ import pytest
 from conftest import ROOT
 from typer.testing import CliRunner
 
+from doe.report.sections.bearing import power
 from rbdyn import Scene
 from rbdyn.cli.app import app
 from rbdyn.dynamics.parameters.friction_check import friction_check, friction_notes
@@ -171,3 +172,15 @@ def test_command_line_states_the_makers_friction(tmp_path):
     shown = CliRunner().invoke(app, ["simulate", scene, *named])
     (line,) = [line for line in shown.stdout.splitlines() if line.startswith("maker's friction: ")]
     assert f"power loss is {result['friction_check']['ratio']:.2f} of SKF's" in line and "ISO 15312 heat" in line
+
+
+def test_unit_a_study_states_the_makers_friction():
+    """Unit: below the powers of confirmed points stands their ratio to SKF's; nothing without a designation."""
+    terms = {"power_terms_W": {"rolling_resistance": 100.0, "land_film": 20.0}}
+    check = dict.fromkeys(KEYS, 1.0) | {"skf_power_W": 80.0}
+    points = {"baseline": {**terms, "friction_check": check | {"ratio": 1.5}},
+              "pick": {**terms, "friction_check": check | {"ratio": 1.4}}}  # fmt: skip
+    named, plain = power({"confirmation": points}, {}), power({"confirmation": {"baseline": terms, "pick": terms}}, {})
+    assert named is not None and plain is not None
+    assert "over the 80 W of SKF's friction model: baseline 1.50, pick 1.40." in str(named.blocks)
+    assert "SKF" not in str(plain.blocks)

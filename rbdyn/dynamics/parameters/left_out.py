@@ -124,7 +124,7 @@ LEFT_OUT = (
     LeftOut(
         "churning of a sump",
         "more power loss",
-        "none: lubrication is by jet or mist, and lubricant.oil_fraction holds what rollers plough through",
+        "none: the level of a bath is unknown, and lubricant.oil_fraction holds what rollers plough through",
     ),
     LeftOut(
         "skew of rollers",
@@ -170,13 +170,13 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
     sizes = drawing.rollers, drawing.roller_diameter, drawing.effective_length, drawing.pitch_diameter
     capacity = drawing.dynamic_capacity_N or dynamic_capacity(*sizes)
     inner, outer = operation.speeds
-    diameter, listed = drawing.pitch_diameter, None
+    diameter, of_series = drawing.pitch_diameter, None
     if (known := catalogued(drawing)) is not None:
         named, box = known
         diameter = 0.5e-3 * (box.bore + box.outside)
-        reference = REFERENCE_SPEED / diameter if box.reference_speed is None else box.reference_speed * RPM
-        listed = SERIES[named.series].minimum_load, reference
-    rules = minimum_loads(diameter, inner - outer, capacity, static_capacity(*sizes), listed)
+        usual = REFERENCE_SPEED / diameter
+        of_series = SERIES[named.series].minimum_load, (box.reference_speed or usual / RPM) * RPM
+    rules = minimum_loads(diameter, inner - outer, capacity, static_capacity(*sizes), of_series)
     load = operation.largest_load_N
     missed = sum(load < least for least in rules.values())
     if not missed:
