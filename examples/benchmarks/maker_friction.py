@@ -69,16 +69,17 @@ def rows_of(results: dict[str, SimulationResult]) -> list[list[str]]:
 
 
 def conclusion(results: dict[str, SimulationResult]) -> str:
-    """Range and median of the ratios, of the loss and of rolling resistance alone."""
-    checks = [(result, result.friction_check["skf_power_W"]) for result in results.values() if result.friction_check]
-    words = []
-    for what, ratios in (
-        ("power loss", [result.power_loss.value / skf for result, skf in checks if skf]),
-        ("rolling resistance alone", [result.power_terms["rolling_resistance"] / skf for result, skf in checks if skf]),
-    ):
-        low, middle, high = min(ratios), statistics.median(ratios), max(ratios)
-        words.append(f"{what} {low:.2f} to {high:.2f} of SKF's M_rr + M_sl, median {middle:.2f}")
-    return "; ".join(words)
+    """Range and median over the bearings of the loss over SKF's, and of each term that makes it."""
+    every = [(result, result.friction_check["skf_power_W"]) for result in results.values() if result.friction_check]
+    ratios = [result.power_loss.value / skf for result, skf in every if skf]
+    terms = {term: [result.power_terms[term] / skf for result, skf in every if skf] for term in every[0][0].power_terms}
+    shown = {term: shares for term, shares in terms.items() if max(shares) > SHOWN_SHARE}
+    parts = (f"{term.replace('_', ' ')} {_spread(shares)}" for term, shares in shown.items())
+    return f"Over SKF's M_rr + M_sl, median (range): power loss {_spread(ratios)}; {', '.join(parts)}."
+
+
+def _spread(values: list[float]) -> str:
+    return f"{statistics.median(values):.2f} ({min(values):.2f} to {max(values):.2f})"
 
 
 def main() -> None:
