@@ -19,6 +19,7 @@ from published.ball_papers import angular_contact, double_decker_search
 from published.cage_speed import cage_speed
 from published.common import Check, Effort, Finding, tally_table
 from published.friction_totals import friction_totals
+from published.minimum_load import minimum_load
 from published.operating import figure14, friction
 from published.sensitivity import QUICK, sensitivity
 from published.skidding import QUICK as QUICK_ASSUMPTIONS
@@ -33,6 +34,8 @@ MEDIUM = Effort(replicates=4, turns=40, discard_turns=10)
 SLOW = Effort(replicates=3, turns=10, discard_turns=40)
 # Rolling resistance hardly fluctuates.
 STEADY = Effort(replicates=2, turns=10, discard_turns=10)
+# A cage that lags needs some tens of turns to settle.
+LAGGING = Effort(replicates=2, turns=10, discard_turns=40)
 
 FULL: dict[str, Callable[[], Check]] = {
     "table4": lambda: table4(LONG),
@@ -40,6 +43,7 @@ FULL: dict[str, Callable[[], Check]] = {
     "nu215": lambda: nu215(SLOW),
     "friction": lambda: friction(SHORT),
     "totals": lambda: friction_totals(STEADY),
+    "minimum": lambda: minimum_load(LAGGING),
     "sensitivity": lambda: sensitivity(SHORT),
     "whirl": lambda: whirl(MEDIUM),
     "cage_speed": lambda: cage_speed(SHORT),
@@ -54,6 +58,7 @@ BRIEF: dict[str, Callable[[], Check]] = {
     ),
     "friction": lambda: friction(SHORT, (12000, 24000, 30000), (650, 1300, 2600)),
     "totals": lambda: friction_totals(),
+    "minimum": lambda: minimum_load(Effort(2, 10, 20), ("NU 210", "NU 308")),
     "sensitivity": lambda: sensitivity(SHORT, QUICK, whole_design=False),
     "whirl": lambda: whirl(SHORT, (1.0, 0.1, 0.01, 0.001), ("four_constant",), 5.0),
     "cage_speed": lambda: cage_speed(SHORT, (20000, 26000, 32000)),

@@ -88,6 +88,8 @@ class SimulationResult(Brief, SavedRecord):
     half-width and film at the largest load of "inner" and "outer"; ``clearance``: drawn and operating diametral clearance
     [um], with what fits, temperature and rotation take of it where a mounting is given, and under "radial", "guide" and
     "pocket" the drawn, fit, temperature, rotation and operating share of each;
+    ``friction_check``: SKF's power [W] and moments [N mm], the heat of ISO 15312 [W] and the ratio of the power loss to SKF's,
+    None where the scene states no designation;
     ``transient_turns``: shaft turns from the start until the figures settled, None where the run does not tell;
     ``counted_turns``: those that each replicate counts, more than asked for where it was lengthened;
     ``target``: what a run to a target accuracy chose, reached and cost, None for any other; ``cage_orbit_radius_share``:
@@ -110,6 +112,7 @@ class SimulationResult(Brief, SavedRecord):
     power_terms: dict[str, float] = keyed("power_terms_W")
     rolling_resistance: dict[str, float] = keyed("rolling_resistance_W")
     clearance: dict[str, Any] = keyed("clearance_um")
+    friction_check: dict[str, float | None] | None
     status: str
     races: dict[str, dict[str, float]]
     impact_window_turns: float

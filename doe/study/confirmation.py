@@ -38,7 +38,8 @@ class Confirmed:
     Every interval of a simulated response joins the two by `error`: the root sum square of the statistical and the
     numerical half-width, as of independent errors. ``freedom`` (m,): degrees of freedom of the statistical ones, infinitely
     many unless given; the numerical ones have that. ``power_terms``: power losses [W] by contact; ``reason``: why the point
-    was chosen; ``orbit_share``: radius of the cage's orbit over its play where that is of a jitter, else None.
+    was chosen; ``orbit_share``: radius of the cage's orbit over its play where that is of a jitter, else None;
+    ``friction_check``: the maker's friction, None without a designation.
     """
 
     point: Array
@@ -49,6 +50,7 @@ class Confirmed:
     reason: str = ""
     freedom: Array | None = None
     orbit_share: float | None = None
+    friction_check: Mapping[str, float | None] | None = None
 
     @property
     def error(self) -> Array:
@@ -129,17 +131,10 @@ def confirmed_from(study: Study, choice: Choice, result: SimulationResult) -> Co
         for key in ("value", "statistical_error", "numerical_error")
     )
     behind = [quantity.get("degrees_of_freedom") or np.inf for quantity in quantities]
-    orbit = result.cage_orbit_radius_share
-    return Confirmed(
-        choice.point,
-        values,
-        statistical,
-        numerical,
-        result.power_terms,
-        choice.reason,
-        np.array(behind),
-        orbit.value if orbit is not None and result.jitters else None,
-    )
+    errors = statistical, numerical
+    terms, check, orbit = result.power_terms, result.friction_check, result.cage_orbit_radius_share
+    jitter = orbit.value if orbit is not None and result.jitters else None
+    return Confirmed(choice.point, values, *errors, terms, choice.reason, np.array(behind), jitter, check)
 
 
 def gains(study: Study, baseline: Confirmed, pick: Confirmed) -> list[Gain]:

@@ -6,7 +6,8 @@ from doe import clearance
 from doe.arrays import Array
 from doe.study_file import Study
 from rbdyn.faults import MethodError
-from rbdyn.properties.catalogue import classes_at
+from rbdyn.properties.catalogue import classes_at, envelope
+from rbdyn.properties.designation import read_designation
 from rbdyn.records.record import Record
 from rbdyn.scene import Scene
 
@@ -51,7 +52,10 @@ def scenes_of(study: Study, baseline: Array, pick: Array) -> dict[str, Scene]:
 
 def bore_of(scene: Scene) -> float | None:
     """Bore of the bearing [mm]; None where the scene does not state it."""
-    return None if scene.mounting is None else scene.mounting.bore_mm
+    if scene.mounting is not None:
+        return scene.mounting.bore_mm
+    name = scene.bearing.designation
+    return None if name is None else envelope(read_designation(name)).bore
 
 
 def class_sentence(bore: float, drawn_um: float, kind: str) -> str:

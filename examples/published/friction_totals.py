@@ -24,6 +24,7 @@ from published.operating import palmgren_moments, skf_moments
 from rbdyn import Scene
 from rbdyn.contact.rolling_resistance import rolling_force
 from rbdyn.dynamics.parameters.model import race_contact_law, rolling_law
+from rbdyn.properties.designation import read_designation
 
 BEARINGS = Path(__file__).parent / "catalogue_bearings.csv"
 TEMPERATURE_C = 70.0
@@ -141,7 +142,10 @@ def point(name: str, speed_rpm: float, load_n: float, grade: int) -> dict[str, A
     flooded = Scene.load(CHEN, keys)
     starved = Scene.load(CHEN, (*keys, f"lubricant.inlet_distance={STARVED}"))
     bore, outside = float(row["bore_mm"]), float(row["outside_diameter_mm"])
-    rolling, sliding = (shaft * moment for moment in skf_moments(speed_rpm, load_n, viscosity, bore, outside))
+    rolling, sliding = (
+        shaft * moment
+        for moment in skf_moments(speed_rpm, load_n, viscosity, bore, outside, read_designation(name).series)
+    )
     palmgren = [
         shaft * sum(palmgren_moments(speed_rpm, load_n, viscosity, 0.5 * (bore + outside), f0)) for f0 in (2, 3)
     ]

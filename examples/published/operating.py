@@ -30,6 +30,7 @@ from published.common import (
     trend,
 )
 from rbdyn import Scene
+from rbdyn.life import maker_friction
 from rbdyn.properties.lubricants import oil_at
 from rbdyn.records.words import with_error
 
@@ -196,20 +197,13 @@ def draw_figure14(frame: pd.DataFrame, path: Path) -> None:
 
 
 def skf_moments(
-    speed_rpm: float, load_n: float, viscosity_cst: float, bore_mm: float, outside_mm: float
+    speed_rpm: float, load_n: float, viscosity_cst: float, bore_mm: float, outside_mm: float, series: str = "2"
 ) -> tuple[float, float]:
-    """Rolling and sliding frictional moment [N mm] of a caged cylindrical roller bearing, SKF's model of 2018.
-
-    Series 2 and 3 (R1 = 1.09e-6, S2 = 0.0015), oil jet (K_rs = 3e-8), K_Z = 5.1; without drag and seals.
-    """
-    mean = 0.5 * (bore_mm + outside_mm)
-    flow = viscosity_cst * speed_rpm
-    heating = 1.0 / (1.0 + 1.84e-9 * (speed_rpm * mean) ** 1.28 * viscosity_cst**0.64)
-    starvation = math.exp(-3e-8 * flow * (bore_mm + outside_mm) * math.sqrt(5.1 / (2.0 * (outside_mm - bore_mm))))
-    rolling = heating * starvation * 1.09e-6 * mean**2.41 * load_n**0.31 * flow**0.6
-    boundary = math.exp(-2.6e-8 * flow**1.4 * mean)
-    sliding = 0.0015 * mean**0.9 * load_n * (boundary * 0.15 + (1.0 - boundary) * 0.02)
-    return rolling, sliding
+    """Rolling and sliding frictional moment [N mm] by SKF's model with an oil jet or bath, without drag and seals."""
+    moments = maker_friction.skf_moments(
+        series, 1e-3 * bore_mm, 1e-3 * outside_mm, speed_rpm * math.pi / 30.0, 1e-6 * viscosity_cst, load_n
+    )
+    return 1e3 * moments.rolling, 1e3 * moments.sliding
 
 
 def palmgren_moments(

@@ -279,6 +279,8 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         print(f"{race} race at its largest load: {pressed}{film}")
     if result.scene.get("mounting"):
         _print_clearances(result.clearance)
+    if result.friction_check is not None:
+        print(_friction_line(result.friction_check))
     if verbose:
         if result.transient_turns is not None:
             print(f"transient: {counted(result.transient_turns, 'shaft turn')}")
@@ -303,6 +305,16 @@ def _print_clearances(clearance: dict[str, Any]) -> None:
         if play is not None:
             numbers = {part.replace("_", " "): value for part, value in play.items() if isinstance(value, float)}
             print(f"{name}: {', '.join(f'{part} {value:+.1f} um' for part, value in numbers.items())}")
+
+
+def _friction_line(check: dict[str, float | None]) -> str:
+    """The maker's friction in a line; [N mm] and [W]."""
+    power, rolling, sliding, heat, ratio = check.values()
+    model = (
+        f"SKF's model {power:.3g} W (rolling {rolling:.3g}, sliding {sliding:.3g} N mm), ISO 15312 heat {heat:.3g} W"
+    )
+    share = "no ratio at zero load or speed" if ratio is None else f"power loss is {ratio:.2f} of SKF's"
+    return f"maker's friction: {model}; {share}"
 
 
 def _print_target(target: dict[str, Any]) -> None:

@@ -14,6 +14,7 @@ from rbdyn.faults import LONGEST_NAME, InputError, MethodError, one_line, refuse
 if TYPE_CHECKING:
     from rbdyn.properties.catalogue import Envelope
     from rbdyn.properties.designation import Designation
+    from rbdyn.properties.oils import NamedOil
 
 TEMPERATURE_C, OIL, CLEARANCE = 70.0, "ISO VG 68", "CN"
 LISTED = "as listed"
@@ -43,6 +44,9 @@ def new(
     ] = OIL,
     temperature: Annotated[float, typer.Option(metavar="C", help="Temperature of the oil.")] = TEMPERATURE_C,
     clearance: Annotated[str | None, valued("CLASS", "C2, CN, C3, C4 or C5.", "of DESIGNATION, else CN")] = None,
+    lubrication: Annotated[
+        str | None, valued("HOW", "bath, drop, jet, oil_air or grease.", "bath, or grease where --oil is one")
+    ] = None,
     bore: Annotated[float | None, valued("MM", "Bore, where the table lacks the bearing.", LISTED)] = None,
     outside: Annotated[float | None, valued("MM", "Outside diameter.", LISTED)] = None,
     width: Annotated[float | None, valued("MM", "Width.", LISTED)] = None,
@@ -72,7 +76,8 @@ def new(
         rollers = named.kind == "cylindrical_roller"
         refuse(_misfits(named, speed, preload, chosen))
         wanted = chosen or named.stated("clearance") or CLEARANCE
-        point = new_scene.OperatingPoint(speed, load, preload, lubricant, temperature, wanted)
+        supply = _supply(lubrication, lubricant, oil, rollers)
+        point = new_scene.OperatingPoint(speed, load, preload, lubricant, temperature, wanted, supply)
         fill = new_scene.roller_values if rollers else new_scene.ball_values
         box = _read(lambda text: _envelope(named, sizes), "DESIGNATION", words, faults)
         inside: Any = None if box is None else _read(lambda text: fill(named, box, point), "DESIGNATION", words, faults)
@@ -135,6 +140,26 @@ def _class_named(text: str) -> str:
     if name not in CLEARANCE_CLASSES:
         raise MethodError(f"is no clearance class; choose one of {', '.join(CLEARANCE_CLASSES)}")
     return name
+
+
+def _supply(asked: str | None, oil: "NamedOil", oil_text: str, rollers: bool) -> str:
+    """How the bearing gets its oil, as asked for or as the oil says. Raises InputError for what contradicts the oil."""
+    from rbdyn.scene.lubricant import SUPPLIES
+
+    usual = "grease" if oil.grease else "bath"
+    if asked is None:
+        return usual
+    supply = asked.strip().lower().replace("-", "_")
+    what, name = f"--lubrication {one_line(asked, LONGEST_NAME)}", one_line(oil_text, LONGEST_NAME)
+    if supply not in SUPPLIES:
+        raise InputError([f"{what}: is no lubrication known here; choose one of {', '.join(SUPPLIES)}"])
+    if not rollers:
+        raise InputError([f"{what}: is one of cylindrical roller bearings; leave it out"])
+    if oil.grease and supply != "grease":
+        raise InputError([f"{what}: contradicts the grease of --oil {name}; leave one out"])
+    if supply == "grease" and not oil.grease:
+        raise InputError([f'{what}: --oil {name} is no grease; write --oil "grease VG 100" with its base oil'])
+    return supply
 
 
 def _misfits(named: "Designation", speed: float | None, preload: float | None, clearance: str | None) -> list[str]:

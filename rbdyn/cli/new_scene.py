@@ -21,9 +21,12 @@ POLYAMIDE_DENSITY = 1.3e-3
 USUAL_CAGE = "MA"
 # Guide clearance in pitch diameters.
 GUIDE_CLEARANCE, SMALLEST_CLEARANCE_MM = 0.004, 0.05
-# SKF's friction model: K_rs of grease and K_Z of cylindrical roller bearings.
-GREASE_STARVATION, ROLLER_GEOMETRY = 6e-8, 5.1
-OIL_FRACTION, GREASE_FRACTION = 0.02, 0.005
+# Half-widths at which the oil begins unless a jet floods the inlet; share of oil in the cavity, less where little oil enters.
+INLET_DISTANCE, FLOODED_SUPPLIES = 5.0, ("jet",)
+OIL_FRACTION, SCARCE_FRACTION, SCARCE_SUPPLIES = 0.02, 0.005, ("drop", "oil_air", "grease")
+SUPPLY_WORDS = {
+    "bath": "oil bath", "drop": "drop feed", "jet": "oil jet", "oil_air": "oil and air", "grease": "grease, its base oil above"
+}  # fmt: skip
 # Axial over radial load, by tan(contact angle), that loads half of the balls (NSK).
 HALF_LOADED = 1.216
 # Reference speed times pitch diameter of ball bearings, as usual in catalogues, within 20 % [mm/min].
@@ -45,6 +48,7 @@ class OperatingPoint(NamedTuple):
     oil: NamedOil
     temperature: float
     clearance: str
+    supply: str = "bath"
 
 
 def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> Values:
@@ -57,7 +61,7 @@ def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) ->
     volume = math.pi / 4.0 * (pitch - diameter) ** 2 * sizes.outside
     ratings = "" if listed is None else f", C = {1e-3 * listed:g} kN, C0 = {1e-3 * (sizes.static_capacity or 0.0):g} kN"
     common = _common(named, sizes, point, REFERENCE_SPEED_FACTOR / pitch, listed or by_iso)
-    grease = point.oil.grease
+    flooded, scarce = point.supply in FLOODED_SUPPLIES, point.supply in SCARCE_SUPPLIES
     return {
         **inside._asdict(),
         **common,
@@ -67,9 +71,13 @@ def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) ->
         "ring_mass": 1e-9 * MATERIALS["bearing_steel"].density * volume,
         "listed_capacity": listed,
         "capacity_share": by_iso / (listed or by_iso),
-        "oil_fraction": GREASE_FRACTION if grease else OIL_FRACTION,
-        "starvation": _grease_factor(sizes, common["speed"], point) if grease else None,
-        "starvation_by": "estimated: SKF's starvation by grease at this speed, x 0.5 to 1.5",
+        # Sizes that are typed are those of no listed bearing.
+        "designation": json.dumps(named.name) if sizes.reference_speed is not None else None,
+        "supply": json.dumps(point.supply),
+        "supply_by": SUPPLY_WORDS[point.supply],
+        "inlet_distance": None if flooded else INLET_DISTANCE,
+        "oil_fraction": SCARCE_FRACTION if scarce else OIL_FRACTION,
+        "oil_fraction_by": "0.001 to 0.02 where little oil enters" if scarce else "0.005 to 0.1",
     }
 
 
@@ -143,14 +151,3 @@ def _cage(named: Designation, width: float, inside: RollerInterior) -> Values:
         "land_width": round(cage.side_ring_width, 2) if landed else None,
         "cage_material": POLYAMIDE if soft else json.dumps(material),
     }
-
-
-def _grease_factor(sizes: Envelope, speed: float, point: OperatingPoint) -> float:
-    """exp(-K_rs nu n (d + D) sqrt(K_Z/(2 (D - d)))) of SKF's friction model, nu in mm^2/s, n in rpm."""
-    from rbdyn.scene.lubricant import Lubricant
-
-    known = {"oil": point.oil.oil, "base_oil": point.oil.base_oil, "temperature_C": point.temperature}
-    oil = Lubricant.model_validate(known).in_service
-    shape = (sizes.bore + sizes.outside) * math.sqrt(ROLLER_GEOMETRY / (2.0 * (sizes.outside - sizes.bore)))
-    kinematic = 1e6 * oil.viscosity / oil.density
-    return round(max(math.exp(-GREASE_STARVATION * kinematic * abs(speed) * shape), 0.01), 3)

@@ -12,6 +12,7 @@ from rbdyn.dynamics.ensemble import Reporter, Stop, threads_of
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
 from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
 from rbdyn.dynamics.pace import Notice, Pace, log
+from rbdyn.dynamics.parameters.friction_check import friction_check, friction_notes
 from rbdyn.dynamics.parameters.left_out import film_drive_notes, heat_notes, left_out_notes, light_load_notes
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.race_report import race_notes, race_report
@@ -90,6 +91,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
     terms = {term: float(np.average([run.power(term) for run in runs], weights=weights)) for term in LOSSES}
     inner_rolling = float(np.average([run.inner_rolling_resistance for run in runs], weights=weights))
     orbit = orbit_radius_share(scene, runs, companions, ensemble.plan.share)
+    maker = friction_check(scene, figures["power_loss_W"].value)
     return SimulationResult(
         status="ok",
         impact_force=figures["impact_force_N"],
@@ -106,6 +108,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         max_land_load=max(run.largest_load(LAND_LOAD) for run in runs),
         races=races,
         clearance=clearance_report(scene),
+        friction_check=maker,
         impact_window_turns=scene.impact_window_turns,
         transient_turns=ensemble.transient_turns,
         counted_turns=runs[0].duration / scene.turn_s,
@@ -121,12 +124,14 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         seed=scene.numerics.seed,
         notes=(
             *scene.unit_notes,
+            *scene.catalogue_notes,
             *scene.lubricant.estimates,
             *scene.section_notes,
             *light_load_notes(scene),
             *film_drive_notes(scene),
             *race_notes(scene, races),
             *heat_notes(scene, figures["power_loss_W"].value),
+            *friction_notes(maker),
             *_notes(scene, power_gap),
             *whirl_notes(scene, orbit),
             *left_out_notes(scene, figures["power_loss_W"].value),

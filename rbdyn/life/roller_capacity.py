@@ -55,18 +55,26 @@ def static_capacity(rollers: int, roller_diameter: float, effective_length: floa
 
 
 def minimum_loads(
-    pitch_diameter: float, speed: float, dynamic_capacity: float, static_capacity: float
+    pitch_diameter: float,
+    speed: float,
+    dynamic_capacity: float,
+    static_capacity: float,
+    listed: tuple[float, float] | None = None,
 ) -> dict[str, float]:
     """Least radial load [N] by rule: of a bearing of this pitch diameter [m], capacities [N], at this speed [rad/s].
 
-    SKF: k_r (6 + 4 n/n_r) (d_m/100 mm)^2 kN, whose k_r and reference speed n_r stand in tables: the former from 0.1 to 0.3,
-    the latter as usual for the diameter; and 0.02 C. Timken: 0.04 C. NTN: 0.04 C0. They differ by a factor of four, and to
-    meet them did not always suffice in tests of a NU 215 (Dawoud et al. 2023).
+    SKF: k_r (6 + 4 n/n_r) (d_m/100 mm)^2 kN, and 0.02 C. Timken: 0.04 C. NTN: 0.04 C0. They differ by a factor of four, and to
+    meet them did not always suffice in tests of a NU 215 (Dawoud et al. 2023). ``listed``: k_r and the reference speed n_r
+    [rad/s] of the catalogue; where it is None k_r is from 0.1 to 0.3 and n_r as usual for the diameter.
     """
-    by_speed = 1e3 * (6.0 + 4.0 * abs(speed) * pitch_diameter / REFERENCE_SPEED) * (pitch_diameter / 0.1) ** 2
+    usual = REFERENCE_SPEED / pitch_diameter
+    factors = {SMALLEST_FACTOR: usual, LARGEST_FACTOR: usual} if listed is None else dict([listed])
+    by_speed = {
+        f"SKF, k_r = {factor:g}": 1e3 * factor * (6.0 + 4.0 * abs(speed) / reference) * (pitch_diameter / 0.1) ** 2
+        for factor, reference in factors.items()
+    }
     return {
-        f"SKF, k_r = {SMALLEST_FACTOR:g}": SMALLEST_FACTOR * by_speed,
-        f"SKF, k_r = {LARGEST_FACTOR:g}": LARGEST_FACTOR * by_speed,
+        **by_speed,
         "SKF, 0.02 C": 0.02 * dynamic_capacity,
         "Timken, 0.04 C": 0.04 * dynamic_capacity,
         "NTN, 0.04 C0": 0.04 * static_capacity,

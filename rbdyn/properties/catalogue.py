@@ -40,7 +40,9 @@ GENERAL_FILLING, SPINDLE_FILLING = 0.87, 0.80
 
 
 class Envelope(NamedTuple):
-    """Boundary dimensions [mm] with what a catalogue adds: ratings [N], raceways of inner and outer ring [mm]."""
+    """Boundary dimensions [mm] with what a catalogue adds: ratings [N], raceways of inner and outer ring [mm], and the
+    thermal reference speed [rpm].
+    """
 
     bore: float
     outside: float
@@ -49,6 +51,7 @@ class Envelope(NamedTuple):
     static_capacity: float | None = None
     inner_raceway: float | None = None
     outer_raceway: float | None = None
+    reference_speed: float | None = None
 
 
 class RollerInterior(NamedTuple):
@@ -76,8 +79,8 @@ class BallInterior(NamedTuple):
     contact_angle_by: str
 
 
-def envelope(named: Designation) -> Envelope:
-    """What the catalogue lists of a designation. Raises MethodError where it does not."""
+def envelope(named: Designation, remedy: str = "add --bore, --outside and --width in mm") -> Envelope:
+    """What the catalogue lists of a designation. Raises MethodError, with the remedy in it, where it does not."""
     size, bore = named.series + named.code, BORES.get(named.code, 5.0 * int(named.code))
     rollers = named.kind == "cylindrical_roller"
     for row in table("cylindrical_rollers" if rollers else "ball_bearings"):
@@ -85,10 +88,10 @@ def envelope(named: Designation) -> Envelope:
         box = number["bore"], number["outside"], number["width"]
         if rollers and row["size"] == size:
             raceways = number.get("inner_raceway"), number.get("outer_raceway")
-            return Envelope(*box, 1e3 * number["C"], 1e3 * number["C0"], *raceways)
+            return Envelope(*box, 1e3 * number["C"], 1e3 * number["C0"], *raceways, number["reference_speed"])
         if not rollers and (row["diameter_series"], box[0]) == (named.diameter_series, bore):
             return Envelope(*box)
-    raise MethodError("is not in the tables here; add --bore, --outside and --width in mm")
+    raise MethodError(f"is not in the tables here; {remedy}")
 
 
 def radial_clearance(bore: float, name: str, kind: str) -> tuple[float, float]:

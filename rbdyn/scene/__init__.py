@@ -18,6 +18,7 @@ from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
 from rbdyn.scene.cage_section import STIFFNESS, section_misfits, section_notes, with_bar_stiffness_of_section
+from rbdyn.scene.catalogue_notes import catalogue_notes
 from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics, with_bar_stiffness_of_cage
 from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
 from rbdyn.scene.mounting import Mounting, material_of, misfits
@@ -298,6 +299,11 @@ class Scene(SceneFile):
         if STIFFNESS in self._tables.get("model", {}):
             return ()
         return section_notes(self.bearing, self.cage, self.model.pocket_bar_stiffness_N_m)
+
+    @property
+    def catalogue_notes(self) -> tuple[str, ...]:
+        """A sentence on dimensions that disagree with the designation; none where it states none."""
+        return catalogue_notes(self.bearing, self.mounting)
 
     @property
     def needs_slices(self) -> bool:

@@ -5,11 +5,13 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
 
 from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive, Share
+from rbdyn.properties.catalogue import envelope
+from rbdyn.properties.designation import ROLLERS, read_designation
 from rbdyn.records.words import counted
 
 # Keys that belong to one roller profile each.
@@ -18,6 +20,16 @@ PROFILE_KEYS = {"crowned": "crown_radius_mm", "lundberg": "lundberg_load_N", "ta
 
 # Keys of [cage], without their unit, that make a section together.
 SECTION_KEYS = ("bar_width", "bar_thickness", "bar_length", "side_ring_width")
+
+
+def _listed(text: str | None) -> str | None:
+    """A designation of a cylindrical roller bearing that the catalogue lists. Raises ValueError."""
+    if text is not None:
+        named = read_designation(text)
+        if named.kind != ROLLERS:
+            raise ValueError("is a ball bearing; name the cylindrical roller bearing or leave it out")
+        envelope(named, "correct it or leave it out")
+    return text
 
 
 class Harmonic(Strict):
@@ -37,6 +49,9 @@ class Bearing(Consistent):
 
     kind: Literal["cylindrical_roller"]
     """Kind of bearing."""
+    designation: Annotated[str | None, AfterValidator(_listed)] = None
+    """Designation in a maker's catalogue, as NU 210 or NU 210 ECP; bore, outside diameter, width and series follow from it.
+    The result then has the maker's friction next to the power loss. It changes nothing in the run."""
     rollers: Annotated[int, Field(ge=2, le=500)]
     """Number of rollers."""
     roller_diameter_mm: Annotated[float, Field(ge=0.5, le=500.0)]

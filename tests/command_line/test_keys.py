@@ -83,10 +83,9 @@ def test_keys_are_those_of_a_scene_that_gives_all():
     tables = {name for name, value in scene.items() if isinstance(value, dict)}
     for table in tables:
         of_table = {name.split(".")[1].removesuffix("[]") for name in listed if name.startswith(f"{table}.")}
-        # A scene saves what tells its oil only where it is given.
-        outside_json = (
-            {"base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3"} if table == "lubricant" else set()
-        )
+        # A scene saves what tells its oil, and how that comes in, only where it is given.
+        oil = {"base_oil", "viscosity_index", "viscosities_C_mm2_s", "density_kg_m3", "supply"}
+        outside_json = oil if table == "lubricant" else set()
         assert of_table - outside_json == set(scene[table]) - outside_json
 
 

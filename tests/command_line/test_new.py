@@ -43,6 +43,11 @@ def test_command_line_from_a_designation_to_a_run(command, tmp_path, arguments, 
     assert 50.0 < result["power_loss_W"]["value"] < 1000.0
     assert any(note.startswith("lubricant: ISO VG") for note in result["notes"])
     assert result["scene"]["traction"]["model"] == "limiting_shear"
+    check = result["friction_check"]
+    assert (
+        check["ratio"] == pytest.approx(result["power_loss_W"]["value"] / check["skf_power_W"])
+        and 0.5 < check["ratio"] < 2.0
+    )
 
 
 def test_command_line_balls_with_a_preload(command, tmp_path):
@@ -75,10 +80,14 @@ def test_command_line_suffixes_and_grease(command):
     soft = scene("NU", "315", "TVP2", "C3", "--oil", "grease VG 100")
     assert soft["cage"]["guidance"] == "roller" and "guide_clearance_mm" not in soft["cage"]
     assert soft["materials"]["cage"]["density_kg_m3"] == 1300.0 and "pocket_bar_stiffness_N_m" not in soft["model"]
-    assert 0.3 < soft["model"]["rolling_resistance_factor"] < 1.0 and soft["lubricant"]["oil_fraction"] == 0.005
+    starved = {"supply": "grease", "inlet_distance": 5.0, "oil_fraction": 0.005}
+    assert "rolling_resistance_factor" not in soft["model"] and soft["lubricant"].items() >= starved.items()
     assert soft["bearing"]["radial_clearance_mm"] == pytest.approx(0.5e-3 * (65 + 100))
     own = scene("NU2210", "--bore", "51", "--outside", "91", "--width", "24", "--clearance", "c2")
-    assert "dynamic_capacity_N" not in own["bearing"] and own["bearing"]["radial_clearance_mm"] == 0.025
+    assert (
+        not {"dynamic_capacity_N", "designation"} & own["bearing"].keys()
+        and own["bearing"]["radial_clearance_mm"] == 0.025
+    )
     ball = scene("6208-2RS", "C3")
     assert ball["bearing"]["radial_clearance_mm"] == 0.024 and "contact_angle_deg" not in ball["bearing"]
 
@@ -123,8 +132,39 @@ def test_unit_fits_write_a_mounting():
 
 
 @pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ((), {"supply": "bath", "inlet_distance": 5.0, "oil_fraction": 0.02}),
+        (("--lubrication", "drop"), {"supply": "drop", "inlet_distance": 5.0, "oil_fraction": 0.005}),
+        (("--lubrication", "oil-air"), {"supply": "oil_air", "inlet_distance": 5.0, "oil_fraction": 0.005}),
+        (("--lubrication", "JET"), {"supply": "jet", "oil_fraction": 0.02}),
+        (("--oil", "grease VG 100"), {"supply": "grease", "inlet_distance": 5.0, "oil_fraction": 0.005}),
+    ],
+)
+def test_command_line_lubrication(command, arguments, expected):
+    """Command line: each supply starves the inlets but a jet, which floods them; the inlet's distance is uncertain in all."""
+    written = json.loads(command("new", "NU210", *arguments, "--json").stdout)
+    assert written["lubricant"].items() >= expected.items()
+    assert ("inlet_distance" in written["lubricant"]) == ("inlet_distance" in expected)
+    assert (
+        "lubricant.inlet_distance" in written["uncertain"]["estimated"]
+        and written["bearing"]["designation"] == "NU 210"
+    )
+
+
+@pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (
+            ("NU210", "--lubrication", "mist"),
+            ["--lubrication mist: is no lubrication known here; choose one of bath, drop"],
+        ),
+        (("6208", "--lubrication", "bath"), ["--lubrication bath: is one of cylindrical roller bearings"]),
+        (("NU210", "--lubrication", "grease"), ["--lubrication grease: --oil ISO VG 68 is no grease; write"]),
+        (
+            ("NU210", "--lubrication", "jet", "--oil", "grease VG 100"),
+            ["--lubrication jet: contradicts the grease of --oil"],
+        ),
         (("XY99",), ["DESIGNATION XY99: is no designation known here"]),
         (("6230",), ["add --bore, --outside and --width"]),
         (("NU210", "--oil", "castor"), ["--oil castor: is no oil known here; write ISO VG 10"]),

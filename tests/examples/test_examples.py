@@ -89,7 +89,7 @@ def test_literature_friction_formulas(effort):
 
 
 def test_literature_friction_totals():
-    """Literature: ISO VG 32 has 11.0 cSt at 70 C; an NU 215 has 18 rollers of 15 mm; SKF gives 130 W for an NU 210. Ours is
+    """Literature: ISO VG 32 has 11.0 cSt at 70 C; an NU 215 has 18 rollers of 15 mm; SKF gives 132 W for an NU 210. Ours is
     within a factor of 3 of SKF's rolling part, and a meniscus at 10 half-widths takes up to a fifth."""
     from published import friction_totals as totals
 
@@ -100,11 +100,37 @@ def test_literature_friction_totals():
     assert (drawing.rollers, drawing.roller_diameter_mm) == (18, 15.0)
     assert drawing.effective_length_mm == pytest.approx(15.4, abs=0.1)
     row = totals.point("NU 210 ECP", 6000.0, 2000.0, 32)
-    assert row["skf_total_W"] == pytest.approx(130.0, abs=2.0)
+    assert row["skf_total_W"] == pytest.approx(132.3, abs=0.3)
     assert row["flooded_over_skf"] > row["starved_over_skf"] > 1.0
     frame = totals.friction_totals(names=("NU 206 ECP", "NU 314 ECP")).frame
     assert frame["flooded_over_skf"].between(0.4, 3.0).all()
     assert (1.0 - frame["starved_W"] / frame["flooded_W"]).between(0.02, 0.2).all()
+
+
+@pytest.mark.slow
+def test_literature_minimum_load():
+    """Literature: at SKF's minimum load an NU 308 slips by less than 12 %, at half of it by more."""
+    from published.common import Effort
+    from published.minimum_load import least_load, minimum_load
+
+    assert least_load("NU 308", 5600.0) == pytest.approx(150.0 * (6.0 + 4.0 * 0.7) * 0.65**2)
+    frame = minimum_load(Effort(2, 5, 5), ("NU 308",)).frame.set_index("share")
+    assert 0.02 < frame["slip"][1.0] < 0.12 and frame["slip"][0.5] > 1.3 * frame["slip"][1.0]
+
+
+@pytest.mark.slow
+def test_literature_friction_at_the_makers_level():
+    """Literature: what ``rbdyn new`` writes of an NU 204 at its reference speed loses 1 to 1.8 times SKF's M_rr + M_sl."""
+    from rbdyn import simulate
+
+    benchmark = script("benchmarks/maker_friction")
+    result = simulate(benchmark.scene_of("204", "", 4.0, 2))
+    header, row = benchmark.rows_of({"NU 204": result})
+    cells = dict(zip(header, row, strict=True))
+    assert (cells["rpm"], cells["N"], cells["SKF W"], cells["ISO 15312 W"]) == ("16000", "1100", "83", "47")
+    powers = [float(cell) for cell in row[3 : header.index("power loss W")]]
+    assert sum(powers) == pytest.approx(result.power_loss.value, abs=0.5)
+    assert result.friction_check is not None and 1.0 < result.friction_check["ratio"] < 1.8
 
 
 def test_unit_static_loads_bear_the_shaft():

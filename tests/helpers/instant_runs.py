@@ -35,7 +35,7 @@ def instant_result(scene: Scene) -> SimulationResult:
     }
     return SimulationResult(
         status="ok", **figures, power_gap=0.0, power_terms={}, rolling_resistance={}, max_inner_load=1.0, max_outer_load=1.0,
-        max_land_load=1.0, races={}, clearance={}, impact_window_turns=1.0, transient_turns=None, counted_turns=1.0, target=None, cost={},
+        max_land_load=1.0, races={}, clearance={}, friction_check=None, impact_window_turns=1.0, transient_turns=None, counted_turns=1.0, target=None, cost={},
         replicates=scene.numerics.replicates, seed=seed, notes=(), versions=versions(),
         scene=scene.model_dump(mode="json"),
     )  # fmt: skip

@@ -69,7 +69,7 @@ SOFT = {"elastic_modulus_GPa": 5.0, "poisson_ratio": 0.35, "density_kg_m3": 1300
 SWITCHED = (
     "model.pocket_film=true", "traction.friction=mixed", "traction.model=eyring", "traction.model=limiting_shear", "traction.model=coulomb",
     "traction.model=thermal_newtonian", "model.race_damping=hunt_crossley", "cage.guidance=roller", "bearing.tilt_mrad=0.1",
-    "lubricant.oil=ISO VG 32", 'lubricant={oil="ISO VG 68", base_oil="PAG", temperature_C=70.0}',
+    "lubricant.supply=bath", "lubricant.supply=drop", "lubricant.supply=jet", "lubricant.oil=ISO VG 32", 'lubricant={oil="ISO VG 68", base_oil="PAG", temperature_C=70.0}',
 )  # fmt: skip
 
 
@@ -104,6 +104,25 @@ def test_invariant_defaults_of_every_material_lie_in_their_documented_ranges(par
 def test_invariant_defaults_of_every_law_lie_in_their_documented_ranges(switch: str) -> None:
     """Invariant: the same of what each law and oil switches on, in the plain example."""
     assert defaults_outside(Scene.load(SCENE, [switch])) == {}
+
+
+@pytest.mark.parametrize(
+    ("supply", "inlet", "oil", "factor"),
+    [
+        ("bath", (2.0, 10.0), (0.005, 0.1), (0.9, 1.2)), ("drop", (2.0, 10.0), (0.001, 0.02), (0.9, 1.2)),
+        ("oil_air", (2.0, 10.0), (0.001, 0.02), (0.9, 1.2)), ("grease", (2.0, 10.0), (0.001, 0.02), (0.9, 1.2)),
+        ("jet", (5.0, 100.0), (0.005, 0.1), (0.9, 1.2)), (None, None, (0.005, 0.1), (0.5, 1.3)),
+    ],
+)  # fmt: skip
+def test_unit_ranges_follow_the_supply(supply: Any, inlet: Any, oil: Any, factor: Any) -> None:
+    """Unit: the oil's inlet, its share and rolling resistance vary by supply; without one the inlet varies only if named."""
+    data = read_toml(SCENE)
+    data["lubricant"] |= {} if supply is None else {"supply": supply}
+    data["lubricant"].pop("oil_fraction", None)
+    laws = {each.key: each.law for each in inputs_of(Scene.from_dict(data), data, Uncertain())}
+    keys = "lubricant.inlet_distance", "lubricant.oil_fraction", "model.rolling_resistance_factor"
+    found = [(laws[key].low, laws[key].high) if key in laws else None for key in keys]
+    assert found == [inlet, oil, factor]
 
 
 def test_unit_a_bar_is_as_stiff_as_its_cage_unless_given() -> None:

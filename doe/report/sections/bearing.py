@@ -25,13 +25,24 @@ def power(summary: Record, motion: Mapping[str, Any]) -> Section | None:
     first = next(iter(found.values()))
     terms.sort(key=lambda term: -abs(first.get(term) or 0.0))
     rows = [[term.replace("_", " "), *(_watts(terms_of.get(term)) for terms_of in found.values())] for term in terms]
-    note = "Terms that are nil everywhere are left out." if len(terms) < len(every) else ""
+    notes = ["Terms that are nil everywhere are left out."] if len(terms) < len(every) else []
+    notes += _maker(part(summary, "confirmation") or {})
     blocks: list[Block] = []
     compared = {name: found[name] for name in ("baseline", "pick") if name in found}
     if compared:
         blocks.append(Figures([power_bars(terms, compared)], "Power loss by where it arises."))
-    blocks.append(Table("Power loss by term", ["term", *(f"{name} [W]" for name in found)], rows, note))
+    blocks.append(Table("Power loss by term", ["term", *(f"{name} [W]" for name in found)], rows, " ".join(notes)))
     return Section("power", "Power by term", blocks)
+
+
+def _maker(confirmed: Mapping[str, Any]) -> list[str]:
+    """A sentence on the maker's friction of the points, where the scene states a designation."""
+    checks = {name: point.get("friction_check") or {} for name, point in confirmed.items()}
+    shares = [f"{name.replace('_', ' ')} {check['ratio']:.2f}" for name, check in checks.items() if check.get("ratio")]
+    if not shares:
+        return []
+    power = next(check["skf_power_W"] for check in checks.values() if check)
+    return [f"Power loss over the {power:.3g} W of SKF's friction model: {', '.join(shares)}."]
 
 
 def _watts(value: float | None) -> str:

@@ -27,6 +27,7 @@ def confirmation_record(outcome: StudyResult) -> dict[str, Any]:
             "power_terms_W": dict(each.power_terms),
             "limits": limits_record(limits_of(outcome.study, each)),
         }
+        | ({} if each.friction_check is None else {"friction_check": dict(each.friction_check)})
         | {
             key: record(outcome.gains[name])
             for key, record in (("gains", gains_record), ("statement", statement))

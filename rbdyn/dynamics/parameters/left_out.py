@@ -8,9 +8,12 @@ import numpy as np
 
 from rbdyn.contact.hertz_line import palmgren
 from rbdyn.dynamics.forces.drag import AIR_DENSITY
-from rbdyn.life.roller_capacity import dynamic_capacity, minimum_loads, static_capacity
+from rbdyn.fields import RPM
+from rbdyn.life.maker_friction import SERIES
+from rbdyn.life.roller_capacity import REFERENCE_SPEED, dynamic_capacity, minimum_loads, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
+from rbdyn.scene.catalogue_notes import catalogued
 
 # Share of the power loss from which a result speaks of power that was left out.
 NOTED_SHARE = 0.03
@@ -125,7 +128,7 @@ LEFT_OUT = (
     LeftOut(
         "churning of a sump",
         "more power loss",
-        "none: lubrication is by jet or mist, and lubricant.oil_fraction holds what rollers plough through",
+        "none: the level of a bath is unknown, and lubricant.oil_fraction holds what rollers plough through",
     ),
     LeftOut(
         "skew of rollers",
@@ -166,12 +169,21 @@ def left_out_notes(scene: Scene, power_loss: float) -> tuple[str, ...]:
 
 
 def light_load_notes(scene: Scene) -> tuple[str, ...]:
-    """A note where even the largest load is below what a maker asks for, with every maker's rule."""
+    """A note where even the largest load is below what a maker asks for, with every maker's rule.
+
+    A designation gives the factor k_r and the reference speed of SKF's rule, and the mean diameter of bore and outside.
+    """
     drawing, operation = scene.bearing, scene.operation
     sizes = drawing.rollers, drawing.roller_diameter, drawing.effective_length, drawing.pitch_diameter
     capacity = drawing.dynamic_capacity_N or dynamic_capacity(*sizes)
     inner, outer = operation.speeds
-    rules = minimum_loads(drawing.pitch_diameter, inner - outer, capacity, static_capacity(*sizes))
+    diameter, of_series = drawing.pitch_diameter, None
+    if (known := catalogued(drawing)) is not None:
+        named, box = known
+        diameter = 0.5e-3 * (box.bore + box.outside)
+        usual = REFERENCE_SPEED / diameter
+        of_series = SERIES[named.series].minimum_load, (box.reference_speed or usual / RPM) * RPM
+    rules = minimum_loads(diameter, inner - outer, capacity, static_capacity(*sizes), of_series)
     load = operation.largest_load_N
     missed = sum(load < least for least in rules.values())
     if not missed:
@@ -179,7 +191,7 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
     rising = sorted(rules.items(), key=lambda item: item[1])
     listed = ", ".join(f"{1e-3 * least:.2g} kN ({rule})" for rule, least in rising)
     what = f"load: {load:.4g} N is below {missed} of {len(rules)} makers' minimum loads against skidding: {listed}"
-    return (f"{what}; no rule is safe, cage_slip tells",)
+    return (f"{what}; no rule is safe; see cage_slip",)
 
 
 def film_drive_notes(scene: Scene) -> tuple[str, ...]:
