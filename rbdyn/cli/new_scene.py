@@ -31,7 +31,7 @@ SUPPLY_WORDS = {
 HALF_LOADED = 1.216
 # Reference speed times pitch diameter of ball bearings, as usual in catalogues, within 20 % [mm/min].
 BALL_SPEEDS = {"deep_groove_ball": 1.0e6, "angular_contact_ball": 6.3e5}
-# Of the reference speed and of C, where nothing is told.
+# Of the reference speed and of C, where the user gives nothing.
 USUAL_SPEED, USUAL_LOAD, USUAL_PRELOAD = 0.5, 0.1, 0.01
 
 
@@ -60,7 +60,7 @@ def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) ->
     by_iso = dynamic_capacity(inside.rollers, diameter * 1e-3, inside.effective_length * 1e-3, pitch * 1e-3)
     volume = math.pi / 4.0 * (pitch - diameter) ** 2 * sizes.outside
     ratings = "" if listed is None else f", C = {1e-3 * listed:g} kN, C0 = {1e-3 * (sizes.static_capacity or 0.0):g} kN"
-    common = _common(named, sizes, point, REFERENCE_SPEED_FACTOR / pitch, listed or by_iso)
+    common = _common(named, sizes, point, sizes.reference_speed or REFERENCE_SPEED_FACTOR / pitch, listed or by_iso)
     flooded, scarce = point.supply in FLOODED_SUPPLIES, point.supply in SCARCE_SUPPLIES
     return {
         **inside._asdict(),
@@ -92,13 +92,14 @@ def ball_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> V
     preload, why = point.preload, ""
     if preload is None and not deep:
         preload = float(f"{max(USUAL_PRELOAD * capacity, HALF_LOADED * common['load'] * math.tan(angle)):.2g}")
-        why = "not told: loads half of the balls, 1.216 F_r tan(contact angle), or 0.01 C"
+        why = "assumed: loads half of the balls, 1.216 F_r tan(contact angle), or 0.01 C"
     known = _clearance(sizes.bore, point.clearance, named.kind) if deep else dict.fromkeys(CLEARANCE_VALUES)
     return {**inside._asdict(), **common, **known, "preload": preload, "preload_by": why}
 
 
 def _common(named: Designation, sizes: Envelope, point: OperatingPoint, reference: float, capacity: float) -> Values:
     """What both kinds of bearing have: name, boundary dimensions, oil, speed [rpm] and load [N]; no mounting."""
+    error = 9 if named.kind == "cylindrical_roller" else 20
     oil, base, grease = point.oil
     speed, load = point.speed, point.load
     speed = float(f"{USUAL_SPEED * reference:.2g}") if speed is None else speed
@@ -113,13 +114,15 @@ def _common(named: Designation, sizes: Envelope, point: OperatingPoint, referenc
         "oil": oil,
         "oil_by": "base oil of the grease" if grease else "",
         "base_oil": (base or "mineral") if oil.startswith("ISO VG") else None,
-        "base_oil_by": "" if base else "not told; or naphthenic, PAO, ester, PAG",
+        "base_oil_by": "" if base else "assumed; or naphthenic, PAO, ester, PAG",
         "temperature": point.temperature,
         "speed": speed,
-        "speed_by": "not told, half of the " if point.speed is None else "",
-        "reference": round(reference, -2),
+        "speed_by": "assumed: half of the " if point.speed is None else "",
+        "reference": f"{reference:g} rpm, catalogue"
+        if reference == sizes.reference_speed
+        else f"about {reference:.2g} rpm, +-{error} %",
         "load": load,
-        "load_by": "not told: " if point.load is None else "",
+        "load_by": "assumed: " if point.load is None else "",
         "load_share": load / capacity,
         **mounting_values(sizes, None, None, point.temperature),
     }
