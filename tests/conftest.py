@@ -7,6 +7,7 @@ default laws), ``inner`` (as ``outer``, but guided on the inner ring), ``conserv
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -88,14 +89,18 @@ def fuzz_cases(request: pytest.FixtureRequest) -> int:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_cmdline_main(config: pytest.Config) -> None:
-    """Two processes where pytest-xdist is installed and nothing else is asked for; a file's tests stay in one."""
+    """Two processes where pytest-xdist is installed and nothing else is asked for; a file's tests stay in one, but for slow
+    ones, which share nothing and go where there is room."""
     if not config.pluginmanager.hasplugin("xdist") or hasattr(config, "workerinput"):
         return
+    # Two processes whose linear algebra spins on two threads each wait for each other. Before any of them loads numpy.
+    for library in ("OPENBLAS", "OMP", "MKL"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     option = config.option
     if option.numprocesses is None and option.dist == "no" and not option.usepdb:
         option.numprocesses = 2
     if option.numprocesses and option.dist == "no":
-        option.dist = "loadfile"
+        option.dist = "worksteal" if option.markexpr == "slow" else "loadfile"
 
 
 def law_types(parameters: Any) -> set[type]:
@@ -262,10 +267,12 @@ def lacking(shown: NDArray[np.float64], wanted: Any) -> list[float]:
 
 @pytest.fixture(scope="session")
 def command() -> Callable[..., subprocess.CompletedProcess[str]]:
-    """``command(*arguments, **environment)``: run ``rbdyn`` in a process of its own."""
-    import os
+    """``command(*arguments, **environment)``: run ``rbdyn``; in a process of its own where it has an environment of its own."""
+    from in_process import in_process
 
     def run(*arguments: Any, **environment: str) -> subprocess.CompletedProcess[str]:
+        if not environment:
+            return in_process("rbdyn", *arguments)
         program = "from rbdyn.cli import run; run()"
         return subprocess.run(
             [sys.executable, "-c", program, *map(str, arguments)],

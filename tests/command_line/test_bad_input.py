@@ -115,10 +115,10 @@ def test_replicates_are_joined_in_the_order_of_their_first_rows(tmp_path):
 
 def test_a_directory_is_no_table_and_a_flood_of_faults_is_told_by_its_count(tmp_path):
     assert "cannot be read" in faults_of(read_table, tmp_path, ["a", "b"], ["y"], Path("S.toml"))[0]
-    start = time.perf_counter()
+    start = time.process_time()
     faults = faults_of(table, tmp_path, "a,b,y\n" + "1,2,x\n" * 100_000)
     assert len(faults) == MOST_FAULTS and faults[-1] == "and 99951 more faults; mend these first"
-    assert time.perf_counter() - start < 10.0
+    assert time.process_time() - start < 10.0
 
 
 @pytest.mark.parametrize(

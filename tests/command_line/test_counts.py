@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import resource
-import subprocess
-import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import EXAMPLE, ROOT
+from in_process import in_process
 
 from doe.designs.design import replicate_groups
 
@@ -19,10 +19,14 @@ GIGABYTE = 1 << 30
 
 
 def command(program, *arguments):
-    """Run ``rbdyn`` or ``doe`` with 4 GB of address space, so that a needless allocation cannot pass unseen."""
-    limited = lambda: resource.setrlimit(resource.RLIMIT_AS, (4 * GIGABYTE,) * 2)  # noqa: E731
-    words = [sys.executable, "-c", f"from {program}.cli import run; run()", *map(str, arguments)]
-    return subprocess.run(words, capture_output=True, text=True, check=False, preexec_fn=limited)
+    """Run ``rbdyn`` or ``doe`` with 2 GB more of address space than there is, so that a needless allocation cannot pass unseen."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    usual = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + 2 * GIGABYTE, usual[1]))
+    try:
+        return in_process(program, *arguments)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, usual)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import sys
 import tomllib
 
 import pytest
+from doe_command import doe
 from typer.testing import CliRunner
 
 from rbdyn.cli.app import app
@@ -18,14 +19,6 @@ QUICK = ("turns=3", "discard_turns=2", "replicates=2", "impact_window_turns=1", 
 SET = [part for assignment in QUICK for part in ("--set", f"numerics.{assignment}")]
 NU_210 = ("NU210", "--speed", "6000", "--load", "2000", "--oil", "ISO VG 32", "--temperature", "70")
 NU_1010 = ("NU", "1010", "--speed", "9000", "--load", "3000", "--oil", "VG 15 PAO", "--temperature", "60")
-
-
-def study(*arguments):
-    """``doe`` in a process of its own."""
-    program = "from doe.cli import run; run()"
-    return subprocess.run(
-        [sys.executable, "-c", program, *map(str, arguments)], capture_output=True, text=True, check=False
-    )
 
 
 @pytest.mark.slow
@@ -228,11 +221,11 @@ def test_command_line_study_of_a_new_scene(command, tmp_path, designation, facto
     """Command line: ``doe new`` writes a study that ``doe design`` takes, with the clearances that act."""
     scene, path = tmp_path / 'my "own" # scene.toml', tmp_path / "study.toml"
     scene.write_text(command("new", designation).stdout, encoding="utf-8")
-    written = study("new", scene)
+    written = doe("new", scene)
     assert written.returncode == 0, written.stderr
     path.write_text(written.stdout, encoding="utf-8")
-    assert json.loads(study("new", scene, "--json").stdout) == tomllib.loads(written.stdout)
-    design = json.loads(study("design", path, "--json").stdout)
+    assert json.loads(doe("new", scene, "--json").stdout) == tomllib.loads(written.stdout)
+    design = json.loads(doe("design", path, "--json").stdout)
     assert len(design["runs"]) == {3: 20, 2: 14}[factors]
     assert written.stdout.count("[[factor]]") == factors and len(written.stdout.split("resolution")) == factors + 1
 
@@ -241,5 +234,5 @@ def test_command_line_no_study_of_balls(command, tmp_path):
     """Command line: a ball bearing is not simulated in time, so has no study."""
     scene = tmp_path / "ball.toml"
     scene.write_text(command("new", "6208").stdout, encoding="utf-8")
-    refused = study("new", scene)
+    refused = doe("new", scene)
     assert refused.returncode == 2 and "use rbdyn ball" in refused.stderr and refused.stdout == ""

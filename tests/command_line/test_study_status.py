@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from doe_command import doe, invoke, loaded_by
+from doe_command import doe, doe_process, invoke, loaded_by
 from instant_runs import instantly
 from short_studies import short_study, silent
 from typer.testing import CliRunner
@@ -104,7 +104,7 @@ def test_command_reads_only_and_loads_no_compiler(tmp_path, monkeypatch):
         store.claim([Point("another", "pick")])
         before = files(out)
         monkeypatch.chdir(tmp_path)
-        shown = doe("status", "study.toml", "--json")
+        shown = doe_process("status", "study.toml", "--json")
         assert files(out) == before
     record = json.loads(shown.stdout)
     assert shown.returncode == 0 and shown.stderr == ""
@@ -115,7 +115,7 @@ def test_command_reads_only_and_loads_no_compiler(tmp_path, monkeypatch):
     # The claim of a live process is seen, whatever it is for.
     assert record["points"]["done"] == 20 and record["status"] == "running"
     assert record["other"] == {"done": 1, "failed": 0, "running": 1}
-    words = doe("status", "study.toml").stdout
+    words = doe_process("status", "study.toml").stdout
     assert "20 done, 0 failed, 0 running, 0 missing" in words and "other runs: 1 done" in words
     assert loaded_by(invoke("status", "study.toml")) == set()
 

@@ -1,14 +1,21 @@
-"""The command ``doe`` in processes of its own: what it prints, and what it loads."""
+"""The command ``doe``: what it prints, and what it loads in a process of its own."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 
+from in_process import in_process
+
 HEAVY = {"numba", "scipy", "pandas", "sklearn", "pymoo", "matplotlib"}
 
 
 def doe(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the command within this process."""
+    return in_process("doe", *arguments)
+
+
+def doe_process(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Run the command in a process of its own."""
     return subprocess.run([sys.executable, "-m", "doe", *arguments], capture_output=True, text=True, timeout=300)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -28,10 +29,14 @@ def determinant(points, terms=QUADRATIC):
     return float(np.exp(np.linalg.slogdet(information(points, terms))[1] / len(terms)))
 
 
+@cache
+def moments(terms, factors):
+    return moment_matrix(terms, factors, "box", 1.0)
+
+
 def mean_variance(points, terms=QUADRATIC):
     """Mean variance of predictions over the box, of responses of variance 1."""
-    moments = moment_matrix(terms, points.shape[1], "box", 1.0)
-    return float(np.trace(np.linalg.inv(information(points, terms)) @ moments))
+    return float(np.trace(np.linalg.inv(information(points, terms)) @ moments(tuple(terms), points.shape[1])))
 
 
 @pytest.mark.parametrize("order", [2, 4, 6, 8])
@@ -196,10 +201,10 @@ def test_new_runs_make_a_block_of_their_own_where_those_given_have_blocks():
 
 
 def test_seeds_and_settings_fix_the_bits():
-    one, again, other = (optimal(4, criterion="i", runs=18, seed=seed).coded for seed in (1, 1, 2))
+    one, again, other = (optimal(3, criterion="i", runs=12, seed=seed).coded for seed in (1, 1, 2))
     assert np.array_equal(one, again)
-    assert mean_variance(other, model_terms(4, "quadratic")) == pytest.approx(
-        mean_variance(one, model_terms(4, "quadratic")), rel=0.05
+    assert mean_variance(other, model_terms(3, "quadratic")) == pytest.approx(
+        mean_variance(one, model_terms(3, "quadratic")), rel=0.05
     )
     assert np.array_equal(np.rint(20.0 * one) / 20.0, one), "coordinates are parts of the half width"
 

@@ -144,7 +144,7 @@ def test_indices_of_the_g_function_under_noise(noise: float, least: float) -> No
     """An emulator rounds the kink at the middle of every input: under little noise errors of 0.01 leave intervals of 0.01."""
     truth = [*PARTIAL / G_VARIANCE, 0.0], [*G_TOTAL, 0.0]
     covered, errors = [], []
-    for seed in range(6):
+    for seed in range(4):
         found = sobol(emulated(_noisy(_g_function, 4, 256, np.sqrt(noise * G_VARIANCE), seed)), 4, seed)
         for indices, true in zip(found, truth, strict=True):
             covered += [each.low - 1e-9 <= value <= each.high + 1e-9 for each, value in zip(indices, true, strict=True)]
@@ -154,8 +154,10 @@ def test_indices_of_the_g_function_under_noise(noise: float, least: float) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("noise", "repeats"), [(0.05, 8), (0.3, 16)])
+@pytest.mark.parametrize(("noise", "repeats"), [(0.05, 6), (0.3, 9)])
 def test_indices_of_ishigami_under_noise(noise: float, repeats: int) -> None:
+    """Eight intervals a repeat: of 72 at 90 %, as if every second knew nothing of the first, 36 hold less than 0.8 in 2 of 100
+    cases, and more than that in 1 of 100 where they hold 0.6."""
     first, total = [0.3139, 0.4424, 0.0, 0.0], [0.5576, 0.4424, 0.2437, 0.0]
     covered, errors = [], []
     for seed in range(repeats):

@@ -120,7 +120,7 @@ def places(meniscus, inner):
     return np.concatenate((ahead[::-1], core[1:], behind[1:]))
 
 
-def newton(contact, p, h0, alpha):
+def newton(contact, p, h0, alpha, enough=1e-9):
     """Flow equal everywhere with pressures below zero held there, load pi/2; steps cut to 0.15 of the Hertz pressure."""
     x, n = contact.x, len(contact.x)
     dx, penalty = np.diff(x), 1e6
@@ -150,7 +150,7 @@ def newton(contact, p, h0, alpha):
         while (contact.terms(p + share * change_of[:n], h0 + share * change_of[n], alpha)[0]).min() <= 0.0:
             share *= 0.6
         p, h0 = p + share * change_of[:n], h0 + share * change_of[n]
-        if largest < 1e-9:
+        if largest < enough:
             return p, h0
     raise AssertionError(f"no solution at alpha p_H = {alpha}")
 
@@ -162,8 +162,9 @@ def elastohydrodynamic(m, viscous, meniscus, hertz_pressure=0.0, inner=280):
     contact = Contact(x, elastic_influence(x), 0.375 * math.pi**2 / m**2, hertz_pressure / 0.59e9)
     p, h0 = np.sqrt(np.maximum(1.0 - x**2, 0.0)), -0.2
     last = viscous * math.sqrt(m / (2.0 * math.pi))
-    for alpha in (*np.arange(2.0, last, 2.0), last):
-        p, h0 = newton(contact, p, h0, alpha)
+    for alpha in np.arange(2.0, last, 2.0):
+        p, h0 = newton(contact, p, h0, alpha, 1e-3)  # a start for the next
+    p, h0 = newton(contact, p, h0, last)
     h = contact.terms(p, h0, last)[0]
     force = 0.5 * (h[1:] + h[:-1]) @ np.diff(np.maximum(p, 0.0))
     return (8.0 * m / math.pi) ** 1.5 / 8.0 * force, h[np.abs(x).argmin()] * 8.0 * m / math.pi

@@ -366,10 +366,10 @@ def test_unit_set_on_the_command_line_of_an_unknown_input() -> None:
 )  # fmt: skip
 def test_unit_many_keys_are_refused_at_once(declared: Any) -> None:
     """Unit: 4000 entries are refused within a second, of which the square of their number took minutes."""
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(InputError):
         _case_with(declared(4000))
-    assert time.perf_counter() - start < 3.0
+    assert time.process_time() - start < 3.0
 
 
 def test_unit_every_number_of_the_example_may_be_unknown_at_once() -> None:
@@ -381,7 +381,7 @@ def test_unit_every_number_of_the_example_may_be_unknown_at_once() -> None:
         if isinstance(value, float) and value > 0.0 and not key.startswith(("bearing.", "traction.constants")):
             laws[key] = {"law": "uniform", "low": 0.998, "high": 0.999, "times": key}
     laws = {key: law for key, law in laws.items() if key not in ("model.pocket_restitution", "model.land_restitution")}
-    start = time.perf_counter()
+    start = time.process_time()
     case = case_of("scene.toml", {**data, "uncertain": {"defaults": "none", **laws}}, ("impact_force_N",))
     assert len(case.every) == len(laws) > 30
-    assert time.perf_counter() - start < 5.0
+    assert time.process_time() - start < 5.0

@@ -51,8 +51,8 @@ def test_every_file_is_written(finished):
     assert sum(name.startswith("surface_") for name in files) == 3
     for name in files:
         if name.endswith(".png"):
-            colours = np.unique((255.0 * imread(folder / name)[..., :3]).astype(int).reshape(-1, 3), axis=0)
-            assert len(colours) > 50, f"{name} is nearly empty"
+            colours = (255.0 * imread(folder / name)[..., :3]).astype(int) @ [1 << 16, 1 << 8, 1]
+            assert np.unique(colours).size > 50, f"{name} is nearly empty"
         else:
             assert (folder / name).read_text(encoding="utf-8").count("\n") > 1, name
 
@@ -164,7 +164,7 @@ def test_same_bits_for_any_number_of_workers(finished, tmp_path):
 
 def test_killed_study_loses_no_finished_run(finished, tmp_path):
     # Long enough that the kill comes in the middle of it.
-    path = short_study(tmp_path, SHORT.replace("turns=3,", "turns=60,"))
+    path = short_study(tmp_path, SHORT.replace("turns=3,", "turns=30,"))
     store = tmp_path / "out" / "study.sqlite"
     process = subprocess.Popen(
         [sys.executable, "-m", "doe", "study", str(path), "--out", str(tmp_path / "out"), "--workers", "1"],
