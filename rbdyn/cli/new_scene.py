@@ -120,7 +120,7 @@ def _common(named: Designation, sizes: Envelope, point: OperatingPoint, referenc
         "speed_by": "assumed: half of the " if point.speed is None else "",
         "reference": f"{reference:g} rpm, catalogue"
         if reference == sizes.reference_speed
-        else f"about {reference:.2g} rpm, +-{error} %",
+        else f"about {round(reference, -2):.0f} rpm, +-{error} %",
         "load": load,
         "load_by": "assumed: " if point.load is None else "",
         "load_share": load / capacity,
