@@ -30,6 +30,8 @@ LAWS = [
     "ViscousDamping",
     "FourConstantTraction",
     "RollingResistance",
+    "RigidContact",
+    "NoOpenFilm",
     "Pocket",
     "LineContactOnBar",
     "HuntCrossleyDamping",

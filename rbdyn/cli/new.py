@@ -51,10 +51,10 @@ def new(
     outside: Annotated[float | None, valued("MM", "Outside diameter.", LISTED)] = None,
     width: Annotated[float | None, valued("MM", "Width.", LISTED)] = None,
     shaft: Annotated[
-        str | None, valued("CLASS", "Tolerance class of the shaft: k5. Writes [mounting].", "loose")
+        str | None, valued("CLASS", "Tolerance class of the shaft: k5. Writes the table mounting.", "loose")
     ] = None,
     housing: Annotated[
-        str | None, valued("CLASS", "Tolerance class of the housing: H7. Writes [mounting].", "loose")
+        str | None, valued("CLASS", "Tolerance class of the housing: H7. Writes the table mounting.", "loose")
     ] = None,
     as_json: Json = False,
 ) -> None:

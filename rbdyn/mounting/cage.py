@@ -4,10 +4,12 @@ A ring guides the cage by a land that grows with the ring, the free edge of whos
 a free body by heat and as a thin hoop by rotation. Clearances and their changes are diametral [m], radii of the drawing.
 """
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from rbdyn.mounting.rings import MountedRings
 from rbdyn.properties.materials import Material
+
+if TYPE_CHECKING:
+    from rbdyn.mounting.rings import MountedRings
 
 # Which way the growth of the guiding ring moves the clearance, and the cage the other way.
 SIDES = {"outer": 1.0, "inner": -1.0}
@@ -66,7 +68,7 @@ class CageBody(NamedTuple):
 
 
 def guide_clearance(
-    drawn: float, land_radius: float, guidance: str, rings: MountedRings, cage: CageBody
+    drawn: float, land_radius: float, guidance: str, rings: "MountedRings", cage: CageBody
 ) -> OperatingClearance:
     """Clearance between the land of the "outer" or the "inner" ring and the cage.
 
@@ -97,7 +99,7 @@ def pocket_clearance(
     return OperatingClearance(drawn, 0.0, cage.thermal_growth(roller_diameter + drawn) - roller)
 
 
-def pocket_circle_shift(pitch_radius: float, rings: MountedRings, cage: CageBody) -> float:
+def pocket_circle_shift(pitch_radius: float, rings: "MountedRings", cage: CageBody) -> float:
     """Growth of the circle of pocket centres less that of the circle midway between the races, radial [m]."""
     outer, inner = rings.outer_ring, rings.inner_ring
     races = outer.growth(outer.inner_radius, outside=rings.outer_pressure)

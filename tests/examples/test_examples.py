@@ -62,7 +62,7 @@ def test_unit_published_checks_are_whole():
     module = script("published_checks")
     assert list(module.FULL) == list(module.BRIEF)
     assert set(module.FULL) == {
-        "table4", "figure14", "nu215", "friction", "totals", "sensitivity", "whirl",
+        "table4", "figure14", "nu215", "friction", "totals", "sensitivity", "whirl", "search", "angular", "minimum", "cage_speed",
     }  # fmt: skip
 
 

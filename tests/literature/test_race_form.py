@@ -13,6 +13,7 @@ from numba import njit
 from rbdyn.contact.damping import NoDamping
 from rbdyn.contact.hertz_line import dowson_higginson, palmgren
 from rbdyn.contact.rolling_resistance import NoRollingResistance
+from rbdyn.contact.tangential_elasticity import RigidContact
 from rbdyn.contact.traction import CoulombTraction, NoTraction
 from rbdyn.dynamics.forces.race_form import RoundRace, form_at, largest_rise, wavy_race
 from rbdyn.dynamics.forces.races import Race, race_contact
@@ -28,11 +29,11 @@ def compiled_form(form, nx, ny, ring_cos, ring_sin):
 
 @njit
 def compiled_contact(race, side, radius, dx, dy, dvx, dvy, spin, speed, ring_cos, ring_sin):
-    return race_contact(race, side, radius, dx, dy, dvx, dvy, spin, speed, ring_cos, ring_sin)
+    return race_contact(race, side, radius, dx, dy, dvx, dvy, spin, speed, ring_cos, ring_sin, 0.0)
 
 
 def race_of(side, form, contact=CONTACT, traction=NoTraction()):  # noqa: B008
-    return Race(RADIUS[side], 1.0, form, contact, NoDamping(), traction, NoRollingResistance())
+    return Race(RADIUS[side], 1.0, form, contact, NoDamping(), traction, NoRollingResistance(), RigidContact())
 
 
 def waves(*harmonics):
@@ -119,7 +120,7 @@ def test_invariant_contact_wrench(side, seed):
     place = (RADIUS[side] - side * (ROLLER - 1e-5)) * np.array([math.cos(azimuth), math.sin(azimuth)])
     velocity = draw.uniform(-20.0, 20.0, 2)
     state = (*place, *velocity, spin, speed, math.cos(turned), math.sin(turned))
-    fx, fy, on_roller, on_ring, load, friction, rolling, damping, _ = compiled_contact(race, side, ROLLER, *state)
+    fx, fy, on_roller, on_ring, load, friction, rolling, damping, *_ = compiled_contact(race, side, ROLLER, *state)
     assert place[0] * fy - place[1] * fx + on_roller + on_ring == pytest.approx(0.0, abs=1e-14 * load)
     lost = -(fx * velocity[0] + fy * velocity[1] + on_roller * spin + on_ring * speed)
 

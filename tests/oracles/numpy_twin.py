@@ -221,7 +221,7 @@ def pocket(scene, roller, cage, radius, mid_line):
         return np.zeros(5)
     # Pocket and lips are cut for the nominal roller.
     larger = radius - 0.5e-3 * scene.bearing.roller_diameter_mm
-    half, laws, result = 0.5e-3 * scene.cage.pocket_clearance_mm - larger, scene.model, np.zeros(5)
+    half, laws, result = 0.5 * scene.pocket_clearance_m - larger, scene.model, np.zeros(5)
     floor = laws.pocket_film_floor_um * 1e-6 if laws.pocket_film else 0.0
     for to_wall in (turned(mid_line), -turned(mid_line)):
         gap = half - float((roller.centre - cage.centre) @ to_wall)
@@ -233,7 +233,7 @@ def pocket(scene, roller, cage, radius, mid_line):
         on_wall, contact = max(result[0], load + push), max(result[1], load)
         result = np.array((on_wall, contact, *np.add(result[2:], (friction, damping, film))))
     if scene.cage.lip_clearance_mm is not None:
-        play, orbit = 0.5e-3 * scene.cage.lip_clearance_mm - larger, 0.5 * sum(raceways(scene))
+        play, orbit = 0.5 * scene.lip_clearance_m - larger, 0.5 * sum(raceways(scene))
         for side in (1.0, -1.0):
             height = side * (float((roller.centre - cage.centre) @ mid_line) - orbit)
             point = roller.centre + side * radius * mid_line
@@ -250,7 +250,7 @@ def guide(scene, cage, ring):
     if laws.guide_land == "off" or drawing.guidance == "roller":
         return 0.0, 0.0, 0.0, 0.0
     journal, bush = (cage, ring) if drawing.guidance == "outer" else (ring, cage)
-    clearance = 0.5e-3 * drawing.guide_clearance_mm
+    clearance = 0.5 * scene.guide_play_m
     land = 0.5e-3 * scene.land_diameter_mm
     radius = land - clearance if drawing.guidance == "outer" else land
     between = journal.centre - bush.centre
