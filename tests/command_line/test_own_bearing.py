@@ -60,9 +60,9 @@ def test_own_bearing_runs_as_told(tmp_path):
         elif text.startswith("[[response]]"):
             study = tmp_path / "study.toml"
             whole = study.read_text(encoding="utf-8")
-            assert whole.count(text.replace("upper = 150.0\n", "")) == 1
+            assert whole.count(text.replace("upper = 135.0\n", "")) == 1
             assert whole.count(BRIEF[0]) == 1
-            brief = whole.replace(text.replace("upper = 150.0\n", ""), text).replace(*BRIEF)
+            brief = whole.replace(text.replace("upper = 135.0\n", ""), text).replace(*BRIEF)
             study.write_text(brief, encoding="utf-8")
         else:
             lines = dict(map(told, printed.splitlines()))
