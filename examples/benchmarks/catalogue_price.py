@@ -1,0 +1,124 @@
+"""What a shaft turn of catalogue bearings costs over that of the example, with and without tangential elasticity.
+
+``python examples/benchmarks/catalogue_price.py`` simulates named and seeded scenes of ``rbdyn new`` both ways: as they are written, and
+with ``traction.elasticity = false``, whose traction follows the steady law at once. Processor time of one thread; each way the
+example runs first and last, and its mean turn is the unit. Slip, loss, impact and whirl stand with the difference of both ways in units of
+their joint statistical error. ``--drawn N`` seeded scenes, ``--turns``, ``--replicates`` set the effort, ``--only`` picks named scenes.
+"""
+
+import argparse
+import math
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from rbdyn import Scene, SimulationResult, simulate
+from rbdyn.properties.catalogue import envelope
+from rbdyn.properties.designation import read_designation
+from rbdyn.properties.tables import table
+
+EXAMPLE = Path(__file__).parents[1] / "cylindrical_roller.toml"
+NAMED = {
+    "NU 210, defaults": ("NU210",),
+    "NU 210, 6000 rpm, 2 kN, VG 32": ("NU210", "--speed", "6000", "--load", "2000", "--oil", "ISO VG 32"),
+    "NU 206, 9000 rpm, 1.5 kN, VG 32": ("NU206", "--speed", "9000", "--load", "1500", "--oil", "ISO VG 32"),
+    "NU 320, defaults": ("NU320",),
+}
+WAYS = {"elastic": "true", "steady": "false"}
+FIGURES = ("power_loss_W", "cage_slip", "impact_force_N", "whirl_deviation_ratio")
+Row = list[str]
+
+
+def drawn(count: int, seed: int) -> dict[str, tuple[str, ...]]:
+    """Seeded scenes: listed sizes to 100 mm bore, 0.3 to 1 of their reference speed, 0.02 to 0.15 of C, three oils, 50 to 90 C."""
+    draw = np.random.default_rng(seed)
+    sizes = [
+        row["size"] for row in table("cylindrical_rollers") if float(row["bore"]) <= 100.0 and row["reference_speed"]
+    ]
+    scenes = {}
+    for size in draw.choice(sizes, count, replace=False):
+        box = envelope(read_designation(f"NU{size}"))
+        assert box.reference_speed is not None and box.dynamic_capacity is not None
+        speed, load = draw.uniform(0.3, 1.0) * box.reference_speed, draw.uniform(0.02, 0.15) * box.dynamic_capacity
+        oil, warm = draw.choice([32, 68, 150]), draw.uniform(50.0, 90.0)
+        point = (
+            "--speed",
+            f"{speed:.0f}",
+            "--load",
+            f"{load:.0f}",
+            "--oil",
+            f"ISO VG {oil}",
+            "--temperature",
+            f"{warm:.0f}",
+        )
+        scenes[f"NU {size}, {speed:.0f} rpm, {load:.0f} N, VG {oil}, {warm:.0f} C"] = (f"NU{size}", *point)
+    return scenes
+
+
+def simulated(data: dict[str, object], turns: float, replicates: int, *keys: str) -> SimulationResult:
+    """A scene, not lengthened, on one thread."""
+    length = (
+        f"turns={turns:g}",
+        f"discard_turns={turns:g}",
+        f"replicates={replicates}",
+        f"impact_window_turns={turns:g}",
+    )
+    numbers = (f"numerics.{key}" for key in (*length, "extend=false", "companion=false"))
+    return simulate(Scene.from_dict(data, "scene", [*numbers, *keys]), workers=1)
+
+
+def turn_ms(result: SimulationResult) -> float:
+    """Processor time of a shaft turn [ms]."""
+    return 1e3 * result.cost["cpu_s"] / result.cost["turns"]
+
+
+def row_of(name: str, results: dict[str, SimulationResult], example_ms: float) -> Row:
+    """Price of both ways, right-hand sides, and how far the figures of both ways are apart."""
+    prices = [f"{turn_ms(result) / example_ms:.1f}" for result in results.values()]
+    evaluations = [f"{result.cost['rhs_evaluations'] / result.cost['turns']:.0f}" for result in results.values()]
+    methods = ["implicit" if result.cost["implicit_runs"] else "explicit" for result in results.values()]
+    apart = []
+    for figure in FIGURES:
+        one, other = (result.quantities[figure] for result in results.values())
+        scatter = math.hypot(one.statistical_error or 0.0, other.statistical_error or 0.0)
+        apart.append(f"{(one.value - other.value) / scatter:+.1f}")
+    gaps = [f"{100.0 * result.power_gap:.1g}" for result in results.values()]
+    return [name, *prices, *evaluations, methods[1], *gaps, *apart]
+
+
+def main(turns: float, replicates: int, count: int, seed: int, only: str | None) -> None:
+    """Simulate and print the table."""
+    example = tomllib.loads(EXAMPLE.read_text(encoding="utf-8"))
+    unit = turn_ms(simulated(example, 4.0 * turns, replicates))
+    both = {}
+    for name, words in (NAMED | drawn(count, seed)).items():
+        if only is not None and only not in name:
+            continue
+        made = subprocess.run(
+            [sys.executable, "-m", "rbdyn", "new", *words], check=True, capture_output=True, text=True
+        )
+        data = tomllib.loads(made.stdout)
+        both[name] = {way: simulated(data, turns, replicates, f"traction.elasticity={on}") for way, on in WAYS.items()}
+    unit = 0.5 * (unit + turn_ms(simulated(example, 4.0 * turns, replicates)))
+    rows = [row_of(name, results, unit) for name, results in both.items()]
+    header = ["bearing", "turn over the example's: elastic", "steady", "right-hand sides a turn: elastic", "steady", "steady by",
+              "power gap %: elastic", "steady", "loss apart", "slip apart", "impact apart", "whirl apart"]  # fmt: skip
+    for row in (header, ["---"] * len(header), *rows):
+        print(f"| {' | '.join(row)} |")
+    print(
+        f"\nA turn of the example takes {unit:.2f} ms of one thread; columns `apart` are differences over their joint 95 % error."
+    )
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--turns", type=float, default=8.0)
+    parser.add_argument("--replicates", type=int, default=4)
+    parser.add_argument("--drawn", type=int, default=10)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only")
+    given = parser.parse_args()
+    main(given.turns, given.replicates, given.drawn, given.seed, given.only)
