@@ -1,25 +1,25 @@
-"""Tangential elasticity of a rolling contact: traction builds up over a relaxation length, as that of a tyre does.
+"""Tangential elasticity of a rolling contact: bodies give way before traction follows slip.
 
-A steady law of creep and film answers a change of slip at once. Real material has to pass the contact first, some tens of
-microseconds, while the bodies give way tangentially (Kalker 1990, Three-Dimensional Elastic Bodies in Rolling Contact;
-Johnson 1985, Contact Mechanics, 8). To first order the traction coefficient follows the steady one by
+A steady law of creep and film answers a change of slip at once, as if the bodies were rigid. They give way tangentially: spring
+and steady contact are in series, so that a traction T builds up by k (s - s_c(T)), s_c being the slip at which the steady law
+has T and k the tangential stiffness, for plane contact of like materials the normal one, dQ/dx (Johnson 1985, Contact Mechanics,
+7 and 8; Kalker 1990). With s_c = s T/T_steady(s), which is exact on the straight part of the law, the traction coefficient is
 
-    (tau + beta) d mu/dt = mu_steady - mu,    tau = C/k,
+    (tau + beta) d mu/dt = mu_steady - mu,    tau = T_steady(s)/(s k) + 1/omega.
 
-with Carter's creep slope C = 2 R Q/(a u) and the tangential stiffness k of the contact, which for plane contact of like
-materials is its normal one, dQ/dx = 10/9 Q/x: tau u = 1.8 R x/a, x being the approach, a the half-width and u the
-entrainment speed. Material damping c beside the spring lets the share beta/(tau + beta), beta = c/k, of the steady traction
-act at once. The coefficient that acts stays within those of the steady law, and traction ends with the load. What the
-contact does on the slip counts as lost, the elastic energy that it stores, some microjoules, with it.
+On the straight part tau is the creep slope over k, the time of a way of about the contact's width; a fast slip, as in an impact,
+meets the spring alone and finds the limit of traction in the time T/(k s). ``omega``, that of a roller's vibration between its
+races, bounds the rate where a flat curve answers faster than anything moves. Material damping c beside the spring lets the share
+beta/(tau + beta), beta = c/k, of the steady traction act at once. The coefficient that acts stays within those of the steady
+law, and traction ends with the load. What the contact does on the slip counts as lost, the elastic energy that it stores, some
+microjoules, with it.
 """
 
-import math
 from typing import NamedTuple
 
 from rbdyn.compiled.kernel import kernel, law
 
-# Of tau u = 1.8 R x/a: Carter's 2 over 10/9.
-RELAXATION = 1.8
+SMALLEST_SLIP = 1e-12  # [m/s], keeps the slope of the law finite
 
 
 class RigidContact(NamedTuple):
@@ -30,28 +30,8 @@ class ElasticContact(NamedTuple):
     """The traction coefficient of each roller at a race is a state."""
 
     start: int  # where those of this race begin
-    length_scale: float  # relaxation length over sqrt(load) [m/sqrt(N)]
-    smallest_load: float  # the length stays below it [N]
-    smallest_speed: float  # entrainment counts no less [m/s]
+    shortest_time: float  # 1/omega [s]
     damping_time: float  # beta [s]
-
-
-def elastic_contact(
-    start: int,
-    radius: float,
-    half_width_scale: float,
-    load: float,
-    approach: float,
-    smallest_load: float,
-    smallest_speed: float,
-    damping_time: float,
-) -> ElasticContact:
-    """Law of a race of reduced ``radius`` [m], whose half-width is ``half_width_scale`` sqrt(load) [m/sqrt(N)].
-
-    The relaxation length goes as load^0.4; it is exact at ``load`` [N], of ``approach`` [m], and taken as sqrt(load).
-    """
-    scale = RELAXATION * radius * approach / (half_width_scale * load)
-    return ElasticContact(start, scale, smallest_load, smallest_speed, damping_time)
 
 
 @law
@@ -70,44 +50,43 @@ def _(tangential, y, j):
 
 
 @kernel
-def relaxation_rate(tangential, load, entrainment_speed):
-    """1/tau [1/s] at a load [N] and an entrainment speed [m/s]; without load that of the smallest."""
-    length = tangential.length_scale * math.sqrt(max(load, tangential.smallest_load))
-    speed = entrainment_speed if load > 0.0 else 0.0
-    return max(speed, tangential.smallest_speed) / length
+def relaxation_time(tangential, steady, load, slip, stiffness):
+    """tau [s] of a steady coefficient at a load [N] and a slip [m/s], with the contact's stiffness [N/m]; shortest without load."""
+    creep = abs(steady) * load / (max(abs(slip), SMALLEST_SLIP) * stiffness) if load > 0.0 else 0.0
+    return creep + tangential.shortest_time
 
 
 @law
-def acting_coefficient(tangential, steady, coefficient, load, entrainment_speed):
-    """Traction coefficient that acts, of the steady law's and the state's, at a load [N] and entrainment speed [m/s] >= 0."""
+def acting_coefficient(tangential, steady, coefficient, load, slip, stiffness):
+    """Traction coefficient that acts, of the steady law's and the state's; the rest as in ``relaxation_time``."""
 
 
 @acting_coefficient.body(RigidContact)
-def _(tangential, steady, coefficient, load, entrainment_speed):
+def _(tangential, steady, coefficient, load, slip, stiffness):
     return steady
 
 
 @acting_coefficient.body(ElasticContact)
-def _(tangential, steady, coefficient, load, entrainment_speed):
-    damped = tangential.damping_time * relaxation_rate(tangential, load, entrainment_speed)
+def _(tangential, steady, coefficient, load, slip, stiffness):
+    damped = tangential.damping_time / relaxation_time(tangential, steady, load, slip, stiffness)
     return coefficient + (steady - coefficient) * damped / (1.0 + damped)
 
 
 @law
-def coefficient_rate(tangential, steady, coefficient, load, entrainment_speed):
+def coefficient_rate(tangential, steady, coefficient, load, slip, stiffness):
     """Rate at which the state follows the steady coefficient [1/s]; arguments as above. Without load it dies away."""
 
 
 @coefficient_rate.body(RigidContact)
-def _(tangential, steady, coefficient, load, entrainment_speed):
+def _(tangential, steady, coefficient, load, slip, stiffness):
     return 0.0
 
 
 @coefficient_rate.body(ElasticContact)
-def _(tangential, steady, coefficient, load, entrainment_speed):
-    rate = relaxation_rate(tangential, load, entrainment_speed)
+def _(tangential, steady, coefficient, load, slip, stiffness):
     target = steady if load > 0.0 else 0.0
-    return (target - coefficient) * rate / (1.0 + tangential.damping_time * rate)
+    whole = relaxation_time(tangential, steady, load, slip, stiffness) + tangential.damping_time
+    return (target - coefficient) / whole
 
 
 @law
@@ -153,4 +132,4 @@ def _(tangential, rollers, y, row, dy):
 @relax_coefficients.body(ElasticContact)
 def _(tangential, rollers, y, row, dy):
     for j in range(rollers):
-        dy[row, tangential.start + j] = coefficient_rate(tangential, 0.0, y[tangential.start + j], 0.0, 0.0)
+        dy[row, tangential.start + j] = coefficient_rate(tangential, 0.0, y[tangential.start + j], 0.0, 0.0, 1.0)

@@ -10,7 +10,7 @@ import pytest
 from conftest import ROOT
 from numpy_twin import twin
 
-from rbdyn.contact.tangential_elasticity import acting_coefficient, coefficient_rate, elastic_contact
+from rbdyn.contact.tangential_elasticity import ElasticContact, acting_coefficient, coefficient_rate
 from rbdyn.contact.traction import traction
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces import state
@@ -26,41 +26,60 @@ ELASTIC = "traction.elasticity=true"
 
 
 def test_unit_relaxation_is_creep_over_stiffness():
-    """Unit: the time is Carter's slope 2 R Q/(a u) over 10/9 Q/x, at the load of the scale and as its root elsewhere."""
-    radius, load, approach, half_width, speed = 4.6e-3, 2000.0, 6e-6, 90e-6, 5.0
-    law = elastic_contact(0, radius, half_width / math.sqrt(load), load, approach, 10.0, 0.1, 0.0)
-    time = 2.0 * radius * load / (half_width * speed) / (10.0 / 9.0 * load / approach)
-    assert coefficient_rate(law, 0.03, 0.01, load, speed) == pytest.approx(0.02 / time, rel=1e-12)
-    assert coefficient_rate(law, 0.03, 0.01, 0.25 * load, speed) == pytest.approx(0.04 / time, rel=1e-12)
-    # Without load the coefficient dies away whatever the slip, at the rate of the smallest load and speed.
-    alone = coefficient_rate(law, 0.03, 0.01, 0.0, speed)
-    assert alone == pytest.approx(-0.01 / time * 0.1 / speed * math.sqrt(load / 10.0), rel=1e-12)
+    """Unit: on the straight part of the law the time is its slope over the stiffness, whatever the slip; past its peak the spring
+    alone acts, k s of force a time; without load the coefficient dies away in the shortest time.
+    """
+    law, load, stiffness, slope = ElasticContact(0, 0.0, 0.0), 2000.0, 4e8, 3.8e4
+    for slip in (1e-6, -1e-3):
+        rate = coefficient_rate(law, slope * slip / load, 0.0, load, slip, stiffness)
+        assert rate * load == pytest.approx(stiffness * slip, rel=1e-12)
+    # Half-way up, half the spring's rate is left.
+    assert coefficient_rate(law, 0.05, 0.025, load, 0.1, stiffness) * load == pytest.approx(
+        0.5 * stiffness * 0.1, rel=1e-12
+    )
+    assert coefficient_rate(ElasticContact(0, 3e-6, 0.0), 0.05, 0.01, 0.0, 0.1, stiffness) == pytest.approx(
+        -0.01 / 3e-6
+    )
+    assert math.isfinite(coefficient_rate(ElasticContact(0, 3e-6, 0.0), 0.0, 0.01, load, 0.0, stiffness))
+
+
+def test_oracle_impact_on_a_rolling_contact():
+    """Oracle: a sudden slip raises traction as the spring does, T = k x, up to the limit of the law, as a spring in series with a
+    dry slider has it (Jenkins), within the tenth that the exponential way to the limit takes."""
+    load, stiffness, slip, limit = 2000.0, 4e8, 0.2, 0.05
+    law, mu, step = ElasticContact(0, 0.0, 0.0), 0.0, 1e-9
+    reaching = limit * load / (stiffness * slip)
+    for _ in range(round(0.2 * reaching / step)):
+        mu += step * coefficient_rate(law, limit, mu, load, slip, stiffness)
+    assert mu * load == pytest.approx(0.2 * limit * load, rel=0.1)
+    for _ in range(round(8.0 * reaching / step)):
+        mu += step * coefficient_rate(law, limit, mu, load, slip, stiffness)
+    assert mu == pytest.approx(limit, rel=1e-3)
 
 
 def test_unit_material_damping():
     """Unit: creep, spring and damper in series and parallel, T = C s (1 + beta p)/(1 + (beta + tau) p) of a slip's change:
     of a step the share beta/(tau + beta) acts at once, the rest in the time tau + beta; undamped nothing does.
     """
-    beta, steady, speed = 4e-6, 0.03, 5.0
-    undamped, damped = (elastic_contact(0, 4.6e-3, 2e-6, 2000.0, 6e-6, 10.0, 0.1, each) for each in (0.0, beta))
-    tau = steady / coefficient_rate(undamped, steady, 0.0, 2000.0, speed)
-    assert acting_coefficient(undamped, steady, 0.0, 2000.0, speed) == 0.0
-    assert acting_coefficient(damped, steady, 0.0, 2000.0, speed) == pytest.approx(
-        steady * beta / (tau + beta), rel=1e-12
-    )
-    assert coefficient_rate(damped, steady, 0.0, 2000.0, speed) == pytest.approx(steady / (tau + beta), rel=1e-12)
-    assert acting_coefficient(damped, steady, steady, 2000.0, speed) == steady
+    beta, steady, at = 4e-6, 0.03, (2000.0, 0.01, 4e8)
+    undamped, damped = (ElasticContact(0, 1e-6, each) for each in (0.0, beta))
+    tau = steady / coefficient_rate(undamped, steady, 0.0, *at)
+    assert tau == pytest.approx(0.03 * 2000.0 / (0.01 * 4e8) + 1e-6, rel=1e-12)
+    assert acting_coefficient(undamped, steady, 0.0, *at) == 0.0
+    assert acting_coefficient(damped, steady, 0.0, *at) == pytest.approx(steady * beta / (tau + beta), rel=1e-12)
+    assert coefficient_rate(damped, steady, 0.0, *at) == pytest.approx(steady / (tau + beta), rel=1e-12)
+    assert acting_coefficient(damped, steady, steady, *at) == steady
 
 
 def test_invariant_coefficients_stay_within_the_steady_ones():
     """Invariant: under any history of slip the coefficient stays within the extremes of the steady law and ends on it."""
-    law, draw = elastic_contact(0, 4.6e-3, 2e-6, 2000.0, 6e-6, 10.0, 0.1, 0.0), np.random.default_rng(3)
-    steady, mu, step = draw.uniform(-0.05, 0.05, 4000), 0.0, 1e-6
+    law, draw, mu, step = ElasticContact(0, 2e-6, 1e-7), np.random.default_rng(3), 0.0, 1e-7
+    steady = draw.uniform(-0.05, 0.05, 4000)
     for target in steady:
-        mu += step * coefficient_rate(law, target, mu, draw.uniform(1.0, 3000.0), 5.0)
+        mu += step * coefficient_rate(law, target, mu, draw.uniform(1.0, 3000.0), target, 4e8)
         assert abs(mu) <= np.abs(steady).max()
-    for _ in range(2000):
-        mu += step * coefficient_rate(law, 0.02, mu, 2000.0, 5.0)
+    for _ in range(4000):
+        mu += step * coefficient_rate(law, 0.02, mu, 2000.0, 0.02, 4e8)
     assert mu == pytest.approx(0.02, rel=1e-6)
 
 

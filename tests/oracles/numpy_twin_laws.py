@@ -277,31 +277,20 @@ def roller_mass(scene):
     return scene.material("roller").density * volume
 
 
-def elastic_traction(scene, encloses, load, steady, coefficient, entrainment):
-    """Traction coefficient that acts and the rate of the state: a creeping contact in series with spring and damper.
-
-    The relaxation time is Carter's slope 2 R Q/(a u) over a stiffness of 10/9 Q/x, which at the most loaded roller is exact
-    and elsewhere goes as the root of the load.
-    """
+def elastic_traction(scene, load, steady, coefficient, slip, stiffness):
+    """Traction coefficient that acts and the rate of the state: the steady law in series with a spring of the contact's normal
+    stiffness and a damper beside it; no relaxation is shorter than a radian of the most loaded roller's vibration."""
     if not scene.traction.elasticity:
         return steady, 0.0
-    length, radius = scene.bearing.effective_length_mm * 1e-3, reduced_radius(scene, encloses)
     most = 5.0 * max(scene.operation.largest_load_N, 1.0) / scene.bearing.rollers
-    half_width = math.sqrt(8.0 * radius * most / (math.pi * modulus(scene, "roller", "rings") * length))
+    length, mass = scene.bearing.effective_length_mm * 1e-3, roller_mass(scene)
     approach = (most / palmgren_stiffness(scene, "roller", "rings", length)) ** 0.9
-    creep, stiffness = 2.0 * radius * most / half_width, 10.0 / 9.0 * most / approach  # creep: slope times speed
-    outer, inner = raceways(scene)
-    shaft, housing = (s * math.pi / 30.0 for s in (scene.operation.inner_speed_rpm, scene.operation.outer_speed_rpm))
-    orbit = (shaft * inner + housing * outer) / (inner + outer)
-    lightest = max(roller_mass(scene) * 0.5 * (inner + outer) * orbit**2, 1e-3 * most)
-    slowest = 0.05 * nominal_entrainment(scene)
-    speed = max(entrainment, slowest) if load > 0.0 else slowest
-    relaxation = creep / stiffness * math.sqrt(max(load, lightest) / most) / speed
+    spring = 10.0 / 9.0 * most / approach
+    creep = abs(steady * load / slip) / stiffness if load > 0.0 else 0.0
     ratio = 0.0 if scene.model.race_damping == "off" else scene.model.race_damping_ratio
-    damping = 2.0 * ratio * math.sqrt(roller_mass(scene) * stiffness / 3.0)
-    whole = relaxation + damping / stiffness
-    acting = (relaxation * coefficient + damping / stiffness * steady) / whole
-    return acting, ((steady if load > 0.0 else 0.0) - coefficient) / whole
+    relaxation, damping = creep + (mass / (2.0 * spring)) ** 0.5, 2.0 * ratio * (mass / 3.0 / spring) ** 0.5
+    acting = (relaxation * coefficient + damping * steady) / (relaxation + damping)
+    return acting, ((steady if load > 0.0 else 0.0) - coefficient) / (relaxation + damping)
 
 
 def open_film(scene, gap):

@@ -123,7 +123,7 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
     entrainment = 0.5 * (roller_surface + ring_surface)
     speed = max(abs(entrainment), SMALLEST_SPEED)
     steady = traction(race.traction, slip, load)
-    traction_force = acting_coefficient(race.tangential, steady, coefficient, load, speed) * load
+    traction_force = acting_coefficient(race.tangential, steady, coefficient, load, slip, stiffness) * load
     resistance = rolling_force(race.rolling, load, speed)
     rolling = math.copysign(resistance, entrainment)
     normal = -side * load
@@ -139,5 +139,5 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
         2.0 * rolling * entrainment,
         (load - elastic) * approach_rate,
         slip,
-        coefficient_rate(race.tangential, steady, coefficient, load, speed),
+        coefficient_rate(race.tangential, steady, coefficient, load, slip, stiffness),
     )

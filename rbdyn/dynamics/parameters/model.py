@@ -14,7 +14,7 @@ from rbdyn.contact.film import short_journal_film
 from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, sliced
 from rbdyn.contact.open_contact import OpenFilm, open_film, touching_gap
 from rbdyn.contact.rolling_resistance import NoRollingResistance, aihara_thermal_factor, biboulet_houpert, starved
-from rbdyn.contact.tangential_elasticity import ElasticContact, RigidContact, elastic_contact
+from rbdyn.contact.tangential_elasticity import ElasticContact, RigidContact
 from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.forces.cage_body import BalancedCage, UnbalancedCage
 from rbdyn.dynamics.forces.drag import NoDrag, cylinder_drag
@@ -40,9 +40,6 @@ if TYPE_CHECKING:
 
 # The largest contact load that a traction surface must cover, in multiples of the largest load on the shaft.
 TRACTION_RANGE = 4.0
-# Load and speed below which the relaxation length stays, over those of the most loaded roller and of rolling: there is little
-# traction to speak of.
-LIGHTEST, SLOWEST = 1e-3, 0.05
 
 
 def roller_bearing(scene: Scene) -> RollerBearing:
@@ -101,18 +98,15 @@ def _tangential(scene: Scene, place: int) -> RigidContact | ElasticContact:
     start = layout_of(scene).coefficients
     if start is None:
         return RigidContact()
-    drawing, radius = scene.bearing, scene.geometry.reduced_radii[place]
-    modulus, length = _modulus(scene, "roller", "rings"), drawing.effective_length
-    # Of the most loaded roller (Stribeck).
-    load = 5.0 * max(scene.operation.largest_load_N, 1.0) / drawing.rollers
-    half_width_scale = math.sqrt(8.0 * radius / (math.pi * modulus * length))
-    approach = (load / palmgren(modulus, length).stiffness) ** 0.9
-    smallest = max(scene.geometry.centrifugal_force, LIGHTEST * load), SLOWEST * abs(scene.geometry.motion.entrainment)
-    # Damping of a roller between two races against its critical one, as that of the approach.
+    # Of the most loaded roller (Stribeck), between its two races.
+    load = 5.0 * max(scene.operation.largest_load_N, 1.0) / scene.bearing.rollers
+    law = palmgren(_modulus(scene, "roller", "rings"), scene.bearing.effective_length)
+    stiffness = 10.0 / 9.0 * load / (load / law.stiffness) ** 0.9
+    mass = scene.geometry.roller_mass
     ratio = 0.0 if scene.model.race_damping == "off" else scene.model.race_damping_ratio
-    damping_time = 2.0 * ratio * math.sqrt(scene.geometry.roller_mass / 3.0 * approach / (10.0 / 9.0 * load))
-    first = start + place * drawing.rollers
-    return elastic_contact(first, radius, half_width_scale, load, approach, *smallest, damping_time)
+    # Its translation weighs the roller's mass on two springs, its traction the third of it that turns with the slip.
+    shortest, damping = math.sqrt(mass / (2.0 * stiffness)), 2.0 * ratio * math.sqrt(mass / (3.0 * stiffness))
+    return ElasticContact(start + place * scene.bearing.rollers, shortest, damping)
 
 
 def _form(harmonics: list[Harmonic]) -> Any:
