@@ -17,11 +17,6 @@ CHAPTER = Path(doe.manual.__file__).with_name("20_own_bearing.md")
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 # Figures are those of one machine; on another the motion parts from them within a turn, and errors scatter.
 CLOSE = 0.15
-# Half the replicates of a design run, and none lengthened: twenty runs together still place the pick.
-BRIEF = (
-    'numerics.replicates=8", "numerics.companion=false"',
-    ('numerics.replicates=4", "numerics.companion=false", "numerics.extend=false"'),
-)
 
 
 def told(line):
@@ -61,14 +56,15 @@ def test_own_bearing_runs_as_told(tmp_path):
             study = tmp_path / "study.toml"
             whole = study.read_text(encoding="utf-8")
             assert whole.count(text.replace("upper = 135.0\n", "")) == 1
-            assert whole.count(BRIEF[0]) == 1
-            brief = whole.replace(text.replace("upper = 135.0\n", ""), text).replace(*BRIEF)
-            study.write_text(brief, encoding="utf-8")
+            study.write_text(whole.replace(text.replace("upper = 135.0\n", ""), text), encoding="utf-8")
         else:
             lines = dict(map(told, printed.splitlines()))
             for line in text.splitlines():
                 words, numbers = told(line)
-                assert len(lines[words]) == len(numbers) and all(map(agrees, lines[words], numbers)), line
+                assert len(lines[words]) == len(numbers), line
+                # The front is flat in some clearances, where another machine may pick others: its verdicts are words.
+                sure = numbers if program == "rbdyn" else numbers[: 2 if "<=" in line else 1]
+                assert all(map(agrees, lines[words], sure)), line
                 quoted += 1
     assert quoted > 15
 
