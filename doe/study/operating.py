@@ -6,10 +6,10 @@ from doe import clearance
 from doe.arrays import Array
 from doe.study_file import Study
 from rbdyn.faults import MethodError
-from rbdyn.properties.catalogue import classes_at, envelope
-from rbdyn.properties.designation import read_designation
+from rbdyn.properties.catalogue import classes_at
 from rbdyn.records.record import Record
 from rbdyn.scene import Scene
+from rbdyn.scene.catalogue_notes import catalogued
 
 RADIAL = "bearing.radial_clearance_mm"
 # Which clearance of a scene a key holds as drawn.
@@ -54,8 +54,8 @@ def bore_of(scene: Scene) -> float | None:
     """Bore of the bearing [mm]; None where the scene does not state it."""
     if scene.mounting is not None:
         return scene.mounting.bore_mm
-    name = scene.bearing.designation
-    return None if name is None else envelope(read_designation(name)).bore
+    listed = catalogued(scene.bearing)
+    return None if listed is None else listed[1].bore
 
 
 def class_sentence(bore: float, drawn_um: float, kind: str) -> str:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from rbdyn.cli.new_mounting import mounting_values
 from rbdyn.life.roller_capacity import REFERENCE_SPEED_FACTOR
-from rbdyn.properties.cages import cage_estimate
+from rbdyn.properties.cages import SMALLEST_CLEARANCE_MM, cage_estimate
 from rbdyn.properties.catalogue import Envelope, RollerInterior, ball_interior, radial_clearance, roller_interior
 from rbdyn.properties.designation import CAGES, Designation
 from rbdyn.properties.materials import MATERIALS
@@ -20,7 +20,7 @@ POLYAMIDE_DENSITY = 1.3e-3
 # Where no suffix names a cage.
 USUAL_CAGE = "MA"
 # Guide clearance in pitch diameters.
-GUIDE_CLEARANCE, SMALLEST_CLEARANCE_MM = 0.004, 0.05
+GUIDE_CLEARANCE = 0.004
 # Half-widths at which the oil begins unless a jet floods the inlet; share of oil in the cavity, less where little oil enters.
 INLET_DISTANCE, FLOODED_SUPPLIES = 5.0, ("jet",)
 OIL_FRACTION, SCARCE_FRACTION, SCARCE_SUPPLIES = 0.02, 0.005, ("drop", "oil_air", "grease")

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from rbdyn.compiled.kernel import kernel
 
-# Where the film of a flooded pair ends.
+# No film ends farther out: that of a flooded pair ends at 0.47513.
 FLOODED_END = 0.4754
 MARTIN = 4.895
 BISECTIONS = 60

@@ -106,6 +106,18 @@ class Bearing(Consistent):
         return self.roller_diameter_mm / self.pitch_diameter_mm
 
     @property
+    def rated_sizes(self) -> tuple[int, float, float, float]:
+        """What ratings by ISO 281 and ISO 76 ask for: rollers, their diameter and effective length, pitch diameter [m]."""
+        return self.rollers, self.roller_diameter, self.effective_length, self.pitch_diameter
+
+    @property
+    def rated_capacity(self) -> float:
+        """Basic dynamic capacity [N]: the catalogue's, or by ISO 281 from the dimensions."""
+        from rbdyn.life.roller_capacity import dynamic_capacity
+
+        return self.dynamic_capacity_N or dynamic_capacity(*self.rated_sizes)
+
+    @property
     def profile_table(self) -> list[tuple[float, float]] | None:
         """Points of the profile: distance from the middle, drop [m]."""
         points = self.profile_table_mm_um

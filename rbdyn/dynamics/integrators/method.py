@@ -72,6 +72,7 @@ def cheaper_method(
 
     ``control_by(method)`` is the step control; ``carry`` and ``tally`` stand at the start of the run and are left as they are.
     """
+    # Elastic contacts have no stiff traction, and the implicit method has no room for their coefficients.
     if scene.traction.elasticity:
         return pair, np.zeros(at.STIFFNESS)
     trial_s = TRIAL_TURNS * scene.turn_s

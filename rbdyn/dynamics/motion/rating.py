@@ -7,7 +7,6 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.dynamics.forces.slice_loads import slice_loads
 from rbdyn.dynamics.parameters.model import race_contact_law
-from rbdyn.life.roller_capacity import dynamic_capacity
 from rbdyn.life.rollers import ReferenceLife, reference_life
 from rbdyn.life.turns import turning_rings
 from rbdyn.scene import Scene
@@ -20,19 +19,16 @@ def rating_life(scene: Scene, azimuth: Array, inner_load: Array, outer_load: Arr
     Loads spread over the slices as at rest. Edge stresses count where the roller has a profile; a plain cylinder's
     ends would need a half-space solution. Rings that turn see the mean over all rollers, a ring at rest each place.
     """
-    drawing = scene.bearing
-    diameter = drawing.roller_diameter
-    sizes = drawing.rollers, diameter, drawing.effective_length, drawing.pitch_diameter
-    capacity = drawing.dynamic_capacity_N or dynamic_capacity(*sizes)
+    drawing, radius = scene.bearing, 0.5 * scene.bearing.roller_diameter
     nx, ny = np.cos(azimuth), np.sin(azimuth)
     inner, outer = (
-        slice_loads(race_contact_law(scene, race), scene.slices, 0.5 * diameter, loads, nx, ny)
+        slice_loads(race_contact_law(scene, race), scene.slices, radius, loads, nx, ny)
         for race, loads in (("inner", inner_load), ("outer", outer_load))
     )
     return reference_life(
         inner,
         outer,
-        capacity=capacity,
+        capacity=drawing.rated_capacity,
         gamma=drawing.diameter_ratio,
         turning=turning_rings(*scene.operation.speeds),
         angle=np.mod(azimuth, 2.0 * math.pi),

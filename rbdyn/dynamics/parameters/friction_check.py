@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from rbdyn.life.maker_friction import FrictionMoments, iso_15312_heat, skf_moments
+from rbdyn.life.maker_friction import iso_15312_heat, skf_moments
 from rbdyn.scene import Scene
 from rbdyn.scene.catalogue_notes import catalogued
 
@@ -10,10 +10,11 @@ from rbdyn.scene.catalogue_notes import catalogued
 USUAL_RATIO = (0.5, 2.0)
 
 
-def maker_moments(scene: Scene) -> FrictionMoments | None:
-    """SKF's moments [N m] at the speed, load and oil of a scene; None without a designation, or where a schedule varies them.
+def friction_check(scene: Scene, power_loss: float) -> dict[str, float | None] | None:
+    """SKF's moments [N mm] and power, the heat of ISO 15312, and the simulated ``power_loss`` [W] over SKF's power.
 
-    The load is the steady one with what rotates in line with it.
+    At the speed, load and oil of the scene; the load is the steady one with what rotates in line with it. None without a
+    designation, or where a schedule varies them; the ratio is None where SKF's power is nil: no load, or no speed.
     """
     listed = catalogued(scene.bearing)
     if listed is None or scene.operation.schedule is not None:
@@ -23,24 +24,13 @@ def maker_moments(scene: Scene) -> FrictionMoments | None:
     oil, load = scene.lubricant.in_service, scene.operation.largest_load_N
     lengths = 1e-3 * sizes.bore, 1e-3 * sizes.outside
     viscosity, supply = oil.viscosity / oil.density, scene.lubricant.supply
-    return skf_moments(named.series, *lengths, inner - outer, viscosity, load, supply=supply)
-
-
-def friction_check(scene: Scene, power_loss: float) -> dict[str, float | None] | None:
-    """SKF's moments [N mm] and power, the heat of ISO 15312, and the simulated ``power_loss`` [W] over SKF's power.
-
-    None as ``maker_moments``; the ratio is None where SKF's power is nil: no load, or no speed.
-    """
-    moments, listed = maker_moments(scene), catalogued(scene.bearing)
-    if moments is None or listed is None:
-        return None
-    inner, outer = scene.operation.speeds
+    moments = skf_moments(named.series, *lengths, inner - outer, viscosity, load, supply=supply)
     power = sum(moments) * abs(inner - outer)
     return {
         "skf_power_W": power,
         "skf_rolling_moment_N_mm": 1e3 * moments.rolling,
         "skf_sliding_moment_N_mm": 1e3 * moments.sliding,
-        "iso_15312_heat_W": iso_15312_heat(listed[1]),
+        "iso_15312_heat_W": iso_15312_heat(sizes),
         "ratio": power_loss / power if power > 0.0 else None,
     }
 

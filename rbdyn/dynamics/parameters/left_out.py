@@ -10,7 +10,7 @@ from rbdyn.contact.hertz_line import palmgren
 from rbdyn.dynamics.forces.drag import AIR_DENSITY
 from rbdyn.fields import RPM
 from rbdyn.life.maker_friction import SERIES
-from rbdyn.life.roller_capacity import REFERENCE_SPEED, dynamic_capacity, minimum_loads, static_capacity
+from rbdyn.life.roller_capacity import REFERENCE_SPEED, minimum_loads, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
 from rbdyn.scene.catalogue_notes import catalogued
@@ -174,8 +174,6 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
     A designation gives the factor k_r and the reference speed of SKF's rule, and the mean diameter of bore and outside.
     """
     drawing, operation = scene.bearing, scene.operation
-    sizes = drawing.rollers, drawing.roller_diameter, drawing.effective_length, drawing.pitch_diameter
-    capacity = drawing.dynamic_capacity_N or dynamic_capacity(*sizes)
     inner, outer = operation.speeds
     diameter, of_series = drawing.pitch_diameter, None
     if (known := catalogued(drawing)) is not None:
@@ -183,7 +181,8 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
         diameter = 0.5e-3 * (box.bore + box.outside)
         usual = REFERENCE_SPEED / diameter
         of_series = SERIES[named.series].minimum_load, (box.reference_speed or usual / RPM) * RPM
-    rules = minimum_loads(diameter, inner - outer, capacity, static_capacity(*sizes), of_series)
+    capacities = drawing.rated_capacity, static_capacity(*drawing.rated_sizes)
+    rules = minimum_loads(diameter, inner - outer, *capacities, of_series)
     load = operation.largest_load_N
     missed = sum(load < least for least in rules.values())
     if not missed:
@@ -196,9 +195,7 @@ def light_load_notes(scene: Scene) -> tuple[str, ...]:
 
 def film_drive_notes(scene: Scene) -> tuple[str, ...]:
     """A note where the load is so small that oil films, and no longer loaded contacts, drive the rollers."""
-    drawing, load = scene.bearing, scene.operation.largest_load_N
-    sizes = drawing.rollers, drawing.roller_diameter, drawing.effective_length, drawing.pitch_diameter
-    capacity = drawing.dynamic_capacity_N or dynamic_capacity(*sizes)
+    load, capacity = scene.operation.largest_load_N, scene.bearing.rated_capacity
     if load >= FILM_DRIVEN * capacity:
         return ()
     why = f"load: {load:.4g} N is below {100.0 * FILM_DRIVEN:g} % of C = {1e-3 * capacity:.3g} kN, so cage slip rests on the drag of oil films"

@@ -28,7 +28,7 @@ from rbdyn.dynamics.forces.race_form import RoundRace, largest_rise, wavy_race
 from rbdyn.dynamics.forces.races import EqualRollers, Race, unequal_rollers
 from rbdyn.dynamics.forces.ring_motion import HeldRing
 from rbdyn.dynamics.parameters.race_traction import race_traction, rolling_contacts
-from rbdyn.dynamics.parameters.scales import layout_of
+from rbdyn.dynamics.parameters.scales import contact_approach, layout_of
 from rbdyn.properties.lubricants import Oil
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.scene import Scene
@@ -100,8 +100,7 @@ def _tangential(scene: Scene, place: int) -> RigidContact | ElasticContact:
         return RigidContact()
     # Of the most loaded roller (Stribeck), between its two races.
     load = 5.0 * max(scene.operation.largest_load_N, 1.0) / scene.bearing.rollers
-    law = palmgren(_modulus(scene, "roller", "rings"), scene.bearing.effective_length)
-    stiffness = 10.0 / 9.0 * load / (load / law.stiffness) ** 0.9
+    stiffness = 10.0 / 9.0 * load / contact_approach(scene, load)
     mass = scene.geometry.roller_mass
     ratio = 0.0 if scene.model.race_damping == "off" else scene.model.race_damping_ratio
     # Its translation weighs the roller's mass on two springs, its traction the third of it that turns with the slip.

@@ -59,11 +59,12 @@ def scales(scene: Scene) -> Scales:
 def _scales(scene: Scene) -> Scales:
     geometry, mass = scene.geometry, scene.geometry.roller_mass
     load = max(scene.operation.largest_load_N / scene.bearing.rollers, geometry.centrifugal_force, 9.81 * mass)
-    approach = _approach(scene, load)
+    approach = contact_approach(scene, load)
     return Scales(load, approach, approach * _frequency(load, approach, mass))
 
 
-def _approach(scene: Scene, load: float) -> float:
+def contact_approach(scene: Scene, load: float) -> float:
+    """Approach [m] of a race contact under a load [N] by Palmgren's law."""
     modulus = equivalent_modulus(scene.material("roller"), scene.material("rings"))
     return float((load / palmgren(modulus, scene.bearing.effective_length).stiffness) ** 0.9)
 
@@ -88,7 +89,7 @@ def light_contact(scene: Scene) -> LightContact | None:
     force, mass, laws = scene.geometry.centrifugal_force, scene.geometry.roller_mass, scene.model
     if not 0.0 < force < LIGHT * scales(scene).load:
         return None
-    approach = _approach(scene, force)
+    approach = contact_approach(scene, force)
     frequency = _frequency(force, approach, mass)
     engaged = min(approach * laws.race_damping_rate, 1.0)
     damping = {
