@@ -158,7 +158,7 @@ def alike(one: Any, other: Any) -> bool:
     """Whether two sets of parameters are of one type, and made of numbers only; known at compile time."""
     if isinstance(one, tuple) and type(one) is type(other):
         return all(alike(x, y) for x, y in zip(one, other, strict=True))
-    return isinstance(one, float) and isinstance(other, float)
+    return isinstance(one, float | int) and isinstance(other, float | int)
 
 
 @numba.extending.overload(alike, jit_options=INLINED)  # type: ignore[arg-type]
@@ -191,11 +191,11 @@ def _either(first, one, other):
 
 
 def _mixable(one: Any, other: Any) -> bool:
-    return one == other and all(isinstance(leaf, types.Float) for leaf in _leaves(one))
+    return one == other and all(isinstance(leaf, types.Number) for leaf in _leaves(one))
 
 
 def _choice(of: Any) -> Callable[..., Any]:
-    if isinstance(of, types.Float):
+    if isinstance(of, types.Number):
 
         def body(first, one, other):
             return one if first else other

@@ -50,6 +50,17 @@ class CoulombTraction(NamedTuple):
     blend_speed: float  # u_r [m/s]
 
 
+class SurfaceAxes(NamedTuple):
+    """Where a slip and a load stand in the table of a ``TractionSurface``."""
+
+    speed_density: float  # 1/u_0 [s/m]
+    slip_density: float  # cells along ln(1 + x) [-]
+    last_slip: float  # where the cells end [cells]
+    load_origin: float  # sqrt(load) where they begin [sqrt(N)]
+    load_density: float  # cells along sqrt(load) [1/sqrt(N)]
+    last_load: float  # where the cells end [cells]
+
+
 class TractionSurface(NamedTuple):
     """mu over slip u and load Q from a table: mu = x/(1 + x) exp(L), x = u/u_0.
 
@@ -57,14 +68,9 @@ class TractionSurface(NamedTuple):
     goes as sqrt(Q). Cells are uniform. Past the table L lands on a constant within one cell, without a kink.
     """
 
+    axes: SurfaceAxes
     cells: Array  # (slip cells x load cells, 16): polynomial of each, load fastest
     columns: int  # cells along sqrt(load)
-    speed_density: float  # 1/u_0 [s/m]
-    slip_density: float  # cells along ln(1 + x) [-]
-    last_slip: float  # where the cells end [cells]
-    load_origin: float  # sqrt(load) where they begin [sqrt(N)]
-    load_density: float  # cells along sqrt(load) [1/sqrt(N)]
-    last_load: float  # where the cells end [cells]
 
 
 class MixedTraction(NamedTuple):
@@ -141,18 +147,103 @@ def _(model, slip, load):
 
 @traction.body(TractionSurface)
 def _(model, slip, load):
-    # NaN of the slip comes through the ratio; both positions are within the table whatever comes in.
-    ratio = abs(slip) * model.speed_density
-    ratio = LARGEST_SPEED_RATIO if ratio > LARGEST_SPEED_RATIO else ratio
-    whole = 1.0 + ratio
-    along = fast_log(whole) * model.slip_density
+    along, across = table_place(model.axes, slip, load)
+    return traction_by_table(model.axes, slip, load, table_value(model, along, across))
+
+
+@traction.body(MixedTraction)
+def _(model, slip, load):
+    return mixed(model, slip, load, traction(model.fluid, slip, load))
+
+
+@kernel
+def mixed(model, slip, load, film):
+    """Traction coefficient of asperities and a film whose own coefficient is ``film``."""
+    share = asperity_load_share(model.share_scale, model.share_exponent, load)
+    rubbing = model.boundary * fast_tanh(slip / model.blend_speed)
+    return share * rubbing + (1.0 - share) * film
+
+
+@law
+def without_table(model):
+    """A law as numbers alone: with ``SurfaceAxes`` where it has a table, for ``table_place`` and ``traction_by_table``."""
+
+
+@without_table.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+def _(model):
+    return model
+
+
+@without_table.body(TractionSurface)
+def _(model):
+    return model.axes
+
+
+@without_table.body(MixedTraction)
+def _(model):
+    return MixedTraction(
+        without_table(model.fluid), model.boundary, model.blend_speed, model.share_scale, model.share_exponent
+    )
+
+
+@law
+def table_place(model, slip, load):
+    """Where a slip [m/s] and a load [N] stand in the table of a law [cells]: along the slip, and across by the load."""
+
+
+@table_place.body(SurfaceAxes)
+def _(model, slip, load):
+    along = fast_log(1.0 + slip_ratio(model, slip)) * model.slip_density
     along = along if along < model.last_slip else model.last_slip
     across = (math.sqrt(load if load > 0.0 else 0.0) - model.load_origin) * model.load_density
     across = across if across > 0.0 else 0.0
     across = across if across < model.last_load else model.last_load
+    return along, across
+
+
+@table_place.body(MixedTraction)
+def _(model, slip, load):
+    return table_place(model.fluid, slip, load)
+
+
+@kernel
+def slip_ratio(axes, slip):
+    """Slip over the speed scale of a surface, bounded; NaN comes through."""
+    ratio = abs(slip) * axes.speed_density
+    return LARGEST_SPEED_RATIO if ratio > LARGEST_SPEED_RATIO else ratio
+
+
+@law
+def table_value(model, along, across):
+    """What the table of a law holds at a ``table_place``."""
+
+
+@table_value.body(TractionSurface)
+def _(model, along, across):
+    # Both positions are within the table whatever slip and load are, NaN too.
     i, j = int(along), int(across)
-    exponent = bicubic(model.cells[i * model.columns + j], along - i, across - j)
-    return math.copysign(ratio / whole * fast_exp(exponent), slip)
+    return bicubic(model.cells[i * model.columns + j], along - i, across - j)
+
+
+@table_value.body(MixedTraction)
+def _(model, along, across):
+    return table_value(model.fluid, along, across)
+
+
+@law
+def traction_by_table(model, slip, load, value):
+    """``traction`` of a law without its table, for which ``table_value`` is known."""
+
+
+@traction_by_table.body(SurfaceAxes)
+def _(model, slip, load, value):
+    ratio = slip_ratio(model, slip)
+    return math.copysign(ratio / (1.0 + ratio) * fast_exp(value), slip)
+
+
+@traction_by_table.body(MixedTraction)
+def _(model, slip, load, value):
+    return mixed(model, slip, load, traction_by_table(model.fluid, slip, load, value))
 
 
 @kernel
@@ -163,13 +254,6 @@ def bicubic(c, x, y):
     third = fma(fma(fma(c[11], y, c[10]), y, c[9]), y, c[8])
     fourth = fma(fma(fma(c[15], y, c[14]), y, c[13]), y, c[12])
     return fma(fma(fma(fourth, x, third), x, second), x, first)
-
-
-@traction.body(MixedTraction)
-def _(model, slip, load):
-    share = asperity_load_share(model.share_scale, model.share_exponent, load)
-    rubbing = model.boundary * fast_tanh(slip / model.blend_speed)
-    return share * rubbing + (1.0 - share) * traction(model.fluid, slip, load)
 
 
 @kernel
@@ -284,9 +368,7 @@ class _Grid:
     def surface(self, cells: Array) -> TractionSurface:
         """The law."""
         within = 1.0 - 1e-12  # the last position still lies in the last cell
-        return TractionSurface(
-            cells=cells,
-            columns=self.j.size + 1,
+        axes = SurfaceAxes(
             speed_density=1.0 / self.scale,
             slip_density=1.0 / self.slip_cell,
             last_slip=self.i.size * within,
@@ -294,6 +376,7 @@ class _Grid:
             load_density=1.0 / self.load_cell,
             last_load=(self.j.size + 1) * within,
         )
+        return TractionSurface(axes, cells, self.j.size + 1)
 
 
 def _polynomials(nodes: Array) -> Array:

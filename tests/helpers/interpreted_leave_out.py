@@ -25,6 +25,7 @@ from rbdyn.contact.traction import (
     CoulombTraction,
     FourConstantTraction,
     NoTraction,
+    SurfaceAxes,
     TractionSurface,
 )
 from rbdyn.dynamics.forces.clock import ClockedDrive
@@ -89,9 +90,8 @@ def rigid(bearing):
 
 # Constants of exp in every cell: a coefficient of exp(-700), which is nothing against any other.
 NO_TABLE = TractionSurface(
-    np.concatenate((np.full((16, 1), -700.0), np.zeros((16, 15))), axis=1),
-    4, 1.0, 1.0, 3.5, 0.0, 0.1, 3.5,
-)  # fmt: skip
+    SurfaceAxes(1.0, 1.0, 3.5, 0.0, 0.1, 3.5), np.concatenate((np.full((16, 1), -700.0), np.zeros((16, 15))), axis=1), 4
+)
 NO_POCKET_FILM = PocketFilm(0.0, 0.0, 0.0, 0.0, 1e-6)
 NO_GUIDE = guide(lambda g: NoGuide())
 

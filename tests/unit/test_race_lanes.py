@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import numpy as np
 import pytest
 from numba import njit
+from typer.testing import CliRunner
 
+from rbdyn.cli.app import app
 from rbdyn.compiled.kernel import alike, either, kernel
 from rbdyn.contact.hertz_line import LineContact, sliced
+from rbdyn.contact.traction import TractionSurface
 from rbdyn.dynamics.forces.pocket import NoPocket, pocket_contact, pocket_gap
 from rbdyn.dynamics.forces.race_form import RoundRace
 from rbdyn.dynamics.forces.race_lanes import share_vectors
 from rbdyn.dynamics.parameters.model import roller_bearing
+from rbdyn.scene import Scene
 
 
 @njit
@@ -54,6 +60,15 @@ def test_unit_races_that_share_vectors(outer, everything):
     plain, rich = roller_bearing(outer), roller_bearing(everything)
     assert compiled_share(plain.outer, plain.inner) and not compiled_share(rich.outer, rich.inner)
     assert not compiled_share(plain.outer, plain.inner._replace(contact=rich.inner.contact))
+
+
+def test_unit_races_with_tables_and_elasticity_share_vectors():
+    """Unit: traction tables, which differ in size, and places in the state keep the two races of a catalogue bearing in one vector."""
+    bearing = roller_bearing(Scene.from_dict(tomllib.loads(CliRunner().invoke(app, ["new", "NU210"]).stdout)))
+    one, other = bearing.outer.traction, bearing.inner.traction
+    assert type(one) is TractionSurface and one.cells.shape != other.cells.shape
+    assert bearing.outer.tangential.start != bearing.inner.tangential.start
+    assert compiled_share(bearing.outer, bearing.inner)
 
 
 @pytest.mark.parametrize("assignments", [(), ("cage.guidance=roller", "cage.pocket_radial_clearance_mm=0.06")])

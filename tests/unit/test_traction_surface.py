@@ -124,8 +124,8 @@ def test_unit_surface_is_smooth_and_ends_level(name):
     surface = SURFACES[name]
     step = 1e-6  # of a cell: its slopes vary by about as much, and round-off of L (1e-15) gives 1e-9
     for edge in range(1, surface.columns + 1):
-        root = surface.load_origin + edge / surface.load_density
-        width = step / surface.load_density
+        root = surface.axes.load_origin + edge / surface.axes.load_density
+        width = step / surface.axes.load_density
         logs = [
             math.log(compiled_traction(surface, 0.3, (root + k * width) ** 2))
             for k in (-1.0, 0.0, 1.0)
@@ -137,8 +137,8 @@ def test_unit_surface_is_smooth_and_ends_level(name):
     for edge in range(1, rows + 1):
         logs = []
         for k in (-1.0, 0.0, 1.0):
-            ratio = math.expm1((edge + k * step) / surface.slip_density)
-            mu = compiled_traction(surface, ratio / surface.speed_density, 500.0)
+            ratio = math.expm1((edge + k * step) / surface.axes.slip_density)
+            mu = compiled_traction(surface, ratio / surface.axes.speed_density, 500.0)
             logs.append(math.log(mu * (1.0 + ratio) / ratio))
         assert (logs[1] - logs[0]) / step == pytest.approx((logs[2] - logs[1]) / step, abs=2e-5)
     assert compiled_traction(surface, 1.0, 1e9) == compiled_traction(surface, 1.0, 2.0 * LARGEST)

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from rbdyn.compiled.kernel import kernel, law
+from rbdyn.compiled.kernel import VECTOR, kernel, law
 from rbdyn.contact.open_contact import OpenFilm, film_forces
 from rbdyn.contact.tangential_elasticity import RigidContact
 from rbdyn.dynamics.forces.race_form import form_at
@@ -65,7 +65,8 @@ def _(film, on_ring, race, sizes, ring, rollers, y, row, dy, lanes):
     sums = on_ring
     for start in range(0, rollers, LANES):
         count = min(LANES, rollers - start)
-        for i in range(count):
+        # Whole vectors: behind the last roller stand other numbers of the state, and lanes past ``count`` hold nothing.
+        for i in range((count + VECTOR - 1) // VECTOR * VECTOR):
             j = start + i
             dx, dy_ = y[j] - ring.x, y[rollers + j] - ring.y
             dvx, dvy = y[2 * rollers + j] - ring.vx, y[3 * rollers + j] - ring.vy

@@ -1,7 +1,8 @@
 """Race contacts side by side: blocks of contacts in straight-line code, which the compiler turns into vector code.
 
 Whole vectors of rollers go through the outer race straight from the state. The rest of them, and the rollers that touch
-the inner race, are picked out and, where both races follow the same laws, share vectors.
+the inner race, are picked out and, where both races follow the same laws, share vectors. A traction law with a table takes three
+loops, for a look-up is no vector code: how rollers and race meet, the look-ups one by one, and what follows from both.
 """
 
 from typing import NamedTuple
@@ -29,10 +30,24 @@ from rbdyn.contact.traction import (
     FourConstantTraction,
     MixedTraction,
     NoTraction,
+    SurfaceAxes,
     TractionSurface,
+    table_place,
+    table_value,
+    traction,
+    traction_by_table,
+    without_table,
 )
 from rbdyn.dynamics.forces.race_form import RoundRace, WavyRace
-from rbdyn.dynamics.forces.races import EqualRollers, UnequalRollers, race_contact, roller_radius
+from rbdyn.dynamics.forces.races import (
+    EqualRollers,
+    Race,
+    RaceApproach,
+    UnequalRollers,
+    race_approach,
+    race_wrench,
+    roller_radius,
+)
 from rbdyn.dynamics.forces.state import PARTS
 
 # Contacts are worked through in blocks of LANES, VECTOR at a time; each quantity is a row of a block. Rollers that are
@@ -45,6 +60,13 @@ COEFFICIENTS = SIDES + LANES
 FORCE_X, FORCE_Y, ROLLER_MOMENT, RING_MOMENT, LOAD, TRACTION, ROLLING, DAMPING, COEFFICIENT_RATE = range(
     0, OUTPUTS * LANES, LANES
 )
+# And those of how rollers and race meet, kept between the loops of a law with a table: the fields of ``RaceApproach``, side and
+# traction coefficient, and the place in the table, then what it holds.
+INPUTS = 16
+(
+    NX, NY, INVERSE, SLOPE, LEAN, MET_LOAD, STIFFNESS, MET_DAMPING, ROLLER_LEVER, RING_LEVER, SLIP, ENTRAINMENT,
+    SIDE, COEFFICIENT, ALONG, ACROSS,
+) = range(0, INPUTS * LANES, LANES)  # fmt: skip
 
 
 class OnRing(NamedTuple):
@@ -64,6 +86,7 @@ class Scratch(NamedTuple):
 
     packed: NDArray[np.float64]  # ((PARTS + 3) * LANES,)
     lanes: NDArray[np.float64]  # (OUTPUTS * LANES,)
+    met: NDArray[np.float64]  # (INPUTS * LANES,)
     roller: NDArray[np.int64]  # (LANES,) number of each packed roller
     gap: NDArray[np.float64]  # (rollers,) way that each has left in its pocket [m]
     touching: NDArray[np.int64]  # (rollers,) numbers of those that touch theirs
@@ -74,6 +97,7 @@ def scratch(rollers: int) -> Scratch:
     return Scratch(
         np.ones((PARTS + 3) * LANES),
         np.empty(OUTPUTS * LANES),
+        np.ones(INPUTS * LANES),
         np.zeros(LANES, np.int64),
         np.empty(rollers),
         np.zeros(rollers, np.int64),
@@ -124,6 +148,8 @@ def in_vectors(parameters):
     FourConstantTraction,
     BlendedFourConstantTraction,
     CoulombTraction,
+    SurfaceAxes,
+    TractionSurface,
 )
 def _(parameters):
     return True
@@ -134,8 +160,8 @@ def _(parameters):
     return in_vectors(parameters.fluid)
 
 
-# Loops within and table look-ups keep a contact to itself.
-@in_vectors.body(SlicedLineContact, TiltedLineContact, WavyRace, TractionSurface)
+# Loops within keep a contact to itself.
+@in_vectors.body(SlicedLineContact, TiltedLineContact, WavyRace)
 def _(parameters):
     return False
 
@@ -147,9 +173,24 @@ def runs_in_vectors(race):
 
 
 @kernel
+def lane_race(race):
+    """A race as lanes read it, which is numbers alone: arrays would be counted in and out of each lane."""
+    return Race(
+        race.radius,
+        race.reach,
+        race.form,
+        race.contact,
+        race.damping,
+        without_table(race.traction),
+        race.rolling,
+        race.tangential,
+    )
+
+
+@kernel
 def share_vectors(outer, inner):
     """Whether contacts of both races may stand in one vector."""
-    return runs_in_vectors(inner) and alike(outer, inner)
+    return runs_in_vectors(inner) and alike(lane_race(outer), lane_race(inner))
 
 
 @kernel
@@ -173,9 +214,9 @@ def keep_lane(tangential, lanes, i, wrench):
 
 
 @kernel
-def contact_in_lane(race, side, radius, ring, source, j, stride, coefficient):
-    """``race_contact`` of the roller whose x, y, vx, vy and spin stand at ``source[j + row * stride]``."""
-    return race_contact(
+def approach_in_lane(race, side, radius, ring, source, j, stride):
+    """``race_approach`` of the roller whose x, y, vx, vy and spin stand at ``source[j + row * stride]``."""
+    return race_approach(
         race,
         side,
         radius,
@@ -187,37 +228,134 @@ def contact_in_lane(race, side, radius, ring, source, j, stride, coefficient):
         ring.speed,
         ring.cos,
         ring.sin,
-        coefficient,
     )
 
 
 @kernel
-def outer_block(race, sizes, ring, y, first, rollers, lanes, count):
-    """Outer contacts of ``count`` rollers from ``first`` on, maybe rounded up to whole vectors, into ``lanes``.
-
-    The lanes past ``count`` hold nothing.
-    """
-    radii = radii_in_order(sizes, y)
-    for i in range(lanes_to_fill(race, count)):
-        j = first + i
-        radius = lane_radius(sizes, radii, j)
-        coefficient = coefficient_of(race.tangential, y, j)
-        keep_lane(race.tangential, lanes, i, contact_in_lane(race, 1.0, radius, ring, y, j, rollers, coefficient))
+def keep_approach(met, i, traction_model, approach, side, coefficient):
+    """Write a ``RaceApproach`` to lane ``i``, with side, traction coefficient and place in the table."""
+    met[NX + i] = approach.nx
+    met[NY + i] = approach.ny
+    met[INVERSE + i] = approach.inverse
+    met[SLOPE + i] = approach.slope
+    met[LEAN + i] = approach.lean
+    met[MET_LOAD + i] = approach.load
+    met[STIFFNESS + i] = approach.stiffness
+    met[MET_DAMPING + i] = approach.damping
+    met[ROLLER_LEVER + i] = approach.roller_lever
+    met[RING_LEVER + i] = approach.ring_lever
+    met[SLIP + i] = approach.slip
+    met[ENTRAINMENT + i] = approach.entrainment
+    met[SIDE + i] = side
+    met[COEFFICIENT + i] = coefficient
+    met[ALONG + i], met[ACROSS + i] = table_place(traction_model, approach.slip, approach.load)
 
 
 @kernel
-def picked_block(outer, inner, sizes, outer_ring, inner_ring, packed, lanes, count):
-    """As ``outer_block``, for packed contacts: of either race where they share vectors, else of the inner one."""
+def approach_of_lane(met, i):
+    """The ``RaceApproach`` in lane ``i``."""
+    return RaceApproach(
+        met[NX + i],
+        met[NY + i],
+        met[INVERSE + i],
+        met[SLOPE + i],
+        met[LEAN + i],
+        met[MET_LOAD + i],
+        met[STIFFNESS + i],
+        met[MET_DAMPING + i],
+        met[ROLLER_LEVER + i],
+        met[RING_LEVER + i],
+        met[SLIP + i],
+        met[ENTRAINMENT + i],
+    )
+
+
+@kernel
+def look_up(traction_model, met, first, count):
+    """Put what the table holds for the lanes from ``first`` to ``count`` where their places stood."""
+    for i in range(first, count):
+        met[ALONG + i] = table_value(traction_model, met[ALONG + i], met[ACROSS + i])
+
+
+@kernel
+def wrenches(outer, inner, met, lanes, count):
+    """Write what follows from approaches and look-ups to ``lanes``; races as ``lane_race``."""
+    for i in range(lanes_to_fill(inner, count)):
+        side = met[SIDE + i]
+        race, approach = either(side > 0.0, outer, inner), approach_of_lane(met, i)
+        steady = traction_by_table(race.traction, approach.slip, approach.load, met[ALONG + i])
+        keep_lane(race.tangential, lanes, i, race_wrench(race, side, approach, steady, met[COEFFICIENT + i]))
+
+
+@law
+def outer_block(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
+    """Outer contacts of ``count`` rollers from ``first`` on, maybe rounded up to whole vectors, into the lanes of ``scratch``.
+
+    The lanes past ``count`` hold nothing. ``traction_model``: that of the race.
+    """
+
+
+@outer_block.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
+    radii = radii_in_order(sizes, y)
+    for i in range(lanes_to_fill(race, count)):
+        j = first + i
+        approach = approach_in_lane(race, 1.0, lane_radius(sizes, radii, j), ring, y, j, rollers)
+        steady = traction(race.traction, approach.slip, approach.load)
+        coefficient = coefficient_of(race.tangential, y, j)
+        keep_lane(race.tangential, scratch.lanes, i, race_wrench(race, 1.0, approach, steady, coefficient))
+
+
+@outer_block.body(TractionSurface)
+def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
+    radii, bare = radii_in_order(sizes, y), lane_race(race)
+    for i in range(lanes_to_fill(race, count)):
+        j = first + i
+        approach = approach_in_lane(bare, 1.0, lane_radius(sizes, radii, j), ring, y, j, rollers)
+        keep_approach(scratch.met, i, bare.traction, approach, 1.0, coefficient_of(bare.tangential, y, j))
+    look_up(race.traction, scratch.met, 0, count)
+    wrenches(bare, bare, scratch.met, scratch.lanes, count)
+
+
+@outer_block.body(MixedTraction)
+def _(traction_model, race, sizes, ring, y, first, rollers, scratch, count):
+    outer_block(traction_model.fluid, race, sizes, ring, y, first, rollers, scratch, count)
+
+
+@law
+def picked_block(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
+    """As ``outer_block``, for packed contacts: of either race where they share vectors, ``outer_count`` of them first, else of the
+    inner one."""
+
+
+@picked_block.body(NoTraction, FourConstantTraction, BlendedFourConstantTraction, CoulombTraction)
+def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
+    packed = scratch.packed
     for i in range(lanes_to_fill(inner, count)):
         side = packed[SIDES + i]
         race, ring = either(side > 0.0, outer, inner), either(side > 0.0, outer_ring, inner_ring)
-        radius = lane_radius(sizes, packed, RADII + i)
-        keep_lane(
-            race.tangential,
-            lanes,
-            i,
-            contact_in_lane(race, side, radius, ring, packed, i, LANES, packed[COEFFICIENTS + i]),
-        )
+        approach = approach_in_lane(race, side, lane_radius(sizes, packed, RADII + i), ring, packed, i, LANES)
+        steady = traction(race.traction, approach.slip, approach.load)
+        coefficient = packed[COEFFICIENTS + i]
+        keep_lane(race.tangential, scratch.lanes, i, race_wrench(race, side, approach, steady, coefficient))
+
+
+@picked_block.body(TractionSurface)
+def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
+    packed, bare_outer, bare_inner = scratch.packed, lane_race(outer), lane_race(inner)
+    for i in range(lanes_to_fill(inner, count)):
+        side = packed[SIDES + i]
+        race, ring = either(side > 0.0, bare_outer, bare_inner), either(side > 0.0, outer_ring, inner_ring)
+        approach = approach_in_lane(race, side, lane_radius(sizes, packed, RADII + i), ring, packed, i, LANES)
+        keep_approach(scratch.met, i, race.traction, approach, side, packed[COEFFICIENTS + i])
+    look_up(outer.traction, scratch.met, 0, outer_count)
+    look_up(inner.traction, scratch.met, outer_count, count)
+    wrenches(bare_outer, bare_inner, scratch.met, scratch.lanes, count)
+
+
+@picked_block.body(MixedTraction)
+def _(traction_model, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count):
+    picked_block(traction_model.fluid, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count)
 
 
 @kernel
@@ -267,7 +405,7 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
     start = 0
     while start < in_order:
         count = min(LANES, in_order - start)
-        outer_block(outer, sizes, outer_ring, y, start, rollers, lanes, count)
+        outer_block(outer.traction, outer, sizes, outer_ring, y, start, rollers, scratch, count)
         for i in range(count):
             add_to_roller(lanes, i, start + i, rollers, row, dy)
             add_coefficient_rate(outer.tangential, lanes[COEFFICIENT_RATE + i], start + i, row, dy)
@@ -291,7 +429,7 @@ def race_forces(outer, inner, sizes, outer_ring, inner_ring, rollers, y, row, dy
                 count += 1
             left += 1
         if count > 0:
-            picked_block(outer, inner, sizes, outer_ring, inner_ring, scratch.packed, lanes, count)
+            picked_block(inner.traction, outer, inner, sizes, outer_ring, inner_ring, scratch, outer_count, count)
         for i in range(count):
             add_to_roller(lanes, i, index[i], rollers, row, dy)
         for i in range(outer_count):

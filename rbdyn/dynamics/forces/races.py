@@ -86,18 +86,31 @@ class RaceWrench(NamedTuple):
     coefficient_rate: float
 
 
-@kernel
-def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin, coefficient):
-    """``RaceWrench`` of one race on one roller; zero, but for round-off, where they do not touch.
+class RaceApproach(NamedTuple):
+    """How a roller meets a race: outward unit vector from ring to roller, 1/distance of the centres [1/m], slope of the race's form
+    and lean of the load [m/rad].
 
-    ``dx, dy, dvx, dvy``: position [m] and velocity [m/s] of the roller's centre less those of the ring's centre;
-    spins [rad/s]; ``ring_cos, ring_sin``: direction of the ring's mark; ``coefficient``: that of the traction, where it is a state.
-
-    Load: Chen et al. 2022, eq 5-6; slip at the point that halves the approach: eq 7-10; rolling resistance with
-    the pressure offset 2 F_R R_x/R_b: Biboulet and Houpert 2010. On a wavy race the load points along the gradient of
-    the overlap: through the roller's centre, past the ring's; so it does between tilted races, whose tilt, being
-    prescribed, bears the moment that this makes about the ring's centre.
+    Then the load [N], the contact's tangent stiffness [N/m], the power of its damping [W], the levers of roller and ring [m], slip and
+    entrainment [m/s].
     """
+
+    nx: float
+    ny: float
+    inverse: float
+    slope: float
+    lean: float
+    load: float
+    stiffness: float
+    damping: float
+    roller_lever: float
+    ring_lever: float
+    slip: float
+    entrainment: float
+
+
+@kernel
+def race_approach(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin):
+    """``RaceApproach`` of one roller to one race; arguments as in ``race_contact``."""
     distance = math.sqrt(dx * dx + dy * dy)
     inverse = 1.0 / distance
     nx, ny = dx * inverse, dy * inverse
@@ -120,24 +133,61 @@ def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, 
     # Seen from the line of centres both surfaces run the same way at the entrainment speed.
     roller_surface = (roller_spin - orbit_rate) * roller_lever
     ring_surface = (ring_speed - orbit_rate) * ring_lever
-    entrainment = 0.5 * (roller_surface + ring_surface)
-    speed = max(abs(entrainment), SMALLEST_SPEED)
-    steady = traction(race.traction, slip, load)
+    return RaceApproach(
+        nx,
+        ny,
+        inverse,
+        slope,
+        lean,
+        load,
+        stiffness,
+        (load - elastic) * approach_rate,
+        roller_lever,
+        ring_lever,
+        slip,
+        0.5 * (roller_surface + ring_surface),
+    )
+
+
+@kernel
+def race_wrench(race, side, approach, steady, coefficient):
+    """``RaceWrench`` of a ``RaceApproach`` with the traction coefficients of the steady law and of the state."""
+    load, slip, stiffness = approach.load, approach.slip, approach.stiffness
+    speed = max(abs(approach.entrainment), SMALLEST_SPEED)
     traction_force = acting_coefficient(race.tangential, steady, coefficient, load, slip, stiffness) * load
     resistance = rolling_force(race.rolling, load, speed)
-    rolling = math.copysign(resistance, entrainment)
+    rolling = math.copysign(resistance, approach.entrainment)
     normal = -side * load
-    along = traction_force + rolling * (ring_lever + roller_lever) * inverse
-    along -= sloped(race.form, slope, normal * inverse) + around(race.contact, lean, load * inverse)
+    along = traction_force + rolling * (approach.ring_lever + approach.roller_lever) * approach.inverse
+    along -= sloped(race.form, approach.slope, normal * approach.inverse) + around(
+        race.contact, approach.lean, load * approach.inverse
+    )
     return RaceWrench(
-        normal * nx - along * ny,
-        normal * ny + along * nx,
-        roller_lever * (traction_force - rolling),
-        -ring_lever * (traction_force + rolling) - sloped(race.form, slope, -normal),
+        normal * approach.nx - along * approach.ny,
+        normal * approach.ny + along * approach.nx,
+        approach.roller_lever * (traction_force - rolling),
+        -approach.ring_lever * (traction_force + rolling) - sloped(race.form, approach.slope, -normal),
         load,
         traction_force * slip,
-        2.0 * rolling * entrainment,
-        (load - elastic) * approach_rate,
+        2.0 * rolling * approach.entrainment,
+        approach.damping,
         slip,
         coefficient_rate(race.tangential, steady, coefficient, load, slip, stiffness),
     )
+
+
+@kernel
+def race_contact(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin, coefficient):
+    """``RaceWrench`` of one race on one roller; zero, but for round-off, where they do not touch.
+
+    ``dx, dy, dvx, dvy``: position [m] and velocity [m/s] of the roller's centre less those of the ring's centre;
+    spins [rad/s]; ``ring_cos, ring_sin``: direction of the ring's mark; ``coefficient``: that of the traction, where it is a state.
+
+    Load: Chen et al. 2022, eq 5-6; slip at the point that halves the approach: eq 7-10; rolling resistance with
+    the pressure offset 2 F_R R_x/R_b: Biboulet and Houpert 2010. On a wavy race the load points along the gradient of
+    the overlap: through the roller's centre, past the ring's; so it does between tilted races, whose tilt, being
+    prescribed, bears the moment that this makes about the ring's centre.
+    """
+    approach = race_approach(race, side, radius, dx, dy, dvx, dvy, roller_spin, ring_speed, ring_cos, ring_sin)
+    steady = traction(race.traction, approach.slip, approach.load)
+    return race_wrench(race, side, approach, steady, coefficient)
