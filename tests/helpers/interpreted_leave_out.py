@@ -14,12 +14,10 @@ from conftest import law_types, make, right_hand_side, state_near_contact
 from interpreted_invariants import REWRITTEN, on_both
 
 from rbdyn.accuracy.rollers.option_cost import OPTIONS
+from rbdyn.contact.cage_film import PocketFilm, ShortJournalFilm
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
-from rbdyn.contact.film import ShortJournalFilm
 from rbdyn.contact.hertz_line import LineContact, LineContactOnBar, PowerLineContact
-from rbdyn.contact.open_contact import OpenFilm
-from rbdyn.contact.pocket_film import PocketFilm
-from rbdyn.contact.rolling_resistance import NoRollingResistance, RollingResistance, StarvedRollingResistance
+from rbdyn.contact.rolling_resistance import NoRollingResistance, OpenFilm, RollingResistance, StarvedRollingResistance
 from rbdyn.contact.traction import (
     BlendedFourConstantTraction,
     CoulombTraction,

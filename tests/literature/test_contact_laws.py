@@ -24,7 +24,7 @@ from rbdyn.compiled.elementary import (
     rough_power,
     tenth_root,
 )
-from rbdyn.contact import damping, film, hertz_line, rolling_resistance, traction
+from rbdyn.contact import cage_film, damping, hertz_line, rolling_resistance, traction
 from rbdyn.properties.lubricants import oil_at
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
 
@@ -325,7 +325,7 @@ def film_by_quadrature(eccentricity, radial_rate, wedge_rate):
 def test_literature_ocvirk_half_film(eccentricity, sense):
     """Literature: pure wedge is Ocvirk's half film, to 1e-12 (round-off over 1 - eps)."""
     omega = sense * 1000.0
-    radial, across = film.journal_film_force(2.0, eccentricity, 0.0, eccentricity * omega)
+    radial, across = cage_film.journal_film_force(2.0, eccentricity, 0.0, eccentricity * omega)
     narrow = 1.0 - eccentricity**2
     assert radial == pytest.approx(-2.0 * abs(omega) * eccentricity**2 / narrow**2, rel=1e-12, abs=1e-12)
     expected = 2.0 * omega * math.pi * eccentricity / (4.0 * narrow**1.5)
@@ -337,10 +337,10 @@ def test_literature_ocvirk_half_film(eccentricity, sense):
 def test_oracle_film_against_quadrature(eccentricity, direction, size):
     """Oracle: any mixture of squeeze and wedge equals the integral of the positive pressure, to 1e-9."""
     radial_rate, wedge_rate = size * math.cos(direction), size * math.sin(direction)
-    force = np.array(film.journal_film_force(1.0, eccentricity, radial_rate, wedge_rate))
+    force = np.array(cage_film.journal_film_force(1.0, eccentricity, radial_rate, wedge_rate))
     expected = film_by_quadrature(eccentricity, radial_rate, wedge_rate)
     assert np.abs(force - expected).max() < 1e-9 * np.abs(expected).max()
-    interpreted = film.journal_film_force.py_func(1.0, eccentricity, radial_rate, wedge_rate)
+    interpreted = cage_film.journal_film_force.py_func(1.0, eccentricity, radial_rate, wedge_rate)
     assert np.abs(force - interpreted).max() < 1e-11 * np.abs(expected).max()
 
 
@@ -348,18 +348,18 @@ def test_oracle_film_against_quadrature(eccentricity, direction, size):
 @settings(max_examples=200, deadline=None)
 def test_invariant_film_resists_motion(eccentricity, radial_rate, whirl_rate):
     """Invariant: without spin, the film takes power from any motion of the journal; at rest it gives no force."""
-    radial, across = film.journal_film_force(1.0, eccentricity, radial_rate, -2.0 * eccentricity * whirl_rate)
+    radial, across = cage_film.journal_film_force(1.0, eccentricity, radial_rate, -2.0 * eccentricity * whirl_rate)
     taken = radial * radial_rate + across * eccentricity * whirl_rate
     # Round-off where wedge and squeeze nearly balance.
     assert taken <= 1e-12 * (abs(radial * radial_rate) + abs(across * eccentricity * whirl_rate))
-    assert film.journal_film_force(1.0, eccentricity, 0.0, 0.0) == (0.0, 0.0)
+    assert cage_film.journal_film_force(1.0, eccentricity, 0.0, 0.0) == (0.0, 0.0)
 
 
 def test_literature_petrov():
     """Literature: a centred journal feels Petrov's moment 2 pi eta R^3 L omega/c and no force, exactly."""
     from rbdyn.dynamics.forces.guide_land import film_wrench
 
-    land = film.short_journal_film(2.87e-3, 24.7e-3, 3e-3, 2, 75e-6, 3e-6, 0.5)
+    land = cage_film.short_journal_film(2.87e-3, 24.7e-3, 3e-3, 2, 75e-6, 3e-6, 0.5)
     fx, fy, on_journal, on_bearing, _, power, *_ = film_wrench(land, 1.0, 0.0, 0.0, 0.0, 0.0, 996.6, 100.0)
     petrov = 0.5 * 2 * 2.0 * math.pi * 2.87e-3 * 24.7e-3**3 * 3e-3 * (996.6 - 100.0) / 75e-6
     assert (fx, fy) == (0.0, 0.0)

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy.integrate import quad
 
+from rbdyn.contact.cage_film import film_shape, pocket_film, wall_film
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping
 from rbdyn.contact.hertz_line import LineContact
-from rbdyn.contact.pocket_film import film_shape, pocket_film, wall_film
 from rbdyn.contact.traction import CoulombTraction, NoTraction
 from rbdyn.dynamics.forces.equations import LOADS, POCKET_CONTACT_LOAD, POCKET_LOAD
 from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, Pocket, pocket_contact, pocket_energy

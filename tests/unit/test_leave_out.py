@@ -21,10 +21,9 @@ import rbdyn.contact
 import rbdyn.dynamics
 from rbdyn.accuracy.rollers.footprint import added_modules, parameter_bytes
 from rbdyn.accuracy.rollers.option_cost import OPTIONS, with_options
-from rbdyn.contact.film import journal_film_force
+from rbdyn.contact.cage_film import journal_film_force, wall_film
 from rbdyn.contact.hertz_line import sum_of_slices
-from rbdyn.contact.open_contact import film_forces
-from rbdyn.contact.pocket_film import wall_film
+from rbdyn.contact.rolling_resistance import film_forces
 from rbdyn.contact.traction import asperity_load_share, bicubic
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.guide_land import journal_wrench

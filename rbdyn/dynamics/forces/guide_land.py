@@ -8,8 +8,8 @@ import math
 from typing import Any, NamedTuple
 
 from rbdyn.compiled.kernel import kernel, law
+from rbdyn.contact.cage_film import ShortJournalFilm, journal_film_force
 from rbdyn.contact.damping import damped_load
-from rbdyn.contact.film import ShortJournalFilm, journal_film_force
 from rbdyn.contact.hertz_line import root_stiffness, whole_energy, whole_load
 from rbdyn.contact.traction import traction
 

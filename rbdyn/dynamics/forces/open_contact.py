@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from rbdyn.compiled.kernel import VECTOR, kernel, law
-from rbdyn.contact.open_contact import OpenFilm, film_forces
+from rbdyn.contact.rolling_resistance import OpenFilm, film_forces
 from rbdyn.contact.tangential_elasticity import RigidContact
 from rbdyn.dynamics.forces.race_form import form_at
 from rbdyn.dynamics.forces.race_lanes import LANES, add_to_ring, add_to_roller, keep_lane

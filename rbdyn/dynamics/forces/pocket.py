@@ -4,9 +4,9 @@ import math
 from typing import Any, NamedTuple
 
 from rbdyn.compiled.kernel import kernel, law
+from rbdyn.contact.cage_film import PocketFilm, wall_film
 from rbdyn.contact.damping import damped_load
 from rbdyn.contact.hertz_line import root_stiffness, whole_energy, whole_load
-from rbdyn.contact.pocket_film import PocketFilm, wall_film
 from rbdyn.contact.traction import traction
 
 

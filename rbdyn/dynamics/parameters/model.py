@@ -9,11 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.contact.cage_film import short_journal_film
 from rbdyn.contact.damping import HuntCrossleyDamping, NoDamping, ViscousDamping
-from rbdyn.contact.film import short_journal_film
 from rbdyn.contact.hertz_line import LineContactOnBar, dowson_higginson, houpert, iso_16281, palmgren, sliced
-from rbdyn.contact.open_contact import OpenFilm, open_film, touching_gap
-from rbdyn.contact.rolling_resistance import NoRollingResistance, aihara_thermal_factor, biboulet_houpert, starved
+from rbdyn.contact.rolling_resistance import (
+    NoRollingResistance,
+    OpenFilm,
+    aihara_thermal_factor,
+    biboulet_houpert,
+    open_film,
+    starved,
+    touching_gap,
+)
 from rbdyn.contact.tangential_elasticity import ElasticContact, RigidContact
 from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
 from rbdyn.dynamics.forces.cage_body import BalancedCage, UnbalancedCage
@@ -223,7 +230,7 @@ def _pocket(scene: Scene, oil: Oil) -> Any:
     clearance, radius = 0.5 * scene.pocket_clearance_m, scene.geometry.roller_radius
     pocket: Any = Pocket(clearance, radius, contact, damping, friction)
     if laws.pocket_film:
-        from rbdyn.contact.pocket_film import pocket_film
+        from rbdyn.contact.cage_film import pocket_film
 
         floor = laws.pocket_film_floor
         covered = cage.pocket_contact_length or scene.bearing.roller_length
