@@ -15,18 +15,15 @@ from numpy_twin import cross
 
 from rbdyn.contact.hertz_line import SlicedLineContact, TiltedLineContact
 from rbdyn.contact.traction import MixedTraction
-from rbdyn.dynamics.forces.cage_body import BalancedCage, UnbalancedCage, mass_centre
-from rbdyn.dynamics.forces.clock import ClockedDrive
+from rbdyn.dynamics.forces.bodies import BalancedCage, UnbalancedCage, mass_centre, outer_motion
 from rbdyn.dynamics.forces.drive import SteadyDrive, TwoSpeedDrive, action
-from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import LOAD, SHAFT, cage_motion, inner_motion
-from rbdyn.dynamics.forces.gravity import Gravity, NoGravity
 from rbdyn.dynamics.forces.guide_land import guide_forces
-from rbdyn.dynamics.forces.race_form import RoundRace, WavyRace
+from rbdyn.dynamics.forces.observe import mechanical_energy
 from rbdyn.dynamics.forces.race_lanes import race_forces, scratch
-from rbdyn.dynamics.forces.races import EqualRollers, unequal_rollers
-from rbdyn.dynamics.forces.ring_motion import outer_motion
-from rbdyn.dynamics.forces.schedule import Constant
+from rbdyn.dynamics.forces.races import EqualRollers, RoundRace, WavyRace, unequal_rollers
+from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant
+from rbdyn.dynamics.forces.surroundings import Gravity, NoGravity
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import layout_of
 

@@ -26,13 +26,12 @@ from rbdyn.contact.traction import (
     SurfaceAxes,
     TractionSurface,
 )
-from rbdyn.dynamics.forces.clock import ClockedDrive
-from rbdyn.dynamics.forces.drag import CylinderDrag, NoDrag
+from rbdyn.dynamics.forces.bodies import SupportedRing
 from rbdyn.dynamics.forces.equations import LOAD
 from rbdyn.dynamics.forces.guide_land import DryContact, InnerGuide, NoContact, NoFilm, NoGuide, OuterGuide
 from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, NoPocket
-from rbdyn.dynamics.forces.schedule import Constant, Ramps, SmoothRamps, Steps
-from rbdyn.dynamics.forces.support import SupportedRing
+from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant, Ramps, SmoothRamps, Steps
+from rbdyn.dynamics.forces.surroundings import CylinderDrag, NoDrag
 from rbdyn.dynamics.parameters.model import roller_bearing
 
 # Round-off of the sums, relative to the largest of each kind of derivative, power or load. Both paths compute the

@@ -14,11 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.clock import ClockedDrive
-from rbdyn.dynamics.forces.energy import mechanical_energy
 from rbdyn.dynamics.forces.equations import LOAD, SHAFT
+from rbdyn.dynamics.forces.observe import mechanical_energy
 from rbdyn.dynamics.forces.races import unequal_rollers
-from rbdyn.dynamics.forces.schedule import SmoothRamps
+from rbdyn.dynamics.forces.schedule import ClockedDrive, SmoothRamps
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import layout_of
 from rbdyn.dynamics.run import Run

@@ -15,8 +15,7 @@ from rbdyn.contact.hertz_line import dowson_higginson, palmgren
 from rbdyn.contact.rolling_resistance import NoRollingResistance
 from rbdyn.contact.tangential_elasticity import RigidContact
 from rbdyn.contact.traction import CoulombTraction, NoTraction
-from rbdyn.dynamics.forces.race_form import RoundRace, form_at, largest_rise, wavy_race
-from rbdyn.dynamics.forces.races import Race, race_contact
+from rbdyn.dynamics.forces.races import Race, RoundRace, form_at, largest_rise, race_contact, wavy_race
 
 RADIUS, ROLLER, Z = {1.0: 26.25e-3, -1.0: 17.25e-3}, 4.5e-3, 10
 CONTACT = palmgren(226.4e9, 3.5e-3)
@@ -80,8 +79,8 @@ def test_unit_lobe_stands_at_its_phase():
 @pytest.mark.parametrize("contact", [CONTACT, dowson_higginson(226.4e9, 3.5e-3, 0.2)], ids=["power", "log"])
 def test_oracle_force_is_virtual_work(side, contact):
     """Oracle: force on roller and moment on ring are minus the energy's slopes over place and angle of the ring."""
-    from rbdyn.dynamics.forces.energy import race_energy
-    from rbdyn.dynamics.forces.ring_motion import RingMotion
+    from rbdyn.dynamics.forces.bodies import RingMotion
+    from rbdyn.dynamics.forces.observe import race_energy
 
     draw = np.random.default_rng(4)
     race = race_of(side, waves((2, 8e-6, 0.3), (17, 1e-6, 1.0)), contact)

@@ -27,9 +27,9 @@ from rbdyn.contact.rolling_resistance import film_forces
 from rbdyn.contact.traction import asperity_load_share, bicubic
 from rbdyn.dynamics.ensemble import Stop
 from rbdyn.dynamics.forces.guide_land import journal_wrench
-from rbdyn.dynamics.forces.open_contact import open_contact
 from rbdyn.dynamics.forces.pocket import dry_walls, film_on_wall
-from rbdyn.dynamics.forces.race_form import turned_multiple
+from rbdyn.dynamics.forces.race_lanes import open_contact
+from rbdyn.dynamics.forces.races import turned_multiple
 from rbdyn.dynamics.forces.schedule import segment
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import layout_of
@@ -95,8 +95,8 @@ STATE = {
     "speed and load by schedule": 3,
 }
 # Modules that an option loads and the plain scene does not.
-CLOCK = ("rbdyn.dynamics.forces.clock", "rbdyn.dynamics.forces.schedule")
-SLICES = ("rbdyn.contact.profile", "rbdyn.dynamics.forces.slice_loads")
+CLOCK = ("rbdyn.dynamics.forces.schedule",)
+SLICES = ("rbdyn.contact.profile",)
 MODULES = {
     "logarithmic profile, 31 slices": SLICES,
     "tilt, 31 slices": SLICES,
@@ -104,7 +104,6 @@ MODULES = {
     "wavy inner race, with clock": CLOCK,
     "rotating load, with clock": CLOCK,
     "speed and load by schedule": CLOCK,
-    "outer ring on a support": ("rbdyn.dynamics.forces.support",),
 }
 # Packages and modules that a simulation of the plain scene has no use for.
 NOT_NEEDED = (

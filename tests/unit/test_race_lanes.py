@@ -14,8 +14,8 @@ from rbdyn.compiled.kernel import alike, either, kernel
 from rbdyn.contact.hertz_line import LineContact, sliced
 from rbdyn.contact.traction import TractionSurface
 from rbdyn.dynamics.forces.pocket import NoPocket, pocket_contact, pocket_gap
-from rbdyn.dynamics.forces.race_form import RoundRace
 from rbdyn.dynamics.forces.race_lanes import share_vectors
+from rbdyn.dynamics.forces.races import RoundRace
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.scene import Scene
 

@@ -12,19 +12,20 @@ from numba import njit
 from scipy.integrate import quad, solve_ivp
 
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.cage_body import (
+from rbdyn.dynamics.forces.bodies import (
     BalancedCage,
+    HeldRing,
+    SupportedRing,
     UnbalancedCage,
     cage_acceleration,
     cage_kinetic_energy,
     mass_centre,
+    support_energy,
+    support_motion,
 )
-from rbdyn.dynamics.forces.clock import ClockedDrive
 from rbdyn.dynamics.forces.drive import SteadyDrive, TwoSpeedDrive, action, load_potential, load_power
-from rbdyn.dynamics.forces.gravity import Gravity, NoGravity, height_energy
-from rbdyn.dynamics.forces.ring_motion import HeldRing, support_energy, support_motion
-from rbdyn.dynamics.forces.schedule import Constant, Ramps, SmoothRamps, Steps, value_at
-from rbdyn.dynamics.forces.support import SupportedRing
+from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant, Ramps, SmoothRamps, Steps, value_at
+from rbdyn.dynamics.forces.surroundings import Gravity, NoGravity, height_energy
 from rbdyn.dynamics.integrators.records import NOW
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.scales import layout_of
@@ -249,8 +250,8 @@ def test_invariant_spin_up_from_rest(make_scene):
     """
     from conftest import EVERYTHING
 
-    from rbdyn.dynamics.forces.energy import mechanical_energy
     from rbdyn.dynamics.forces.equations import LOAD, SHAFT
+    from rbdyn.dynamics.forces.observe import mechanical_energy
 
     scene = make_scene(
         *EVERYTHING,

@@ -1,4 +1,4 @@
-"""What turns the rings and loads the shaft, steadily; ``clock`` has the drive that changes with time."""
+"""What turns the rings and loads the shaft, steadily; ``schedule`` has the drive that changes with time."""
 
 from typing import NamedTuple
 

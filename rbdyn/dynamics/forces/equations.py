@@ -12,16 +12,13 @@ from numpy.typing import NDArray
 from rbdyn.compiled.elementary import fast_cos_sin
 from rbdyn.compiled.kernel import kernel, routine
 from rbdyn.dynamics.forces import state
-from rbdyn.dynamics.forces.cage_body import cage_acceleration
-from rbdyn.dynamics.forces.drag import drag_forces
+from rbdyn.dynamics.forces.bodies import RingMotion, cage_acceleration, outer_motion, support_motion
 from rbdyn.dynamics.forces.drive import action, load_power, tick
-from rbdyn.dynamics.forces.gravity import add_weight
 from rbdyn.dynamics.forces.guide_land import guide_forces
-from rbdyn.dynamics.forces.open_contact import with_open_films
 from rbdyn.dynamics.forces.pocket import pocket_contact, pocket_gap
-from rbdyn.dynamics.forces.race_lanes import race_forces
+from rbdyn.dynamics.forces.race_lanes import race_forces, with_open_films
 from rbdyn.dynamics.forces.races import Race, roller_radius
-from rbdyn.dynamics.forces.ring_motion import RingMotion, outer_motion, support_motion
+from rbdyn.dynamics.forces.surroundings import add_weight, drag_forces
 
 # Powers lost, in the order of the power vector; behind them stand the powers that come in by the shafts and by loads
 # without a potential, and last the inner race's part of the rolling resistance.

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from rbdyn.arrays import Array
-from rbdyn.dynamics.forces.slice_loads import slice_loads
+from rbdyn.dynamics.forces.observe import slice_loads
 from rbdyn.dynamics.parameters.model import race_contact_law
 from rbdyn.life.rollers import ReferenceLife, reference_life
 from rbdyn.life.turns import turning_rings

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.contact.hertz_line import palmgren
-from rbdyn.dynamics.forces.drag import AIR_DENSITY
+from rbdyn.dynamics.forces.surroundings import AIR_DENSITY
 from rbdyn.fields import RPM
 from rbdyn.life.maker_friction import SERIES
 from rbdyn.life.roller_capacity import REFERENCE_SPEED, minimum_loads, static_capacity

@@ -23,17 +23,14 @@ from rbdyn.contact.rolling_resistance import (
 )
 from rbdyn.contact.tangential_elasticity import ElasticContact, RigidContact
 from rbdyn.contact.traction import CoulombTraction, NoTraction, dry_friction
-from rbdyn.dynamics.forces.cage_body import BalancedCage, UnbalancedCage
-from rbdyn.dynamics.forces.drag import NoDrag, cylinder_drag
+from rbdyn.dynamics.forces.bodies import BalancedCage, HeldRing, UnbalancedCage
 from rbdyn.dynamics.forces.drive import SteadyDrive, TwoSpeedDrive
 from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.forces.gravity import Gravity, NoGravity
 from rbdyn.dynamics.forces.guide_land import DryContact, InnerGuide, NoFilm, NoGuide, OuterGuide
-from rbdyn.dynamics.forces.open_contact import NoOpenFilm
 from rbdyn.dynamics.forces.pocket import LippedPocket, LubricatedPocket, NoPocket, Pocket
-from rbdyn.dynamics.forces.race_form import RoundRace, largest_rise, wavy_race
-from rbdyn.dynamics.forces.races import EqualRollers, Race, unequal_rollers
-from rbdyn.dynamics.forces.ring_motion import HeldRing
+from rbdyn.dynamics.forces.race_lanes import NoOpenFilm
+from rbdyn.dynamics.forces.races import EqualRollers, Race, RoundRace, largest_rise, unequal_rollers, wavy_race
+from rbdyn.dynamics.forces.surroundings import Gravity, NoDrag, NoGravity, cylinder_drag
 from rbdyn.dynamics.parameters.race_traction import race_traction, rolling_contacts
 from rbdyn.dynamics.parameters.scales import contact_approach, layout_of
 from rbdyn.properties.lubricants import Oil
@@ -42,8 +39,8 @@ from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Harmonic
 
 if TYPE_CHECKING:
-    from rbdyn.dynamics.forces.clock import ClockedDrive
-    from rbdyn.dynamics.forces.support import SupportedRing
+    from rbdyn.dynamics.forces.bodies import SupportedRing
+    from rbdyn.dynamics.forces.schedule import ClockedDrive
 
 # The largest contact load that a traction surface must cover, in multiples of the largest load on the shaft.
 TRACTION_RANGE = 4.0
@@ -285,7 +282,7 @@ def _outer_ring(scene: Scene) -> "HeldRing | SupportedRing":
     support, start = scene.support, layout_of(scene).support
     if support is None or start is None:
         return HeldRing()
-    from rbdyn.dynamics.forces.support import SupportedRing
+    from rbdyn.dynamics.forces.bodies import SupportedRing
 
     return SupportedRing(start, support.outer_ring_mass_kg, float(support.stiffness_N_m), float(support.damping_N_s_m))
 
@@ -301,7 +298,7 @@ def _drive(scene: Scene) -> "SteadyDrive | TwoSpeedDrive | ClockedDrive":
     load = float(operation.radial_load_N)
     if clock is None:
         return SteadyDrive(inner, load) if outer == 0.0 else TwoSpeedDrive(inner, outer, load)
-    from rbdyn.dynamics.forces.clock import ClockedDrive
+    from rbdyn.dynamics.forces.schedule import ClockedDrive
 
     return ClockedDrive(
         clock,

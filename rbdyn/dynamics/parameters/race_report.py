@@ -61,7 +61,7 @@ def race_notes(scene: Scene, races: Mapping[str, Mapping[str, float]]) -> tuple[
 
 def _most_loaded_slice(scene: Scene, race: str, load: float) -> float:
     """Load [N] of the slice that bears most of ``load`` [N] on a race, where the tilt is largest."""
-    from rbdyn.dynamics.forces.slice_loads import slice_loads
+    from rbdyn.dynamics.forces.observe import slice_loads
 
     direction = scene.bearing.tilt_direction
     nx, ny = np.array([math.cos(direction)]), np.array([math.sin(direction)])

@@ -4,8 +4,7 @@ import math
 
 from rbdyn.compiled.kernel import entry, kernel, routine
 from rbdyn.contact.hertz_line import line_load
-from rbdyn.dynamics.forces.race_form import form_at
-from rbdyn.dynamics.forces.races import roller_radius
+from rbdyn.dynamics.forces.races import form_at, roller_radius
 
 TRIES = 60
 BALANCED = 1e-11  # of the forces at the ends of the bracket

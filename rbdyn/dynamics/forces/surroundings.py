@@ -1,4 +1,6 @@
-"""Drag of the oil-air mixture on an orbiting roller."""
+"""What the surroundings do to the bodies: drag of the oil-air mixture on orbiting rollers; gravity, or the steady part of a manoeuvre,
+on rollers, cage and rings.
+"""
 
 import math
 from typing import NamedTuple
@@ -50,3 +52,46 @@ def _(drag, rollers, y, row, dy):
     for j in range(2 * rollers, 3 * rollers):
         power -= dy[row, j] * y[j] + dy[row, rollers + j] * y[rollers + j]
     return power
+
+
+class NoGravity(NamedTuple):
+    """Weightless."""
+
+
+class Gravity(NamedTuple):
+    """Acceleration x, y [m/s^2]."""
+
+    x: float
+    y: float
+
+
+@law
+def add_weight(gravity, first, count, row, dy):
+    """Add gravity to the accelerations of ``count`` bodies: x from ``first`` on in row ``row`` of ``dy``, then y."""
+
+
+@add_weight.body(NoGravity)
+def _(gravity, first, count, row, dy):
+    pass
+
+
+@add_weight.body(Gravity)
+def _(gravity, first, count, row, dy):
+    for i in range(first, first + count):
+        dy[row, i] += gravity.x
+        dy[row, i + count] += gravity.y
+
+
+@law
+def height_energy(gravity, mass, x, y):
+    """Potential energy [J] of a mass [kg] at x, y [m]."""
+
+
+@height_energy.body(NoGravity)
+def _(gravity, mass, x, y):
+    return 0.0
+
+
+@height_energy.body(Gravity)
+def _(gravity, mass, x, y):
+    return -mass * (gravity.x * x + gravity.y * y)
