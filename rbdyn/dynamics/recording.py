@@ -12,8 +12,7 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.dynamics.companions import Companions
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
-from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.forces.observe import mechanical_energy
+from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.state import CAGE_ANGLE, CAGE_X
 from rbdyn.dynamics.integrators.records import (
     ACCEPTED,

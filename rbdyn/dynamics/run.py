@@ -8,8 +8,7 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.forces.observe import mechanical_energy
+from rbdyn.dynamics.forces.equations import RollerBearing, mechanical_energy
 from rbdyn.dynamics.forces.state import INNER_ANGLE, OUTER_ANGLE, name
 from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators.advance import advance

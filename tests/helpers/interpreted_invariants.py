@@ -17,9 +17,8 @@ from rbdyn.contact.hertz_line import SlicedLineContact, TiltedLineContact
 from rbdyn.contact.traction import MixedTraction
 from rbdyn.dynamics.forces.bodies import BalancedCage, UnbalancedCage, mass_centre, outer_motion
 from rbdyn.dynamics.forces.drive import SteadyDrive, TwoSpeedDrive, action
-from rbdyn.dynamics.forces.equations import LOAD, SHAFT, cage_motion, inner_motion
+from rbdyn.dynamics.forces.equations import LOAD, SHAFT, cage_motion, inner_motion, mechanical_energy
 from rbdyn.dynamics.forces.guide_land import guide_forces
-from rbdyn.dynamics.forces.observe import mechanical_energy
 from rbdyn.dynamics.forces.race_lanes import race_forces, scratch
 from rbdyn.dynamics.forces.races import EqualRollers, RoundRace, WavyRace, unequal_rollers
 from rbdyn.dynamics.forces.schedule import ClockedDrive, Constant

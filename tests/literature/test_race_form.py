@@ -80,7 +80,7 @@ def test_unit_lobe_stands_at_its_phase():
 def test_oracle_force_is_virtual_work(side, contact):
     """Oracle: force on roller and moment on ring are minus the energy's slopes over place and angle of the ring."""
     from rbdyn.dynamics.forces.bodies import RingMotion
-    from rbdyn.dynamics.forces.observe import race_energy
+    from rbdyn.dynamics.forces.equations import race_energy
 
     draw = np.random.default_rng(4)
     race = race_of(side, waves((2, 8e-6, 0.3), (17, 1e-6, 1.0)), contact)

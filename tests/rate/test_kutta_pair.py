@@ -9,8 +9,7 @@ import pytest
 from smooth_runs import run_of, vibrating
 from test_runge_kutta import one_step, orders_of, slope_of
 
-from rbdyn.dynamics.forces.equations import SHAFT
-from rbdyn.dynamics.forces.observe import mechanical_energy
+from rbdyn.dynamics.forces.equations import SHAFT, mechanical_energy
 from rbdyn.dynamics.integrators import dormand_prince as dp
 from rbdyn.dynamics.integrators import kutta_pair as pair
 from rbdyn.dynamics.integrators.method_laws import interpolate

@@ -10,8 +10,7 @@ from smooth_runs import fixed_step, run_of, vibrating
 
 from rbdyn.compiled.kernel import entry
 from rbdyn.dynamics.ensemble import Stop
-from rbdyn.dynamics.forces.equations import LOADS, POWERS, SHAFT
-from rbdyn.dynamics.forces.observe import mechanical_energy
+from rbdyn.dynamics.forces.equations import LOADS, POWERS, SHAFT, mechanical_energy
 from rbdyn.dynamics.forces.race_lanes import scratch
 from rbdyn.dynamics.forces.state import PARTS, layout
 from rbdyn.dynamics.integrators import records as at

@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 from smooth_runs import fixed_step, run_of, vibrating
 
 from rbdyn.dynamics.ensemble import CancelledError
-from rbdyn.dynamics.forces.equations import POWERS, SHAFT
-from rbdyn.dynamics.forces.observe import mechanical_energy
+from rbdyn.dynamics.forces.equations import POWERS, SHAFT, mechanical_energy
 from rbdyn.dynamics.integrators import dormand_prince as dp
 from rbdyn.dynamics.integrators import records as at
 from rbdyn.dynamics.integrators.advance import advance, refine_peak

@@ -96,7 +96,7 @@ STATE = {
 }
 # Modules that an option loads and the plain scene does not.
 CLOCK = ("rbdyn.dynamics.forces.schedule",)
-SLICES = ("rbdyn.contact.profile",)
+SLICES = ("rbdyn.contact.profile", "rbdyn.dynamics.forces.observe")
 MODULES = {
     "logarithmic profile, 31 slices": SLICES,
     "tilt, 31 slices": SLICES,

@@ -250,8 +250,7 @@ def test_invariant_spin_up_from_rest(make_scene):
     """
     from conftest import EVERYTHING
 
-    from rbdyn.dynamics.forces.equations import LOAD, SHAFT
-    from rbdyn.dynamics.forces.observe import mechanical_energy
+    from rbdyn.dynamics.forces.equations import LOAD, SHAFT, mechanical_energy
 
     scene = make_scene(
         *EVERYTHING,

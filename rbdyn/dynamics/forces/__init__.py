@@ -5,5 +5,5 @@
 - ``pocket``, ``guide_land``, ``surroundings``: one interaction each
 - ``bodies``: how the cage and a supported outer ring move
 - ``drive``: steady speeds and loads; ``schedule``: those over time
-- ``equations``: forces gathered into accelerations and powers; ``observe``: all of them written out on request, and energy
+- ``equations``: forces gathered into accelerations and powers, and energy; ``observe``: all of them written out on request
 """

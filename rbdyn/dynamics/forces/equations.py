@@ -1,24 +1,34 @@
-"""Equations of motion: forces gathered into accelerations, and the power each loss takes.
+"""Equations of motion: forces gathered into accelerations, the power each loss takes, and the energy that balances it.
 
 Newton for rollers, cage and rings in Cartesian coordinates (Chen et al. 2022, eq 19-21 in the plane; free of their
 centrifugal terms because the frame does not turn), Euler for spins. The rings turn at prescribed speeds.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.compiled.elementary import fast_cos_sin
-from rbdyn.compiled.kernel import kernel, routine
+from rbdyn.compiled.kernel import entry, kernel, routine
+from rbdyn.contact.hertz_line import line_energy
 from rbdyn.dynamics.forces import state
-from rbdyn.dynamics.forces.bodies import RingMotion, cage_acceleration, outer_motion, support_motion
-from rbdyn.dynamics.forces.drive import action, load_power, tick
-from rbdyn.dynamics.forces.guide_land import guide_forces
-from rbdyn.dynamics.forces.pocket import pocket_contact, pocket_gap
+from rbdyn.dynamics.forces.bodies import (
+    RingMotion,
+    cage_acceleration,
+    cage_kinetic_energy,
+    mass_centre,
+    outer_motion,
+    support_energy,
+    support_motion,
+)
+from rbdyn.dynamics.forces.drive import action, load_potential, load_power, tick
+from rbdyn.dynamics.forces.guide_land import guide_energy, guide_forces
+from rbdyn.dynamics.forces.pocket import pocket_contact, pocket_energy, pocket_gap
 from rbdyn.dynamics.forces.race_lanes import race_forces, with_open_films
-from rbdyn.dynamics.forces.races import Race, roller_radius
-from rbdyn.dynamics.forces.surroundings import add_weight, drag_forces
+from rbdyn.dynamics.forces.races import Race, form_at, roller_radius
+from rbdyn.dynamics.forces.surroundings import add_weight, drag_forces, height_energy
 
 # Powers lost, in the order of the power vector; behind them stand the powers that come in by the shafts and by loads
 # without a potential, and last the inner race's part of the rolling resistance.
@@ -292,3 +302,38 @@ def derivative_once(bearing, y, row, dy, power, loads, scratch):
     Its parameters, more than a hundred numbers, are handed over one by one, which costs a quarter of the evaluation.
     """
     derivative(bearing, y, row, dy, power, loads, scratch)
+
+
+@kernel
+def race_energy(race, side, radius, dx, dy, ring):
+    """Elastic energy [J] of one race contact; ``dx, dy``: roller's centre less the ring's [m]."""
+    distance = math.sqrt(dx * dx + dy * dy)
+    nx, ny = dx / distance, dy / distance
+    rise, _ = form_at(race.form, nx, ny, ring.cos, ring.sin)
+    return line_energy(race.contact, side * (distance - race.radius - rise) + radius, nx, ny)
+
+
+@entry
+def mechanical_energy(bearing, y):
+    """(kinetic, elastic, potential) energy [J] of a state. The rotation of the rings, being prescribed, is left out."""
+    z = bearing.rollers
+    _, cage, inner, outer = motions(bearing, y)
+    kinetic, elastic, potential = support_energy(bearing.outer_ring, bearing.gravity, y)
+    kinetic += cage_kinetic_energy(bearing.cage, cage.vx, cage.vy, cage.cos, cage.sin, cage.speed)
+    kinetic += 0.5 * bearing.inner_ring_mass * (inner.vx**2 + inner.vy**2)
+    elastic += guide_energy(bearing.guide, cage.x, cage.y, inner.x, inner.y, outer.x, outer.y)
+    centre_x, centre_y = mass_centre(bearing.cage, cage.x, cage.y, cage.cos, cage.sin)
+    potential += load_potential(bearing.drive, inner.x)
+    potential += height_energy(bearing.gravity, bearing.cage.mass, centre_x, centre_y)
+    potential += height_energy(bearing.gravity, bearing.inner_ring_mass, inner.x, inner.y)
+    for j in range(z):
+        x, y_ = y[j], y[z + j]
+        radius = roller_radius(bearing.sizes, j)
+        kinetic += 0.5 * bearing.roller_mass * (y[2 * z + j] ** 2 + y[3 * z + j] ** 2)
+        kinetic += 0.5 * bearing.roller_inertia * y[4 * z + j] ** 2
+        potential += height_energy(bearing.gravity, bearing.roller_mass, x, y_)
+        elastic += race_energy(bearing.outer, 1.0, radius, x - outer.x, y_ - outer.y, outer)
+        elastic += race_energy(bearing.inner, -1.0, radius, x - inner.x, y_ - inner.y, inner)
+        ex, ey = pocket_direction(bearing, cage.cos, cage.sin, j)
+        elastic += pocket_energy(bearing.pocket, radius, ex, ey, x - cage.x, y_ - cage.y)
+    return kinetic, elastic, potential
