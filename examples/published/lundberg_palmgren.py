@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rbdyn.life.ball_capacity import ball_size_term, refuse_impossible
+from rbdyn.life.balls import ball_size_term, refuse_impossible
 from rbdyn.scene.ball_bearing import BallRow
 
 LUNDBERG_PALMGREN = 98.1  # [N, mm]

@@ -1,8 +1,7 @@
 """Fatigue life of the row of a scene: which ratings its drawing gives, and which ring turns against the load."""
 
-from rbdyn.life.ball_capacity import dynamic_capacity
-from rbdyn.life.balls import rated_capacities, row_life
-from rbdyn.life.turns import Life, Turning
+from rbdyn.life import Life, Turning
+from rbdyn.life.balls import dynamic_capacity, rated_capacities, row_life
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.scene.ball_bearing import BallRow
 

@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from rbdyn.arrays import Array
 from rbdyn.faults import MethodError, validated
-from rbdyn.life.turns import turning_rings
+from rbdyn.life import turning_rings
 from rbdyn.quasistatic.fatigue import reference_capacities, solution_life
 from rbdyn.quasistatic.remarks import Rating, overloads, pressures
 from rbdyn.quasistatic.row.equilibrium import Solution, solve

@@ -11,7 +11,7 @@ from rbdyn.contact import point_film
 from rbdyn.contact.film_thickness import lambda_ratio
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
 from rbdyn.faults import MethodError
-from rbdyn.life.turns import turning_rings
+from rbdyn.life import turning_rings
 from rbdyn.properties.materials import equivalent_modulus
 from rbdyn.quasistatic.fatigue import solution_life
 from rbdyn.quasistatic.remarks import Rating, needed_friction

@@ -113,7 +113,7 @@ class Bearing(Consistent):
     @property
     def rated_capacity(self) -> float:
         """Basic dynamic capacity [N]: the catalogue's, or by ISO 281 from the dimensions."""
-        from rbdyn.life.roller_capacity import dynamic_capacity
+        from rbdyn.life.rollers import dynamic_capacity
 
         return self.dynamic_capacity_N or dynamic_capacity(*self.rated_sizes)
 

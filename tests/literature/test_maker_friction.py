@@ -14,7 +14,7 @@ from rbdyn.dynamics.parameters.friction_check import friction_check, friction_no
 from rbdyn.dynamics.parameters.left_out import light_load_notes
 from rbdyn.faults import InputError
 from rbdyn.life import maker_friction
-from rbdyn.life.roller_capacity import minimum_loads
+from rbdyn.life.rollers import minimum_loads
 from rbdyn.properties.catalogue import Envelope, envelope
 from rbdyn.properties.designation import read_designation
 

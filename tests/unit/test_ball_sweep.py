@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from rbdyn import equilibrium
 from rbdyn.faults import InputError
-from rbdyn.life.turns import turning_rings
+from rbdyn.life import turning_rings
 from rbdyn.plots import ball as ball_pictures
 from rbdyn.plots import ball_sweep as pictures
 from rbdyn.quasistatic.fatigue import reference_capacities, solution_life

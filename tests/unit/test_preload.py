@@ -15,7 +15,7 @@ from rbdyn import BallScene
 from rbdyn.cli.ball_studies import optimum_study
 from rbdyn.faults import InputError
 from rbdyn.life import balls as life
-from rbdyn.life.turns import turning_rings
+from rbdyn.life import turning_rings
 from rbdyn.quasistatic import fatigue, preload
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.sweep.run import sweep

@@ -10,7 +10,7 @@ from rbdyn.contact.hertz_line import palmgren
 from rbdyn.dynamics.forces.drag import AIR_DENSITY
 from rbdyn.fields import RPM
 from rbdyn.life.maker_friction import SERIES
-from rbdyn.life.roller_capacity import REFERENCE_SPEED, minimum_loads, static_capacity
+from rbdyn.life.rollers import REFERENCE_SPEED, minimum_loads, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
 from rbdyn.scene.catalogue_notes import catalogued

@@ -8,7 +8,7 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.contact.hertz_point import PointContact
 from rbdyn.fields import RPM
-from rbdyn.life import ball_capacity
+from rbdyn.life import balls
 from rbdyn.mounting.ball_rings import layer_changes
 from rbdyn.mounting.ring_growth import GrooveChange
 from rbdyn.quasistatic.double_decker import speed_split
@@ -102,7 +102,7 @@ def layer_frictions(scene: DoubleDeckerScene) -> tuple[LayerFriction, LayerFrict
 def static_capacity(row: BallRow, races: tuple[PointContact, PointContact]) -> float:
     """Static capacity C0 [N], of the catalogue or from the pressure that defines it."""
     given = row.static_capacity_N
-    return ball_capacity.static_capacity(row.balls, row.contact_angle, races) if given is None else given
+    return balls.static_capacity(row.balls, row.contact_angle, races) if given is None else given
 
 
 def middle_record(model: DoubleDeckerModel, solution: DoubleDeckerSolution) -> dict[str, Any]:
