@@ -13,7 +13,7 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.faults import LONGEST_NAME, InputError, one_line
-from rbdyn.mounting.ball_rings import growth_record, row_change
+from rbdyn.mounting.fits import growth_record, row_change
 from rbdyn.quasistatic import result as told
 from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of, load_record, middle_record

@@ -9,8 +9,8 @@ from rbdyn.arrays import Array
 from rbdyn.contact.hertz_point import PointContact
 from rbdyn.fields import RPM
 from rbdyn.life import balls
-from rbdyn.mounting.ball_rings import layer_changes
-from rbdyn.mounting.ring_growth import GrooveChange
+from rbdyn.mounting.fits import layer_changes
+from rbdyn.mounting.rings import GrooveChange
 from rbdyn.quasistatic.double_decker import speed_split
 from rbdyn.quasistatic.double_decker.equilibrium import DoubleDeckerSolution, Layer, Stack
 from rbdyn.quasistatic.double_decker.speed_split import LayerFriction, SpeedSplit, Status

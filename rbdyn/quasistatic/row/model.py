@@ -7,8 +7,8 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.contact.hertz_point import PointContact, ball_on_race
-from rbdyn.mounting.ball_rings import row_change
-from rbdyn.mounting.ring_growth import UNCHANGED, GrooveChange
+from rbdyn.mounting.fits import row_change
+from rbdyn.mounting.rings import UNCHANGED, GrooveChange
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.row import Row, at_rest
