@@ -10,8 +10,7 @@ from doe.dimension_chain.faults import faults
 from doe.dimension_chain.links import Chain, Link, Part
 from doe.dimension_chain.reading import chain_from, is_several, read_chains
 from doe.dimension_chain.solution import ChainResult, solve
-from rbdyn.properties.iso286 import fit_limits, grade_tolerances, tolerance_unit
-from rbdyn.properties.iso492 import ring_limits
+from rbdyn.properties.tolerances import fit_limits, grade_tolerances, ring_limits, tolerance_unit
 
 __all__ = [
     "Chain",

@@ -25,7 +25,7 @@ from doe.dimension_chain.monte_carlo import Assemblies, draw
 from doe.dimension_chain.parts import allocated_part, given_part
 from doe.dimension_chain.yields import closing_moments, exact_shares, standard_error
 from rbdyn.faults import MethodError
-from rbdyn.properties.iso286 import grade_tolerances, tolerance_unit
+from rbdyn.properties.tolerances import grade_tolerances, tolerance_unit
 
 SAMPLES = 100_000  # assemblies that judge a yield where no convolution can
 HALVINGS = 26

@@ -10,7 +10,7 @@ from doe.dimension_chain.expressions import shown
 from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link
 from doe.dimension_chain.parts import coded_limits
 from rbdyn.faults import MethodError
-from rbdyn.properties.iso286 import LARGEST, positioned
+from rbdyn.properties.tolerances import LARGEST, positioned
 
 
 def faults(chain: Chain) -> list[str]:

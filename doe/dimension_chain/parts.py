@@ -3,8 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from doe.dimension_chain.links import DIGITS, Interval, Link, Part
-from rbdyn.properties.iso286 import fit_limits, positioned
-from rbdyn.properties.iso492 import SURFACES, ring_limits
+from rbdyn.properties.tolerances import SURFACES, fit_limits, positioned, ring_limits
 
 
 def coded_limits(link: Link) -> Interval:

@@ -6,9 +6,17 @@ from typing import Any, NamedTuple
 
 from rbdyn.cli.new_mounting import mounting_values
 from rbdyn.life.rollers import REFERENCE_SPEED_FACTOR
-from rbdyn.properties.cages import SMALLEST_CLEARANCE_MM, cage_estimate
-from rbdyn.properties.catalogue import Envelope, RollerInterior, ball_interior, radial_clearance, roller_interior
-from rbdyn.properties.designation import CAGES, Designation
+from rbdyn.properties.catalogue import (
+    CAGES,
+    SMALLEST_CLEARANCE_MM,
+    Designation,
+    Envelope,
+    RollerInterior,
+    ball_interior,
+    cage_estimate,
+    radial_clearance,
+    roller_interior,
+)
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.properties.oils import NamedOil
 

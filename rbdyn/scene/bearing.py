@@ -10,8 +10,7 @@ from pydantic_core import PydanticKnownError
 
 from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import LIGHTEST_RING_KG, SI, Fraction, NotVanishing, OptionalSI, Positive, Share
-from rbdyn.properties.catalogue import envelope
-from rbdyn.properties.designation import ROLLERS, read_designation
+from rbdyn.properties.catalogue import ROLLERS, envelope, read_designation
 from rbdyn.records.words import counted
 
 # Keys that belong to one roller profile each.

@@ -1,7 +1,6 @@
 """Dimensions of a scene that do not go with the designation it states."""
 
-from rbdyn.properties.catalogue import Envelope, envelope, roller_interior
-from rbdyn.properties.designation import Designation, read_designation
+from rbdyn.properties.catalogue import Designation, Envelope, envelope, read_designation, roller_interior
 from rbdyn.scene.bearing import Bearing
 from rbdyn.scene.mounting import Mounting
 

@@ -10,10 +10,16 @@ from conftest import ROOT
 
 from rbdyn.cli.new_scene import OperatingPoint, ball_values, roller_values
 from rbdyn.life.rollers import dynamic_capacity, static_capacity
-from rbdyn.properties.catalogue import Envelope, ball_interior, envelope, radial_clearance, roller_interior
-from rbdyn.properties.designation import read_designation
+from rbdyn.properties import table
+from rbdyn.properties.catalogue import (
+    Envelope,
+    ball_interior,
+    envelope,
+    radial_clearance,
+    read_designation,
+    roller_interior,
+)
 from rbdyn.properties.oils import oil_named
-from rbdyn.properties.tables import table
 from rbdyn.scene import Scene
 
 # Orders of a catalogue (Timken, ball bearing housed units, table A-9): number of balls BPFO + BPFI, and BSF = (1/g - g)/2

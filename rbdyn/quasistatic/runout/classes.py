@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from rbdyn.faults import MethodError
-from rbdyn.properties.tables import table
+from rbdyn.properties import table
 
 ToleranceClass = Literal["P2", "P4", "P5", "P6", "normal"]
 
