@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rbdyn.life.balls import ball_size_term, refuse_impossible
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.scene.ball import BallRow
 
 LUNDBERG_PALMGREN = 98.1  # [N, mm]
 

@@ -150,10 +150,10 @@ def run(
     if folder:
         write_json(folder / files[0], record)
         if table is not None:
-            from rbdyn.plots.ball_sweep import pictures
+            from rbdyn.plots.ball import sweep_pictures
 
             table.save(folder / f"{name}.csv")
-            files += [f"{name}.csv", *pictures(table, folder)]
+            files += [f"{name}.csv", *sweep_pictures(table, folder)]
     hand_over(lambda: record, as_json, lambda: _print(record, table, quiet), folder, files)
     return 0
 

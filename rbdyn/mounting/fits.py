@@ -16,8 +16,7 @@ from rbdyn.mounting.rings import (
 )
 from rbdyn.properties.materials import Material
 from rbdyn.records.record import finite
-from rbdyn.scene.ball import BallScene, DoubleDeckerScene, SingleRowScene
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.scene.ball import BallRow, BallScene, DoubleDeckerScene, SingleRowScene
 from rbdyn.scene.bearing import Bearing, Cage, Materials
 from rbdyn.scene.mounting import Mounting, Raceways, material_of, raceway_radii
 

@@ -3,7 +3,7 @@
 from rbdyn.life import Life, Turning
 from rbdyn.life.balls import dynamic_capacity, rated_capacities, row_life
 from rbdyn.quasistatic.row.equilibrium import Solution
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.scene.ball import BallRow
 
 # ISO 281 grants grooves closer than its table's no more than the table.
 CLOSEST_RATED = 0.52

@@ -12,8 +12,7 @@ from rbdyn.contact.static_limit import BALLS, dent_sentence
 from rbdyn.quasistatic.row.control import FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, MOMENT, OUTER_LOAD
 from rbdyn.quasistatic.row.model import RowModel
-from rbdyn.scene.ball import BallScene
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.scene.ball import BallRow, BallScene
 
 # A contact at a steeper angle lies beyond any shoulder [rad].
 STEEPEST = math.radians(80.0)

@@ -15,8 +15,7 @@ from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.quasistatic.row.control import Control
 from rbdyn.quasistatic.row.model import row_model
 from rbdyn.quasistatic.row.row import Row
-from rbdyn.scene.ball import BallModel, BallOperation, Prescribed
-from rbdyn.scene.ball_bearing import BallBearing
+from rbdyn.scene.ball import BallBearing, BallModel, BallOperation, Prescribed
 
 CONTROLS = ("outer", "inner", "half", "hybrid", "common_cage")
 LOADS = ("radial", "axial", "combined", "moment", "preload_force", "preload_displacement")

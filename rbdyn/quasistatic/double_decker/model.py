@@ -17,8 +17,7 @@ from rbdyn.quasistatic.double_decker.speed_split import LayerFriction, SpeedSpli
 from rbdyn.quasistatic.result import displacement_record
 from rbdyn.quasistatic.row.model import RowModel, contacts, row_model
 from rbdyn.records.record import finite
-from rbdyn.scene.ball import DoubleDeckerScene
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.scene.ball import BallRow, DoubleDeckerScene
 
 
 class DoubleDeckerModel(NamedTuple):

@@ -12,8 +12,7 @@ from rbdyn.mounting.rings import UNCHANGED, GrooveChange
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.row import Row, at_rest
-from rbdyn.scene.ball import BallModel, BallScene, SingleRowScene
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.scene.ball import BallModel, BallRow, BallScene, SingleRowScene
 
 INNER_SHARE = {"outer": 0.0, "inner": 1.0, "half": 0.5}
 # Keeps a quotient finite where nothing turns.

@@ -10,9 +10,8 @@ from rbdyn.quasistatic.runout import race_errors
 from rbdyn.quasistatic.runout.race_errors import PERFECT, RaceErrors, Waviness, waviness
 from rbdyn.quasistatic.runout.tolerance_design import Bench
 from rbdyn.quasistatic.runout.turn import Followed, follow
-from rbdyn.scene.ball import BallScene, SingleRowScene
+from rbdyn.scene.ball import GROOVES, BallScene, FormErrors, RandomWaviness, SingleRowScene
 from rbdyn.scene.bearing import Harmonic
-from rbdyn.scene.form_errors import GROOVES, FormErrors, RandomWaviness
 
 # Steps times balls of a path: 1.4 kB each while it is made.
 MOST_PLACES = 1_000_000
