@@ -17,8 +17,8 @@ from rbdyn.mounting.rings import (
 from rbdyn.properties.materials import Material
 from rbdyn.records.record import finite
 from rbdyn.scene.ball import BallRow, BallScene, DoubleDeckerScene, SingleRowScene
-from rbdyn.scene.bearing import Bearing, Cage, Materials
-from rbdyn.scene.mounting import Mounting, Raceways, material_of, raceway_radii
+from rbdyn.scene.bearing import Bearing, Cage, Materials, material_of
+from rbdyn.scene.mounting import Mounting, Raceways, raceway_radii
 
 
 class RunningSpeeds(NamedTuple):

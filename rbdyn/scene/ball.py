@@ -10,9 +10,9 @@ from rbdyn.faults import Consistent, Strict
 from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI, Positive
 from rbdyn.properties.materials import Material
 from rbdyn.records.words import counted
-from rbdyn.scene.bearing import CustomMaterial, Harmonic, MaterialName
+from rbdyn.scene.bearing import CustomMaterial, Harmonic, MaterialName, material_of
 from rbdyn.scene.lubricant import Lubricant
-from rbdyn.scene.mounting import Mounting, material_of
+from rbdyn.scene.mounting import Mounting
 from rbdyn.scene.mounting import misfits as mounting_faults
 from rbdyn.scene.operation import Speed
 from rbdyn.scene.reading import SceneFile

@@ -24,7 +24,7 @@ from rbdyn.contact.cage_bar import (
     torsion_constant,
 )
 from rbdyn.properties.catalogue import cage_estimate, envelope, read_designation, roller_interior
-from rbdyn.scene.cage_section import STIFFNESS_ERROR
+from rbdyn.scene.bearing import STIFFNESS_ERROR
 
 BRASS, POLYAMIDE = Elastic(105e9, 0.34), Elastic(5e9, 0.35)
 SIZES = [
