@@ -31,7 +31,7 @@ from published.common import (
 )
 from rbdyn import Scene
 from rbdyn.life import maker_friction
-from rbdyn.properties.oils import oil_at
+from rbdyn.properties.lubricants import oil_at
 from rbdyn.records.words import with_error
 
 # Table 8: as designed, and the paper's optimum.

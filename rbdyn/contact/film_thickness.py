@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbdyn.properties.oils import Oil
+from rbdyn.properties.lubricants import Oil
 
 # Below, the fitted numerator of the thermal factor runs through zero (cold oil at high speed).
 SMALLEST_PRESSURE_TERM = 0.1

@@ -12,7 +12,7 @@ import numpy as np
 
 from rbdyn.contact.film_thickness import inlet_heating
 from rbdyn.contact.hertz_point import PointContact, peak_pressure
-from rbdyn.properties.oils import Oil
+from rbdyn.properties.lubricants import Oil
 
 # Powers of the load in the central and in the thinnest film.
 CENTRAL_LOAD, THINNEST_LOAD = 0.067, 0.073

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from rbdyn.contact.film_thickness import RollingContact, half_width, hertz_pressure
-from rbdyn.properties.oils import ABSOLUTE_ZERO_C
+from rbdyn.properties.lubricants import ABSOLUTE_ZERO_C
 
 # Gauss-Legendre in the angle theta, x = b sin(theta). Relative error up to 4 GPa, against adaptive quadrature: below
 # 3e-7 for aircraft oils at 100 C, 3e-6 for ten times their pressure coefficient; with limiting shear below 2e-5,

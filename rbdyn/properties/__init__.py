@@ -1,6 +1,7 @@
 """Properties by name.
 
-- ``materials``: elastic constants, density, expansion; ``oils``: grades, data sheets and jet oils over temperature
+- ``materials``: elastic constants, density, expansion
+- ``lubricants``: an oil, and jet oils over temperature; ``oils``: grades and data sheets
 - ``tolerances``: limits of shafts, housings and rings (ISO 286, ISO 492), and the interference of a ring on its seat
 - ``catalogue``: what a designation says of a bearing, and what is inside it
 

@@ -9,18 +9,8 @@ from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, mode
 
 from rbdyn.faults import Consistent
 from rbdyn.fields import SI, Fraction, NonNegative, NotVanishing, Positive, Share
-from rbdyn.properties.oils import (
-    BASE_OILS,
-    GOLD_SPREAD,
-    OILS,
-    TURBINE_OILS,
-    BaseOil,
-    Fluid,
-    Oil,
-    Walther,
-    grade_oil,
-    oil_at,
-)
+from rbdyn.properties.lubricants import OILS, Oil, oil_at
+from rbdyn.properties.oils import BASE_OILS, GOLD_SPREAD, TURBINE_OILS, BaseOil, Fluid, Walther, grade_oil
 
 RheologyOil = Literal["MIL-L-7808", "MIL-L-23699", "MIL-L-27502", "Santotrac 30", "Santotrac 50", "Mobil DTE SAE30"]
 RHEOLOGY_OILS = get_args(RheologyOil)

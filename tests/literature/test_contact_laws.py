@@ -25,8 +25,8 @@ from rbdyn.compiled.elementary import (
     tenth_root,
 )
 from rbdyn.contact import damping, film, hertz_line, rolling_resistance, traction
+from rbdyn.properties.lubricants import oil_at
 from rbdyn.properties.materials import MATERIALS, equivalent_modulus
-from rbdyn.properties.oils import oil_at
 
 STEEL = equivalent_modulus(MATERIALS["bearing_steel"], MATERIALS["bearing_steel"])
 LINE = hertz_line.palmgren(STEEL, 3.5e-3)

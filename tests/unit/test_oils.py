@@ -15,6 +15,7 @@ from rbdyn.dynamics.parameters.race_traction import _rheology
 from rbdyn.dynamics.parameters.start import start_state
 from rbdyn.faults import InputError
 from rbdyn.life.rollers import minimum_loads
+from rbdyn.properties.lubricants import oil_at
 from rbdyn.properties.oils import (
     BASE_OILS,
     GOLD_SPREAD,
@@ -23,7 +24,6 @@ from rbdyn.properties.oils import (
     NamedOil,
     Walther,
     grade_oil,
-    oil_at,
     oil_named,
     viscosity_at_100,
     viscosity_index,

@@ -27,7 +27,7 @@ from rbdyn.contact.traction import (
 )
 from rbdyn.dynamics.parameters.race_traction import film_report, race_traction
 from rbdyn.faults import InputError
-from rbdyn.properties.oils import oil_at
+from rbdyn.properties.lubricants import oil_at
 from rbdyn.scene import Scene
 from rbdyn.scene.lubricant import RHEOLOGIES, smallest_traction
 

@@ -29,8 +29,8 @@ from rbdyn.dynamics.forces.races import EqualRollers, Race, unequal_rollers
 from rbdyn.dynamics.forces.ring_motion import HeldRing
 from rbdyn.dynamics.parameters.race_traction import race_traction, rolling_contacts
 from rbdyn.dynamics.parameters.scales import contact_approach, layout_of
+from rbdyn.properties.lubricants import Oil
 from rbdyn.properties.materials import equivalent_modulus
-from rbdyn.properties.oils import Oil
 from rbdyn.scene import Scene
 from rbdyn.scene.bearing import Harmonic
 

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 from rbdyn.contact import film_thickness, traction
 from rbdyn.faults import InputError
+from rbdyn.properties.lubricants import Oil
 from rbdyn.properties.materials import equivalent_modulus
-from rbdyn.properties.oils import Oil
 from rbdyn.scene import Scene
 from rbdyn.scene.lubricant import RHEOLOGIES
 
