@@ -17,8 +17,7 @@ from scipy.optimize import minimize_scalar
 from rbdyn.arrays import Array
 from rbdyn.faults import MethodError, validated
 from rbdyn.life import turning_rings
-from rbdyn.quasistatic.fatigue import reference_capacities, solution_life
-from rbdyn.quasistatic.remarks import Rating, overloads, pressures
+from rbdyn.quasistatic.result import Rating, overloads, pressures, reference_capacities, solution_life
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 from rbdyn.scene.ball import BallRow, SingleRowScene

@@ -14,9 +14,7 @@ from numba import njit
 
 from rbdyn.fields import RPM
 from rbdyn.properties.materials import MATERIALS
-from rbdyn.quasistatic.row.ball import ball_forces
-from rbdyn.quasistatic.row.ball_motion import orbit_and_spin
-from rbdyn.quasistatic.row.control import FixedShare, Spinning
+from rbdyn.quasistatic.row.ball import FixedShare, Spinning, ball_forces, orbit_and_spin
 from rbdyn.quasistatic.row.model import cage_speed, row_model
 from rbdyn.scene.ball import BallModel, BallRow
 

@@ -15,8 +15,8 @@ from rbdyn import equilibrium
 from rbdyn.faults import InputError
 from rbdyn.life import turning_rings
 from rbdyn.plots import ball as ball_pictures
-from rbdyn.quasistatic.fatigue import reference_capacities, solution_life
-from rbdyn.quasistatic.row.control import CommonCage, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.result import reference_capacities, solution_life
+from rbdyn.quasistatic.row.ball import CommonCage, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.newton import RACE_CONTROL_LOST
 from rbdyn.quasistatic.sweep import run as sweeps
 from rbdyn.quasistatic.sweep.march import leaves, with_numbers

@@ -12,9 +12,9 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.properties.materials import MATERIALS, Material
-from rbdyn.quasistatic.row.control import Control
+from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.model import row_model
-from rbdyn.quasistatic.row.row import Row
+from rbdyn.quasistatic.row.ring import Row
 from rbdyn.scene.ball import BallBearing, BallModel, BallOperation, Prescribed
 
 CONTROLS = ("outer", "inner", "half", "hybrid", "common_cage")

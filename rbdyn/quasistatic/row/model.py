@@ -10,8 +10,8 @@ from rbdyn.contact.hertz_point import PointContact, ball_on_race
 from rbdyn.mounting.fits import row_change
 from rbdyn.mounting.rings import UNCHANGED, GrooveChange
 from rbdyn.properties.materials import Material, equivalent_modulus
-from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
-from rbdyn.quasistatic.row.row import Row, at_rest
+from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.row.ring import Row, at_rest
 from rbdyn.scene.ball import BallModel, BallRow, BallScene, SingleRowScene
 
 INNER_SHARE = {"outer": 0.0, "inner": 1.0, "half": 0.5}
