@@ -385,10 +385,10 @@ def motion_record(motions: "Mapping[str, History]") -> dict[str, Any]:
 
     Each holds ``t_s`` and ``cage_orbit_um`` {"x", "y"}: the whole motion, thinned to at most ORBIT_POINTS;
     ``guide_radius_um``, None without a guide; ``moving``: FRAMES frames of PLAYED_TURNS shaft turns about the
-    largest pocket force, as rbdyn.plots.player.motion_record keeps them.
+    largest pocket force, as rbdyn.plots.drawing.motion_record keeps them.
     """
     from rbdyn.plots.drawing import drawing
-    from rbdyn.plots.player import motion_record as frames
+    from rbdyn.plots.drawing import motion_record as frames
 
     record = {}
     for name, motion in motions.items():

@@ -22,12 +22,10 @@ import typer
 from published.common import Table, canvas, save
 from published.homogenisation import homogenisation
 
-from rbdyn.quasistatic.runout.classes import running_accuracy
-from rbdyn.quasistatic.runout.lots import Lot, draw_parts, linear_response, readings
-from rbdyn.quasistatic.runout.model import bench_of
+from rbdyn.quasistatic.runout.lots import Bench, Lot, RaceLimits, design, draw_parts, linear_response, readings, runouts
+from rbdyn.quasistatic.runout.measures import running_accuracy
 from rbdyn.quasistatic.runout.race_errors import RaceErrors, ball_path, perfect, waviness
-from rbdyn.quasistatic.runout.tolerance_design import Bench, RaceLimits, design, runouts
-from rbdyn.quasistatic.runout.turn import Followed, follow
+from rbdyn.quasistatic.runout.turn import Followed, bench_of, follow
 from rbdyn.records.words import with_error
 from rbdyn.scene.ball import BallScene
 

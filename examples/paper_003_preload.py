@@ -23,7 +23,7 @@ from published.lundberg_palmgren import plain_capacities
 from rbdyn import BallScene
 from rbdyn.contact.hertz_point import peak_pressure
 from rbdyn.life.balls import row_life
-from rbdyn.quasistatic import fatigue, preload
+from rbdyn.quasistatic import preload, result
 from rbdyn.quasistatic.row.equilibrium import solve
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 
@@ -149,7 +149,7 @@ def read_back_capacity() -> float:
 @functools.cache
 def table4() -> pd.DataFrame:
     """Table 4 beside ours, a row an axial force."""
-    own_capacity = fatigue.capacity_of(bearing(WORKING_AXIAL_N).bearing)
+    own_capacity = result.capacity_of(bearing(WORKING_AXIAL_N).bearing)
     records = []
     for axial, inner, outer, angle, hours in TABLE_4:
         record: dict[str, float] = {
@@ -301,7 +301,7 @@ def _conclusion(stress: pd.DataFrame, clearance: pd.DataFrame) -> str:
     read_back = stress["life_h ISO 281, read back"] / stress["life_h paper"] - 1.0
     before_last = read_back.iloc[:-1]
     neighbours = stress["life_h ISO 281, read back"].iloc[-1] / (1.0 + read_back.iloc[-2])
-    own = fatigue.capacity_of(bearing(WORKING_AXIAL_N).bearing)
+    own = result.capacity_of(bearing(WORKING_AXIAL_N).bearing)
     best = optima()
     rest, fast, free = (best[name].least_stress.value for name in MODELS)
     lives = [best[name].longest_life.value for name in MODELS]

@@ -9,8 +9,8 @@ from doe.adaptive.candidates import Region, front_rows
 from doe.adaptive.emulators import Emulators
 from doe.adaptive.runs import Border, Face
 from doe.arrays import Array
-from doe.pareto.archive import dominates
-from doe.pareto.picks import Rule, pick_all
+from doe.pareto.goals import Rule, pick_all
+from doe.pareto.search import dominates
 
 NEAR = 0.05  # of the range of a factor: as near to a face a pick lies at it
 AHEAD, BETTER = 0.1, 0.9  # of the range beyond a face; chance there of what no point of the front dominates

@@ -9,7 +9,7 @@ from scipy.stats import qmc
 
 from doe.adaptive.emulators import Emulators, Inactive, settled
 from doe.arrays import Array, Mask, Rows
-from doe.pareto.archive import non_dominated
+from doe.pareto.search import non_dominated
 
 EVERYWHERE = 9  # 2^9 points all over the region
 PAST = 1.3  # times the region: what lies beyond is moved to its faces, where fronts like to end

@@ -19,7 +19,7 @@ from scipy.stats import qmc
 
 from doe.adaptive.emulators import Emulators
 from doe.arrays import Array, Mask
-from doe.pareto.archive import REFERENCE
+from doe.pareto.search import REFERENCE
 
 LEVELS = 13  # 2^13 levels, of which only those count that something may still gain
 MOST_LEVELS = 1500  # of those

@@ -23,11 +23,9 @@ from doe.adaptive.result import AdaptiveFront, Batch
 from doe.adaptive.runs import Border, Evaluate, Face, Runs
 from doe.adaptive.settling import CHECKS, as_foretold, missed, nothing_gained
 from doe.arrays import Array, Whole
-from doe.pareto.archive import best_for_hypervolume, hypervolume, spread
 from doe.pareto.direct import DirectFront, Samples
-from doe.pareto.goals import Goals
-from doe.pareto.nsga2 import InfeasibleError
-from doe.pareto.picks import NAMES, Rule, pick_all
+from doe.pareto.goals import NAMES, Goals, Rule, pick_all
+from doe.pareto.search import InfeasibleError, best_for_hypervolume, hypervolume, spread
 from doe.threads import one_thread
 from rbdyn.faults import MethodError
 from rbdyn.records.words import counted

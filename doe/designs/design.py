@@ -1,8 +1,18 @@
-"""A design of experiments as a record: its points, their blocks and kinds, and the order of the runs; coded and actual
-units of points, and which of them are replicates."""
+"""A design of experiments as a record, and the designs that are constructed: central composite, of three levels, and those that fill a box.
 
+A record holds points, their blocks and kinds, and the order of the runs; coded and actual units of points, and which of them are
+replicates. Coded units: centre 0, corners of the cube -1 and +1, one column a factor.
+
+- Central composite designs stand on two-level factorials, full and fractional, and their division into blocks.
+- Box-Behnken designs have three levels and no corners: all points but the centre lie on one sphere. Definitive screening designs
+  have hardly more than twice as many runs as factors.
+- Full factorials, Latin hypercubes and Sobol sequences fill the box from -1 to +1.
+"""
+
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations, product
 from typing import Literal, Self
 
 import numpy as np
@@ -10,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from doe.arrays import Array, Rows, Whole
 from rbdyn.faults import MethodError
+from rbdyn.records.words import counted
 
 Region = Literal["ball", "box"]
 SAME_POINT = 1e-9  # coded units within which two runs are replicates
@@ -96,3 +107,306 @@ def to_coded(actual: ArrayLike, centre: ArrayLike, step: ArrayLike) -> Array:
     if np.any(step == 0):
         raise MethodError(f"step = {step.tolist()}: every step must differ from zero")
     return (np.asarray(actual, float) - np.asarray(centre, float)) / step
+
+
+# Generators of the smallest regular fractions of resolution V or more: each added factor is the product of
+# the named ones. Box and Hunter, The 2^(k-p) fractional factorial designs II, Technometrics 3 (1961).
+RESOLUTION_V = {5: ("ABCD",), 6: ("ABCDE",), 7: ("ABCDEF",), 8: ("ABCD", "ABEF")}
+
+
+def central_composite(
+    factors: int,
+    *,
+    alpha: float | str = "rotatable",
+    centre_replicates: int = 6,
+    cube: str = "full",
+    blocks: bool = False,
+    cube_blocks: int = 1,
+) -> Design:
+    """Central composite design in standard order.
+
+    factors : number of factors k, at least 2.
+    alpha : axial distance in coded units, or one of the words of `axial_distance`; "inscribed" is the
+        rotatable design shrunk until its axial points lie at -1 and +1.
+    centre_replicates : number of centre points, from whose scatter pure error is estimated.
+    cube : "full", or "resolution_v" for the tabulated fraction.
+    blocks : run cube and axial points in blocks of their own, the centre points shared between them by
+        `centre_shares`.
+    cube_blocks : blocks of the cube, 1, 2 or 4 (with ``blocks``).
+
+    Raises MethodError when a number is out of its range, ``alpha`` or ``cube`` is an unknown word, no fraction is
+    tabulated, or the blocks are impossible.
+
+    Source: Box and Hunter, Multi-factor experimental designs for exploring response surfaces,
+    Ann. Math. Stat. 28 (1957) 195-241.
+    """
+    if factors < 2:
+        raise MethodError(f"factors = {factors}: a central composite design needs at least 2 factors")
+    if centre_replicates < 0:
+        raise MethodError(f"centre_replicates = {centre_replicates}: must be at least 0")
+    corners = cube_points(factors, cube)
+    number = cube_blocks if blocks else 1
+    shares = centre_shares(factors, len(corners), alpha, centre_replicates, number)
+    distance = axial_distance(factors, alpha, cube_runs=len(corners), centres=shares)
+    axial = np.asarray(np.kron(np.eye(factors), [[-distance], [distance]]), float)
+    if alpha == "inscribed":
+        corners = corners / axial_distance(factors, "rotatable", cube_runs=len(corners))
+    parts = [("cube", corners), ("axial", axial), ("centre", np.zeros((centre_replicates, factors)))]
+    of_run = [0] * (len(corners) + len(axial) + centre_replicates)
+    if blocks:
+        of_cube = corner_blocks(corners, number).tolist()
+        of_centres = [each % number for each in range(shares[0])] + [number] * shares[1]
+        of_run = [*of_cube, *[number] * len(axial), *of_centres]
+    ball = distance > 1.0 or alpha == "inscribed"
+    return assembled(parts, of_run, max(1.0, distance), "ball" if ball else "box")
+
+
+def axial_distance(
+    factors: int, alpha: float | str, *, cube_runs: int | None = None, centres: tuple[int, int] = (0, 0)
+) -> float:
+    """Axial distance in coded units, from a number or a word.
+
+    With k factors, F runs of the cube (``cube_runs``; 2^k unless given), ``centres`` centre points with the
+    cube and with the axial points, and N runs in all:
+
+    - "rotatable": F^(1/4); the variance of a predicted quadratic depends on the distance from the centre only
+    - "spherical": sqrt(k); axial points as far out as the corners of the cube
+    - "orthogonal_blocks": alpha^2 = k (1 + n0s/(2k)) / (1 + n0c/F); cube and axial block shift no term
+    - "orthogonal_columns": alpha^2 = (sqrt(F N) - F)/2; square terms are estimated independently of each other
+    - "face_centred": 1; "inscribed": 1, with the cube shrunk
+
+    Raises MethodError for an unknown word or a number that is not positive and finite.
+
+    Source: Box and Hunter (1957), rotatability and blocks; Khuri and Cornell, Response Surfaces (1987), columns.
+    """
+    cube = 2**factors if cube_runs is None else cube_runs
+    total = cube + 2 * factors + sum(centres)
+    distances = {
+        "rotatable": math.pow(cube, 0.25),
+        "spherical": math.sqrt(factors),
+        "orthogonal_blocks": math.sqrt(factors * (1 + centres[1] / (2 * factors)) / (1 + centres[0] / cube)),
+        "orthogonal_columns": math.sqrt((math.sqrt(cube * total) - cube) / 2),
+        "face_centred": 1.0,
+        "inscribed": 1.0,
+    }
+    if isinstance(alpha, str):
+        if alpha not in distances:
+            words = ", ".join(f'"{word}"' for word in distances)
+            raise MethodError(f"alpha = {alpha!r}: write {words} or a positive number")
+        return distances[alpha]
+    if not (math.isfinite(alpha) and alpha > 0):
+        raise MethodError(f"alpha = {alpha}: must be a positive number")
+    return float(alpha)
+
+
+def centre_shares(
+    factors: int, cube_runs: int, alpha: float | str, centre_replicates: int, cube_blocks: int = 1
+) -> tuple[int, int]:
+    """Centre points with the cube and with the axial points, of ``centre_replicates`` in all.
+
+    The share whose orthogonal blocking is nearest to the axial distance that is asked for (the rotatable one
+    for alpha = "orthogonal_blocks"), so that blocks disturb the surface least; every block of the cube gets
+    the same number.
+
+    Raises MethodError for an unknown ``alpha``.
+    """
+    asked = "rotatable" if alpha in ("orthogonal_blocks", "inscribed") else alpha
+    wanted = axial_distance(factors, asked, cube_runs=cube_runs, centres=(0, centre_replicates))
+
+    def away(with_cube: int) -> float:
+        shares = (with_cube, centre_replicates - with_cube)
+        orthogonal = axial_distance(factors, "orthogonal_blocks", cube_runs=cube_runs, centres=shares)
+        return abs(math.log(orthogonal / wanted))
+
+    best = min(range(0, centre_replicates + 1, cube_blocks), key=away)
+    return best, centre_replicates - best
+
+
+def cube_points(factors: int, cube: str = "full") -> Array:
+    """Corners (n, k) in standard order, the first factor fastest.
+
+    ``cube``: "full" for 2^k corners, "resolution_v" for the smallest tabulated fraction in which no main
+    effect or two-factor interaction is confused with another. Raises MethodError where none is tabulated or
+    the word is unknown.
+    """
+    if cube not in ("full", "resolution_v"):
+        raise MethodError(f'cube = {cube!r}: choose "full" or "resolution_v"')
+    generators = RESOLUTION_V.get(factors, ()) if cube == "resolution_v" else ()
+    if cube == "resolution_v" and not generators:
+        tabulated = f"tabulated for {factors} factors, only for {min(RESOLUTION_V)} to {max(RESOLUTION_V)}"
+        raise MethodError(f"cube = 'resolution_v': no fraction of resolution V is {tabulated}; use cube = \"full\"")
+    basic = factors - len(generators)
+    corners = np.array([corner[::-1] for corner in product((-1.0, 1.0), repeat=basic)])
+    added = [corners[:, ["ABCDEFGH".index(letter) for letter in word]].prod(axis=1) for word in generators]
+    return np.column_stack([corners, *added])
+
+
+def corner_blocks(corners: Array, blocks: int) -> Rows:
+    """Block (n,) of each corner, such that no block effect is confused with a term up to second order.
+
+    Blocks are told by the signs of interactions of three or more factors, the longest that serve; their
+    products must not be short either. Raises MethodError where no such division exists.
+    """
+    if blocks == 1:
+        return np.zeros(len(corners), dtype=np.intp)
+    count = corners.shape[1]
+    longest_first = (word for size in range(count, 2, -1) for word in combinations(range(count), size))
+    words = [corners[:, word].prod(axis=1) for word in longest_first]
+    short = _short_products(corners)
+    clear = [word for word in words if not np.abs(short.T @ word).any()]
+    if blocks == 2 and clear:
+        return (clear[0] > 0).astype(np.intp)
+    if blocks == 4:
+        for one, two in combinations(clear, 2):
+            between = one * two
+            if not np.abs(short.T @ between).any():
+                return (2 * (one > 0) + (two > 0)).astype(np.intp)
+    what = f"cube_blocks = {blocks}: {len(corners)} corners of {corners.shape[1]} factors cannot be divided so without"
+    raise MethodError(f"{what} confusing a block with a second-order term; use fewer blocks or a larger cube")
+
+
+def _short_products(corners: Array) -> Array:
+    """Columns of the constant, the factors and the products of two."""
+    pairs = [corners[:, pair].prod(axis=1) for pair in combinations(range(corners.shape[1]), 2)]
+    return np.column_stack([np.ones(len(corners)), corners, *pairs])
+
+
+# Factors that vary together, in the order of the published tables, and how the design divides into blocks:
+# by parts of that list (4 and 5 factors) or by the sign of the product of the three (6 and 7 factors).
+TOGETHER = {
+    3: ("AB", "AC", "BC"),
+    4: ("AB", "CD", "AD", "BC", "AC", "BD"),
+    5: ("AB", "AC", "CD", "DE", "BE", "AD", "AE", "BC", "BD", "CE"),
+    6: ("ABD", "BCE", "CDF", "ADE", "BEF", "ACF"),
+    7: ("DEF", "AFG", "BEG", "ABD", "CDG", "ACE", "BCF"),
+}
+BLOCKS = {4: 3, 5: 2, 6: 2, 7: 2}
+MOST_SCREENED = 8  # factors; the primes 3, 5 and 7 give the conference matrices up to there
+
+
+def box_behnken(factors: int, *, centre_replicates: int = 6, blocks: bool = False) -> Design:
+    """Box-Behnken design in standard order, 3 to 7 factors.
+
+    ``blocks``: the published division into orthogonal blocks (3 for 4 factors, 2 for 5 to 7), each with an
+    equal share of the centre points.
+
+    Raises MethodError when the number of factors is out of range, blocks do not exist for it, or the centre points
+    cannot be shared equally.
+
+    Source: Box and Behnken, Some new three level designs for the study of quantitative variables,
+    Technometrics 2 (1960) 455-475.
+    """
+    if factors not in TOGETHER:
+        mend = 'use kind = "central_composite"'
+        raise MethodError(f"kind = 'box_behnken': tabulated for 3 to 7 factors, not for {factors}; {mend}")
+    number = BLOCKS.get(factors, 1) if blocks else 1
+    if blocks and number == 1:
+        raise MethodError(f"blocks = true: a Box-Behnken design in {factors} factors has no orthogonal blocks")
+    if centre_replicates % number:
+        need = f"{number} blocks need equal shares of the centre points; give a multiple of {number}"
+        raise MethodError(f"centre_replicates = {centre_replicates}: {need}")
+    edges, of_run = [], []
+    for place, letters in enumerate(TOGETHER[factors]):
+        columns = ["ABCDEFG".index(letter) for letter in letters]
+        for signs in product((-1.0, 1.0), repeat=len(columns)):
+            point = np.zeros(factors)
+            point[columns] = signs[::-1]
+            edges.append(point)
+            part = place * number // len(TOGETHER[factors])
+            of_run.append(int(np.prod(signs) > 0) if len(columns) == 3 else part)
+    centres = np.zeros((centre_replicates, factors))
+    parts = [("edge", np.array(edges)), ("centre", centres)]
+    return assembled(parts, [each % number for each in (*of_run, *range(centre_replicates))], 1.0, "ball")
+
+
+def definitive_screening(factors: int, *, centre_replicates: int = 1) -> Design:
+    """Definitive screening design in 2 to 8 factors: a conference matrix, its mirror image, and centre points.
+
+    With one centre point 2k + 1 runs for an even number k of factors; an odd one takes a column less of the next even
+    design. Main effects are orthogonal to each other and to all squares and products; squares can be told from each
+    other and from products, products not all from each other: the model for it is "pure_quadratic".
+
+    Raises MethodError when the number of factors is out of range.
+
+    Source: Jones and Nachtsheim, A class of three-level designs for definitive screening in the presence of
+    second-order effects, J. Qual. Technol. 43 (2011) 1-15; Xiao, Lin and Bai, Constructing definitive screening designs
+    using conference matrices, J. Qual. Technol. 44 (2012) 2-8.
+    """
+    if not 2 <= factors <= MOST_SCREENED:
+        mend = 'use kind = "d_optimal"'
+        raise MethodError(
+            f"kind = 'definitive_screening': is for 2 to {MOST_SCREENED} factors, not for {factors}; {mend}"
+        )
+    half = conference_matrix(factors + factors % 2)[:, :factors]
+    points = np.stack([half, -half], axis=1).reshape(-1, factors)
+    parts = [("screening", points), ("centre", np.zeros((centre_replicates, factors)))]
+    return assembled(parts, [0] * (len(points) + centre_replicates), 1.0, "box")
+
+
+def conference_matrix(order: int) -> Array:
+    """C (n, n) with zeros on the diagonal, else -1 and 1, and C'C = (n - 1) I; n - 1 is an odd prime or 1.
+
+    Source: Paley, On orthogonal matrices, J. Math. Phys. 12 (1933) 311-320.
+    """
+    prime = order - 1
+    squares = {place * place % prime for place in range(1, prime)}
+    character = np.array([0, *(1 if place in squares else -1 for place in range(1, prime))], float)
+    places = np.arange(prime)
+    matrix = np.ones((order, order))
+    matrix[1:, 1:] = character[(places[:, None] - places) % prime]
+    matrix[1:, 0] = -1.0 if prime % 4 == 3 else 1.0
+    matrix[0, 0] = 0.0
+    return matrix
+
+
+MOST_RUNS = 10_000
+# More runs of a Latin hypercube are even enough by themselves, and exchanges among them take seconds.
+MOST_EXCHANGED = 200
+
+
+def full_factorial(factors: int, *, levels: int = 3, centre_replicates: int = 0) -> Design:
+    """All combinations of ``levels`` equally spaced values of each factor, the first factor fastest.
+
+    ``centre_replicates`` points are added at the centre. Raises MethodError beyond 10 000 combinations.
+    """
+    if (runs := levels**factors) > MOST_RUNS:
+        mend = 'give fewer levels or use kind = "sobol"'
+        raise MethodError(
+            f"levels = {levels}: {counted(factors, 'factor')} give {runs} runs, more than {MOST_RUNS}; {mend}"
+        )
+    values = np.linspace(-1.0, 1.0, levels)
+    return _filled("grid", np.array([each[::-1] for each in product(values, repeat=factors)]), centre_replicates)
+
+
+def latin_hypercube(factors: int, *, runs: int = 60, seed: int = 1, centre_replicates: int = 0) -> Design:
+    """Latin hypercube: in every factor one run in each of ``runs`` equal intervals, evenly spread by exchanges.
+
+    Seeded; exchanges within columns lower the centred discrepancy of up to `MOST_EXCHANGED` runs.
+
+    Source: McKay, Beckman and Conover, Technometrics 21 (1979) 239-245; Fang, Li and Sudjianto, Design and
+    Modeling for Computer Experiments (2006) (exchanges).
+    """
+    from scipy.stats import qmc
+
+    exchanges = "random-cd" if runs <= MOST_EXCHANGED else None
+    sample = qmc.LatinHypercube(factors, optimization=exchanges, seed=seed).random(runs)
+    return _filled("sample", 2.0 * sample - 1.0, centre_replicates)
+
+
+def sobol(factors: int, *, runs: int = 60, seed: int = 1, centre_replicates: int = 0) -> Design:
+    """The first ``runs`` points of a scrambled Sobol sequence: more runs later keep those made.
+
+    Powers of two are the most even.
+
+    Source: Sobol, USSR Comput. Math. Math. Phys. 7 (1967) 86-112; Owen, scrambling, J. Complexity 14 (1998).
+    """
+    from scipy.stats import qmc
+
+    sample = qmc.Sobol(factors, seed=seed).random_base2(max(runs - 1, 1).bit_length())[:runs]
+    return _filled("sample", 2.0 * sample - 1.0, centre_replicates)
+
+
+def _filled(kind: str, points: Array, centre_replicates: int) -> Design:
+    centres = np.zeros((centre_replicates, points.shape[1]))
+    blocks = [0] * (len(points) + centre_replicates)
+    return assembled([(kind, points), ("centre", centres)], blocks, 1.0, "box")

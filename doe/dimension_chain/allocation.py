@@ -20,12 +20,10 @@ from math import exp, inf, sqrt
 import numpy as np
 
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, closing_function, interval, middle, total
-from doe.dimension_chain.links import DIGITS, SLACK, Chain, Cost, Interval, Link, Mode, Part
-from doe.dimension_chain.monte_carlo import Assemblies, draw
-from doe.dimension_chain.parts import allocated_part, given_part
-from doe.dimension_chain.yields import closing_moments, exact_shares, standard_error
+from doe.dimension_chain.links import DIGITS, SLACK, Chain, Cost, Interval, Link, Mode, Part, allocated_part, given_part
+from doe.dimension_chain.yields import Assemblies, closing_moments, draw, exact_shares, standard_error
 from rbdyn.faults import MethodError
-from rbdyn.properties.iso286 import grade_tolerances, tolerance_unit
+from rbdyn.properties.tolerances import grade_tolerances, tolerance_unit
 
 SAMPLES = 100_000  # assemblies that judge a yield where no convolution can
 HALVINGS = 26

@@ -1,15 +1,185 @@
-"""Chains from TOML: one of its own, or several under names in one file."""
+"""Chains from TOML: one of its own, or several under names in one file; and what is wrong with a chain, one sentence a fault, with key,
+value and fix.
+"""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
 
-from doe.dimension_chain.faults import faults
-from doe.dimension_chain.links import Chain
-from rbdyn.faults import Strict, read_toml, refuse, validated
+from doe.dimension_chain.allocation import Allocation
+from doe.dimension_chain.closing import NoValueError, interval, is_part, press_fit_factor, shown, used_links
+from doe.dimension_chain.links import SLACK, Chain, ClosingLink, Link, coded_limits
+from rbdyn.faults import MethodError, Strict, read_toml, refuse, validated
+from rbdyn.properties.tolerances import LARGEST, positioned
+
+
+def faults(chain: Chain) -> list[str]:
+    """All faults of a chain; empty if there is none."""
+    used = _used(chain.link)
+    sentences = [fault for link in chain.link for fault in _link_faults(link, chain, link.name in used)]
+    lower, upper = chain.closing_link.lower_mm, chain.closing_link.upper_mm
+    if lower >= upper:
+        sentences.append(f"closing_link.lower_mm = {lower:g}: must be below upper_mm = {upper:g}; swap them")
+    counts = Counter(link.name for link in chain.link)
+    repeated = [name for name, count in counts.items() if count > 1]
+    sentences += [f'link.name = "{name}": used {counts[name]} times; name each once' for name in repeated]
+    sentences += _reference_faults(chain) + _selective_faults(chain)
+    sentences += _allocation_faults(chain, [link.name for link in chain.free if link.coefficient != 0])
+    # The width that fixed links leave can only be told of a chain that is otherwise sound.
+    try:
+        return sentences or _room_faults(chain)
+    except NoValueError as error:
+        return [str(error)]
+
+
+def _used(links: list[Link]) -> set[str]:
+    names: set[str] = set()
+    for link in links:
+        # An expression that cannot be read may use any link.
+        unread = _sentence(partial(used_links, link)) is not None
+        names |= {each.name for each in links} if unread else set(used_links(link))
+    return names
+
+
+def _link_faults(link: Link, chain: Chain, used: bool) -> list[str]:
+    if not link.is_dimension:
+        return _function_faults(link)
+    rule = chain.allocate
+    bare = not link.has_deviations and link.lower_mm is None
+    half = (link.upper_mm is None) != (link.lower_mm is None)
+    lower, upper, mean = link.lower_mm or 0.0, link.upper_mm or 0.0, link.mean_mm
+    shaped = link.distribution in ("uniform", "triangular")
+    free, iso = link in chain.free, rule.method == "iso286" or rule.grades
+    lettered = link.position not in ("unilateral", "symmetric")
+    size, idle = f"nominal_mm = {link.nominal:g}", link.coefficient == 0 and not used
+    large = free and rule.grades and link.nominal > LARGEST
+    priceless = free and rule.method == "cost" and link.cost is None
+    twice = link.fit is not None and (link.upper_mm is not None or link.lower_mm is not None)
+    checks = [
+        (link.nominal_mm is None, "nominal_mm: missing; add it"),
+        (idle, "coefficient = 0: must not be zero; set it, remove the link, or use it in a function"),
+        (half, "only one of upper_mm and lower_mm is given; give both or neither"),
+        (link.fixed and bare, "fixed = true without deviations; give upper_mm and lower_mm or unfix it"),
+        (not half and lower > upper, f"lower_mm = {lower:g}: exceeds upper_mm = {upper:g}; swap them"),
+        (free and iso and link.nominal <= 0, f"{size}: ISO 286 needs it positive; allocate otherwise or fix it"),
+        (large, f"{size}: the grades here end at {LARGEST} mm; set grades = false or fix it"),
+        (priceless, 'method = "cost" needs a curve; give cost = { b = ..., k = ... } or fix it'),
+        (mean is not None and bare, f"mean_mm = {mean}: needs deviations; give upper_mm and lower_mm"),
+        (mean is not None and shaped, f'mean_mm = {mean}: not for "{link.distribution}"; remove it'),
+        (twice, f'fit = "{link.fit}": says the deviations already; remove upper_mm and lower_mm, or the fit'),
+    ]
+    sentences = [sentence for bad, sentence in checks if bad]
+    if link.fit is not None and (unknown := _sentence(lambda: coded_limits(link))):
+        sentences.append(f'fit = "{link.fit}": {unknown}')
+    elif link.fit is not None:
+        lower, upper = coded_limits(link)
+    if mean is not None and not (bare or half) and not lower <= mean <= upper:
+        sentences.append(f"mean_mm = {mean}: is a deviation from the nominal; put it between lower_mm and upper_mm")
+    if free and lettered and (outside := _sentence(lambda: positioned(link.nominal, link.position, 0.0))):
+        sentences.append(f'position = "{link.position}": {outside}')
+    return [f'link "{link.name}": {sentence}' for sentence in sentences]
+
+
+def _function_faults(link: Link) -> list[str]:
+    """Faults of a link that is a function: it takes nothing that only a dimension has."""
+    kinds = [key for key in ("press_fit", "thermal_growth", "expression") if getattr(link, key) is not None]
+    sentences = [f"{' and '.join(kinds)} stand together; a link is one of them"] if len(kinds) > 1 else []
+    alien = [key for key in ("nominal_mm", "upper_mm", "lower_mm", "fit", "mean_mm", "cost") if getattr(link, key)]
+    sentences += [f"{key} = {getattr(link, key)}: a link of kind {kinds[0]} has none; remove it" for key in alien]
+    rise = link.thermal_growth
+    if rise and rise.lower_K > rise.upper_K:
+        sentences.append(f"lower_K = {rise.lower_K:g}: exceeds upper_K = {rise.upper_K:g}; swap them")
+    if unread := _sentence(lambda: used_links(link)):
+        sentences.append(f"expression = {shown(link.expression or '')}: {unread}")
+    return [f'link "{link.name}": {sentence}' for sentence in sentences]
+
+
+def _reference_faults(chain: Chain) -> list[str]:
+    """Functions must use links that stand before them, and make sense with them."""
+    sentences = []
+    before: dict[str, Link] = {}
+    for link in chain.link:
+        if _sentence(partial(used_links, link)) is None:
+            names = used_links(link)
+            mend = f"name one of {', '.join(before) or 'those placed before it'}"
+            alien = [f'uses "{name}", which no link before it is called' for name in names if name not in before]
+            sentences += [f'link "{link.name}": {fault}; {mend}' for fault in alien]
+            grown = link.thermal_growth and before.get(link.thermal_growth.of)
+            if grown and not (grown.is_dimension and grown.nominal > 0):
+                why = f'thermal_growth.of = "{grown.name}": must be a positive dimension'
+                sentences.append(f'link "{link.name}": {why}')
+        bore = link.press_fit and before.get(link.press_fit.bore)
+        if link.press_fit and bore and (wrong := _sentence(partial(press_fit_factor, link.press_fit, bore.nominal))):
+            sentences.append(f'link "{link.name}": press_fit: {wrong}')
+        before.setdefault(link.name, link)
+    return sentences
+
+
+def _selective_faults(chain: Chain) -> list[str]:
+    if chain.selective is None:
+        return []
+    parts = [link.name for link in chain.link if is_part(link)]
+    pair = {"first": chain.selective.first, "second": chain.selective.second}
+    alien = {key: name for key, name in pair.items() if name not in parts}
+    mend = f"name one of {', '.join(parts)}"
+    sentences = [f'selective.{key} = "{name}": is no part; {mend}' for key, name in alien.items()]
+    if pair["first"] == pair["second"]:
+        sentences.append(f'selective.second = "{pair["second"]}": is the first part too; name another')
+    return sentences
+
+
+def _allocation_faults(chain: Chain, free: list[str]) -> list[str]:
+    if not free:
+        return ["link.fixed = true on every link: nothing is left to allocate; unfix at least one"]
+    adjust = chain.allocate.adjust
+    if adjust is not None and adjust not in free:
+        kind = "is fixed" if any(link.name == adjust for link in chain.link) else "is no link"
+        return [f'allocate.adjust = "{adjust}": {kind}; name one of {", ".join(free)}']
+    return []
+
+
+def _room_faults(chain: Chain) -> list[str]:
+    """Fixed links, or the narrowest tolerances of cost curves, that leave no room within the limits."""
+    search, free = Allocation(chain), chain.free
+    bare_widths = {link.name: 0.0 for link in free}
+    if lost := _sentence(partial(search.parts, bare_widths)):
+        return [f'allocate.adjust = "{search.adjusted.name}": {lost}']
+    bare = search.parts(bare_widths)
+    limits, width = chain.closing_link, chain.width_mm
+    if chain.allocate.mode == "yield":
+        share, target = search.sure_yield(bare), chain.allocate.target_yield
+        if share < target:
+            low, high = search.tails(bare)
+            what = f"allocate.target_yield = {target:g}: the fixed links alone give {share:.4g}"
+            return [f"{what}; narrow or unfix one, or widen the limits: {_nearest(limits, high - low)}"]
+    else:
+        low, high = interval(search.function, bare, chain.allocate.mode)
+        consumed = high - low
+        if consumed > SLACK and width <= consumed + SLACK:
+            what = f"link.fixed = true: the fixed links consume {consumed:.4f} mm of the closing link's {width:.4f} mm"
+            return [f"{what}; narrow or unfix one, or widen the limits: {_nearest(limits, consumed)}"]
+    tight = _sentence(search.linear_rule)
+    return [f'allocate.method = "{chain.allocate.method}": {tight}'] if tight else []
+
+
+def _nearest(limits: ClosingLink, width: float) -> str:
+    middle = (limits.lower_mm + limits.upper_mm) / 2
+    return f"the nearest that can be met are wider than {middle - width / 2:.4f} to {middle + width / 2:.4f} mm"
+
+
+def _sentence(attempt: Callable[[], object]) -> str | None:
+    """The message of a MethodError, if one comes; one that names its link itself passes."""
+    try:
+        attempt()
+    except NoValueError:
+        raise
+    except MethodError as error:
+        return str(error)
+    return None
 
 
 class NamedChain(Chain):

@@ -14,9 +14,8 @@ import numpy as np
 
 from doe.arrays import Array, Rows
 from doe.dimension_chain.closing import ClosingFunction, interval, middle
-from doe.dimension_chain.distributions import quantile
 from doe.dimension_chain.links import DIGITS, SLACK, ClosingLink, Interval, Part, Selective
-from doe.dimension_chain.yields import standard_error
+from doe.dimension_chain.yields import quantile, standard_error
 from rbdyn.records.record import Record, derived, keyed
 
 MOST_CLASSES = 100

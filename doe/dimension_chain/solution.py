@@ -7,13 +7,20 @@ import numpy as np
 
 from doe.dimension_chain.allocation import Allocation, total_cost
 from doe.dimension_chain.closing import ClosingFunction, NoValueError, interval, linear_interval, middle
-from doe.dimension_chain.distributions import moments
-from doe.dimension_chain.faults import faults
-from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part
-from doe.dimension_chain.monte_carlo import ALIKE, Assemblies, draw
-from doe.dimension_chain.parts import given_parts
+from doe.dimension_chain.links import DIGITS, SLACK, Chain, Distribution, Interval, Part, given_parts
+from doe.dimension_chain.reading import faults
 from doe.dimension_chain.selective_assembly import SelectiveAssembly, selective_assembly
-from doe.dimension_chain.yields import closing_moments, exact_shares, normal_yield, sampled_ppm, standard_error
+from doe.dimension_chain.yields import (
+    ALIKE,
+    Assemblies,
+    closing_moments,
+    draw,
+    exact_shares,
+    moments,
+    normal_yield,
+    sampled_ppm,
+    standard_error,
+)
 from rbdyn.faults import InputError
 from rbdyn.records.record import Record, derived, keyed, outside_json
 

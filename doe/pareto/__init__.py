@@ -1,15 +1,13 @@
 """Pareto fronts: search, picks, errors.
 
-- ``goals``, ``archive``, ``picks``: costs of responses, what dominates what, how good a front is, which one
-- ``nsga2``, ``front``: search among cheap responses, and the front found
-- ``uncertainty``: what the surfaces' errors make of a front and of a gain
-- ``quadratic``, ``tolerance_aware``: the front of what manufacture leaves of a point
+- ``goals``: costs of responses, and which point of a front to pick
+- ``search``: what dominates what, how good a front is, and the search among cheap responses; ``front``: the front found, and what
+  the surfaces' errors make of it and of a gain
+- ``manufacture``: what tolerances leave of a point, and the front of that
 - ``tolerance``: backwards from a pick to the widest tolerances that keep its gains
-- ``direct``, ``surrogate_loss``: the front of a noisy simulator, and what surfaces lose against it
+- ``direct``, ``direct_tolerance``, ``surrogate_loss``: the front of a noisy simulator, and what surfaces lose against it
 """
 
-from doe.pareto.archive import hypervolume, non_dominated
 from doe.pareto.front import ParetoFront, front
-from doe.pareto.goals import Goals
-from doe.pareto.nsga2 import InfeasibleError
-from doe.pareto.picks import knee_depth
+from doe.pareto.goals import Goals, knee_depth
+from doe.pareto.search import InfeasibleError, hypervolume, non_dominated

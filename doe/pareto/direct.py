@@ -16,10 +16,8 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from doe.arrays import Array, Mask, Rows
-from doe.pareto.archive import dominance, error_aware_dominance, order, ranks, spread
-from doe.pareto.goals import Goals
-from doe.pareto.nsga2 import check_search
-from doe.pareto.picks import NAMES, Rule, pick_all
+from doe.pareto.goals import NAMES, Goals, Rule, pick_all
+from doe.pareto.search import check_search, dominance, error_aware_dominance, order, ranks, spread
 from rbdyn.faults import MethodError
 
 Evaluate = Callable[[Array], tuple[Array, Array]]

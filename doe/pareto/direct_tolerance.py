@@ -14,12 +14,9 @@ from typing import Self
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto.archive import dominates, non_dominated
-from doe.pareto.goals import Goals
-from doe.pareto.manufacture import even_offsets
-from doe.pareto.picks import NAMES, Rule, pick_all
-from doe.pareto.quadratic import Quadratic
-from doe.pareto.tolerance_aware import SURVIVAL_PARTS, ToleranceBox
+from doe.pareto.goals import NAMES, Goals, Rule, pick_all
+from doe.pareto.manufacture import SURVIVAL_PARTS, Quadratic, ToleranceBox, even_offsets
+from doe.pareto.search import dominates, non_dominated
 
 NEIGHBOURS = 10  # runs a coefficient of a local line: with tricube weights the half of them counts
 HARDLY_VARIED = 0.1  # of the largest spread of the neighbours: along directions with less they tell no slope

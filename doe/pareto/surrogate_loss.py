@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto.archive import hypervolume, non_dominated
 from doe.pareto.direct import DirectFront
+from doe.pareto.search import hypervolume, non_dominated
 from rbdyn.faults import MethodError
 from rbdyn.records.words import signed_with_error
 

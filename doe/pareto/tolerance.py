@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 
 from doe.arrays import Array, Mask, Rows
-from doe.pareto.manufacture import Distribution, error_of_share, random_offsets
-from doe.pareto.share import Interval, interval_of_share, percent
+from doe.pareto.manufacture import Distribution, Interval, error_of_share, interval_of_share, percent, random_offsets
 from rbdyn.faults import MethodError
 
 Costs = Callable[[Array], Array]

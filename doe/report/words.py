@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from doe.pareto.share import Interval, percent
+from doe.pareto.manufacture import Interval, percent
 from rbdyn.records.words import improvement
 
 

@@ -17,7 +17,7 @@ from doe.adaptive.search import check_budget
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.pareto.direct import DirectFront, Samples
-from doe.pareto.nsga2 import InfeasibleError
+from doe.pareto.search import InfeasibleError
 from doe.response_surface import Surface
 from doe.running.failure import Failure, grouped
 from doe.study.design import design_of

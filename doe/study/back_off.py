@@ -14,7 +14,7 @@ import numpy as np
 from scipy import special
 
 from doe.arrays import Array
-from doe.pareto.nsga2 import Doubt
+from doe.pareto.search import Doubt
 from doe.response_surface import Surface
 from doe.response_surface.model_error import correlation
 from doe.study.confirmation import Confirmed

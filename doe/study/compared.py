@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from doe.arrays import Array
-from doe.pareto.archive import hypervolume, non_dominated
+from doe.pareto.search import hypervolume, non_dominated
 from doe.pareto.surrogate_loss import DRAWS, noisy_hypervolume
 from doe.study.adaptive import Adaptive, costs_foretold
 from doe.study.finished import inputs_digest

@@ -11,8 +11,8 @@ from doe import clearance
 from doe.arrays import Array, Whole
 from doe.clearance import Simulations
 from doe.pareto import ParetoFront
-from doe.pareto.archive import spread
 from doe.pareto.direct import DirectFront, direct_front, repeated
+from doe.pareto.search import spread
 from doe.pareto.surrogate_loss import SurrogateLoss, compare_with_surrogate
 from doe.running.failure import Failure, grouped
 from doe.running.runner import Progress

@@ -8,8 +8,8 @@ from scipy import special
 
 from doe.arrays import Array
 from doe.designs.model import second_order
-from doe.pareto.quadratic import Quadratic, identity
-from doe.pareto.uncertainty import draw_coefficients
+from doe.pareto.front import draw_coefficients
+from doe.pareto.manufacture import Quadratic, identity
 from doe.response_surface import Surface, model_matrix
 from doe.response_surface.box_cox import backward, slope
 from doe.response_surface.model_error import draw_fields

@@ -9,10 +9,9 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.pareto import Goals, InfeasibleError, ParetoFront, front
-from doe.pareto.archive import Archive
-from doe.pareto.nsga2 import Doubt
-from doe.pareto.tolerance_aware import ToleranceAware, ToleranceBox, tolerance_aware_front
-from doe.pareto.uncertainty import FrontUncertainty, front_uncertainty
+from doe.pareto.front import FrontUncertainty, front_uncertainty
+from doe.pareto.manufacture import ToleranceAware, ToleranceBox, tolerance_aware_front
+from doe.pareto.search import Archive, Doubt
 from doe.response_surface import Surface
 from doe.study.back_off import SurfaceDoubt
 from doe.study.confirmation import Confirmed

@@ -6,7 +6,7 @@ import numpy as np
 
 from doe.arrays import Array, Mask
 from doe.pareto.goals import BLANK, Goals
-from doe.pareto.tolerance_aware import ToleranceBox
+from doe.pareto.manufacture import ToleranceBox
 from doe.study.design import design_of
 from doe.study_file import Study
 from rbdyn.faults import InputError, refuse

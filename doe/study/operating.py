@@ -9,7 +9,7 @@ from rbdyn.faults import MethodError
 from rbdyn.properties.catalogue import classes_at
 from rbdyn.records.record import Record
 from rbdyn.scene import Scene
-from rbdyn.scene.catalogue_notes import catalogued
+from rbdyn.scene.notes import catalogued
 
 RADIAL = "bearing.radial_clearance_mm"
 # Which clearance of a scene a key holds as drawn.

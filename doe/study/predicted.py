@@ -7,7 +7,7 @@ import numpy as np
 from scipy import stats
 
 from doe.arrays import Array
-from doe.pareto.uncertainty import contrast_error
+from doe.pareto.front import contrast_error
 from doe.response_surface import Surface
 from doe.response_surface.model_error import correlation
 from doe.study.drawn import jacobian, predict_all

@@ -6,11 +6,9 @@ from functools import partial
 import numpy as np
 
 from doe.arrays import Array, Rows
-from doe.pareto.archive import dominates
-from doe.pareto.manufacture import even_offsets
-from doe.pareto.share import Interval, interval_of_share
+from doe.pareto.manufacture import SURVIVAL_PARTS, Interval, ToleranceBox, even_offsets, interval_of_share
+from doe.pareto.search import dominates
 from doe.pareto.tolerance import Kept
-from doe.pareto.tolerance_aware import SURVIVAL_PARTS, ToleranceBox
 from doe.response_surface import Surface
 from doe.study.confirmation import Confirmed
 from doe.study.goals import goals_of

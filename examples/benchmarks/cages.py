@@ -15,9 +15,15 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.contact.cage_bar import CageSection, Elastic, bar_beam, bar_compliance, bar_stiffness
-from rbdyn.properties.cages import CageEstimate, cage_estimate
-from rbdyn.properties.catalogue import Envelope, RollerInterior, envelope, roller_interior
-from rbdyn.properties.designation import read_designation
+from rbdyn.properties.catalogue import (
+    CageEstimate,
+    Envelope,
+    RollerInterior,
+    cage_estimate,
+    envelope,
+    read_designation,
+    roller_interior,
+)
 
 CATALOGUE = Path(__file__).resolve().parents[1] / "published" / "catalogue_masses.csv"
 STEEL, BRASS, POLYAMIDE = 7.827e-6, 8.5e-6, 1.3e-6  # [kg/mm^3]

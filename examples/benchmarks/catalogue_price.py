@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from rbdyn import Scene, SimulationResult, simulate
-from rbdyn.properties.catalogue import envelope
-from rbdyn.properties.designation import read_designation
-from rbdyn.properties.tables import table
+from rbdyn.properties import table
+from rbdyn.properties.catalogue import envelope, read_designation
 
 EXAMPLE = Path(__file__).parents[1] / "cylindrical_roller.toml"
 NAMED = {

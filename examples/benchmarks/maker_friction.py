@@ -14,8 +14,7 @@ import sys
 import tomllib
 
 from rbdyn import Scene, SimulationResult, simulate
-from rbdyn.properties.catalogue import envelope
-from rbdyn.properties.designation import read_designation
+from rbdyn.properties.catalogue import envelope, read_designation
 from rbdyn.records.words import with_error
 
 SIZES = ("204", "208", "210", "215", "220", "308", "314", "320", "1020", "2210")

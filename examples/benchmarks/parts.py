@@ -14,8 +14,7 @@ import numpy as np
 
 from doe import clearance
 from doe.clearance import Simulations
-from doe.pareto.manufacture import random_offsets
-from doe.pareto.share import Interval, percent
+from doe.pareto.manufacture import Interval, percent, random_offsets
 from doe.running.failure import Failure
 from doe.running.store import Store
 from doe.study.goals import goals_of

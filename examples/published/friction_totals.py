@@ -24,7 +24,7 @@ from published.operating import palmgren_moments, skf_moments
 from rbdyn import Scene
 from rbdyn.contact.rolling_resistance import rolling_force
 from rbdyn.dynamics.parameters.model import race_contact_law, rolling_law
-from rbdyn.properties.designation import read_designation
+from rbdyn.properties.catalogue import read_designation
 
 BEARINGS = Path(__file__).parent / "catalogue_bearings.csv"
 TEMPERATURE_C = 70.0

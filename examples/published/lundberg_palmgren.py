@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from rbdyn.life.ball_capacity import ball_size_term, refuse_impossible
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.life.balls import ball_size_term, refuse_impossible
+from rbdyn.scene.ball import BallRow
 
 LUNDBERG_PALMGREN = 98.1  # [N, mm]
 

@@ -145,12 +145,12 @@ def _print_map(mapped: "SlipMap") -> None:
 
 def _write_map(mapped: "SlipMap", folder: Path) -> list[str]:
     """Write map.json, map.csv and map.png; returns the file names."""
-    from rbdyn.plots.slip_map import draw
+    from rbdyn.plots.roller import draw_slip_map
     from rbdyn.result import write_json
 
     write_json(folder / "map.json", mapped.as_dict())
     save_table(mapped.table(), folder / "map.csv")
-    draw(mapped, folder / "map.png")
+    draw_slip_map(mapped, folder / "map.png")
     return ["map.json", "map.csv", "map.png"]
 
 

@@ -12,13 +12,11 @@ from rbdyn.cli.ranges import axis_values
 from rbdyn.cli.terminal import hand_over, output_folder, print_notes, print_table
 from rbdyn.faults import InputError, MethodError
 from rbdyn.quasistatic.preload import Sweep, over_clearance, over_preload, over_wear
-from rbdyn.quasistatic.remarks import remarks, tipping
+from rbdyn.quasistatic.result import remarks, tipping
 from rbdyn.quasistatic.row.equilibrium import OK
-from rbdyn.quasistatic.runout.classes import ToleranceClass, running_accuracy
-from rbdyn.quasistatic.runout.lots import Lot
-from rbdyn.quasistatic.runout.model import bench_of, follow_ring, single_row
-from rbdyn.quasistatic.runout.tolerance_design import design
-from rbdyn.quasistatic.runout.turn import Followed
+from rbdyn.quasistatic.runout.lots import Lot, design
+from rbdyn.quasistatic.runout.measures import ToleranceClass, running_accuracy
+from rbdyn.quasistatic.runout.turn import Followed, bench_of, follow_ring, single_row
 from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.quasistatic.sweep.run import grouped
@@ -150,10 +148,10 @@ def run(
     if folder:
         write_json(folder / files[0], record)
         if table is not None:
-            from rbdyn.plots.ball_sweep import pictures
+            from rbdyn.plots.ball import sweep_pictures
 
             table.save(folder / f"{name}.csv")
-            files += [f"{name}.csv", *pictures(table, folder)]
+            files += [f"{name}.csv", *sweep_pictures(table, folder)]
     hand_over(lambda: record, as_json, lambda: _print(record, table, quiet), folder, files)
     return 0
 

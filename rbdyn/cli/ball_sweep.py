@@ -69,11 +69,11 @@ def print_points(result: "SweepResult") -> None:
 
 def write(result: "SweepResult", folder: Path) -> list[str]:
     """Write sweep.json, sweep.csv and pictures; returns the names of the files."""
-    from rbdyn.plots.ball_sweep import pictures
+    from rbdyn.plots.ball import sweep_pictures
 
     write_json(folder / "sweep.json", result.as_dict())
     result.save(folder / "sweep.csv")
-    return ["sweep.json", "sweep.csv", *pictures(result, folder)]
+    return ["sweep.json", "sweep.csv", *sweep_pictures(result, folder)]
 
 
 def _row(result: "SweepResult", place: int) -> list[str]:

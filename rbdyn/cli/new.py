@@ -12,8 +12,7 @@ from rbdyn.cli.terminal import guarded, print_json
 from rbdyn.faults import LONGEST_NAME, InputError, MethodError, one_line, refuse
 
 if TYPE_CHECKING:
-    from rbdyn.properties.catalogue import Envelope
-    from rbdyn.properties.designation import Designation
+    from rbdyn.properties.catalogue import Designation, Envelope
     from rbdyn.properties.oils import NamedOil
 
 TEMPERATURE_C, OIL, CLEARANCE = 70.0, "ISO VG 68", "CN"
@@ -62,7 +61,7 @@ def new(
     with guarded(as_json):
         from rbdyn.cli import new_scene
         from rbdyn.cli.template import filled
-        from rbdyn.properties.designation import read_designation
+        from rbdyn.properties.catalogue import read_designation
         from rbdyn.properties.oils import oil_named
         from rbdyn.scene import Scene
 
@@ -100,7 +99,7 @@ def new(
 def _mounting(sizes: "Envelope", shaft: str | None, housing: str | None, temperature: float) -> dict[str, Any]:
     """Values of [mounting], none of them without a class. Raises InputError for a class or a size that is not listed."""
     from rbdyn.cli.new_mounting import mounting_values
-    from rbdyn.properties.seats import housing_interference, shaft_interference
+    from rbdyn.properties.tolerances import housing_interference, shaft_interference
 
     faults = list[str]()
     if shaft is not None:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from rbdyn.properties.catalogue import Envelope
-from rbdyn.properties.seats import Interference, housing_interference, shaft_interference
+from rbdyn.properties.tolerances import Interference, housing_interference, shaft_interference
 
 # Classes for a load that stands still on an inner ring that turns, where only the other seat is stated.
 USUAL_SHAFT, USUAL_HOUSING = "k5", "H7"

@@ -5,10 +5,18 @@ import math
 from typing import Any, NamedTuple
 
 from rbdyn.cli.new_mounting import mounting_values
-from rbdyn.life.roller_capacity import REFERENCE_SPEED_FACTOR
-from rbdyn.properties.cages import SMALLEST_CLEARANCE_MM, cage_estimate
-from rbdyn.properties.catalogue import Envelope, RollerInterior, ball_interior, radial_clearance, roller_interior
-from rbdyn.properties.designation import CAGES, Designation
+from rbdyn.life.rollers import REFERENCE_SPEED_FACTOR
+from rbdyn.properties.catalogue import (
+    CAGES,
+    SMALLEST_CLEARANCE_MM,
+    Designation,
+    Envelope,
+    RollerInterior,
+    ball_interior,
+    cage_estimate,
+    radial_clearance,
+    roller_interior,
+)
 from rbdyn.properties.materials import MATERIALS
 from rbdyn.properties.oils import NamedOil
 
@@ -53,7 +61,7 @@ class OperatingPoint(NamedTuple):
 
 def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> Values:
     """Values of ``roller_scene.toml``. Raises ValueError for impossible dimensions or an unlisted clearance."""
-    from rbdyn.life.roller_capacity import dynamic_capacity
+    from rbdyn.life.rollers import dynamic_capacity
 
     inside = roller_interior(sizes, named.series == "10")
     diameter, pitch, listed = inside.roller_diameter, inside.pitch_diameter, sizes.dynamic_capacity
@@ -83,7 +91,7 @@ def roller_values(named: Designation, sizes: Envelope, point: OperatingPoint) ->
 
 def ball_values(named: Designation, sizes: Envelope, point: OperatingPoint) -> Values:
     """Values of ``ball_scene.toml``. Raises ValueError as ``roller_values``."""
-    from rbdyn.life.ball_capacity import dynamic_capacity
+    from rbdyn.life.balls import dynamic_capacity
 
     inside = ball_interior(sizes, named)
     deep, angle = inside.contact_angle is None, math.radians(inside.contact_angle or 0.0)

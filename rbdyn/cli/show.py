@@ -101,8 +101,8 @@ def write(
         files.append(name)
     if animate:
         progress(len(tasks) + 1, steps)
-        from rbdyn.plots.animation import moving_bearing
-        from rbdyn.plots.player import player_html
+        from rbdyn.plots.drawing import player_html
+        from rbdyn.plots.roller import moving_bearing
 
         files += [moving_bearing(motion, folder / "bearing").name, "bearing.html"]
         (folder / "bearing.html").write_text(player_html(motion), encoding="utf-8")

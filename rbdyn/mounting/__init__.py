@@ -1,6 +1,6 @@
 """What mounting, heat and rotation do to clearances.
 
-- ``rings``: growth of a ring by fit, rotation and temperature; ``cage``: clearances of a cage between growing parts
-- ``fits``: the clearances of a roller bearing in operation, from a scene
-- ``ring_growth``: growth of the grooves of a row of balls; ``ball_rings``: the same from a scene
+- ``rings``: growth of a ring by fit, rotation and temperature, and of the grooves of balls
+- ``cage``: clearances of a cage between growing parts
+- ``fits``: both from a scene, for rollers and for balls
 """

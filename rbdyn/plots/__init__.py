@@ -1,11 +1,13 @@
 """Pictures. matplotlib is loaded in this package and nowhere else in ``rbdyn``.
 
-- ``motion``: cage orbit, pocket and land forces, whirl, sections, spectra, load, slip and heat, of a history; power by loss
-- ``ball``: one equilibrium of a ball bearing; ``ball_sweep``: many, over one or two keys of the scene
-- ``drawing``: the bearing at one moment, clearances magnified; shared by ``animation`` (GIF or MP4) and ``player`` (HTML)
+- ``roller``: cage orbit, pocket and land forces, whirl, sections, spectra, load, slip and heat, of a history; power by loss; slip
+  over speed and load; the moving bearing as GIF or MP4
+- ``ball``: one equilibrium of a ball bearing, and many over one or two keys of the scene
+- ``drawing``: the bearing at one moment, clearances magnified, and the page of HTML that plays it
+- ``style``: how every picture looks
 """
 
-from rbdyn.plots.motion import (
+from rbdyn.plots.roller import (
     cage_orbit,
     forces,
     pocket_forces,

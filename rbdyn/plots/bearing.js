@@ -1,5 +1,5 @@
 "use strict";
-// The bearing at one moment on a canvas, its clearances magnified; ``d`` is the record of rbdyn/plots/player.py.
+// The bearing at one moment on a canvas, its clearances magnified; ``d`` is the record of rbdyn/plots/drawing.py.
 // Shared by every page that plays the motion. Colours by role, so that a page can have its own.
 const LIGHT_BEARING = {
   outer: "#0072b2", inner: "#d55e00", cage: "#009e73", ring: "#e4e7ea", ring_edge: "#8a9096", space: "#fff",

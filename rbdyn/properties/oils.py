@@ -11,8 +11,8 @@ import re
 from typing import NamedTuple, Self
 
 from rbdyn.faults import MethodError
+from rbdyn.properties import table
 from rbdyn.properties.lubricants import ABSOLUTE_ZERO_C, Oil
-from rbdyn.properties.tables import table
 
 # ISO 3448: kinematic viscosity at 40 C [mm^2/s], within 10 % of it.
 GRADES = (10, 15, 22, 32, 46, 68, 100, 150, 220, 320, 460)

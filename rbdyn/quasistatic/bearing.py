@@ -13,18 +13,30 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.faults import LONGEST_NAME, InputError, one_line
-from rbdyn.mounting.ball_rings import growth_record, row_change
-from rbdyn.quasistatic import result as told
+from rbdyn.mounting.fits import growth_record, row_change
 from rbdyn.quasistatic.double_decker.equilibrium import solve_double_decker
 from rbdyn.quasistatic.double_decker.model import double_decker_of, load_record, middle_record
-from rbdyn.quasistatic.fatigue import reference_capacities
-from rbdyn.quasistatic.remarks import Rating, overloads, remarks, sentences, tipping
-from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport, RowReport, film_record, row_report
+from rbdyn.quasistatic.result import (
+    BallResult,
+    DoubleDeckerReport,
+    Rating,
+    RowReport,
+    ball_records,
+    displacement_record,
+    film_record,
+    overloads,
+    reference_capacities,
+    remarks,
+    row_report,
+    sentences,
+    stiffness_record,
+    tipping,
+)
 from rbdyn.quasistatic.rivals import finite_search, plain_newton
-from rbdyn.quasistatic.row.control import Control, FixedShare, FrictionShare
+from rbdyn.quasistatic.row.ball import Control, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
-from rbdyn.quasistatic.row.row import Row
+from rbdyn.quasistatic.row.ring import Row
 from rbdyn.records.words import counted
 from rbdyn.result import versions
 from rbdyn.scene import BallScene, Scene, balls_only
@@ -90,7 +102,7 @@ def _other_roots(scene: SingleRowScene, model: RowModel, solution: Solution) -> 
     if scene.model.raceway_control not in SEVERAL_ROOTS or scene.model.solver != "convex":
         return None
     roots = other_roots(model.row, model.control, load_of(scene), given_of(scene), solution)
-    return [{**told.displacement_record(root.displacement), "balls": told.ball_records(root.figures)} for root in roots]
+    return [{**displacement_record(root.displacement), "balls": ball_records(root.figures)} for root in roots]
 
 
 def _solutions(start: Any, rows: int) -> tuple[Solution, ...]:
@@ -130,8 +142,8 @@ def _double_decker(scene: DoubleDeckerScene, before: tuple[Solution, ...]) -> Ba
     races = zip(("inner_less_middle_bore", "middle_less_outer_race"), model.changes, strict=True)
     grown = growth_record(scene, dict(races))
     report = DoubleDeckerReport(
-        **told.displacement_record(solution.displacement),
-        stiffness=told.stiffness_record(solution.stiffness),
+        **displacement_record(solution.displacement),
+        stiffness=stiffness_record(solution.stiffness),
         reaction=load_record(solution.reaction),
         middle_ring=middle_record(model, solution),
         residual_N=solution.residual,

@@ -16,13 +16,11 @@ from scipy.optimize import minimize_scalar
 
 from rbdyn.arrays import Array
 from rbdyn.faults import MethodError, validated
-from rbdyn.life.turns import turning_rings
-from rbdyn.quasistatic.fatigue import reference_capacities, solution_life
-from rbdyn.quasistatic.remarks import Rating, overloads, pressures
+from rbdyn.life import turning_rings
+from rbdyn.quasistatic.result import Rating, overloads, pressures, reference_capacities, solution_life
 from rbdyn.quasistatic.row.equilibrium import Solution, solve
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
-from rbdyn.scene.ball import SingleRowScene
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.scene.ball import BallRow, SingleRowScene
 
 # Optima closer together than this share of the range, or that lose less than this of stress or life, count as one.
 SAME_PLACE = 0.02

@@ -16,16 +16,23 @@ from pydantic import BaseModel, Field, model_validator
 from rbdyn.faults import LONGEST_NAME, InputError, one_line
 from rbdyn.properties.materials import Material, equivalent_modulus
 from rbdyn.scene.ball import BALL_KINDS, BallScene
-from rbdyn.scene.bearing import Bearing, Cage, Materials
-from rbdyn.scene.cage_section import STIFFNESS, section_misfits, section_notes, with_bar_stiffness_of_section
-from rbdyn.scene.catalogue_notes import catalogue_notes
+from rbdyn.scene.bearing import (
+    STIFFNESS,
+    Bearing,
+    Cage,
+    Materials,
+    material_of,
+    section_misfits,
+    section_notes,
+    with_bar_stiffness_of_section,
+)
 from rbdyn.scene.laws import MOST_SAMPLES, SAMPLES_A_PERIOD, Laws, Numerics, with_bar_stiffness_of_cage
 from rbdyn.scene.lubricant import RHEOLOGY_OILS, Lubricant, Traction, with_traction_of_oil
-from rbdyn.scene.mounting import Mounting, material_of, misfits
+from rbdyn.scene.mounting import Mounting, misfits
+from rbdyn.scene.notes import catalogue_notes, unit_notes
 from rbdyn.scene.operation import Operation, Support
 from rbdyn.scene.reading import SceneFile
 from rbdyn.scene.uncertain import Calibrate, Uncertain
-from rbdyn.scene.units import unit_notes
 
 if TYPE_CHECKING:
     from rbdyn.mounting.cage import CageClearances, OperatingClearance

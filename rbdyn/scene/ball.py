@@ -1,22 +1,327 @@
-"""One validated scene of a ball bearing: single row or double-decker, its load, its model."""
+"""One validated scene of a ball bearing, single row or double-decker: its drawing, form errors of grooves and balls, load and model."""
 
+import math
 from collections.abc import Iterable, Iterator
-from typing import Annotated, Any, Literal, Self, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
 
 from pydantic import Field
 
 from rbdyn.faults import Consistent, Strict
-from rbdyn.fields import SI
+from rbdyn.fields import SI, NonNegative, NotVanishing, OptionalSI, Positive
 from rbdyn.properties.materials import Material
-from rbdyn.scene.ball_bearing import BallBearing, BallRow, DoubleDecker
-from rbdyn.scene.bearing import CustomMaterial, MaterialName
-from rbdyn.scene.form_errors import FormErrors
-from rbdyn.scene.form_errors import misfits as form_faults
+from rbdyn.records.words import counted
+from rbdyn.scene.bearing import CustomMaterial, Harmonic, MaterialName, material_of
 from rbdyn.scene.lubricant import Lubricant
-from rbdyn.scene.mounting import Mounting, material_of
+from rbdyn.scene.mounting import Mounting
 from rbdyn.scene.mounting import misfits as mounting_faults
 from rbdyn.scene.operation import Speed
 from rbdyn.scene.reading import SceneFile
+
+if TYPE_CHECKING:
+    from rbdyn.arrays import Array
+
+
+# How far a contact angle and a clearance that are both given may differ before they contradict each other.
+AGREED_DEG = 0.2
+
+GrooveFactor = Annotated[float, Field(gt=0.5, le=1.0)]
+
+
+class BallRow(Consistent):
+    """Geometry of one row of balls. Of contact angle and clearance one is given, or both that agree."""
+
+    balls: Annotated[int, Field(ge=3, le=500)]
+    """Number of balls."""
+    ball_diameter_mm: Annotated[float, Field(ge=0.1, le=500.0)]
+    """Diameter of a ball."""
+    pitch_diameter_mm: Annotated[float, Field(ge=1.0, le=10000.0)]
+    """Diameter of the circle through the balls' centres."""
+    inner_groove_factor: GrooveFactor
+    """Radius of the inner groove over the ball's diameter: 0.515 to 0.53 in catalogue bearings."""
+    outer_groove_factor: GrooveFactor
+    """Radius of the outer groove over the ball's diameter: 0.515 to 0.53 in catalogue bearings."""
+    contact_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] | None = None
+    """Unloaded contact angle a_0; follows from radial_clearance_mm where left out: cos a_0 = 1 - P_d/(2 B), B = (f_i +
+    f_o - 1) D."""
+    radial_clearance_mm: Annotated[float, Field(ge=-2.0, le=5.0)] | None = None
+    """Diametral clearance P_d; follows from contact_angle_deg where left out. Negative is an interference, with a
+    contact angle of 0."""
+    clearance_change_um: Annotated[float, Field(ge=-2000.0, le=2000.0)] = 0.0
+    """What mounting changes of the diametral clearance after the contact angle was measured; negative takes clearance
+    away."""
+    dynamic_capacity_N: Positive | None = None  # noqa: N815
+    """Basic dynamic capacity of the catalogue; by ISO 281 from the dimensions where left out."""
+    static_capacity_N: Positive | None = None  # noqa: N815
+    """Load at which the most loaded ball has a pressure of 4200 MPa (ISO 76); by Hertz from the dimensions where left
+    out."""
+    bore_mm: Positive | None = None
+    """Bore of the inner ring; only for the growth of rotating rings."""
+    outside_diameter_mm: Positive | None = None
+    """Outside diameter of the outer ring; only for the growth of rotating rings."""
+
+    ball_diameter, pitch_diameter, groove_centre_distance = SI("mm"), SI("mm"), SI("mm")
+    radial_clearance, bore, outside_diameter = OptionalSI("mm"), OptionalSI("mm"), OptionalSI("mm")
+
+    def faults(self) -> Iterator[str]:
+        chord = self.pitch_diameter_mm * math.sin(math.pi / self.balls)
+        if chord <= self.ball_diameter_mm:
+            circle = f"a pitch circle of {self.pitch_diameter_mm:g} mm, where each has {chord:.4g} mm"
+            what = f"balls = {self.balls}: balls of {self.ball_diameter_mm:g} mm do not fit on {circle}"
+            yield f"{what}; take fewer or smaller ones"
+        if self.ball_diameter_mm >= self.pitch_diameter_mm:
+            circle = f"a pitch circle of {self.pitch_diameter_mm:g} mm"
+            yield f"ball_diameter_mm = {self.ball_diameter_mm:g}: leaves no inner raceway on {circle}; make the ball smaller"
+        # Only a contact angle that is known tells where the races are.
+        yield from self._clearance_faults() or self._ring_faults()
+
+    def _clearance_faults(self) -> list[str]:
+        angle, clearance = self.contact_angle_deg, self.radial_clearance_mm
+        if angle is None and clearance is None:
+            return ["contact_angle_deg: missing; give it or radial_clearance_mm"]
+        if clearance is None:
+            return []
+        gap = self.groove_centre_distance_mm
+        if clearance >= 2.0 * gap:
+            what = f"radial_clearance_mm = {clearance:g}: grooves with centres {gap:.4g} mm apart"
+            return [f"{what} cannot hold a ball with that much; make it less than {2.0 * gap:.4g}"]
+        if angle is None:
+            return []
+        implied = math.degrees(math.acos(min(1.0 - clearance / (2.0 * gap), 1.0)))
+        if abs(implied - angle) > AGREED_DEG:
+            clearance_of_angle = 2.0 * gap * (1.0 - math.cos(math.radians(angle)))
+            what = f"contact_angle_deg = {angle:g} and radial_clearance_mm = {clearance:g} contradict each other"
+            why = f"that clearance gives {implied:.4g} deg, that angle {clearance_of_angle:.4g} mm"
+            return [f"{what}: {why}; leave one out, and give what mounting changes as clearance_change_um"]
+        return []
+
+    def _ring_faults(self) -> Iterator[str]:
+        reach = self.ball_diameter_mm * math.cos(self.contact_angle)
+        if self.bore_mm is not None and self.bore_mm >= self.pitch_diameter_mm - reach:
+            race = f"a raceway of {self.pitch_diameter_mm - reach:.4g} mm"
+            yield f"bore_mm = {self.bore_mm:g}: leaves no inner ring under {race}; make it smaller"
+        if self.outside_diameter_mm is not None and self.outside_diameter_mm <= self.pitch_diameter_mm + reach:
+            race = f"a raceway of {self.pitch_diameter_mm + reach:.4g} mm"
+            yield f"outside_diameter_mm = {self.outside_diameter_mm:g}: leaves no outer ring over {race}; make it larger"
+
+    @property
+    def groove_centre_distance_mm(self) -> float:
+        """B = (f_i + f_o - 1) D: distance of the groove centres where a ball just touches both [mm]."""
+        return (self.inner_groove_factor + self.outer_groove_factor - 1.0) * self.ball_diameter_mm
+
+    @property
+    def groove_factors(self) -> tuple[float, float]:
+        """Of the inner and the outer groove."""
+        return self.inner_groove_factor, self.outer_groove_factor
+
+    @property
+    def contact_angle(self) -> float:
+        """Unloaded contact angle [rad], given or from the clearance; 0 for an interference."""
+        if self.radial_clearance_mm is None:
+            assert self.contact_angle_deg is not None
+            return math.radians(self.contact_angle_deg)
+        return math.acos(min(1.0 - self.radial_clearance_mm / (2.0 * self.groove_centre_distance_mm), 1.0))
+
+    @property
+    def gamma(self) -> float:
+        """Ball over pitch diameter, in the plane of the unloaded contacts: D cos a_0/d_m."""
+        return self.ball_diameter_mm * math.cos(self.contact_angle) / self.pitch_diameter_mm
+
+    @property
+    def raceway_diameters_mm(self) -> tuple[float, float]:
+        """Circles on which balls touch both races at the unloaded contact angle."""
+        reach = self.ball_diameter_mm * math.cos(self.contact_angle)
+        return self.pitch_diameter_mm - reach, self.pitch_diameter_mm + reach
+
+    @property
+    def interference_m(self) -> float:
+        """What the inner groove is pushed outward by interference and mounting, radially [m]; negative with clearance."""
+        given = self.radial_clearance_mm or 0.0
+        return 0.5e-3 * max(-given, 0.0) - 0.5e-6 * self.clearance_change_um
+
+
+class BallBearing(BallRow):
+    """A single row: angular contact or deep groove."""
+
+    kind: Literal["angular_contact_ball", "deep_groove_ball"]
+    """Kind of bearing."""
+
+
+class MiddleRing(Strict):
+    """The ring between the rows of a double-decker bearing: it floats, and only friction turns it."""
+
+    speed_rpm: Speed | None = None
+    """Speed of the middle ring, where it is known; otherwise by speed_split."""
+    speed_split: Literal["oil", "torque_balance"] = "oil"
+    """What turns the middle ring. "oil": rows of equal oil friction (Hu et al., eq 13); "torque_balance": oil and load
+    after Palmgren; needs [lubricant]."""
+    inner_oil_factor: Positive = 3.3
+    """Palmgren's f0 of the inner row: oil mist 1.7, grease 2, oil bath 3.3, oil jet 6.6 as commonly cited."""
+    outer_oil_factor: Positive = 3.3
+    """Palmgren's f0 of the outer row."""
+    tilt: Literal["free", "fixed"] | None = None
+    """fixed: the middle ring stays square to the outer ring; as operation.tilt where left out."""
+    axial_offset_mm: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
+    """Axial distance of the inner row's ball plane from the outer row's, the bearing unloaded."""
+    speed, axial_offset = OptionalSI("rpm"), SI("mm")
+
+
+class DoubleDecker(Consistent):
+    """Two rows one inside the other; the ring between them floats."""
+
+    kind: Literal["double_decker_ball"]
+    """Kind of bearing."""
+    inner: BallRow
+    """The row on the inner ring."""
+    outer: BallRow
+    """The row in the outer ring."""
+    middle: MiddleRing = MiddleRing()
+    """The ring between the rows."""
+
+    def faults(self) -> Iterator[str]:
+        below, above = self.inner.raceway_diameters_mm[1], self.outer.raceway_diameters_mm[0]
+        if not below < above:
+            why = f"leaves no middle ring between raceways of {below:.4g} and {above:.4g} mm"
+            mend = "make it larger, or the inner row smaller"
+            yield f"bearing.outer.pitch_diameter_mm = {self.outer.pitch_diameter_mm:g}: {why}; {mend}"
+
+    @property
+    def pitch_ratio(self) -> float:
+        """Pitch circle of the outer row over that of the inner one."""
+        return self.outer.pitch_diameter_mm / self.inner.pitch_diameter_mm
+
+    @property
+    def raceway_diameters_mm(self) -> tuple[float, float]:
+        """Race of the inner ring and race of the outer ring."""
+        return self.inner.raceway_diameters_mm[0], self.outer.raceway_diameters_mm[1]
+
+
+Order = Annotated[int, Field(ge=1, le=2000)]
+# Beyond this share of the ball it is no form error but a slip of the unit.
+LARGEST_ERROR = 0.01
+
+
+class RandomWaviness(Strict):
+    """Waves in random phases, ``lowest_order`` to ``highest_order``."""
+
+    lowest_order: Order = 1
+    """Lowest order of the waves drawn."""
+    highest_order: Order
+    """Highest order of the waves drawn."""
+    height_um: Annotated[float, Field(gt=0.0, le=500.0), NotVanishing]
+    """Height from peak to valley of all waves together."""
+    decay: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
+    """Amplitudes fall as order^-decay on the average; ground raceways: between 1 and 2."""
+    height = SI("um")
+
+
+class BallHarmonic(Strict):
+    """One harmonic of the sphericity of balls, from order 2: order 1 is no form."""
+
+    order: Annotated[int, Field(ge=2, le=2000)]
+    """Waves around a ball, from 2: order 1 is no form."""
+    amplitude_um: Annotated[float, Field(ge=-500.0, le=500.0)]
+    """Amplitude of the ball's radius."""
+    phase_deg: float | None = None
+    """Angle of a crest; drawn for each ball by errors.seed where left out."""
+    balls: list[Annotated[int, Field(ge=1)]] | None = None
+    """Numbers of the balls that have it, from 1; every ball where left out."""
+    amplitude, phase = SI("um"), OptionalSI("deg")
+
+
+class FormErrors(Consistent):
+    """Form errors of grooves and balls, and how finely and how long the turning ring is followed.
+
+    Each error of a groove is given by its harmonics, drawn at random, or both added.
+    """
+
+    inner_roundness: list[Harmonic] = []
+    """Radial harmonics of the inner groove."""
+    outer_roundness: list[Harmonic] = []
+    """Radial harmonics of the outer groove."""
+    inner_side_sway: list[Harmonic] = []
+    """Axial harmonics of the inner groove: order 1 is side-sway proper, others axial waviness."""
+    outer_side_sway: list[Harmonic] = []
+    """Axial harmonics of the outer groove: order 1 is side-sway proper, others axial waviness."""
+    inner_groove_radius: list[Harmonic] = []
+    """Harmonics of the inner groove's radius, the width of the groove at a fixed bottom."""
+    outer_groove_radius: list[Harmonic] = []
+    """Harmonics of the outer groove's radius, the width of the groove at a fixed bottom."""
+    inner_roundness_random: RandomWaviness | None = None
+    """Radial waves of the inner groove drawn by errors.seed, on top of the given ones."""
+    outer_roundness_random: RandomWaviness | None = None
+    """Radial waves of the outer groove drawn by errors.seed, on top of the given ones."""
+    inner_side_sway_random: RandomWaviness | None = None
+    """Axial waves of the inner groove drawn by errors.seed, on top of the given ones."""
+    outer_side_sway_random: RandomWaviness | None = None
+    """Axial waves of the outer groove drawn by errors.seed, on top of the given ones."""
+    inner_groove_radius_random: RandomWaviness | None = None
+    """Waves of the inner groove's radius drawn by errors.seed, on top of the given ones."""
+    outer_groove_radius_random: RandomWaviness | None = None
+    """Waves of the outer groove's radius drawn by errors.seed, on top of the given ones."""
+    ball_sphericity: list[BallHarmonic] = []
+    """Harmonics of the balls' radius."""
+    ball_diameter_errors_um: list[float] | None = None
+    """Each ball's diameter less the nominal one, instead of ball_diameter_spread_um."""
+    ball_diameter_spread_um: NonNegative = 0.0
+    """Standard deviation of a seeded normal spread of the balls' diameters."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of all that is drawn."""
+    steps: Annotated[int, Field(ge=8, le=100_000)] = 360
+    """Steps to a turn of the inner ring against the outer."""
+    turns: Annotated[int, Field(ge=1, le=10_000)] = 8
+    """Turns of the inner ring that are followed, since the cage does not come round with the ring."""
+
+    def faults(self) -> Iterator[str]:
+        for key in GROOVES:
+            drawn = getattr(self, f"{key}_random")
+            if drawn is not None and drawn.lowest_order > drawn.highest_order:
+                what = f"errors.{key}_random.lowest_order = {drawn.lowest_order}"
+                yield f"{what}: above highest_order = {drawn.highest_order}; swap them"
+        if self.ball_diameter_errors_um is not None and self.ball_diameter_spread_um > 0.0:
+            what = "errors.ball_diameter_errors_um and errors.ball_diameter_spread_um contradict each other"
+            yield f"{what}: give the errors or their spread, not both"
+        highest = self.highest_order
+        if 2 * highest >= self.steps:
+            what = f"errors.steps = {self.steps}: too few to show order {highest}"
+            yield f"{what}, which needs more than two steps a wave; take at least {2 * highest + 1}"
+
+    def ball_diameter_errors(self, normal: "Array") -> "Array":
+        """Each ball's diameter less the nominal one [m], as given or with the spread of standard ``normal`` numbers."""
+        import numpy as np
+
+        given, spread = self.ball_diameter_errors_um, self.ball_diameter_spread_um
+        return 1e-6 * (spread * normal if given is None else np.array(given))
+
+    @property
+    def highest_order(self) -> int:
+        """Highest order of a groove; 0 where all are perfect."""
+        given = [wave.order for key in GROOVES for wave in getattr(self, key)]
+        drawn = [getattr(self, f"{key}_random") for key in GROOVES]
+        return max(given + [wave.highest_order for wave in drawn if wave is not None], default=0)
+
+
+GROOVES = tuple(key for key in FormErrors.model_fields if f"{key}_random" in FormErrors.model_fields)
+
+
+def misfits(errors: FormErrors, balls: int, ball_diameter_mm: float, pitch_diameter_mm: float) -> Iterator[str]:
+    """What does not go with a row of ``balls`` on a pitch circle, one sentence each."""
+    given = errors.ball_diameter_errors_um
+    if given is not None and len(given) != balls:
+        yield f"errors.ball_diameter_errors_um: {counted(len(given), 'value')} for {balls} balls; give one a ball"
+    limit = LARGEST_ERROR * ball_diameter_mm * 1e3
+    if any(abs(error) > limit for error in given or []) or errors.ball_diameter_spread_um > limit:
+        yield f"errors: ball diameters beyond {limit:g} um, a hundredth of the ball; give micrometres"
+    for number, harmonic in enumerate(errors.ball_sphericity, 1):
+        alien = [ball for ball in harmonic.balls or [] if ball > balls]
+        if alien:
+            yield f"errors.ball_sphericity[{number}].balls: ball {alien[0]} of {balls}; balls count from 1 to {balls}"
+    # A ball spins dm/(2 D) times a turn, or a little less.
+    fastest = max((wave.order for wave in errors.ball_sphericity), default=0) * pitch_diameter_mm / ball_diameter_mm
+    if fastest >= errors.steps:
+        spinning = f"balls that spin {0.5 * pitch_diameter_mm / ball_diameter_mm:.3g} times a turn"
+        what = f"errors.steps = {errors.steps}: too few to show errors.ball_sphericity on {spinning}"
+        yield f"{what}; take at least {int(fastest) + 1}"
+
 
 BALL_KINDS = ("angular_contact_ball", "deep_groove_ball", "double_decker_ball")
 
@@ -237,7 +542,7 @@ class SingleRowScene(BallScene):
         row, faults = self.bearing, super().faults()
         if self.errors is None:
             return faults
-        return tuple(faults) or form_faults(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm)
+        return tuple(faults) or misfits(self.errors, row.balls, row.ball_diameter_mm, row.pitch_diameter_mm)
 
 
 class DoubleDeckerScene(BallScene):

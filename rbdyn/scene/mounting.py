@@ -7,7 +7,6 @@ from pydantic import Field
 
 from rbdyn.faults import Consistent
 from rbdyn.fields import SI, NonNegative, Positive
-from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene.bearing import CustomMaterial, MaterialName
 
 Celsius = Annotated[float, Field(ge=-200.0, le=1000.0)]
@@ -102,11 +101,3 @@ def misfits(mounting: Mounting, bearing: Raceways) -> Iterator[str]:
     if mounting.outside_diameter_mm <= outer:
         what = f"mounting.outside_diameter_mm = {mounting.outside_diameter_mm:g}"
         yield f"{what}: leaves no outer ring over a raceway of {outer:g} mm; make it larger"
-
-
-def material_of(chosen: MaterialName | CustomMaterial) -> Material:
-    """A material in SI, from its name or its numbers."""
-    if isinstance(chosen, CustomMaterial):
-        modulus, expansion = chosen.elastic_modulus_GPa * 1e9, chosen.thermal_expansion_1e_6_K * 1e-6
-        return Material(modulus, chosen.poisson_ratio, chosen.density_kg_m3, expansion)
-    return MATERIALS[chosen]

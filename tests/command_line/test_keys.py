@@ -15,7 +15,7 @@ from doe.dimension_chain.reading import Chains
 from doe.study_file import StudyFile
 from rbdyn.cli.app import app as rbdyn_app
 from rbdyn.cli.keys import _models, descriptions, keys, schema
-from rbdyn.plots.ball_sweep import label as axis_label
+from rbdyn.plots.ball import label as axis_label
 from rbdyn.records.words import label, quantity
 from rbdyn.scene import Scene
 from rbdyn.scene.ball import DoubleDeckerScene, SingleRowScene

@@ -11,11 +11,20 @@ import pytest
 
 from rbdyn.faults import InputError, RunError
 from rbdyn.quasistatic.row.equilibrium import solve
-from rbdyn.quasistatic.runout.lots import CHANGES, RACES, Lot, bearing_errors, draw_parts, linear_response, readings
-from rbdyn.quasistatic.runout.model import bench_of, follow_ring
+from rbdyn.quasistatic.runout.lots import (
+    CHANGES,
+    RACES,
+    Lot,
+    bearing_errors,
+    design,
+    draw_parts,
+    full_runouts,
+    linear_response,
+    readings,
+    runouts,
+)
 from rbdyn.quasistatic.runout.race_errors import ball_path, perfect, waviness
-from rbdyn.quasistatic.runout.tolerance_design import design, full_runouts, runouts
-from rbdyn.quasistatic.runout.turn import follow
+from rbdyn.quasistatic.runout.turn import bench_of, follow, follow_ring
 from rbdyn.quasistatic.runout.walk import walk
 from rbdyn.scene.ball import BallScene
 

@@ -14,12 +14,9 @@ from numba import njit
 
 from rbdyn.fields import RPM
 from rbdyn.properties.materials import MATERIALS
-from rbdyn.quasistatic.row.ball import ball_forces
-from rbdyn.quasistatic.row.ball_motion import orbit_and_spin
-from rbdyn.quasistatic.row.control import FixedShare, Spinning
+from rbdyn.quasistatic.row.ball import FixedShare, Spinning, ball_forces, orbit_and_spin
 from rbdyn.quasistatic.row.model import cage_speed, row_model
-from rbdyn.scene.ball import BallModel
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.scene.ball import BallModel, BallRow
 
 DIAMETER, PITCH, DENSITY = 0.0127, 0.070, 7800.0
 MASS = DENSITY * math.pi * DIAMETER**3 / 6.0

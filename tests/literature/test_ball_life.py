@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
 from rbdyn.contact.hertz_point import ball_on_race
-from rbdyn.life import ball_capacity as rating
 from rbdyn.life import balls as life
 
 GAMMA = 11.5 / 43.5
@@ -129,13 +128,13 @@ CAPACITY_FACTORS = {
 def test_literature_capacity_factor():
     """Literature: f_c as ISO 281 tabulates it, within 0.1 %."""
     for gamma, factor in CAPACITY_FACTORS.items():
-        assert rating.capacity_factor(gamma) == pytest.approx(factor, rel=1.2e-3)
-    assert rating.capacity_factor(0.2, 0.53, 0.53) < rating.capacity_factor(0.2)
+        assert life.capacity_factor(gamma) == pytest.approx(factor, rel=1.2e-3)
+    assert life.capacity_factor(0.2, 0.53, 0.53) < life.capacity_factor(0.2)
     for gamma in (0.0, 1.0, math.nan):
         with pytest.raises(ValueError, match="gamma"):
-            rating.capacity_factor(gamma)
+            life.capacity_factor(gamma)
     with pytest.raises(ValueError, match="groove"):
-        rating.capacity_factor(0.2, 0.5)
+        life.capacity_factor(0.2, 0.5)
 
 
 def static_races(ball_diameter, gamma):
@@ -146,27 +145,27 @@ def static_races(ball_diameter, gamma):
 def test_literature_static_factor():
     """Literature: f_0 of ISO 76 for grooves of 0.52 and 0.53, within one of the last printed digit."""
     for gamma, factor in {0.0: 14.7, 0.01: 14.9, 0.05: 15.7, 0.10: 16.4, 0.20: 14.0}.items():
-        assert rating.static_capacity(1, 0.0, static_races(1e-3, gamma)) == pytest.approx(factor, abs=0.1)
+        assert life.static_capacity(1, 0.0, static_races(1e-3, gamma)) == pytest.approx(factor, abs=0.1)
 
 
 def test_literature_catalogue_of_a_6206():
     """Literature: 9 balls of 9.525 mm on 46 mm; catalogues give C 19.5 to 20.3 kN, C_0 11.2 to 11.3 kN, f_0 near 14."""
-    capacity = rating.dynamic_capacity(9, 9.525e-3, 46e-3)
-    static = rating.static_capacity(9, 0.0, static_races(9.525e-3, 9.525 / 46.0))
+    capacity = life.dynamic_capacity(9, 9.525e-3, 46e-3)
+    static = life.static_capacity(9, 0.0, static_races(9.525e-3, 9.525 / 46.0))
     assert capacity == pytest.approx(19.5e3, rel=0.02)
     assert static == pytest.approx(11.25e3, rel=0.02)
 
 
 def test_capacity_scales_with_balls_rows_and_size():
     """Unit: Z^(2/3), i^0.7, cos(alpha)^0.7 at one gamma, D^1.8, and continuous where D^1.4 takes over."""
-    one = rating.dynamic_capacity(1, 10e-3, 50e-3)
-    assert one == pytest.approx(1.3 * rating.capacity_factor(0.2) * 10.0**1.8, rel=1e-13)
-    assert rating.dynamic_capacity(8, 10e-3, 50e-3, rows=2) == pytest.approx(one * 4.0 * 2.0**0.7, rel=1e-13)
+    one = life.dynamic_capacity(1, 10e-3, 50e-3)
+    assert one == pytest.approx(1.3 * life.capacity_factor(0.2) * 10.0**1.8, rel=1e-13)
+    assert life.dynamic_capacity(8, 10e-3, 50e-3, rows=2) == pytest.approx(one * 4.0 * 2.0**0.7, rel=1e-13)
     angle = math.radians(40.0)
-    tilted = rating.dynamic_capacity(1, 10e-3, 50e-3 * math.cos(angle), angle)
+    tilted = life.dynamic_capacity(1, 10e-3, 50e-3 * math.cos(angle), angle)
     assert tilted == pytest.approx(one * math.cos(angle) ** 0.7, rel=1e-13)
-    assert rating.ball_size_term(25.4e-3 + 1e-12) == pytest.approx(rating.ball_size_term(25.4e-3), rel=2e-4)
-    assert rating.ball_size_term(50e-3) == pytest.approx(3.647 * 50.0**1.4, rel=1e-13)
+    assert life.ball_size_term(25.4e-3 + 1e-12) == pytest.approx(life.ball_size_term(25.4e-3), rel=2e-4)
+    assert life.ball_size_term(50e-3) == pytest.approx(3.647 * 50.0**1.4, rel=1e-13)
 
 
 def test_literature_load_factors(published):
@@ -198,7 +197,7 @@ def test_both_roads_to_the_race_capacities_meet(published, angle, gamma):
     radians = math.radians(angle)
     pitch = 10e-3 * math.cos(radians) / gamma
     direct = published("lundberg_palmgren").lundberg_palmgren_capacities(12, 10e-3, pitch, radians, 0.52, 0.53)
-    capacity = rating.dynamic_capacity(12, 10e-3, pitch, radians, 0.52, 0.53, rating_factor=1.0 / rating.REDUCTION)
+    capacity = life.dynamic_capacity(12, 10e-3, pitch, radians, 0.52, 0.53, rating_factor=1.0 / life.REDUCTION)
     rated = life.rated_capacities(capacity, 12, gamma, radians, 0.52, 0.53)
     scaled = np.array(rated) * math.cos(radians) ** -0.3
     assert scaled == pytest.approx(direct, rel=0.012)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from rbdyn.properties.cages import cage_estimate
+from rbdyn.properties.catalogue import cage_estimate
 from rbdyn.scene.uncertain import documented
 
 CAGES = runpy.run_path(str(ROOT / "examples" / "benchmarks" / "cages.py"))

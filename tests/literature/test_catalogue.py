@@ -9,11 +9,17 @@ import pytest
 from conftest import ROOT
 
 from rbdyn.cli.new_scene import OperatingPoint, ball_values, roller_values
-from rbdyn.life.roller_capacity import dynamic_capacity, static_capacity
-from rbdyn.properties.catalogue import Envelope, ball_interior, envelope, radial_clearance, roller_interior
-from rbdyn.properties.designation import read_designation
+from rbdyn.life.rollers import dynamic_capacity, static_capacity
+from rbdyn.properties import table
+from rbdyn.properties.catalogue import (
+    Envelope,
+    ball_interior,
+    envelope,
+    radial_clearance,
+    read_designation,
+    roller_interior,
+)
 from rbdyn.properties.oils import oil_named
-from rbdyn.properties.tables import table
 from rbdyn.scene import Scene
 
 # Orders of a catalogue (Timken, ball bearing housed units, table A-9): number of balls BPFO + BPFI, and BSF = (1/g - g)/2
@@ -122,7 +128,7 @@ def test_literature_balls_of_test_rigs():
 @pytest.mark.parametrize("name", NSK)
 def test_literature_angular_contact_balls(name):
     """Literature: 40 degrees; number of balls within one, capacity by ISO 281 within 15 % of the catalogue's."""
-    from rbdyn.life.ball_capacity import dynamic_capacity as of_balls
+    from rbdyn.life.balls import dynamic_capacity as of_balls
 
     capacity, _, balls = NSK[name]
     _, inside = interior(name)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from doe.designs import axial_distance, box_behnken, central_composite, to_actual, to_coded
-from doe.designs.central_composite import RESOLUTION_V, centre_shares, corner_blocks, cube_points
+from doe.designs.design import RESOLUTION_V, centre_shares, corner_blocks, cube_points
 from doe.designs.evaluation import block_contrasts
 from doe.designs.model import model_matrix, model_terms
 from doe.response_surface import fit

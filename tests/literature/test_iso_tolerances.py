@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from doe.dimension_chain import fit_limits, grade_tolerances, ring_limits, tolerance_unit
-from rbdyn.properties.iso286 import RANGES, STANDARD_TOLERANCES, positioned
+from rbdyn.properties.tolerances import RANGES, STANDARD_TOLERANCES, positioned
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,8 @@ from rbdyn.dynamics.parameters.friction_check import friction_check, friction_no
 from rbdyn.dynamics.parameters.left_out import light_load_notes
 from rbdyn.faults import InputError
 from rbdyn.life import maker_friction
-from rbdyn.life.roller_capacity import minimum_loads
-from rbdyn.properties.catalogue import Envelope, envelope
-from rbdyn.properties.designation import read_designation
+from rbdyn.life.rollers import minimum_loads
+from rbdyn.properties.catalogue import Envelope, envelope, read_designation
 
 # Size, bore, outside diameter, width [mm], R1, reference speed [rpm], 0.05 C0 [N], and of a calculation apart from this
 # package, with ISO VG 32 at 70 C: SKF's power and the heat of ISO 15312 [W].

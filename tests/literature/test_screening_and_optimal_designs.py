@@ -10,10 +10,10 @@ import pytest
 from scipy.optimize import minimize
 
 from doe.designs import central_composite, definitive_screening, full_factorial, optimal
+from doe.designs.design import conference_matrix
 from doe.designs.evaluation import evaluate, lost_terms, moment_matrix
 from doe.designs.model import model_matrix, model_terms
 from doe.designs.optimal import Exchange
-from doe.designs.three_levels import conference_matrix
 from doe.response_surface import fit
 
 QUADRATIC = model_terms(2, "quadratic")

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from rbdyn.faults import MethodError
-from rbdyn.properties.seats import (
+from rbdyn.properties.tolerances import (
     HOUSING_SMOOTHING,
     SHAFT_SMOOTHING,
     Interference,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbdyn.quasistatic.double_decker.speed_split import (
+from rbdyn.quasistatic.double_decker.model import (
     RPM,
     LayerFriction,
     balanced_split,

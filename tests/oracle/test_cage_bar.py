@@ -23,10 +23,8 @@ from rbdyn.contact.cage_bar import (
     side_ring_flexibility,
     torsion_constant,
 )
-from rbdyn.properties.cages import cage_estimate
-from rbdyn.properties.catalogue import envelope, roller_interior
-from rbdyn.properties.designation import read_designation
-from rbdyn.scene.cage_section import STIFFNESS_ERROR
+from rbdyn.properties.catalogue import cage_estimate, envelope, read_designation, roller_interior
+from rbdyn.scene.bearing import STIFFNESS_ERROR
 
 BRASS, POLYAMIDE = Elastic(105e9, 0.34), Elastic(5e9, 0.35)
 SIZES = [

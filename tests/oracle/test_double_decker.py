@@ -23,7 +23,7 @@ from rbdyn.quasistatic.double_decker.model import double_decker_of, static_capac
 from rbdyn.quasistatic.row.ball import ball_forces
 from rbdyn.quasistatic.row.equilibrium import solve
 from rbdyn.quasistatic.row.model import contacts, given_of, load_of
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.scene.ball import BallRow
 
 FILE = Path(__file__).parents[2] / "examples" / "double_decker.toml"
 FREE = np.full(5, np.nan)

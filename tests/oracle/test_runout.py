@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbdyn.quasistatic.runout.classes import running_accuracy
 from rbdyn.quasistatic.runout.measures import (
     convex_hull,
     diameter,
@@ -20,6 +19,7 @@ from rbdyn.quasistatic.runout.measures import (
     face_runout,
     least_squares_circle,
     minimum_zone,
+    running_accuracy,
     runout,
     zone_about,
 )

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from rbdyn.cli.app import app
 from rbdyn.faults import LONGEST_SENTENCE
-from rbdyn.properties.tables import table
+from rbdyn.properties import table
 from rbdyn.scene import Scene
 
 # What a suffix must leave in the scene, by kind of bearing: dotted key and value; a class of clearance; or nothing.

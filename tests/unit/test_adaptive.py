@@ -16,9 +16,8 @@ from doe.adaptive.emulators import embedded, fit_emulators, shares_of
 from doe.adaptive.improvement import Known, batch, dominated, levels_of
 from doe.adaptive.runs import Runs
 from doe.adaptive.settling import as_foretold, missed, nothing_gained
-from doe.pareto.archive import best_for_hypervolume, hypervolume, spread
 from doe.pareto.goals import Goals
-from doe.pareto.nsga2 import InfeasibleError
+from doe.pareto.search import InfeasibleError, best_for_hypervolume, hypervolume, spread
 
 TWO = Goals.of(["min", "min"])
 POINTS = np.random.default_rng(1).uniform(-1.0, 1.0, (24, 2))

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from rbdyn import BallScene, Scene, equilibrium
 from rbdyn.cli.app import app
 from rbdyn.faults import InputError
-from rbdyn.quasistatic.row.control import CommonCage, FixedShare, FrictionShare
+from rbdyn.quasistatic.row.ball import CommonCage, FixedShare, FrictionShare
 from rbdyn.quasistatic.row.equilibrium import solve
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
 from rbdyn.scene import balls_only, rollers_only

@@ -22,8 +22,8 @@ from rbdyn.quasistatic.rivals import finite_search, limited, minpack, plain_newt
 from rbdyn.quasistatic.rivals.finite_search import loaded, offset_distances, search_points
 from rbdyn.quasistatic.rivals.full_system import evaluate, forces, system_of, unknowns
 from rbdyn.quasistatic.row import equilibrium
-from rbdyn.quasistatic.row.elimination import eliminate
 from rbdyn.quasistatic.row.model import given_of, load_of, row_of
+from rbdyn.quasistatic.row.newton import eliminate
 from rbdyn.scene import BallScene
 
 BALLS = ROOT / "examples" / "angular_contact_ball.toml"

@@ -13,11 +13,10 @@ from hypothesis import strategies as st
 
 from rbdyn import equilibrium
 from rbdyn.faults import InputError
-from rbdyn.life.turns import turning_rings
+from rbdyn.life import turning_rings
 from rbdyn.plots import ball as ball_pictures
-from rbdyn.plots import ball_sweep as pictures
-from rbdyn.quasistatic.fatigue import reference_capacities, solution_life
-from rbdyn.quasistatic.row.control import CommonCage, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.result import reference_capacities, solution_life
+from rbdyn.quasistatic.row.ball import CommonCage, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.newton import RACE_CONTROL_LOST
 from rbdyn.quasistatic.sweep import run as sweeps
 from rbdyn.quasistatic.sweep.march import leaves, with_numbers
@@ -184,7 +183,7 @@ def test_unit_failed_points_are_records_grouped_by_cause(broken, tmp_path):
     assert record["points"][1] == {SPEED: 10e3, "status": cause}
     assert record["failures"] == [{"cause": short, "points": 2, "first": {SPEED: 10e3}, "status": cause}]
     assert set(broken.balls()[SPEED]) == {5e3, 20e3, 25e3}
-    assert len(pictures.pictures(broken, tmp_path)) == 4
+    assert len(ball_pictures.sweep_pictures(broken, tmp_path)) == 4
 
 
 def test_unit_overloaded_points_are_those_of_single_equilibria():
@@ -221,7 +220,7 @@ def test_unit_a_double_decker_goes_point_by_point(tmp_path):
         most = max(ball["inner_angle_deg"] for ball in alone[row]["balls"])
         assert shown[f"{row}_row_inner_angle_max_deg"] == pytest.approx(most, rel=1e-8)
     assert set(found.balls()["row"]) == {"inner", "outer"}
-    assert len(pictures.pictures(found, tmp_path)) == 4
+    assert len(ball_pictures.sweep_pictures(found, tmp_path)) == 4
 
 
 @pytest.mark.parametrize(
@@ -281,11 +280,13 @@ def test_trend_speed_drives_the_contact_angles_apart(grid):
 
 def test_unit_pictures(grid, tmp_path, drawn):
     """Unit: few lines are lines, many a map; an equilibrium gives three pictures; each shows its figures."""
-    names = pictures.pictures(grid, tmp_path)
+    names = ball_pictures.sweep_pictures(grid, tmp_path)
     assert not lacking(drawn["angles.png"], grid.grid("inner_angle_max_deg"))
     assert not lacking(drawn["pressure_and_life.png"], grid.grid("L10_Mrev"))
     assert not lacking(drawn["stiffness.png"], grid.grid("stiffness_x_N_per_um"))
-    names += pictures.pictures(sweep(scene_with(), {LOAD: np.linspace(100.0, 400.0, 8), SPEED: [1e4, 2e4]}), tmp_path)
+    names += ball_pictures.sweep_pictures(
+        sweep(scene_with(), {LOAD: np.linspace(100.0, 400.0, 8), SPEED: [1e4, 2e4]}), tmp_path
+    )
     assert names == ["angles.png", "pressure_and_life.png", "stiffness.png", "map.png"]
     one = equilibrium(scene_with())
     names += ball_pictures.pictures(one, tmp_path)
@@ -297,7 +298,7 @@ def test_unit_pictures(grid, tmp_path, drawn):
 
 def test_unit_labels_carry_units():
     """Unit: an axis says what the key says, its unit in brackets."""
-    labels = [pictures.label(key) for key in (SPEED, "operation.load_N[3]", "bearing.inner_groove_factor")]
+    labels = [ball_pictures.label(key) for key in (SPEED, "operation.load_N[3]", "bearing.inner_groove_factor")]
     assert labels == ["inner speed [rpm]", "load 3 [N]", "inner groove factor"]
 
 

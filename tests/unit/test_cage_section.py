@@ -14,7 +14,7 @@ from rbdyn.contact.cage_bar import CageSection, Elastic, bar_stiffness
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.faults import InputError, read_toml
 from rbdyn.scene import Scene
-from rbdyn.scene.cage_section import STIFFNESS_ERROR
+from rbdyn.scene.bearing import STIFFNESS_ERROR
 from rbdyn.scene.unknown import documented_of
 
 SCENE = Path(__file__).parents[2] / "examples" / "cylindrical_roller.toml"

@@ -8,11 +8,9 @@ from hypothesis import strategies as st
 
 from doe.dimension_chain import solve
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.closing import closing_function, interval, press_fit_factor
-from doe.dimension_chain.expressions import evaluate, names_in
-from doe.dimension_chain.links import PressFit
-from doe.dimension_chain.monte_carlo import draw
-from doe.dimension_chain.parts import given_parts
+from doe.dimension_chain.closing import closing_function, evaluate, interval, names_in, press_fit_factor
+from doe.dimension_chain.links import PressFit, given_parts
+from doe.dimension_chain.yields import draw
 from rbdyn.faults import InputError
 
 # Raceways and the seats of an inner ring: a, b raceways, c shaft seat, d ring bore.

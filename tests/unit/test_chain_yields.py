@@ -10,10 +10,8 @@ from scipy.stats import kstest, triang, truncnorm, uniform
 
 from doe.dimension_chain import solve
 from doe.dimension_chain.allocation import Allocation
-from doe.dimension_chain.distributions import moments, quantile, share_below
-from doe.dimension_chain.monte_carlo import CHUNK, draw
-from doe.dimension_chain.parts import given_parts
-from doe.dimension_chain.yields import exact_shares
+from doe.dimension_chain.links import given_parts
+from doe.dimension_chain.yields import CHUNK, draw, exact_shares, moments, quantile, share_below
 
 SAMPLES = 100_000
 LAWS = ["normal", "truncated_normal", "uniform", "triangular"]

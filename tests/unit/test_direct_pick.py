@@ -10,8 +10,7 @@ from short_studies import SHORT, short_study, silent
 from doe import clearance
 from doe.pareto import Goals
 from doe.pareto.direct_tolerance import Neighbourhood, direct_aware, pick_among
-from doe.pareto.quadratic import Quadratic
-from doe.pareto.tolerance_aware import ToleranceBox
+from doe.pareto.manufacture import Quadratic, ToleranceBox
 from doe.report.study.files import write
 from doe.study.whole import run_study
 from doe.study_file import Study

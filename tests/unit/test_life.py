@@ -12,7 +12,6 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from rbdyn.contact.profile import logarithmic_relief, slice_centres
-from rbdyn.life import roller_capacity
 from rbdyn.life import rollers as life
 
 GAMMA = 9.0 / 43.5
@@ -39,21 +38,21 @@ def test_literature_capacity_factor():
     """Literature: f_c as ISO 281 tabulates it for radial roller bearings, within one of the last printed digit."""
     table = {0.01: 52.1, 0.02: 60.8, 0.04: 70.7, 0.06: 76.9, 0.10: 84.2, 0.16: 88.5, 0.20: 88.7, 0.30: 83.8}
     for gamma, factor in table.items():
-        assert roller_capacity.capacity_factor(gamma) == pytest.approx(factor, abs=0.11)
+        assert life.capacity_factor(gamma) == pytest.approx(factor, abs=0.11)
     for gamma in (0.0, 1.0, -0.1, math.nan):
         with pytest.raises(ValueError, match="gamma"):
-            roller_capacity.capacity_factor(gamma)
+            life.capacity_factor(gamma)
 
 
 def test_unit_dynamic_capacity_scales():
     """Unit: (i L)^(7/9) Z^(3/4) D^(29/27) at one gamma, and 1.1 f_c for a roller of 1 mm in one row."""
-    one = roller_capacity.dynamic_capacity(1, 1e-3, 1e-3, 1e-3 / GAMMA)
-    assert one == pytest.approx(1.1 * roller_capacity.capacity_factor(GAMMA), rel=1e-13)
-    assert roller_capacity.dynamic_capacity(10, 9e-3, 3.5e-3, 43.5e-3) == pytest.approx(
+    one = life.dynamic_capacity(1, 1e-3, 1e-3, 1e-3 / GAMMA)
+    assert one == pytest.approx(1.1 * life.capacity_factor(GAMMA), rel=1e-13)
+    assert life.dynamic_capacity(10, 9e-3, 3.5e-3, 43.5e-3) == pytest.approx(
         one * 10.0**0.75 * 3.5 ** (7.0 / 9.0) * 9.0 ** (29.0 / 27.0), rel=1e-13
     )
-    two_rows = roller_capacity.dynamic_capacity(10, 9e-3, 3.5e-3, 43.5e-3, rows=2)
-    assert two_rows == pytest.approx(roller_capacity.dynamic_capacity(10, 9e-3, 7e-3, 43.5e-3), rel=1e-13)
+    two_rows = life.dynamic_capacity(10, 9e-3, 3.5e-3, 43.5e-3, rows=2)
+    assert two_rows == pytest.approx(life.dynamic_capacity(10, 9e-3, 7e-3, 43.5e-3), rel=1e-13)
 
 
 def test_literature_commercial_report():
@@ -110,7 +109,7 @@ def test_literature_aligned_reference_life_exceeds_the_basic(share, low, high):
     So the reference profile, aligned and without clearance, outlives (C/P)^(10/3) by a factor that falls with load:
     as an equivalent load, 0.67 to 0.79 of P.
     """
-    capacity = roller_capacity.dynamic_capacity(13, 10e-3, 11e-3, 52e-3)
+    capacity = life.dynamic_capacity(13, 10e-3, 11e-3, 52e-3)
     loads = static_loads(13, 10.0, 11.0, share * capacity, 41, profiled=True)
     result = life.reference_life(loads, loads, capacity=capacity, gamma=10.0 / 52.0)
     assert low < result.million_turns * share ** (10.0 / 3.0) < high

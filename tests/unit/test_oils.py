@@ -14,7 +14,7 @@ from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.parameters.race_traction import _rheology
 from rbdyn.dynamics.parameters.start import start_state
 from rbdyn.faults import InputError
-from rbdyn.life.roller_capacity import minimum_loads
+from rbdyn.life.rollers import minimum_loads
 from rbdyn.properties.lubricants import oil_at
 from rbdyn.properties.oils import (
     BASE_OILS,

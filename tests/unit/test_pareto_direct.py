@@ -7,8 +7,8 @@ import pytest
 from pareto_cases import LOWER, UPPER, bowls, noisy_bowls
 
 from doe.pareto import Goals, front, hypervolume
-from doe.pareto.archive import dominance, error_aware_dominance, order, ranks
 from doe.pareto.direct import direct_front
+from doe.pareto.search import dominance, error_aware_dominance, order, ranks
 from doe.pareto.surrogate_loss import compare_with_surrogate, noisy_hypervolume
 
 GOALS = Goals.of(["min", "min"])

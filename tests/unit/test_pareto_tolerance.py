@@ -9,11 +9,9 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from doe.pareto import Goals, front
-from doe.pareto.archive import Archive
-from doe.pareto.manufacture import even_offsets, offsets, random_offsets
-from doe.pareto.quadratic import Quadratic
+from doe.pareto.manufacture import Quadratic, ToleranceBox, even_offsets, offsets, random_offsets, tolerance_aware_front
+from doe.pareto.search import Archive
 from doe.pareto.tolerance import RIM, widest_tolerances
-from doe.pareto.tolerance_aware import ToleranceBox, tolerance_aware_front
 
 BOX = {"lower": [-10.0, -10.0], "upper": [10.0, 10.0]}
 

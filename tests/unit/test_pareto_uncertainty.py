@@ -10,7 +10,7 @@ from pareto_cases import TABLE, edited_study, table_surfaces
 
 from doe.designs import to_coded
 from doe.pareto import Goals, front, hypervolume, non_dominated
-from doe.pareto.uncertainty import (
+from doe.pareto.front import (
     contrast_error,
     draw_coefficients,
     front_uncertainty,

@@ -15,8 +15,8 @@ from rbdyn import BallScene
 from rbdyn.cli.ball_studies import optimum_study
 from rbdyn.faults import InputError
 from rbdyn.life import balls as life
-from rbdyn.life.turns import turning_rings
-from rbdyn.quasistatic import fatigue, preload
+from rbdyn.life import turning_rings
+from rbdyn.quasistatic import preload, result
 from rbdyn.quasistatic.bearing import equilibrium
 from rbdyn.quasistatic.sweep.run import sweep
 from rbdyn.scene import Scene
@@ -74,7 +74,7 @@ def test_axial_load_alone_has_no_optimum_and_says_so():
     load = 80.0 / (10.0 * math.sin(point.solution.inner_angle[0]))
     assert point.solution.inner_load == pytest.approx(np.full(10, load), rel=1e-8)
     expected = life.row_life(
-        np.full(10, load), np.full(10, load), fatigue.reference_capacities(scene().bearing)
+        np.full(10, load), np.full(10, load), result.reference_capacities(scene().bearing)
     ).million_turns
     assert point.million_turns == pytest.approx(expected, rel=1e-7)
 
@@ -120,11 +120,11 @@ def test_wear_raises_stress_and_shortens_life():
 def test_ratings_of_a_drawing(monkeypatch):
     """Unit: a catalogue's capacity is taken as it is; grooves closer than 0.52 rate no higher than 0.52."""
     drawing = scene().bearing
-    rated = drawing.model_copy(update={"dynamic_capacity_N": 2.0 * fatigue.capacity_of(drawing)})
-    twice = np.array(fatigue.reference_capacities(rated)) / fatigue.reference_capacities(drawing)
+    rated = drawing.model_copy(update={"dynamic_capacity_N": 2.0 * result.capacity_of(drawing)})
+    twice = np.array(result.reference_capacities(rated)) / result.reference_capacities(drawing)
     assert twice == pytest.approx((2.0, 2.0))
     close = drawing.model_copy(update={"inner_groove_factor": 0.51})
-    assert fatigue.capacity_of(close) == pytest.approx(fatigue.capacity_of(drawing))
+    assert result.capacity_of(close) == pytest.approx(result.capacity_of(drawing))
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "examples"))
     plain_capacities = importlib.import_module("published.lundberg_palmgren").plain_capacities
     assert plain_capacities(close)[0] > plain_capacities(drawing)[0]

@@ -17,8 +17,8 @@ from rbdyn.mounting.fits import operating_clearance
 from rbdyn.mounting.rings import MountedRings, Ring, interface_pressure, mounted_clearance
 from rbdyn.properties.materials import MATERIALS, Material
 from rbdyn.scene import Scene
-from rbdyn.scene.bearing import Bearing, CustomMaterial, Materials
-from rbdyn.scene.mounting import Mounting, material_of, misfits
+from rbdyn.scene.bearing import Bearing, CustomMaterial, Materials, material_of
+from rbdyn.scene.mounting import Mounting, misfits
 
 STEEL = MATERIALS["bearing_steel"]
 OMEGA = 24000.0 * math.pi / 30.0

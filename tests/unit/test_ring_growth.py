@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from rbdyn import BallScene, equilibrium
 from rbdyn.faults import InputError
-from rbdyn.mounting.ball_rings import layer_changes, mounted_of, row_change
-from rbdyn.mounting.ring_growth import groove_change, printed_growth
-from rbdyn.mounting.rings import Ring, interface_pressure, loosening_speed
+from rbdyn.mounting.fits import layer_changes, mounted_of, row_change
+from rbdyn.mounting.rings import Ring, groove_change, interface_pressure, loosening_speed, printed_growth
 from rbdyn.properties.materials import MATERIALS
 
 STEEL, CERAMIC = MATERIALS["bearing_steel"], MATERIALS["silicon_nitride"]

@@ -16,7 +16,7 @@ from short_studies import EXAMPLES, SHORT, short_study, silent
 from doe import clearance
 from doe.adaptive.candidates import Region
 from doe.adaptive.runs import Face
-from doe.pareto.archive import REFERENCE
+from doe.pareto.search import REFERENCE
 from doe.report.sections.blocks import Figures
 from doe.report.sections.searches import in_few_runs
 from doe.report.steps.search_words import SURE, held_sentence

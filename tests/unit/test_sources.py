@@ -76,7 +76,7 @@ def copy(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("module", "old", "new"),
     [
-        ("rbdyn/plots/motion.py", '"', "'"),
+        ("rbdyn/plots/roller.py", '"', "'"),
         ("rbdyn/scene/bearing.py", "Harmonics of the outer raceway", "Waves of the outer raceway"),
         ("rbdyn/scene/bearing.py", '"""Geometry of a cylindrical roller bearing.', '"""Drawing.'),
         ("rbdyn/cli/app.py", '"', "'"),

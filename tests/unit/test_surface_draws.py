@@ -8,8 +8,7 @@ from scipy import stats
 from short_studies import short_study
 
 from doe.designs import central_composite
-from doe.pareto.manufacture import random_offsets
-from doe.pareto.share import interval_of_share, percent
+from doe.pareto.manufacture import interval_of_share, percent, random_offsets
 from doe.pareto.tolerance import widest_tolerances
 from doe.response_surface import fit, model_matrix
 from doe.response_surface.model_error import correlation

@@ -7,8 +7,8 @@ import numpy as np
 
 from doe.arrays import Array
 from doe.pareto import ParetoFront
-from doe.pareto.archive import REFERENCE, dominates
-from doe.pareto.tolerance_aware import ToleranceAware
+from doe.pareto.manufacture import ToleranceAware
+from doe.pareto.search import REFERENCE, dominates
 from doe.report.steps.confirmation import gains_record, point_record
 from doe.report.words import change, share_with_interval
 from doe.response_surface import Surface

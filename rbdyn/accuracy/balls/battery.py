@@ -18,7 +18,7 @@ from rbdyn.accuracy.report import Progress, Report, Reporter, Table, records, re
 from rbdyn.quasistatic.rivals.finite_search import loaded
 from rbdyn.quasistatic.rivals.full_system import system_of, unknowns
 from rbdyn.quasistatic.row.equilibrium import Solution
-from rbdyn.quasistatic.row.row import component_lengths
+from rbdyn.quasistatic.row.ring import component_lengths
 from rbdyn.scene.ball import BallScene
 
 # A tenth of a second and more for a scene they fail on.

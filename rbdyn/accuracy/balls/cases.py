@@ -12,11 +12,10 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.properties.materials import MATERIALS, Material
-from rbdyn.quasistatic.row.control import Control
+from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.model import row_model
-from rbdyn.quasistatic.row.row import Row
-from rbdyn.scene.ball import BallModel, BallOperation, Prescribed
-from rbdyn.scene.ball_bearing import BallBearing
+from rbdyn.quasistatic.row.ring import Row
+from rbdyn.scene.ball import BallBearing, BallModel, BallOperation, Prescribed
 
 CONTROLS = ("outer", "inner", "half", "hybrid", "common_cage")
 LOADS = ("radial", "axial", "combined", "moment", "preload_force", "preload_displacement")

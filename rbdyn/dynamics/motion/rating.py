@@ -7,8 +7,8 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.dynamics.forces.observe import slice_loads
 from rbdyn.dynamics.parameters.model import race_contact_law
+from rbdyn.life import turning_rings
 from rbdyn.life.rollers import ReferenceLife, reference_life
-from rbdyn.life.turns import turning_rings
 from rbdyn.scene import Scene
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from rbdyn.life.maker_friction import iso_15312_heat, skf_moments
 from rbdyn.scene import Scene
-from rbdyn.scene.catalogue_notes import catalogued
+from rbdyn.scene.notes import catalogued
 
 # A ratio of simulated to maker's loss outside this is noted: SKF's model is a factor of two off ISO 15312 itself.
 USUAL_RATIO = (0.5, 2.0)

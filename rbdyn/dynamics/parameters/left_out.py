@@ -10,10 +10,10 @@ from rbdyn.contact.hertz_line import palmgren
 from rbdyn.dynamics.forces.surroundings import AIR_DENSITY
 from rbdyn.fields import RPM
 from rbdyn.life.maker_friction import SERIES
-from rbdyn.life.roller_capacity import REFERENCE_SPEED, minimum_loads, static_capacity
+from rbdyn.life.rollers import REFERENCE_SPEED, minimum_loads, static_capacity
 from rbdyn.properties.materials import SOFTEST_METAL, equivalent_modulus
 from rbdyn.scene import Scene
-from rbdyn.scene.catalogue_notes import catalogued
+from rbdyn.scene.notes import catalogued
 
 # Share of the power loss from which a result speaks of power that was left out.
 NOTED_SHARE = 0.03

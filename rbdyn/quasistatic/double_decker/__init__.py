@@ -1,1 +1,1 @@
-"""Two rows with a floating ring between: ``equilibrium``, ``speed_split`` (speed of the middle ring), ``model`` (from a scene)."""
+"""Two rows with a floating ring between: ``equilibrium``, and ``model`` from a scene, with the speed of the middle ring."""

@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rbdyn.arrays import Array, Mask
-from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare
+from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare
 from rbdyn.quasistatic.row.equilibrium import OK, Solution, solve, without_noise
-from rbdyn.quasistatic.row.row import Row, component_lengths
+from rbdyn.quasistatic.row.ring import Row, component_lengths
 
 # Newton on the middle ring: force left over, relative to the largest force, and where rounding allows no better.
 AIM, ACCEPTED = 1e-11, 1e-8

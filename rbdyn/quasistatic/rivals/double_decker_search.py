@@ -29,7 +29,7 @@ from rbdyn.quasistatic.rivals.levenberg_marquardt import (
 from rbdyn.quasistatic.row.ball import ball_forces, deflection
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
 from rbdyn.quasistatic.row.newton import ACCEPTED
-from rbdyn.quasistatic.row.place import groove_centre
+from rbdyn.quasistatic.row.ring import groove_centre
 
 # Only x and z of the rings are free; nothing pulls across.
 SQUARE = np.array([math.nan, 0.0, math.nan, 0.0, 0.0])

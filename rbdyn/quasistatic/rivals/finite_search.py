@@ -25,10 +25,9 @@ from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.rivals.full_system import Stop, System, move, rival
 from rbdyn.quasistatic.rivals.levenberg_marquardt import CONVERGED, EXHAUSTED, SENTENCES, Damping, levenberg_marquardt
-from rbdyn.quasistatic.row.control import Control
+from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
-from rbdyn.quasistatic.row.place import groove_centre
-from rbdyn.quasistatic.row.row import Row
+from rbdyn.quasistatic.row.ring import Row, groove_centre
 
 UNLOADED_BALLS = 5  # besides the outcomes of Levenberg-Marquardt
 ENDS = {**SENTENCES, UNLOADED_BALLS: "found unloaded balls, which rule a refuses"}

@@ -14,13 +14,10 @@ from numpy.typing import NDArray
 
 from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry, routine
-from rbdyn.quasistatic.row.ball import ball_forces, deflection
-from rbdyn.quasistatic.row.control import Control
+from rbdyn.quasistatic.row.ball import Control, ball_forces, deflection
 from rbdyn.quasistatic.row.equilibrium import FIGURES, Solution, fill_figures, solution_of
-from rbdyn.quasistatic.row.place import groove_centre
-from rbdyn.quasistatic.row.ring import LOADED, assemble
-from rbdyn.quasistatic.row.row import Row
-from rbdyn.quasistatic.row.space import STEPS, Task, posed, space
+from rbdyn.quasistatic.row.newton import STEPS, Task, posed, space
+from rbdyn.quasistatic.row.ring import LOADED, Row, assemble, groove_centre
 
 
 class System(NamedTuple):

@@ -15,8 +15,7 @@ import numpy as np
 
 from rbdyn.compiled.kernel import routine
 from rbdyn.quasistatic.rivals.full_system import forces, move
-from rbdyn.quasistatic.row.elimination import eliminate
-from rbdyn.quasistatic.row.newton import ACCEPTED, copy
+from rbdyn.quasistatic.row.newton import ACCEPTED, copy, eliminate
 
 CONVERGED, STATIONARY, NO_DESCENT, NOT_FINITE, EXHAUSTED = range(5)
 SENTENCES = {

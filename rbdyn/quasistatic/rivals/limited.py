@@ -6,12 +6,10 @@ import numpy as np
 
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.rivals.full_system import Stop, System, evaluate, rival, unknowns
-from rbdyn.quasistatic.row.ball import rules
-from rbdyn.quasistatic.row.control import Control
+from rbdyn.quasistatic.row.ball import Control, rules
 from rbdyn.quasistatic.row.equilibrium import OK
-from rbdyn.quasistatic.row.newton import CONVEX_MARCH, descend, go_to, march, roughly, start_afresh
+from rbdyn.quasistatic.row.newton import CONVEX_MARCH, STEPS, Task, descend, go_to, march, roughly, space, start_afresh
 from rbdyn.quasistatic.row.ring import RING
-from rbdyn.quasistatic.row.space import STEPS, Task, space
 
 
 @entry

@@ -12,13 +12,10 @@ import numpy as np
 from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.rivals.full_system import Stop, System, forces, move, rival, unknowns
-from rbdyn.quasistatic.row.control import Control
-from rbdyn.quasistatic.row.elimination import eliminate
+from rbdyn.quasistatic.row.ball import Control
 from rbdyn.quasistatic.row.equilibrium import OK, Solution
-from rbdyn.quasistatic.row.newton import ACCEPTED
-from rbdyn.quasistatic.row.row import component_lengths
-from rbdyn.quasistatic.row.space import space
-from rbdyn.quasistatic.row.start import settle_all
+from rbdyn.quasistatic.row.newton import ACCEPTED, eliminate, settle_all, space
+from rbdyn.quasistatic.row.ring import component_lengths
 
 STEPS = 100
 # Unloaded contacts have no stiffness, so that Newton's method cannot begin where nothing is pressed: the ring is pushed

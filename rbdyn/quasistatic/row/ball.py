@@ -1,4 +1,33 @@
-"""Forces on one ball and on the inner ring from it, with their derivatives (Jones 1960; Harris, *Rolling Bearing Analysis*).
+"""One ball: its raceway control, its orbit and spin, the forces on it and on the inner ring from it, with their derivatives
+(Jones 1960; Harris, *Rolling Bearing Analysis*).
+
+Raceway control: which race a ball spins on, and who takes its gyroscopic moment.
+
+A ball cannot roll without spin on both races. Let its spin moments be proportional to spin speed with weights w_i and
+w_o: their balance is linear in the pitch angle beta of the ball's axis,
+
+    tan beta = [w_o sin a_o/P + w_i sin a_i/N] / [w_o (cos a_o + g)/P + w_i (cos a_i - g)/N],
+    P = 1 + g cos a_o,  N = 1 - g cos a_i,  g = D/d_m.
+
+w_i = 0 is Jones's outer raceway control, w_o = 0 inner control, equal weights share evenly; with the friction moments
+w = Q a E(k) of a Hertz ellipse (up to a common factor) it is the friction-weighted hybrid. The friction forces that take
+the gyroscopic moment are shared alike: lambda_i = 2 s, lambda_o = 2 (1 - s) with s = w_i/(w_i + w_o).
+
+One common cage speed with no gyroscopic moment is the hypothesis without any of this.
+
+Orbit and spin of a ball that rolls on both races: centrifugal force and gyroscopic moment with their derivatives.
+
+Rolling without slip at both contacts (Harris, *Rolling Bearing Analysis*), pitch angle beta by ``control``:
+
+    w_m = [w_in N cos(a_o - b) + w_out P cos(a_i - b)] / [N cos(a_o - b) + P cos(a_i - b)],
+    w_R = (w_out - w_in) N P / (g [N cos(a_o - b) + P cos(a_i - b)]),
+    F_c = m d_m w_m^2/2,  M_g = J w_R w_m sin b.
+
+Numerators and denominators are of one degree in (cos b, sin b), so no angle is ever computed. w_R counts positive where
+the outer ring turns faster: with the inner ring turning M_g is negative, and the friction that balances it pushes the ball
+the other way than where the sign is dropped, as many texts do.
+
+Forces on one ball and on the inner ring from it, with their derivatives (Jones 1960; Harris, *Rolling Bearing Analysis*).
 
 With T = lambda M_g/D the friction forces that take the gyroscopic moment:
 
@@ -10,11 +39,109 @@ the groove centre.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from rbdyn.compiled.kernel import kernel, law
-from rbdyn.quasistatic.row.ball_motion import orbit_and_spin
-from rbdyn.quasistatic.row.control import CommonCage, FixedShare, FrictionShare
+
+
+class Spinning(NamedTuple):
+    """What orbit and spin of a ball depend on besides its contact angles. SI.
+
+    ``ratio``: g = D/d_m. ``orbit_mass``: half the ball's mass times the pitch diameter, F_c = orbit_mass w_m^2 [kg m].
+    ``inertia``: J of the ball [kg m^2], 0 where no gyroscopic moment is wanted. ``turning``: -1 keeps the sign of the ball's spin
+    for an inner ring that turns faster, +1 drops it. ``blend_load``: inner contact load [N] from which on a ball
+    follows the race control; unloaded it goes with the cage. ``friction``: largest coefficient that may hold a gyroscopic moment.
+    """
+
+    ratio: float
+    ball_diameter: float
+    orbit_mass: float
+    inertia: float
+    turning: float
+    inner_speed: float
+    outer_speed: float
+    blend_load: float
+    friction: float
+
+
+class CommonCage(NamedTuple):
+    """All balls orbit at one speed; no gyroscopic moment."""
+
+    cage_speed: float
+
+
+class FixedShare(NamedTuple):
+    """Weights of the spin moments fixed: ``inner`` = w_i/(w_i + w_o), 0 for outer and 1 for inner raceway control."""
+
+    inner: float
+    spinning: Spinning
+
+
+class FrictionShare(NamedTuple):
+    """Weights from friction: ``inner_weight`` (a E/Q^(1/3)) K^(4/3) of the inner race over that of the outer, so that
+    w_i/w_o = inner_weight (delta_i/delta_o)^2."""
+
+    inner_weight: float
+    spinning: Spinning
+
+
+Control = CommonCage | FixedShare | FrictionShare
+
+
+@kernel
+def orbit_and_spin(spinning: Any, share: float, ci: float, si: float, co: float, so: float) -> tuple[Any, Any]:
+    """F_c [N] and M_g [N m] of a ball, each with its derivatives by inner angle, outer angle and inner ``share``.
+
+    Contact angles are given by cosine and sine. Returns ((F_c, by a_i, by a_o, by share), (M_g, ...)).
+    """
+    g = spinning.ratio
+    outer = 1.0 - share
+    p, n = 1.0 + g * co, 1.0 - g * ci
+    one_p, one_n = 1.0 / p, 1.0 / n
+    flat = 1.0 - g * g
+    # tan b = rise/run.
+    rise = outer * so * one_p + share * si * one_n
+    run = outer * (co + g) * one_p + share * (ci - g) * one_n
+    rise_i = share * (ci - g) * one_n * one_n
+    run_i = -share * si * flat * one_n * one_n
+    rise_o = outer * (co + g) * one_p * one_p
+    run_o = -outer * so * flat * one_p * one_p
+    rise_s = si * one_n - so * one_p
+    run_s = (ci - g) * one_n - (co + g) * one_p
+    # cos(a - b) over the common length of (run, rise).
+    at_o, at_i = co * run + so * rise, ci * run + si * rise
+    at_o_i = co * run_i + so * rise_i
+    at_o_o = co * run_o + so * rise_o + co * rise - so * run
+    at_o_s = co * run_s + so * rise_s
+    at_i_i = ci * run_i + si * rise_i + ci * rise - si * run
+    at_i_o = ci * run_o + si * rise_o
+    at_i_s = ci * run_s + si * rise_s
+    n_i, p_o = g * si, -g * so
+    whole = 1.0 / (n * at_o + p * at_i)
+    whole_i = n_i * at_o + n * at_o_i + p * at_i_i
+    whole_o = n * at_o_o + p_o * at_i + p * at_i_o
+    whole_s = n * at_o_s + p * at_i_s
+    lead = n * at_o * whole
+    lead_i = (n_i * at_o + n * at_o_i - lead * whole_i) * whole
+    lead_o = (n * at_o_o - lead * whole_o) * whole
+    lead_s = (n * at_o_s - lead * whole_s) * whole
+    tip = n * p * rise * whole
+    tip_i = (n_i * p * rise + n * p * rise_i - tip * whole_i) * whole
+    tip_o = (n * p_o * rise + n * p * rise_o - tip * whole_o) * whole
+    tip_s = (n * p * rise_s - tip * whole_s) * whole
+    difference = spinning.inner_speed - spinning.outer_speed
+    orbit = spinning.outer_speed + difference * lead
+    pull = 2.0 * spinning.orbit_mass * orbit * difference
+    spin = spinning.turning * spinning.inertia * difference / g
+    force = (spinning.orbit_mass * orbit * orbit, pull * lead_i, pull * lead_o, pull * lead_s)
+    moment = (
+        spin * orbit * tip,
+        spin * (difference * lead_i * tip + orbit * tip_i),
+        spin * (difference * lead_o * tip + orbit * tip_o),
+        spin * (difference * lead_s * tip + orbit * tip_s),
+    )
+    return force, moment
+
 
 # Share of the friction limit up to which a contact holds all of a gyroscopic moment.
 STICKING = 0.8

@@ -7,13 +7,19 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.compiled.kernel import entry, routine
-from rbdyn.quasistatic.row.ball import ball_forces, spring
-from rbdyn.quasistatic.row.control import Control
-from rbdyn.quasistatic.row.newton import CONVERGED, NOT_CONVEX_MINIMUM, find
-from rbdyn.quasistatic.row.place import groove_centre
-from rbdyn.quasistatic.row.ring import INNER_DEPTH, LOADED, OUTER_DEPTH, RING, TAKEN, unbalance
-from rbdyn.quasistatic.row.row import Row, component_lengths
-from rbdyn.quasistatic.row.space import STEPS, STRIDES, Space, Task, posed, space
+from rbdyn.quasistatic.row.ball import Control, ball_forces, spring
+from rbdyn.quasistatic.row.newton import CONVERGED, NOT_CONVEX_MINIMUM, STEPS, STRIDES, Space, Task, find, posed, space
+from rbdyn.quasistatic.row.ring import (
+    INNER_DEPTH,
+    LOADED,
+    OUTER_DEPTH,
+    RING,
+    TAKEN,
+    Row,
+    component_lengths,
+    groove_centre,
+    unbalance,
+)
 
 # Figures of a ball.
 INNER_LOAD, OUTER_LOAD, INNER_ANGLE, OUTER_ANGLE, PULL, MOMENT, FIGURES = range(7)

@@ -7,13 +7,12 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.contact.hertz_point import PointContact, ball_on_race
-from rbdyn.mounting.ball_rings import row_change
-from rbdyn.mounting.ring_growth import UNCHANGED, GrooveChange
+from rbdyn.mounting.fits import row_change
+from rbdyn.mounting.rings import UNCHANGED, GrooveChange
 from rbdyn.properties.materials import Material, equivalent_modulus
-from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
-from rbdyn.quasistatic.row.row import Row, at_rest
-from rbdyn.scene.ball import BallModel, BallScene, SingleRowScene
-from rbdyn.scene.ball_bearing import BallRow
+from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.row.ring import Row, at_rest
+from rbdyn.scene.ball import BallModel, BallRow, BallScene, SingleRowScene
 
 INNER_SHARE = {"outer": 0.0, "inner": 1.0, "half": 0.5}
 # Keeps a quotient finite where nothing turns.

@@ -4,17 +4,200 @@ With one common cage speed and no gyroscopic moment the equilibrium is the minim
 displacement and the places of the balls: unique, and a guarded Newton reaches it from anywhere. From there Newton on the
 full equations; where it fails the race control is brought in by and by. All work on a ``Task`` and leave ``at``, a ``Space``,
 where they end.
+
+The first guess is how far the ring goes along its load, and where the balls then rest. ``Task`` is what a solve is given.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from rbdyn.arrays import Array, Whole
 from rbdyn.compiled.kernel import kernel, routine
-from rbdyn.quasistatic.row.ball import rules
-from rbdyn.quasistatic.row.elimination import eliminate
-from rbdyn.quasistatic.row.ring import ENERGY, LARGEST, LOADED, RING, assemble, ball_step, follow, unbalance
-from rbdyn.quasistatic.row.space import COLD_STARTS, STEPS, STRIDES
-from rbdyn.quasistatic.row.start import along_the_load, settle_all
+from rbdyn.quasistatic.row.ball import Control, rules
+from rbdyn.quasistatic.row.ring import (
+    BALL,
+    BALL_WORK,
+    ENERGY,
+    LARGEST,
+    LOADED,
+    RING,
+    SUMS,
+    Row,
+    assemble,
+    ball_step,
+    component_lengths,
+    follow,
+    groove_centre,
+    measure,
+    moved_centre,
+    settle,
+    unbalance,
+)
+
+# Counters: Newton steps, continuations, starts from nothing.
+STEPS, STRIDES, COLD_STARTS, COUNTERS = range(4)
+
+
+class Task(NamedTuple):
+    """A row, its raceway control, and what holds its ring: all forces [N], as moments count over the lever R.
+
+    ``load`` (5,) on the ring; ``free`` (5,): 1 where the load rules, 0 where the displacement is prescribed.
+    """
+
+    control: Control
+    row: Row
+    load: Array
+    free: Array
+
+
+class Space(NamedTuple):
+    """Where a solve of Z balls stands, and its work space; kept from one solve to the next.
+
+    ``q`` (5,): displacement of the ring [m], tilts times R; ``balls`` (Z, BALL); ``old_q, old_balls, old_work``: before the last step.
+    ``matrix`` (5, 5): stiffness of the ring [N/m]; ``vector`` (5,): what a Newton step is to take away [N]; ``step`` (5,) [m];
+    ``sums``, ``work`` (Z, BALL_WORK): columns of ``ring``; ``counts``: above. ``table``, ``base``: of an elimination and of the first guess.
+    """
+
+    counts: Whole
+    q: Array
+    balls: Array
+    matrix: Array
+    vector: Array
+    table: Array
+    step: Array
+    sums: Array
+    work: Array
+    old_q: Array
+    old_balls: Array
+    old_work: Array
+    base: Array
+
+
+def space(balls: int) -> Space:
+    """Work space for a row of so many balls."""
+    ball, work, square = (balls, BALL), (balls, BALL_WORK), (RING, RING)
+    shapes = (RING, ball, square, RING, square, RING, SUMS, work, RING, ball, work, RING)
+    return Space(np.zeros(COUNTERS, np.int64), *(np.zeros(shape) for shape in shapes))
+
+
+def posed(row: Row, load: Array, given: Array | None) -> tuple[Array, Array, Array]:
+    """``load`` and ``free`` of a ``Task`` from load and prescribed displacements of ``equilibrium.solve``, and those displacements.
+
+    The last (5,) in m, 0 where the load rules.
+    """
+    unit = component_lengths(row.lever)
+    held = np.full(RING, np.nan) if given is None else np.asarray(given, float)
+    free = np.isnan(held)
+    return np.asarray(load, float) / unit, free.astype(float), np.where(free, 0.0, held) * unit
+
+
+@routine
+def eliminate(matrix: Any, vector: Any, size: int, least: float) -> bool:
+    """Solve ``matrix`` x = ``vector`` in place with row pivots; x is left in ``vector``, the matrix is spent.
+
+    Only the first ``size`` rows and columns count. Returns whether every pivot was found: False for a matrix that is not
+    finite or has a pivot no larger than ``least``, 0 where only a singular one is to fail.
+    """
+    for i in range(size):
+        pivot = i
+        for k in range(i + 1, size):
+            if abs(matrix[k, i]) > abs(matrix[pivot, i]):
+                pivot = k
+        if not least < abs(matrix[pivot, i]) < 1e300:
+            return False
+        if pivot != i:
+            for k in range(i, size):
+                matrix[i, k], matrix[pivot, k] = matrix[pivot, k], matrix[i, k]
+            vector[i], vector[pivot] = vector[pivot], vector[i]
+        one = 1.0 / matrix[i, i]
+        for k in range(i + 1, size):
+            factor = matrix[k, i] * one
+            # Most of a matrix of all balls is zero, and stays so where no ball meets another.
+            if factor != 0.0:
+                for m in range(i + 1, size):
+                    matrix[k, m] -= factor * matrix[i, m]
+                vector[k] -= factor * vector[i]
+    for i in range(size - 1, -1, -1):
+        rest = vector[i]
+        for k in range(i + 1, size):
+            rest -= matrix[i, k] * vector[k]
+        vector[i] = rest / matrix[i, i]
+    return True
+
+
+FIRST_STEP = 1e-6  # [m]
+LONGEST_STEP = 1.0  # [m]
+# Residual over the contact loads of a ball that is good enough to start from.
+START_BALANCE = 1e-2
+# The start need only be of the right size.
+START_ERROR = 0.1
+
+
+@kernel
+def force_along(row: Any, both: float, q: Any, direction: Any) -> float:
+    """Force along ``direction`` of balls without centrifugal force: two Hertz springs in series, K = ``both``."""
+    total = 0.0
+    for j in range(row.cosine.size):
+        a_axial, a_radial = groove_centre(row, q, j)
+        length = math.sqrt(a_axial * a_axial + a_radial * a_radial)
+        deflection = max(length - row.inner_reach[j] - row.outer_reach[j], 0.0)
+        load = both * deflection * math.sqrt(deflection) / length
+        axial, radial = moved_centre(row, j, direction)
+        total += load * (a_axial * axial + a_radial * radial)
+    return total
+
+
+@kernel
+def force_at(row: Any, both: float, far: float, at: Any) -> float:
+    """``force_along`` with the ring at ``at.base`` + ``far`` along ``at.step``, where it is left."""
+    q, base, step = at.q, at.base, at.step
+    for i in range(RING):
+        q[i] = base[i] + far * step[i]
+    return force_along(row, both, q, step)
+
+
+@routine
+def along_the_load(task: Any, at: Any) -> None:
+    """Move ``at.q`` from where it is along the free part of the load until the balls carry it, roughly."""
+    row, direction = task.row, at.step
+    length = 0.0
+    for i in range(RING):
+        direction[i] = task.load[i] * task.free[i]
+        at.base[i] = at.q[i]
+        length += direction[i] * direction[i]
+    if length == 0.0:
+        return
+    wanted = math.sqrt(length)
+    for i in range(RING):
+        direction[i] /= wanted
+    both = (row.inner_stiffness ** (-2.0 / 3.0) + row.outer_stiffness ** (-2.0 / 3.0)) ** -1.5
+    below, above = 0.0, FIRST_STEP
+    while above < LONGEST_STEP and not force_at(row, both, above, at) >= wanted:
+        below, above = above, 3.0 * above
+    while above - below > START_ERROR * (above - below + 0.1 * below):
+        middle = 0.5 * (below + above)
+        if force_at(row, both, middle, at) >= wanted:
+            above = middle
+        else:
+            below = middle
+        if above - below < 0.02 * above:
+            break
+    for i in range(RING):
+        at.q[i] = at.base[i] + above * direction[i]
+
+
+@routine
+def settle_all(row: Any, at: Any) -> None:
+    """Settle every ball for the ring at ``at.q``, and mark all as loaded."""
+    q, balls = at.q, at.balls
+    at.work[:, LOADED] = 1.0
+    for j in range(row.cosine.size):
+        a_axial, a_radial = groove_centre(row, q, j)
+        settle(row, j, a_axial, a_radial, START_BALANCE, balls)
+        measure(row, j, a_axial, a_radial, balls)
+
 
 # Outcomes of ``find``.
 CONVERGED, NOT_CONVEX_MINIMUM, RACE_CONTROL_LOST = range(3)

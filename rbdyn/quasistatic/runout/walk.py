@@ -4,9 +4,8 @@ from typing import Any
 
 from rbdyn.compiled.kernel import entry
 from rbdyn.quasistatic.row.ball import spring
-from rbdyn.quasistatic.row.newton import CONVERGED, find
+from rbdyn.quasistatic.row.newton import CONVERGED, STEPS, find
 from rbdyn.quasistatic.row.ring import INNER_DEPTH, LOADED, OUTER_DEPTH, RING, unbalance
-from rbdyn.quasistatic.row.space import STEPS
 
 # Figures of a step.
 LARGEST_LOAD, RESIDUAL, FIGURES = range(3)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rbdyn.arrays import Array
+from rbdyn.life import turning_rings
 from rbdyn.life.balls import LOAD_LIFE, RACE_EXPONENT, WEIBULL
-from rbdyn.life.turns import turning_rings
-from rbdyn.quasistatic.remarks import Rating, pressures
+from rbdyn.quasistatic.result import Rating, pressures
 from rbdyn.quasistatic.row.equilibrium import INNER_ANGLE, INNER_LOAD, OUTER_ANGLE, OUTER_LOAD
 
 Columns = dict[str, Array]

@@ -6,12 +6,10 @@ import numpy as np
 
 from rbdyn.arrays import Array, Whole
 from rbdyn.compiled.kernel import entry, kernel, law
-from rbdyn.quasistatic.row.control import CommonCage, Control, FixedShare, FrictionShare, Spinning
+from rbdyn.quasistatic.row.ball import CommonCage, Control, FixedShare, FrictionShare, Spinning
 from rbdyn.quasistatic.row.equilibrium import FIGURES, solve_row
-from rbdyn.quasistatic.row.newton import CONVERGED
-from rbdyn.quasistatic.row.ring import RING, TAKEN
-from rbdyn.quasistatic.row.row import Row
-from rbdyn.quasistatic.row.space import COLD_STARTS, STEPS, Task
+from rbdyn.quasistatic.row.newton import COLD_STARTS, CONVERGED, STEPS, Task
+from rbdyn.quasistatic.row.ring import RING, TAKEN, Row
 
 # Fields of ``Row`` that change from point to point: arrays over the balls, then numbers.
 PLACES, NUMBERS = Row._fields[2:6], Row._fields[6:]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbdyn.arrays import Array
-from rbdyn.quasistatic.remarks import Remark
+from rbdyn.quasistatic.result import Remark
 from rbdyn.quasistatic.row.equilibrium import Solution
 from rbdyn.records.digest import content_of, with_digest
 from rbdyn.result import whole_file

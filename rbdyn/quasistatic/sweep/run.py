@@ -15,14 +15,20 @@ import numpy as np
 
 from rbdyn.arrays import Array, Whole
 from rbdyn.quasistatic.bearing import equilibrium
-from rbdyn.quasistatic.fatigue import reference_capacities
-from rbdyn.quasistatic.remarks import Rating, Remark, overloads, remarks, tipping
-from rbdyn.quasistatic.result import BallResult, DoubleDeckerReport
+from rbdyn.quasistatic.result import (
+    BallResult,
+    DoubleDeckerReport,
+    Rating,
+    Remark,
+    overloads,
+    reference_capacities,
+    remarks,
+    tipping,
+)
 from rbdyn.quasistatic.row.equilibrium import FIGURES, LOST, OK, SENTENCES, Solution, resolved
 from rbdyn.quasistatic.row.model import RowModel, given_of, load_of, row_of
-from rbdyn.quasistatic.row.newton import CONVERGED
+from rbdyn.quasistatic.row.newton import CONVERGED, space
 from rbdyn.quasistatic.row.ring import RING
-from rbdyn.quasistatic.row.space import space
 from rbdyn.quasistatic.sweep.figures import Columns, ring_columns, row_columns
 from rbdyn.quasistatic.sweep.march import LEVER, Points, empty, leaves, march_through
 from rbdyn.quasistatic.sweep.partial import Partial, Solved, as_text, from_text

@@ -1,17 +1,22 @@
-"""Pictures of how the cage moves and what hits it, of load, sliding and heat around the bearing, and of where the power goes."""
+"""Pictures of a roller bearing: how the cage moves and what hits it; load, sliding and heat around the bearing; where the power goes; cage
+slip over speed and load; and a moving picture of the bearing with its forces (GIF, or MP4 where ffmpeg is installed).
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 
 from rbdyn.dynamics.motion import orbit
+from rbdyn.plots.drawing import Drawing, Shape, drawing, shapes
 from rbdyn.plots.style import BLUE, GREEN, GREY, INNER, ORANGE, OUTER, SKY, VERMILION, plain, plt, save
 
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
+    from rbdyn.dynamics.slip_map import SlipMap
 
 SHOWN_POCKETS = 3
 POCKET_COLOURS = (BLUE, ORANGE, GREEN)
@@ -226,3 +231,109 @@ def power_by_loss(terms: Mapping[str, float], path: Path) -> None:
     plain(axis)
     axis.grid(axis="y", visible=False)
     save(figure, path)
+
+
+PANELS = (
+    ("cage_slip", "cage slip [%]", 100.0),
+    ("power_loss_W", "power loss [W]", 1.0),
+    ("impact_force_N", "largest roller/cage force [N]", 1.0),
+    ("whirl_deviation_ratio", "whirl deviation ratio", 1.0),
+)
+
+
+def draw_slip_map(slip_map: "SlipMap", path: Path) -> None:
+    """A panel a figure, values written into the cells; failed points stay white."""
+    speeds, loads = slip_map.speeds_rpm, slip_map.loads_N
+    width = max(4.2, 0.85 * len(speeds) + 2.0)
+    figure, axes = plt.subplots(2, 2, figsize=(2.0 * width, 2.0 * max(3.2, 0.5 * len(loads) + 1.8)))
+    for axis, (name, label, unit) in zip(axes.ravel(), PANELS, strict=True):
+        values = unit * slip_map.grid(name)
+        image = axis.imshow(values, origin="lower", aspect="auto", cmap="cividis")
+        middle = np.nanmean([np.nanmin(values), np.nanmax(values)]) if np.isfinite(values).any() else 0.0
+        for (row, column), value in np.ndenumerate(values):
+            text = f"{value:.3g}" if np.isfinite(value) else "failed"
+            colour = "white" if np.isfinite(value) and value < middle else "black"
+            axis.text(column, row, text, ha="center", va="center", fontsize=8, color=colour)
+        axis.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds])
+        axis.set_yticks(range(len(loads)), [f"{load:g}" for load in loads])
+        axis.set(xlabel="inner speed [rpm]", ylabel="radial load [N]", title=label)
+        figure.colorbar(image, ax=axis)
+    save(figure, path)
+
+
+TURNS = 2.0
+FRAMES_PER_TURN = 40
+FRAMES_PER_SECOND = 15
+FORCES = {"outer_force": OUTER, "inner_force": INNER, "cage_force": GREEN}
+# Fill and edge.
+LOOKS = {
+    "ring": ("#e4e7ea", "#8a9096"),
+    "space": ("white", "#8a9096"),
+    "mark": ("#3c4248", "none"),
+    "land": ("none", "#b08a3c"),
+    "cage": ("#e3c27a", "#9c7a2e"),
+    "rim": ("none", "#c9a95c"),
+    "roller": ("#cdd6df", "#59636d"),
+}
+
+
+def moving_bearing(history: "History", stem: Path) -> Path:
+    """Write ``stem``.mp4, or .gif where there is no ffmpeg: two shaft turns about the largest pocket force."""
+    from matplotlib import animation
+
+    picture = drawing(history, TURNS, FRAMES_PER_TURN)
+    figure = plt.figure(figsize=(6.0, 6.6), dpi=80)
+    axis = figure.add_axes((0.0, 0.0, 1.0, 6.0 / 6.6))
+    figure.text(
+        0.02, 0.975, f"clearances magnified {picture.magnification:g} times, rollers drawn smaller",
+        fontsize=10, va="center",
+    )  # fmt: skip
+    words = figure.text(0.02, 0.935, "", fontsize=10, va="center", color=GREY)
+    turn_s = history.scene.turn_s
+
+    def draw(frame: int) -> list[Any]:
+        axis.clear()
+        _set_up(axis, picture)
+        for shape in shapes(picture, frame, picture.magnification):
+            _add(axis, shape)
+        words.set_text(f"shaft turn {picture.time[frame] / turn_s:.2f}, {picture.time[frame] * 1e3:.3f} ms")
+        return []
+
+    film = animation.FuncAnimation(figure, draw, frames=len(picture.time), blit=False)
+    ffmpeg = animation.writers.is_available("ffmpeg")
+    path = stem.with_suffix(".mp4" if ffmpeg else ".gif")
+    film.save(path, writer=(animation.FFMpegWriter if ffmpeg else animation.PillowWriter)(fps=FRAMES_PER_SECOND))
+    plt.close(figure)
+    return path
+
+
+def _set_up(axis: Axes, picture: Drawing) -> None:
+    side = picture.extent
+    axis.set(xlim=(-side, side), ylim=(side, -side), aspect="equal")
+    axis.set_axis_off()
+    for reference in picture.references:
+        _add(axis, reference.arrow)
+        axis.text(reference.u, reference.v, reference.words, fontsize=8.5, va="center")
+    axis.annotate("load", (0.9 * side, 0.97 * side), xytext=(0.9 * side, 0.78 * side), ha="center", fontsize=9,
+                  arrowprops={"arrowstyle": "-|>", "color": "black", "linewidth": 1.6})  # fmt: skip
+
+
+def _add(axis: Axes, shape: Shape) -> None:
+    if shape.kind == "arrow":
+        look: dict[str, Any] = {
+            "arrowstyle": "-|>",
+            "mutation_scale": 9,
+            "shrinkA": 0,
+            "shrinkB": 0,
+            "linewidth": 2.2,
+            "zorder": 5,
+        }
+        axis.add_patch(FancyArrowPatch(shape.points[0], shape.points[1], color=FORCES[shape.role], **look))
+    elif shape.kind == "line":
+        axis.plot(*zip(*shape.points, strict=True), color="#59636d", linewidth=1.0)
+    else:
+        fill, edge = LOOKS[shape.role]
+        line = "--" if shape.role == "land" else "-"
+        style: dict[str, Any] = {"facecolor": fill, "edgecolor": edge, "linewidth": 0.9, "linestyle": line, "zorder": 2}
+        circle = shape.kind == "circle"
+        axis.add_patch(Circle(shape.points[0], shape.radius, **style) if circle else Polygon(shape.points, **style))

@@ -1,19 +1,28 @@
-"""ISO system of limits and fits up to 500 mm: standard tolerances and fundamental deviations.
+"""Limits and fits: ISO 286 for shafts and housings up to 500 mm, ISO 492 for rings, and the interference between them.
 
-Source: ISO 286-1:2010, Tables 1 to 5 (the same values in BS 4500:1969), and the rule of a delta of one grade for
-the holes K to S. The tables, in ``iso286.toml``, take the formulas of the standard at the geometric mean of a range of
-sizes and round them.
+ISO 286-1:2010, Tables 1 to 5 (the same values in BS 4500:1969), and the rule of a delta of one grade for the holes K to S. The
+tables, in ``iso286.toml``, take the formulas of the standard at the geometric mean of a range of sizes and round them. The
+deviations of mean bores and outside diameters of purchased rings are in ``iso492.toml``.
+
+The ring's mean bore or outside diameter lies below its nominal by up to the tolerance of ISO 492, the seat about its own by the
+class of ISO 286. Both are taken as normal, centred, six standard deviations wide: the mean interference is that of the middles,
+and the deviations add as squares.
+
+Mounting smooths the surfaces: NTN (Ball and Roller Bearings) subtracts 1 to 2.5 um from the interference of a ground shaft,
+5 to 7 um from that of a machined one, as a bore of a housing is too. A loose fit is not smoothed.
 """
 
+import math
 import re
 import tomllib
 from bisect import bisect_left
 from math import cbrt
-from pathlib import Path
+from typing import NamedTuple
 
 from rbdyn.faults import MethodError
+from rbdyn.properties import FOLDER
 
-TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+TABLES = tomllib.loads((FOLDER / "iso286.toml").read_text(encoding="utf-8"))
 RANGES: list[int] = TABLES["ranges_mm"]
 LARGEST = RANGES[-1]
 STANDARD_TOLERANCES: dict[str, list[float]] = TABLES["standard_tolerances"]
@@ -117,3 +126,76 @@ def _listed(table: str, grade: int) -> list[float]:
     if str(grade) not in rows:
         raise MethodError(f"is not listed here: {'j' if table == 'shaft_j' else 'J'} has the grades {', '.join(rows)}")
     return rows[str(grade)]
+
+
+SURFACES = tomllib.loads((FOLDER / "iso492.toml").read_text(encoding="utf-8"))
+CLASSES = [name for name in SURFACES["bore"] if name != "sizes_mm"]
+
+
+def ring_limits(nominal_mm: float, code: str) -> tuple[float, float]:
+    """Lower and upper deviation in mm of "P5 bore", "Normal outside" and their like, of purchased bearing rings.
+
+    ISO 492, mean diameter in a plane, radial bearings but tapered roller bearings; classes Normal, 6, 5 and 4. The upper
+    deviation is 0, the lower one is in ``iso492.toml``; sizes that could not be checked against several published catalogue
+    tables are left out.
+
+    Raises MethodError for a class, surface or size that is not listed here.
+    """
+    name, _, surface = code.partition(" ")
+    if surface not in SURFACES or name not in CLASSES:
+        raise MethodError(
+            f'is no ring class such as "P5 bore" or "Normal outside"; classes known: {", ".join(CLASSES)}'
+        )
+    ranges, lower = SURFACES[surface]["sizes_mm"], SURFACES[surface][name]
+    column = bisect_left(ranges, nominal_mm)
+    if nominal_mm <= 0 or column >= len(lower):
+        raise MethodError(f"is listed here from 0 to {ranges[len(lower) - 1]:g} mm; give the deviations themselves")
+    return 1e-3 * lower[column], 0.0
+
+
+SHAFT = re.compile(r"(g|h|js?|k|m|n|p|r)[4-7]")
+HOUSING = re.compile(r"(G|H|JS?|K|M|N|P)[5-8]")
+# Middles of what smoothing takes from ground shafts and machined bores [um].
+SHAFT_SMOOTHING, HOUSING_SMOOTHING = 1.75, 6.0
+# Standard deviations in the width of a tolerance.
+WIDTH = 6.0
+
+
+class Interference(NamedTuple):
+    """Diametral interference of a ring on its seat [um], negative is loose: mean, standard deviation and ends.
+
+    ``smoothing``: what smoothing has taken of each of them.
+    """
+
+    mean: float
+    sd: float
+    low: float
+    high: float
+    smoothing: float
+
+
+def shaft_interference(bore_mm: float, zone: str) -> Interference:
+    """Of an inner ring on a shaft of a class such as "k5". Raises MethodError for a class or size that is not listed."""
+    if not SHAFT.fullmatch(zone):
+        raise MethodError(
+            'is no tolerance class of a shaft such as "k5"; take g, h, j, js, k, m, n, p or r, grade 4 to 7'
+        )
+    return _interference(fit_limits(bore_mm, zone), ring_limits(bore_mm, "Normal bore"), SHAFT_SMOOTHING)
+
+
+def housing_interference(outside_mm: float, zone: str) -> Interference:
+    """Of an outer ring in a housing of a class such as "H7". Raises MethodError as ``shaft_interference``."""
+    if not HOUSING.fullmatch(zone):
+        raise MethodError(
+            'is no tolerance class of a housing such as "H7"; take G, H, J, JS, K, M, N or P, grade 5 to 8'
+        )
+    return _interference(ring_limits(outside_mm, "Normal outside"), fit_limits(outside_mm, zone), HOUSING_SMOOTHING)
+
+
+def _interference(inside: tuple[float, float], around: tuple[float, float], smoothing: float) -> Interference:
+    """From lower and upper deviations [mm] of the part inside and of the part around it."""
+    low, high = 1e3 * (inside[0] - around[1]), 1e3 * (inside[1] - around[0])
+    mean = 0.5 * (low + high)
+    sd = 1e3 * math.hypot(inside[1] - inside[0], around[1] - around[0]) / WIDTH
+    loss = min(smoothing, max(mean, 0.0))
+    return Interference(mean - loss, sd, low - loss, high - loss, loss)
