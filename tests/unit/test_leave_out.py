@@ -111,7 +111,7 @@ NOT_NEEDED = (
     "scipy.special", "scipy.linalg", "scipy.interpolate", "scipy.signal", "scipy.stats", "scipy.optimize",
     "rbdyn.accuracy", "rbdyn.accuracy.rollers.option_cost", "rbdyn.accuracy.rollers.footprint", "rbdyn.accuracy.rollers.scaling", "rbdyn.dynamics.slip_map", "rbdyn.cli.show",
     "rbdyn.plots", "rbdyn.mounting.fits", "rbdyn.mounting.rings", "rbdyn.dynamics.motion.history", "rbdyn.dynamics.forces.observe",
-    "rbdyn.life.rollers", "rbdyn.dynamics.motion.rating", "rbdyn.dynamics.motion.lyapunov", "rbdyn.dynamics.motion.orbit",
+    "rbdyn.dynamics.motion.rating", "rbdyn.dynamics.motion.lyapunov", "rbdyn.dynamics.motion.orbit",
     *(module for modules in MODULES.values() for module in modules),
 )  # fmt: skip
 
