@@ -33,7 +33,7 @@ from doe.running.failure import Failure
 from doe.running.store import Store
 from doe.study.calibration import Calibration, find_calibration
 from doe.study.calibration_question import Question, question_of, read_question
-from doe.unknown import laws
+from doe.unknown import inputs as laws
 from doe.unknown.decision import wilson
 from rbdyn.scene.unknown import put
 

@@ -16,9 +16,9 @@ from doe.study.calibration_question import Question, cases_of
 from doe.study.input_sets import NORMAL, Case, check_holes, outcomes, scattered, screened
 from doe.study.rig_file import Rig
 from doe.threads import one_thread
-from doe.unknown import laws
+from doe.unknown import inputs as laws
 from doe.unknown.calibration import MISSED, Batch, Matched, Unknowns, matched
-from doe.unknown.discrepancy import Measured
+from doe.unknown.likelihood import Measured
 from doe.unknown.posterior import Learnt, contraction, densest_intervals, learnt
 from doe.unknown.verdict import FAR, Judgement, judge, objections, reweighed
 from rbdyn.faults import RunError

@@ -17,8 +17,8 @@ from doe.clearance import Simulations
 from doe.running.failure import Failure, sentence
 from doe.study.scene_columns import key_values, unknown_keys
 from doe.study_file.cells import read_sheet
-from doe.unknown import laws, screening
-from doe.unknown.joint import Joint
+from doe.unknown import inputs as laws
+from doe.unknown.inputs import Joint
 from rbdyn.faults import Claims, InputError, RunError, assignment_faults, key_path, one_line, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import shown
@@ -345,12 +345,12 @@ def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[st
     every, tried = case.every, [each for each in case.every if each.key not in case.sample]
     if len(every) <= case.uncertain.inputs or not tried:
         return every, {}
-    quantiles = screening.two_levels(len(tried))
+    quantiles = laws.screening_design(len(tried))
     with_middle = np.column_stack([quantiles, np.full(len(quantiles), 0.5)])
     sets = run(case, tried, with_middle, simulations, SCREENING_SEEDS, title="screening")
-    share = screening.shares(sets.quantiles[:, :-1], sets.signals)
+    share = laws.effect_shares(sets.quantiles[:, :-1], sets.signals)
     declared = [place for place, each in enumerate(tried) if each.key in case.uncertain.laws]
-    stay = screening.kept(share, declared, case.uncertain.inputs - len(every) + len(tried))
+    stay = laws.retained(share, declared, case.uncertain.inputs - len(every) + len(tried))
     left = {tried[place].key: float(share[place].max()) for place in range(len(tried)) if place not in stay}
     return [each for each in every if each.key not in left], left
 
@@ -396,7 +396,7 @@ def strongest(case: Case, quantiles: Array, signals: Array) -> tuple[list[int], 
     scene declares, and of the rest what matters most, as many as the scene allows. By key of the others, which vary all the
     same, the largest share of a signal's variance that their main effect makes."""
     always = declared(case)
-    places = screening.strongest(quantiles[:, :-1], signals, case.uncertain.inputs, always)
+    places = laws.strongest(quantiles[:, :-1], signals, case.uncertain.inputs, always)
     return places, outside(case, places, quantiles, signals)
 
 
@@ -408,7 +408,7 @@ def declared(case: Case) -> list[int]:
 
 def outside(case: Case, places: Collection[int], quantiles: Array, signals: Array) -> dict[str, float]:
     """By key of the inputs at no ``places``: the largest share of a signal's variance that their main effect makes."""
-    share = screening.main_effects(quantiles[:, :-1], signals).max(axis=1)
+    share = laws.main_effects(quantiles[:, :-1], signals).max(axis=1)
     return {each.key: float(share[place]) for place, each in enumerate(case.every) if place not in places}
 
 

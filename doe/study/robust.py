@@ -20,10 +20,9 @@ from doe.study.pairs import Pairs, simulated
 from doe.study.robust_front import RobustFront, find_robust_front
 from doe.study_file import Study
 from doe.threads import one_thread
-from doe.unknown import laws
-from doe.unknown.decision import Better, better, in_doubt
-from doe.unknown.odds import odds
-from doe.unknown.spread import Share
+from doe.unknown import inputs as laws
+from doe.unknown.decision import Better, better, in_doubt, odds
+from doe.unknown.propagation import Share
 from doe.unknown.worth import Decides, Deciding, Interval, Verdict, decides
 from rbdyn.faults import set_key
 from rbdyn.scene.unknown import Input, is_number
