@@ -33,7 +33,7 @@ from doe.running.failure import Failure
 from doe.running.store import Store
 from doe.study.calibration import Calibration, find_calibration
 from doe.study.calibration_question import Question, question_of, read_question
-from doe.unknown import laws
+from doe.unknown import inputs as unknown
 from doe.unknown.decision import wilson
 from rbdyn.scene.unknown import put
 
@@ -125,7 +125,7 @@ def simulated_sets(found: Calibration) -> np.ndarray:
 def survival(found: Calibration, simulations: Simulations) -> list[str]:
     """Whether the pick beats the baseline over the posterior: both at the same input sets."""
     quantiles = found.quantiles[:: max(1000 // PAIRS, 1)][:PAIRS]
-    values = laws.table_of({each.key: each.law for each in found.inputs}, quantiles)
+    values = unknown.table_of({each.key: each.law for each in found.inputs}, quantiles)
     outputs = []
     for design in ((0.02, 0.15, 0.3), PICK):
         tables = copy.deepcopy(found.case.data)

@@ -24,8 +24,9 @@ from published.homogenisation import homogenisation
 
 from rbdyn.quasistatic.runout.lots import Bench, Lot, RaceLimits, design, draw_parts, linear_response, readings, runouts
 from rbdyn.quasistatic.runout.measures import running_accuracy
+from rbdyn.quasistatic.runout.model import bench_of
 from rbdyn.quasistatic.runout.race_errors import RaceErrors, ball_path, perfect, waviness
-from rbdyn.quasistatic.runout.turn import Followed, bench_of, follow
+from rbdyn.quasistatic.runout.turn import Followed, follow
 from rbdyn.records.words import with_error
 from rbdyn.scene.ball import BallScene
 

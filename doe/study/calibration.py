@@ -16,9 +16,9 @@ from doe.study.calibration_question import Question, cases_of
 from doe.study.input_sets import NORMAL, Case, check_holes, outcomes, scattered, screened
 from doe.study.rig_file import Rig
 from doe.threads import one_thread
-from doe.unknown import laws
+from doe.unknown import inputs as unknown
 from doe.unknown.calibration import MISSED, Batch, Matched, Unknowns, matched
-from doe.unknown.discrepancy import Measured
+from doe.unknown.likelihood import Measured
 from doe.unknown.posterior import Learnt, contraction, densest_intervals, learnt
 from doe.unknown.verdict import FAR, Judgement, judge, objections, reweighed
 from rbdyn.faults import RunError
@@ -89,7 +89,7 @@ class Calibration:
         """What the scene has at each input, and at each key that multiplies one, in the input sets of ``quantiles``."""
         inputs = [each.key for each in self.inputs]
         tied = [each.key for each in self.case.every if each.key not in inputs and each.law.times in inputs]
-        rows = laws.table_of({each.key: each.law for each in self.inputs}, self.quantiles)
+        rows = unknown.table_of({each.key: each.law for each in self.inputs}, self.quantiles)
         scenes = self.case.scenes(self.inputs, rows, 0)
         # A set that is impossible in the scene itself, though not at the rig's conditions, is none.
         return [{key: value_of(each, key) for key in (*inputs, *tied)} for each in scenes if not isinstance(each, str)]
@@ -113,7 +113,7 @@ class _Rows:
     def simulate(self, quantiles: Array, stage: int) -> Batch:
         """Input sets at all conditions. Raises RunError where too many are impossible or fail."""
         title = f"wave {stage + 1}" if stage < 100 else "posterior"
-        values = laws.table_of({each.key: each.law for each in self.inputs}, quantiles)
+        values = unknown.table_of({each.key: each.law for each in self.inputs}, quantiles)
         first = clearance.CALIBRATION_SEEDS + stage * STAGE_SEEDS
         scenes = [
             scene
@@ -222,7 +222,7 @@ def _unknowns(case: Case, inputs: Sequence[Input]) -> Unknowns:
     def at(scores: Array) -> Array:
         quantiles = special.ndtr(scores if factor is None else scores @ factor.T)
         for place, law in choices.items():
-            quantiles[:, place] = laws.quantiles_of(law, laws.values_of(law, quantiles[:, place]))
+            quantiles[:, place] = unknown.quantiles_of(law, unknown.values_of(law, quantiles[:, place]))
         return quantiles
 
     return Unknowns(len(inputs), at)
@@ -263,7 +263,7 @@ def _logarithms(inputs: Sequence[Input], quantiles: Array) -> Array:
     found = np.full(quantiles.shape, np.nan)
     for place, each in enumerate(inputs):
         if each.law.law != "choices":
-            values = np.array(laws.values_of(each.law, quantiles[:, place]))
+            values = np.array(unknown.values_of(each.law, quantiles[:, place]))
             if (values > 0.0).all():
                 found[:, place] = np.log(values)
     return found

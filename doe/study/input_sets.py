@@ -17,8 +17,8 @@ from doe.clearance import Simulations
 from doe.running.failure import Failure, sentence
 from doe.study.scene_columns import key_values, unknown_keys
 from doe.study_file.cells import read_sheet
-from doe.unknown import laws, screening
-from doe.unknown.joint import Joint
+from doe.unknown import inputs as unknown
+from doe.unknown.inputs import Joint
 from rbdyn.faults import Claims, InputError, RunError, assignment_faults, key_path, one_line, read_toml, refuse, set_key
 from rbdyn.records.kept import digest_of
 from rbdyn.records.words import shown
@@ -156,8 +156,8 @@ class Case:
         keys = [each.key for each in inputs]
         pairs = [pair for pair in self.uncertain.correlation if set(keys).issuperset(pair.keys)]
         columns = tuple(place for place, key in enumerate(keys) if key in self.sample)
-        rows = np.column_stack([laws.ranks(self.sample[keys[place]]) for place in columns]) if columns else None
-        return Joint(len(keys), laws.copula(keys, pairs, self.home), rows, columns)
+        rows = np.column_stack([unknown.ranks(self.sample[keys[place]]) for place in columns]) if columns else None
+        return Joint(len(keys), unknown.copula(keys, pairs, self.home), rows, columns)
 
 
 def tables_of(path: Path, overrides: Sequence[str]) -> dict[str, Any]:
@@ -230,7 +230,7 @@ def case_of(
     uncertain = declared or scene.uncertain or Uncertain()
     home = stated_in if declared and stated_in else Path(source)
     sample = {} if uncertain.sample is None else read_sample(home.parent / uncertain.sample, uncertain.laws)
-    ordered = ((key, [column[place] for place in np.argsort(laws.ranks(column))]) for key, column in sample.items())
+    ordered = ((key, [column[place] for place in np.argsort(unknown.ranks(column))]) for key, column in sample.items())
     columns = {key: Sampled(tuple(column)) for key, column in ordered}
     # A run depends on no declaration; to check them all again at every input set would take long.
     plain = {table: keys for table, keys in data.items() if table != "uncertain"}
@@ -305,7 +305,7 @@ def impossible(case: Case) -> Iterator[str]:
     if faults:
         return
     sets = case.joint(case.every).sets(TRIED, case.uncertain.seed)
-    scenes = case.scenes(case.every, laws.table_of({each.key: each.law for each in case.every}, sets), 0)
+    scenes = case.scenes(case.every, unknown.table_of({each.key: each.law for each in case.every}, sets), 0)
     why = [each for each in scenes if isinstance(each, str)]
     if 2 * len(why) > TRIED:
         yield f"{case.home}: uncertain: inputs are impossible together: {_bare(case, why[0])}; change their laws"
@@ -313,7 +313,7 @@ def impossible(case: Case) -> Iterator[str]:
 
 def _impossible_rows(case: Case) -> Iterator[str]:
     sampled = [each for each in case.every if each.key in case.sample]
-    ends = {row for each in sampled for row in np.argsort(laws.ranks(case.sample[each.key]))[[0, -1]].tolist()}
+    ends = {row for each in sampled for row in np.argsort(unknown.ranks(case.sample[each.key]))[[0, -1]].tolist()}
     for row in sorted(ends):
         (scene,) = case.scenes(sampled, [{each.key: case.sample[each.key][row] for each in sampled}], 0)
         if isinstance(scene, str):
@@ -325,7 +325,7 @@ def _impossible_values(case: Case) -> Iterator[str]:
         if each.key in case.sample or each.reason != "declared":
             continue
         choices = each.law.values if each.law.law == "choices" else None
-        for value in choices or dict.fromkeys(laws.values_of(each.law, ENDS)):
+        for value in choices or dict.fromkeys(unknown.values_of(each.law, ENDS)):
             (scene,) = case.scenes([each], [{each.key: value}], 0)
             if isinstance(scene, str):
                 yield f'{case.home}: uncertain."{each.key}" at {shown(value)}: {_bare(case, scene)}; change its law'
@@ -345,12 +345,12 @@ def screened(case: Case, simulations: Simulations) -> tuple[list[Input], dict[st
     every, tried = case.every, [each for each in case.every if each.key not in case.sample]
     if len(every) <= case.uncertain.inputs or not tried:
         return every, {}
-    quantiles = screening.two_levels(len(tried))
+    quantiles = unknown.screening_design(len(tried))
     with_middle = np.column_stack([quantiles, np.full(len(quantiles), 0.5)])
     sets = run(case, tried, with_middle, simulations, SCREENING_SEEDS, title="screening")
-    share = screening.shares(sets.quantiles[:, :-1], sets.signals)
+    share = unknown.effect_shares(sets.quantiles[:, :-1], sets.signals)
     declared = [place for place, each in enumerate(tried) if each.key in case.uncertain.laws]
-    stay = screening.kept(share, declared, case.uncertain.inputs - len(every) + len(tried))
+    stay = unknown.retained(share, declared, case.uncertain.inputs - len(every) + len(tried))
     left = {tried[place].key: float(share[place].max()) for place in range(len(tried)) if place not in stay}
     return [each for each in every if each.key not in left], left
 
@@ -366,7 +366,7 @@ def run(
     own: Sequence[Sequence[str]] = (),
 ) -> Sets:
     """Run input sets, with overrides ``more`` for all and its ``own`` for each. Raises RunError where too many are impossible or fail, InputError, KeyboardInterrupt."""
-    values = laws.table_of({each.key: each.law for each in inputs}, quantiles)
+    values = unknown.table_of({each.key: each.law for each in inputs}, quantiles)
     scenes = case.scenes(inputs, values, case.scene.numerics.seed + clearance.INPUT_SEEDS + seeds, more, own)
     lost = [scene for scene in scenes if isinstance(scene, str)]
     check_holes(len(lost), len(scenes), (), lost)
@@ -396,7 +396,7 @@ def strongest(case: Case, quantiles: Array, signals: Array) -> tuple[list[int], 
     scene declares, and of the rest what matters most, as many as the scene allows. By key of the others, which vary all the
     same, the largest share of a signal's variance that their main effect makes."""
     always = declared(case)
-    places = screening.strongest(quantiles[:, :-1], signals, case.uncertain.inputs, always)
+    places = unknown.strongest(quantiles[:, :-1], signals, case.uncertain.inputs, always)
     return places, outside(case, places, quantiles, signals)
 
 
@@ -408,7 +408,7 @@ def declared(case: Case) -> list[int]:
 
 def outside(case: Case, places: Collection[int], quantiles: Array, signals: Array) -> dict[str, float]:
     """By key of the inputs at no ``places``: the largest share of a signal's variance that their main effect makes."""
-    share = screening.main_effects(quantiles[:, :-1], signals).max(axis=1)
+    share = unknown.main_effects(quantiles[:, :-1], signals).max(axis=1)
     return {each.key: float(share[place]) for place, each in enumerate(case.every) if place not in places}
 
 

@@ -20,10 +20,9 @@ from doe.study.pairs import Pairs, simulated
 from doe.study.robust_front import RobustFront, find_robust_front
 from doe.study_file import Study
 from doe.threads import one_thread
-from doe.unknown import laws
-from doe.unknown.decision import Better, better, in_doubt
-from doe.unknown.odds import odds
-from doe.unknown.spread import Share
+from doe.unknown import inputs as unknown
+from doe.unknown.decision import Better, better, in_doubt, odds
+from doe.unknown.propagation import Share
 from doe.unknown.worth import Decides, Deciding, Interval, Verdict, decides
 from rbdyn.faults import set_key
 from rbdyn.scene.unknown import Input, is_number
@@ -174,8 +173,8 @@ def _read(case: Case, inputs: Sequence[Input], fresh: Array, seed: int) -> Array
     random, read = np.random.default_rng(seed), fresh.copy()
     for place, each in enumerate(inputs):
         if each.law.measurable is not None:
-            values = abs(case.unit(each)) * np.array(laws.values_of(each.law, fresh[:, place]), float)
-            read[:, place] = laws.ranks(values + each.law.measurable * random.standard_normal(len(values)))
+            values = abs(case.unit(each)) * np.array(unknown.values_of(each.law, fresh[:, place]), float)
+            read[:, place] = unknown.ranks(values + each.law.measurable * random.standard_normal(len(values)))
     return read
 
 
@@ -203,5 +202,5 @@ def _value(case: Case, one: Input, quantile: float | None) -> Any:
     """Value of an input at a quantile, in its own unit."""
     if quantile is None:
         return None
-    (value,) = laws.values_of(one.law, np.array([quantile]))
+    (value,) = unknown.values_of(one.law, np.array([quantile]))
     return value if one.law.times is None else value * case.unit(one)

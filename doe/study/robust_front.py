@@ -22,8 +22,8 @@ from doe.study.input_sets import Case, Sets, declared, run
 from doe.study.pairs import Pairs, relative_gains, simulated
 from doe.study_file import Study
 from doe.unknown.decision import Better, better, shrunk
-from doe.unknown.joint import nested
-from doe.unknown.spread import Emulated, Runs, emulated
+from doe.unknown.inputs import nested
+from doe.unknown.propagation import Emulated, Runs, emulated
 
 JOINT_SEEDS = 200_000
 # Input sets over which the search averages, those at which points are simulated, and how many points.

@@ -12,7 +12,7 @@ from doe.study.robust import case_of_study
 from doe.study.robust_front import CONFIRMED, POINTS, fresh_rows
 from doe.study.uncertainty import OUTPUTS
 from doe.study_file import Study
-from doe.unknown import screening
+from doe.unknown import inputs
 from doe.unknown.calibration import TRIED, sets_a_wave
 from rbdyn.scene import Scene
 
@@ -65,4 +65,4 @@ def _screening_runs(case: Case) -> int:
     sought = [each for each in case.every if each.key not in case.sample]
     if len(case.every) <= case.uncertain.inputs or not sought:
         return 0
-    return len(screening.two_levels(len(sought)))
+    return len(inputs.screening_design(len(sought)))

@@ -9,8 +9,19 @@ from doe.clearance import Simulations
 from doe.running.failure import Failure
 from doe.study.input_sets import NORMAL, Case, Sets, declared, outside, overriding, read_case, replicated
 from doe.threads import one_thread
-from doe.unknown.sensitivity import Indices, explained, shapley, sobol
-from doe.unknown.spread import Emulated, Runs, Share, Spread, emulated, residual_variance, spread_of
+from doe.unknown.propagation import (
+    Emulated,
+    Indices,
+    Runs,
+    Share,
+    Spread,
+    emulated,
+    explained,
+    residual_variance,
+    shapley,
+    sobol,
+    spread_of,
+)
 from rbdyn.faults import RunError
 from rbdyn.records.words import are, counted
 from rbdyn.result import Quantity, SimulationResult

@@ -1,4 +1,12 @@
-"""Inputs of a simulation from measurements: waves of history matching, then a sampled posterior that is simulated again."""
+"""Inputs of a simulation from measurements: waves of history matching, then a sampled posterior that is simulated again.
+
+History matching: input sets at which the simulation cannot be what was measured are ruled out, in waves.
+
+The implausibility of a cell is |z - m|/sqrt(V): the distance of the measured value from the emulator's mean in standard
+deviations of rig, emulator, integration and discrepancy together. New input sets spread over what is left.
+
+Source: Vernon, Goldstein and Bower, Galaxy formation: a Bayesian uncertainty analysis, Bayesian Analysis 5 (2010) 619.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,11 +17,64 @@ import numpy as np
 from scipy import special
 
 from doe.arrays import Array, Mask, Whole
-from doe.unknown import matching
-from doe.unknown.cells import Cells, fit_cells
-from doe.unknown.discrepancy import BY_ROW, Errors, Joint, Measured, joint
-from doe.unknown.joint import nested
-from doe.unknown.sampler import PARTICLES, Sampled, sampled
+from doe.unknown.inputs import nested
+from doe.unknown.likelihood import BY_ROW, Cells, Errors, Joint, Measured, fit_cells, joint
+from doe.unknown.posterior import PARTICLES, Sampled, sampled
+
+RULED_OUT = 3.0
+# Emulators are good enough whose variance is below this share of the rest, and volumes steady that change by less than this.
+GOOD, STEADY = 0.25, 0.1
+# Rounds in which points that are left beget others, where few are left.
+ROUNDS = 12
+
+
+def implausibility(cells: Cells, measured: Measured, quantiles: Array) -> tuple[Array, Array]:
+    """Implausibility (n, k) of the cells that teach at quantiles (n, d), and the share (n, k) that the emulator has in what
+    the cell is compared with row by row."""
+    learnt = measured.learnt
+    mean, doubt = (each[:, learnt] for each in cells.predict(quantiles))
+    emulator = (doubt**2).sum(axis=2) + cells.rest[learnt]
+    square = measured.scales[measured.output[learnt]] ** 2
+    apart, rig = np.abs(measured.values[learnt] - mean), measured.variances[learnt]
+    whole = np.sqrt(emulator + rig + (1.0 + BY_ROW**2) * square)
+    return apart / whole, emulator / (rig + BY_ROW**2 * square)
+
+
+def plausible(implausible: Array, wave: int) -> Mask:
+    """Which input sets (n,) are left: in the first wave one cell may be off, as emulators are poor still."""
+    place = max(implausible.shape[1] - (2 if wave == 0 else 1), 0)
+    worst = np.partition(implausible, place, axis=1)[:, place]
+    return worst < RULED_OUT
+
+
+def ruling_out(implausible: Array) -> Whole:
+    """Places of the cells that rule out every input set (n, k); where none does so alone, of the worst."""
+    alone = np.flatnonzero((implausible >= RULED_OUT).all(axis=0))
+    return alone if alone.size else np.argsort(-np.median(implausible, axis=0))[:2]
+
+
+def more_sets(left: Array, fits: Callable[[Array], Mask], wanted: int, random: np.random.Generator) -> Array:
+    """At least ``wanted`` quantiles where there are as many, of those left (n, d) and of others beside them that fit."""
+    for _ in range(ROUNDS):
+        if len(left) >= wanted or len(left) < 3:
+            break
+        scores = special.ndtri(left)
+        first, second, third = random.integers(0, len(left), (3, 4 * wanted))
+        tried = special.ndtr(scores[first] + 0.5 * (scores[second] - scores[third]))
+        tried = tried.clip(1e-6, 1.0 - 1e-6)
+        left = np.vstack([left, tried[fits(tried)]])
+    return left
+
+
+def spread_out(candidates: Array, count: int) -> Array:
+    """``count`` of the candidates (n, d), each the farthest from the first and from those before it."""
+    distance = ((candidates - candidates[0]) ** 2).sum(axis=1)
+    places: list[int] = []
+    for _ in range(min(count, len(candidates))):
+        places.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, ((candidates - candidates[places[-1]]) ** 2).sum(axis=1))
+    return candidates[places]
+
 
 # Input sets of a wave: so many, and so many an input; candidates that tell what is left; sets that try the posterior.
 FEWEST, EACH, CANDIDATES, TRIED = 64, 10, 16384, 50
@@ -95,14 +156,14 @@ def matched(
         measured = measured.with_scales(new.values) if batch is None else measured
         batch = new if batch is None else batch.joined(new)
         cells = _emulated(batch, measured, cells)
-        apart, share = matching.implausibility(cells, measured, _dependent(unknowns, candidates))
-        fits = matching.kept(apart, wave)
+        apart, share = implausibility(cells, measured, _dependent(unknowns, candidates))
+        fits = plausible(apart, wave)
         volumes.append(float(fits.mean()))
         if not fits.any():
-            refuted = measured.learnt[matching.ruling_out(apart)].tolist()
+            refuted = measured.learnt[ruling_out(apart)].tolist()
             break
-        steady = wave > 0 and abs(volumes[-1] - volumes[-2]) < matching.STEADY * volumes[-2]
-        if steady or float(np.median(share[fits], axis=0).max()) < matching.GOOD or wave == waves - 1:
+        steady = wave > 0 and abs(volumes[-1] - volumes[-2]) < STEADY * volumes[-2]
+        if steady or float(np.median(share[fits], axis=0).max()) < GOOD or wave == waves - 1:
             break
         points = _spread_over(candidates[fits], unknowns, cells, measured, wave, count, random)
     assert batch is not None and cells is not None
@@ -145,12 +206,12 @@ def _spread_over(
     random: np.random.Generator,
 ) -> Array:
     def fits(quantiles: Array) -> Mask:
-        return matching.kept(matching.implausibility(cells, measured, _dependent(unknowns, quantiles))[0], wave)
+        return plausible(implausibility(cells, measured, _dependent(unknowns, quantiles))[0], wave)
 
-    candidates = matching.more(left, fits, 4 * count, random)
+    candidates = more_sets(left, fits, 4 * count, random)
     if len(candidates) > 20 * count:
         candidates = random.permutation(candidates)[: 20 * count]
-    return matching.spread_out(candidates, count)
+    return spread_out(candidates, count)
 
 
 def _emulated(batch: Batch, measured: Measured, before: Cells | None) -> Cells:

@@ -1,4 +1,4 @@
-"""Whether one design beats another while inputs are unknown; which input decides that is a question of ``worth``.
+"""Whether one design beats another, and how likely a design keeps its limits, while inputs are unknown.
 
 Rows are pairs: both designs at the same input set, their relative gains D (n, m) with variances s^2 (n, m) of the simulation.
 Taken one by one they scatter more than the truth, so each is shrunk towards the mean of all by what scatter is noise: the
@@ -6,17 +6,21 @@ true gains of row i are normal about m + V (V + S_i)^-1 (D_i - m), V = cov D - m
 that all true gains are positive; its interval is by resampling rows. Responses are never multiplied: gains go together.
 
 Sources: Efron and Morris, Journal of the American Statistical Association 68 (1973) 117; Wilson, ibid. 22 (1927) 209.
+
+Limits: rows are input sets at which the design was simulated. They are shrunk as gains are: the true value of row i is normal about
+m + V/(V + s_i^2) (y_i - m) with the variance V s_i^2/(V + s_i^2), V = var y - mean s^2. The probability is the mean over rows that it
+lies between the limits; its interval is by resampling rows, and no shorter than Wilson's.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special, stats
 
 from doe.arrays import Array, Whole
 from doe.threads import one_thread
-from doe.unknown.spread import Share
+from doe.unknown.propagation import Share
 
 # Draws of a row's true gains, resamplings of rows, and the share of cases an interval should hold.
 DRAWS, RESAMPLES, CONFIDENCE = 64, 200, 0.95
@@ -97,3 +101,25 @@ def _positive(matrix: Array) -> Array:
 def _root(matrix: Array) -> Array:
     sizes, axes = np.linalg.eigh(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
     return axes * np.sqrt(sizes.clip(0.0))[..., None, :]
+
+
+@one_thread
+def odds(values: Array, variances: Array, lower: float, upper: float, seed: int) -> Share:
+    """Probability that the true value of an input set lies from ``lower`` to ``upper``, from simulated ``values`` (n,) with
+    ``variances`` (n,); an end may be infinite."""
+    (found,) = resampled(
+        lambda rows: np.array([_share(values[rows], variances[rows], lower, upper)]),
+        len(values),
+        np.random.default_rng(seed),
+    )
+    return found
+
+
+def _share(values: Array, variances: Array, lower: float, upper: float) -> float:
+    middle = values.mean()
+    between = max(float(values.var(ddof=1) - variances.mean()), 0.0)
+    weight = np.divide(between, between + variances, out=np.zeros_like(variances), where=between + variances > 0.0)
+    true, deviation = middle + weight * (values - middle), np.sqrt(weight * variances)
+    sure = deviation <= 1e-12 * np.abs(true)
+    below, above = (special.ndtr((end - true) / np.where(sure, 1.0, deviation)) for end in (lower, upper))
+    return float(np.where(sure, (lower <= true) & (true <= upper), above - below).mean())

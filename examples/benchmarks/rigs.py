@@ -78,7 +78,7 @@ OTHER_LAWS = ({"model.guide_land": "dry"}, {"model.rolling_resistance": "off"})
 
 def simulated_rig(folder: Path, kind: str, number: int) -> tuple[Path, Path, dict[str, float]]:
     """Scene and table of a rig of the example bearing, and its hidden values by key."""
-    from doe.unknown.laws import values_of
+    from doe.unknown.inputs import values_of
     from rbdyn.dynamics.simulate import simulate
     from rbdyn.scene import Scene
     from rbdyn.scene.uncertain import Law
@@ -161,7 +161,7 @@ def closed_form(quantiles: Array, land: float = 1.0, power: float = 0.4) -> Arra
 def surrogate(kind: str, number: int) -> Answer:
     """Calibrate a rig in closed form."""
     from doe.unknown.calibration import MISSED, Batch, Unknowns, matched
-    from doe.unknown.discrepancy import Measured
+    from doe.unknown.likelihood import Measured
     from doe.unknown.posterior import densest_intervals, learnt
     from doe.unknown.verdict import judge, objections
 
@@ -195,7 +195,7 @@ def surrogate(kind: str, number: int) -> Answer:
 def widths(repeats: int, cells: int, factor: float) -> float:
     """Share of ``repeats`` tables, of three correlated cells a row, whose predictions are ``factor`` times too wide, that
     are rejected."""
-    from doe.unknown.width import scores_of, width
+    from doe.unknown.verdict import scores_of, width
 
     random, rejected = np.random.default_rng([cells, int(100 * factor)]), 0
     root = np.linalg.cholesky(0.6 + 0.4 * np.eye(3))

@@ -16,7 +16,8 @@ from rbdyn.quasistatic.result import remarks, tipping
 from rbdyn.quasistatic.row.equilibrium import OK
 from rbdyn.quasistatic.runout.lots import Lot, design
 from rbdyn.quasistatic.runout.measures import ToleranceClass, running_accuracy
-from rbdyn.quasistatic.runout.turn import Followed, bench_of, follow_ring, single_row
+from rbdyn.quasistatic.runout.model import bench_of, follow_ring, single_row
+from rbdyn.quasistatic.runout.turn import Followed
 from rbdyn.quasistatic.sweep.figures import ring_columns, row_columns
 from rbdyn.quasistatic.sweep.result import SweepResult
 from rbdyn.quasistatic.sweep.run import grouped

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 
 from doe.arrays import Array
 from doe.emulator import pooled_variances
-from doe.unknown.joint import nested
+from doe.unknown.inputs import nested
 from doe.unknown.worth import Decides, decides
 
 FRESH = 8192

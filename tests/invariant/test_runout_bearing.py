@@ -23,8 +23,9 @@ from rbdyn.quasistatic.runout.lots import (
     readings,
     runouts,
 )
+from rbdyn.quasistatic.runout.model import bench_of, follow_ring
 from rbdyn.quasistatic.runout.race_errors import ball_path, perfect, waviness
-from rbdyn.quasistatic.runout.turn import bench_of, follow, follow_ring
+from rbdyn.quasistatic.runout.turn import follow
 from rbdyn.quasistatic.runout.walk import walk
 from rbdyn.scene.ball import BallScene
 

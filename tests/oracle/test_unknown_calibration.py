@@ -10,24 +10,25 @@ from scipy import special, stats
 
 from doe.arrays import Array
 from doe.unknown.calibration import Batch, Matched, Unknowns, matched
-from doe.unknown.cells import fit_cells
-from doe.unknown.discrepancy import BEYOND, BY_ROW, SHARE, WIDER, Joint, Measured
-from doe.unknown.posterior import contraction, densest_intervals, learnt, seen
-from doe.unknown.sampler import sampled
+from doe.unknown.likelihood import BEYOND, BY_ROW, SHARE, WIDER, Joint, Measured, fit_cells
+from doe.unknown.posterior import contraction, densest_intervals, learnt, sampled, seen
 from doe.unknown.verdict import (
     MOST,
     Explanation,
     Judgement,
     Particles,
+    Scores,
     Trial,
+    Width,
     bayes_factor,
     by_others,
     held_out,
     judge,
     objections,
     reweighed,
+    scores_of,
+    width,
 )
-from doe.unknown.width import Scores, Width, scores_of, width
 
 ROWS, OUTPUTS, INPUTS = 8, 2, 3
 ACROSS = np.linspace(-1.0, 1.0, ROWS)

@@ -6,7 +6,7 @@ from decisions import noisy, smooth
 from scipy import stats
 
 from doe.unknown.decision import better, in_doubt, wilson
-from doe.unknown.joint import nested
+from doe.unknown.inputs import nested
 from doe.unknown.worth import decides
 
 

@@ -7,11 +7,8 @@ import pytest
 from scipy import stats
 
 from doe.arrays import Array
-from doe.unknown.joint import Joint, nested
-from doe.unknown.laws import ranks
-from doe.unknown.screening import kept, main_effects, shares, strongest, two_levels
-from doe.unknown.sensitivity import explained, shapley, sobol
-from doe.unknown.spread import Runs, emulated, residual_variance, spread_of
+from doe.unknown.inputs import Joint, effect_shares, main_effects, nested, ranks, retained, screening_design, strongest
+from doe.unknown.propagation import Runs, emulated, explained, residual_variance, shapley, sobol, spread_of
 
 ISHIGAMI = 0.5 + 49.0 / 8.0 + 0.1 * np.pi**4 / 5.0 + 0.01 * np.pi**8 / 18.0
 
@@ -172,17 +169,17 @@ def test_indices_of_ishigami_under_noise(noise: float, repeats: int) -> None:
 
 
 def test_screening_finds_the_inputs_that_matter() -> None:
-    quantiles = two_levels(20)
+    quantiles = screening_design(20)
     weights = np.zeros(20)
     weights[[3, 11]] = 3.0, 1.0
     values = np.column_stack([quantiles @ weights, quantiles[:, 7]]) + 0.05 * np.random.default_rng(1).standard_normal(
         (len(quantiles), 2)
     )
-    share = shares(quantiles, values)
+    share = effect_shares(quantiles, values)
     assert share[3, 0] == pytest.approx(0.9, abs=0.02)
     assert share[7, 1] > 0.98
-    assert kept(share, [0], 4) == [0, 3, 7, 11]
-    assert kept(share, [0, 1], 1) == [0, 1]
+    assert retained(share, [0], 4) == [0, 3, 7, 11]
+    assert retained(share, [0, 1], 1) == [0, 1]
 
 
 # y = sum of c_i x_i of normals: the first two make 0.9 of the variance, the other twenty the rest.

@@ -6,7 +6,7 @@ from decisions import KNOWN, noisy, smooth
 from scipy import stats
 
 from doe.unknown.decision import better
-from doe.unknown.joint import nested
+from doe.unknown.inputs import nested
 from doe.unknown.worth import _about, _Figures, _smooth, decides
 
 # Worths are stated in whole points of a hundred.

@@ -20,7 +20,7 @@ from doe.study.input_sets import Case, case_of
 from doe.study.robust import case_of_study
 from doe.study_file import Study
 from doe.study_file.study import StudyFile
-from doe.unknown import laws
+from doe.unknown import inputs
 from rbdyn.faults import LONGEST_SENTENCE, MOST_FAULTS, InputError, key_path, read_toml, validated
 from rbdyn.scene import Scene
 from rbdyn.scene.unknown import FOLLOWING, value_of
@@ -169,7 +169,7 @@ def check(case: Case, table: dict[str, Any], design: list[str], seed: int) -> in
         sets = joint.sets(1024, seed)
         first, second = (sets[:, keys.index(key)] for key in pair["keys"])
         assert spearmanr(first, second).statistic == pytest.approx(pair["rank"], abs=0.08), pair
-    listed = laws.table_of({each.key: each.law for each in case.every}, joint.sets(4, seed))
+    listed = inputs.table_of({each.key: each.law for each in case.every}, joint.sets(4, seed))
     for each in case.every:
         assert math.isfinite(case.unit(each)) and case.unit(each) != 0.0
         for values in listed:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy import special
 
-from doe.unknown.decision import wilson
-from doe.unknown.odds import odds
+from doe.unknown.decision import odds, wilson
 
 COUNT, SPREAD = 2000, 3.0
 

@@ -9,7 +9,7 @@ import pytest
 
 from doe.report.steps.calibrate import write_sample
 from doe.study.input_sets import read_case, read_sample
-from doe.unknown.laws import values_of
+from doe.unknown.inputs import values_of
 from rbdyn.faults import InputError
 from rbdyn.records.kept import digest_of
 from rbdyn.scene.uncertain import Law

@@ -13,9 +13,8 @@ from doe.study.runs import read_runs
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study_file import Study
 from doe.threads import _controller, one_thread
-from doe.unknown.sampler import sampled
-from doe.unknown.sensitivity import sobol
-from doe.unknown.spread import Runs, emulated, spread_of
+from doe.unknown.posterior import sampled
+from doe.unknown.propagation import Runs, emulated, sobol, spread_of
 
 THREADS = (1, 2)
 

@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.unknown.joint import nested
-from doe.unknown.laws import copula, dependent, quantiles_of, table_of, values_of
-from doe.unknown.screening import two_levels
+from doe.unknown.inputs import copula, dependent, nested, quantiles_of, screening_design, table_of, values_of
 from rbdyn.cli.keys import keys
 from rbdyn.dynamics.parameters.scales import light_contact
 from rbdyn.faults import InputError, read_toml, validated
@@ -305,7 +303,7 @@ def test_input_sets_nest_and_repeat() -> None:
 
 @pytest.mark.parametrize("inputs", [3, 7, 12, 25])
 def test_screening_frees_main_effects_of_each_other_and_of_pairs(inputs: int) -> None:
-    signs = np.sign(two_levels(inputs) - 0.5)
+    signs = np.sign(screening_design(inputs) - 0.5)
     assert np.allclose(signs.T @ signs, len(signs) * np.eye(inputs))
     pairs = np.column_stack([signs[:, i] * signs[:, j] for i in range(inputs) for j in range(i)])
     assert np.abs(signs.T @ pairs).max() == 0.0

@@ -12,7 +12,7 @@ from doe.arrays import Array
 from doe.study.calibration import Calibration
 from doe.study.input_sets import NORMAL
 from doe.study_file.cells import text_of
-from doe.unknown import laws
+from doe.unknown import inputs
 from doe.unknown.posterior import seen
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.kept import digest_of, intact, sign
@@ -116,7 +116,7 @@ def _inputs(found: Calibration) -> dict[str, Any]:
 def _between(found: Calibration, place: int, quantiles: Array) -> tuple[float, float]:
     """What the scene has at two quantiles of an input's law."""
     each = found.inputs[place]
-    low, high = (found.case.unit(each) * value for value in laws.values_of(each.law, quantiles))
+    low, high = (found.case.unit(each) * value for value in inputs.values_of(each.law, quantiles))
     return low, high
 
 

@@ -7,8 +7,7 @@ from typing import Any
 from doe.report.words import of_hundred
 from doe.study.uncertainty import OutputRange, Uncertainty
 from doe.study_file.cells import text_of
-from doe.unknown.sensitivity import CONFIDENCE
-from doe.unknown.spread import Share
+from doe.unknown.propagation import CONFIDENCE, Share
 from rbdyn.cli.terminal import print_table
 from rbdyn.records.words import counted, quantity, shown, with_error
 from rbdyn.result import write_json
