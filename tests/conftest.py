@@ -76,6 +76,16 @@ EVERYTHING = (
 )
 
 
+# Files that take longest begin, so that no process works on one of them while the other has nothing left; the first of them
+# compiles most, the second nothing.
+DEAREST = (
+    "test_accuracy", "test_study_adaptive", "test_adaptive", "test_search_report", "test_uncertainty", "test_streams",
+    "test_study_survival", "test_equations", "test_golden", "test_ball_command", "test_leave_out", "test_invariants",
+    "test_map_and_options", "test_ball_solvers", "test_ball_sweep", "test_study", "test_study_status", "test_calibrate",
+    "test_inactive_factors", "test_rolling_resistance", "test_manual", "test_filtered_whirl", "test_methods",
+)  # fmt: skip
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """``--fuzz-cases N``: how many cases each fuzz test draws."""
     parser.addoption("--fuzz-cases", type=int, default=100, help="cases that each fuzz test draws (100)")
@@ -101,6 +111,13 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
         option.numprocesses = 2
     if option.numprocesses and option.dist == "no":
         option.dist = "worksteal" if option.markexpr == "slow" else "loadfile"
+        option.loadscopereorder = False  # as they are collected, not by the number of a file's tests
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The dearest files first."""
+    place = {name: number for number, name in enumerate(DEAREST)}
+    items.sort(key=lambda item: place.get(item.path.stem, len(place)))
 
 
 def law_types(parameters: Any) -> set[type]:

@@ -118,7 +118,7 @@ def test_a_directory_is_no_table_and_a_flood_of_faults_is_told_by_its_count(tmp_
     start = time.process_time()
     faults = faults_of(table, tmp_path, "a,b,y\n" + "1,2,x\n" * 100_000)
     assert len(faults) == MOST_FAULTS and faults[-1] == "and 99951 more faults; mend these first"
-    assert time.process_time() - start < 10.0
+    assert time.process_time() - start < 5.0
 
 
 @pytest.mark.parametrize(
@@ -168,16 +168,16 @@ def test_a_bad_assignment_is_one_sentence(assignment, words):
 
 @pytest.mark.parametrize("read", [Scene.load, Study.load, read_chains])
 def test_unknown_keys_are_told_in_linear_time_and_a_byte_order_mark_is_read(tmp_path, read):
-    """Rate: 100 000 unknown keys take seconds of the processor (hours where each is compared with all)."""
+    """Rate: 30 000 unknown keys take a second of the processor (many minutes where each is compared with all)."""
     name = {Scene.load: "cylindrical_roller", Study.load: "clearance_study"}.get(read, "pocket_chain")
     whole, path = (EXAMPLES / f"{name}.toml").read_bytes(), tmp_path / "s.toml"
     path.write_bytes(b"\xef\xbb\xbf" + whole)
     assert read(path)
-    path.write_bytes(b"".join(b"k%d = 1\n" % number for number in range(100_000)) + whole)
+    path.write_bytes(b"".join(b"k%d = 1\n" % number for number in range(30_000)) + whole)
     start = time.process_time()
     faults = faults_of(read, path)
-    assert len(faults) == MOST_FAULTS and "99951 more" in faults[-1]
-    assert time.process_time() - start < 10.0
+    assert len(faults) == MOST_FAULTS and "29951 more" in faults[-1]
+    assert time.process_time() - start < 5.0
 
 
 def test_sentences_are_cut_in_the_middle():

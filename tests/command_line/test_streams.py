@@ -1,4 +1,8 @@
-"""Streams that close, fill up or know only ASCII, and Ctrl-C: both commands, in processes of their own."""
+"""Streams that close, fill up or know only ASCII, and Ctrl-C: both commands, in processes of their own.
+
+What Python makes of its streams as it starts is tried once for each kind of end, by a command that loads little; all other
+commands run in children of this process.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,11 @@ import time
 
 import pytest
 from conftest import EXAMPLE, ROOT
+from forked import forked
+from in_process import in_process
 from short_studies import short_study
+
+from rbdyn.accuracy.rollers import coverage
 
 EXAMPLES = ROOT / "examples"
 BALL = f"rbdyn ball {EXAMPLES}/angular_contact_ball.toml"
@@ -41,56 +49,73 @@ RUN = (
 SIMULATED = [
     RUN,
     f"rbdyn map {EXAMPLE} --speed 20000 --load 900 --turns 2 --replicates 1 --set numerics.companion=false",
-    f"brief_accuracy {EXAMPLE} --coverage --repeats 2 --set numerics.turns=1 --set numerics.discard_turns=1 "
+    f"rbdyn accuracy {EXAMPLE} --coverage --repeats 2 --set numerics.turns=1 --set numerics.discard_turns=1 "
     "--set numerics.replicates=2 --set numerics.extend=false --set numerics.companion=false",
 ]
-# ``rbdyn accuracy`` with a truth of two replicates in place of 64.
-ACCURACY = (
-    "import sys; from rbdyn.accuracy.rollers import coverage; coverage.TRUTH_REPLICATES = 2; "
-    "from rbdyn.cli import run; sys.argv[1:1] = ['accuracy']; run()"
-)
+HELP = ["rbdyn --help", "doe study --help"]
+# What is closed of the streams, or how many lines are read, and how a shell says so.
+ENDS = {"| true": {"lines": 0}, ">&-": {"closed": [1]}, "2>&-": {"closed": [2]}, "<&- >&- 2>&-": {"closed": [0, 1, 2]}}
 
 
 @pytest.fixture(scope="module", autouse=True)
 def brief(tmp_path_factory):
-    """The example's study with five generations of its front, in the folder $BRIEF."""
+    """The example's study with a short front, in the folder $BRIEF."""
     folder = tmp_path_factory.mktemp("brief")
-    short_study(folder, replace=("generations = 20", "generations = 5"))
+    short_study(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("BRIEF", str(folder))
+        # What commands load and compile is loaded here once, not in each child.
+        for line in (BALL, *COMMANDS[-2:], RUN):
+            assert in_process(*shlex.split(os.path.expandvars(line))).returncode == 0
         yield
 
 
 def shell(line, **environment):
     """Run a line of bash in which ``rbdyn`` and ``doe`` are this checkout's; the code of a pipe is its command's."""
     functions = "".join(f'{name}() {{ {shlex.quote(sys.executable)} -m {name} "$@"; }}\n' for name in ("rbdyn", "doe"))
-    functions += f'brief_accuracy() {{ {shlex.quote(sys.executable)} -c {shlex.quote(ACCURACY)} "$@"; }}\n'
     script = f"set -o pipefail\n{functions}{line}"
     variables = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
     return subprocess.run(["bash", "-c", script], capture_output=True, text=True, env=variables, check=False)
 
 
-@pytest.mark.parametrize(
-    ("line", "end"), list(zip(COMMANDS, 3 * ["| true", ">&-", "2>&-", "<&- >&- 2>&-"], strict=True))
-)
-def test_a_reader_that_goes_or_a_closed_stream_changes_no_exit_code(line, end):
-    """Command line: | true, >&- and 2>&- end as usual and without a word."""
+@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("line", HELP)
+def test_a_shell_closes_a_stream_of_a_new_interpreter(line, end):
+    """Command line: | true, >&- and 2>&- as a shell makes them."""
     found = shell(f"{line} {end}")
     assert (found.returncode, found.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("line", [*COMMANDS[::3], *SIMULATED])
-def test_a_full_device_is_told_in_one_sentence(line):
+@pytest.mark.parametrize(("line", "end"), list(zip(COMMANDS, 3 * [*ENDS], strict=True)))
+def test_a_reader_that_goes_or_a_closed_stream_changes_no_exit_code(line, end):
+    """Command line: | true, >&- and 2>&- end as usual and without a word."""
+    found = forked(line, **ENDS[end])
+    assert (found.returncode, found.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("start", "line"), [(shell, HELP[0]), *((forked, line) for line in [*COMMANDS[::3], *SIMULATED])]
+)
+def test_a_full_device_is_told_in_one_sentence(monkeypatch, start, line):
     """Command line: > /dev/full is exit code 1 and one sentence."""
-    found = shell(f"{line} > /dev/full")
+    monkeypatch.setattr(coverage, "TRUTH_REPLICATES", 2)  # in place of 64
+    found = shell(f"{line} > /dev/full") if start is shell else forked(line, output="/dev/full")
     assert found.returncode == 1
     assert found.stderr == "standard output: No space left on device; make room, or write elsewhere\n"
 
 
+def test_tables_are_written_where_python_starts_with_ascii():
+    """Command line: in the locale C tables come in ASCII, "±" as "+-"."""
+    for more in ({"PYTHONUTF8": "0"}, {"PYTHONIOENCODING": "ascii"}):
+        found = shell(f"{CHAIN} -v", LC_ALL="C", **more)
+        assert (found.returncode, found.stderr) == (0, "")
+        assert found.stdout.isascii() and "?" not in found.stdout
+
+
 @pytest.mark.parametrize("line", [f"{CHAIN} -v", f"doe fit {STUDY} -v", f"doe front {STUDY} -v", RUN])
 def test_tables_are_written_where_only_ascii_goes(line):
-    """Command line: in the locale C tables come in ASCII, "±" as "+-"."""
-    found = shell(line, LC_ALL="C", **({"PYTHONUTF8": "0"} if line == RUN else {"PYTHONIOENCODING": "ascii"}))
+    """Command line: every table, in ASCII."""
+    found = forked(line, encoding="ascii")
     assert (found.returncode, found.stderr) == (0, "")
     assert found.stdout.isascii() and "?" not in found.stdout
 
@@ -106,7 +131,7 @@ def test_tables_are_written_where_only_ascii_goes(line):
 )
 def test_files_stand_whole_where_the_pipe_is_closed_early(line, files, tmp_path):
     """Command line: --out writes what it writes without a pipe, whoever reads."""
-    found = shell(f"{line} --out {tmp_path} | head -3")
+    found = forked(f"{line} --out {tmp_path}", lines=3)
     assert (found.returncode, found.stderr) == (0, "")
     assert files <= {path.name for path in tmp_path.iterdir()} - {"made_by.json"}
     assert all(json.loads(path.read_text()) for path in tmp_path.glob("*.json"))
@@ -114,9 +139,9 @@ def test_files_stand_whole_where_the_pipe_is_closed_early(line, files, tmp_path)
 
 def test_a_closed_error_stream_leaves_standard_output_to_json():
     """Command line: sentences do not fall into standard output where standard error is closed."""
-    assert shell("doe chain none.toml 2>&-").stdout == ""
-    assert json.loads(shell("doe chain none.toml --json 2>&-").stdout)["status"] == "refused"
-    assert shell("doe chain none.toml 2>&-").returncode == 2
+    silent = shell("doe chain none.toml 2>&-")
+    assert (silent.returncode, silent.stdout) == (2, "")
+    assert json.loads(forked("doe chain none.toml --json", closed=[2]).stdout)["status"] == "refused"
 
 
 @pytest.mark.parametrize("line", ["rbdyn --help", f"doe front {STUDY}", RUN])
@@ -124,7 +149,7 @@ def test_ctrl_c_leaves_with_130_and_no_traceback(line):
     """Command line: an interrupt at any time from the first import on; what had ended by then ended as usual."""
     name, *arguments = shlex.split(os.path.expandvars(line))
     # Its first line tells that Python itself is up.
-    program = f"import rbdyn.cli.loading; print(flush=True); from {name}.cli import run; run()"
+    program = f"import {name}, rbdyn.cli.loading; print(flush=True); from {name}.cli import run; run()"
     codes = set()
     for delay in (0.05, 0.1, 0.2, 0.4, 1.0):
         process = subprocess.Popen(

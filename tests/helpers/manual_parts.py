@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import tomllib
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -11,7 +12,7 @@ from typer.main import get_command
 from rbdyn.cli.app import app
 from rbdyn.cli.keys import kinds
 from rbdyn.cli.manual import command
-from rbdyn.cli.manual.page import Part
+from rbdyn.cli.manual.page import Part, page
 
 ROOT = Path(__file__).parents[2]
 
@@ -26,3 +27,9 @@ def parts() -> list[Part]:
     """Parts in the order of the page."""
     own = Part("rbdyn", Path(command.__file__).with_name("prose"), get_command(app), kinds())
     return [own, *(EntryPoint(name, value, command.GROUP).load()() for name, value in declared().items())]
+
+
+@functools.cache
+def whole_page() -> str:
+    """The page, made once a process."""
+    return page(parts())

@@ -7,6 +7,11 @@ import sqlite3
 from pathlib import Path
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+# Searches that find something, and draws that tell something, in no time.
+BRIEF = (
+    ("generations = 200", "generations = 5\ndraws = 100\ntolerance_samples = 64"),
+    ("keep = 0.5", "keep = 0.5\nsamples = 512"),
+)
 SHORT = "turns=3,discard_turns=1,replicates=2,companion=false,impact_window_turns=1"
 
 
@@ -20,7 +25,8 @@ def short_study(folder: Path, settings: str = SHORT, replace: tuple[str, str] = 
     text = text.replace(first, f"set = [{', '.join(lines)}]").replace("replicates = 16", "replicates = 2")
     pocket = 'factor = "pocket_clearance_mm"\n'
     text = text.replace(pocket, pocket + "half_width_mm = 0.005\n")
-    text = text.replace("generations = 200", "generations = 20")
+    for long, short in BRIEF:
+        text = text.replace(long, short)
     text = text.replace(*replace) if replace[0] else text
     path = folder / "study.toml"
     path.write_text(text, encoding="utf-8")

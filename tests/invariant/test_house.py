@@ -1,6 +1,7 @@
 """The house: imports run one way, few files lie loose, files and functions stay short."""
 
 import ast
+import functools
 import re
 import subprocess
 from graphlib import CycleError, TopologicalSorter
@@ -34,6 +35,12 @@ EDGES = {
 }
 
 
+@functools.cache
+def parsed(path: Path) -> ast.Module:
+    """The syntax tree of a module, which several tests walk."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def test_invariant_no_circle_of_imports():
     """Invariant: no module imports itself through others, imports inside functions and for typing only counted."""
     graph = grimp.build_graph("rbdyn", "doe", cache_dir=None)
@@ -59,7 +66,7 @@ def test_invariant_files_and_functions_stay_short():
         text = path.read_text(encoding="utf-8")
         if text.count("\n") > LONGEST_FILE:
             long.append(f"{path.name}: {text.count(chr(10))} lines")
-        for node in ast.walk(ast.parse(text)):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.FunctionDef) and node.end_lineno - node.lineno + 1 > LONGEST_FUNCTION:
                 long.append(f"{path.name}: {node.name}")
     assert not long
@@ -79,7 +86,7 @@ def test_invariant_units_end_at_the_scene():
     for path in SOURCES:
         name = path.relative_to(ROOT).as_posix()
         edge = next((edge for edge in EDGES if name.startswith(edge)), None)
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.Attribute) and NOT_SI.search(node.attr):
                 needed.add(edge)
                 found += [f"{name}:{node.lineno} {node.attr}"] if edge is None else []
@@ -95,7 +102,7 @@ def test_invariant_errors_of_libraries_are_not_the_users():
     """Invariant: the words of a ValueError are shown where one text was converted; all other sentences are our own errors."""
     words, found = 0, []
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(path)):
             if not isinstance(node, ast.Try):
                 continue
             called = {
@@ -112,7 +119,7 @@ def test_invariant_kernels_index_from_the_start():
     """Invariant: no index of a kernel is written as one that counts from the end, which compiled code would not follow."""
     seen, found = 0, []
     for path in SOURCES:
-        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for function in ast.walk(parsed(path)):
             if not isinstance(function, ast.FunctionDef) or not any(
                 map(KERNEL.match, map(ast.unparse, function.decorator_list))
             ):

@@ -28,7 +28,7 @@ SCENES = pytest.mark.parametrize("fixture", ["outer", "inner", "everything"])
 def test_invariant_over_scenes_of_every_make():
     """Invariant: ``interpreted_invariants``, in a process where nothing is compiled."""
     found = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", INTERPRETED],
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", INTERPRETED],
         cwd=INTERPRETED.parents[2],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
         capture_output=True,

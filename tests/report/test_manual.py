@@ -11,12 +11,12 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from manual_parts import ROOT, declared, parts
+from manual_parts import ROOT, declared, parts, whole_page
 
 import rbdyn
 from rbdyn.cli.keys import keys, lines
 from rbdyn.cli.manual.docstrings import markdown
-from rbdyn.cli.manual.page import page, rendered
+from rbdyn.cli.manual.page import rendered
 
 # A command with its options, as prose and code write it.
 CALL = re.compile(r"\b(rbdyn|doe) (?!=)([a-z]+)\b((?: [^\s`|]+)*)")
@@ -62,9 +62,9 @@ def floors():
 
 
 @pytest.fixture(scope="module")
-def manual(floors):
+def manual():
     """The page, read."""
-    return Read(page(floors))
+    return Read(whole_page())
 
 
 def test_page_is_whole_and_needs_nothing_else(manual):
@@ -155,7 +155,7 @@ def test_prose_names_commands_and_options_that_exist(floors):
     assert calls > 30
 
 
-def test_command_writes_the_page_and_nothing_else(tmp_path, command, floors):
+def test_command_writes_the_page_and_nothing_else(tmp_path, command):
     """Command line: the declared entry points bring both floors in; equal bytes in any process; one JSON object."""
     meta = tmp_path / f"rbdyn-{rbdyn.__version__}.dist-info"
     meta.mkdir()
@@ -167,7 +167,7 @@ def test_command_writes_the_page_and_nothing_else(tmp_path, command, floors):
     assert ran.returncode == 0, ran.stderr
     assert json.loads(ran.stdout) == {"status": "ok", "page": str(tmp_path / "out" / "manual.html")}
     assert os.listdir(tmp_path / "out") == ["manual.html"]
-    assert (tmp_path / "out" / "manual.html").read_text(encoding="utf-8") == page(floors)
+    assert (tmp_path / "out" / "manual.html").read_text(encoding="utf-8") == whole_page()
 
 
 def test_command_refuses_a_file_for_a_folder(tmp_path, command):

@@ -7,16 +7,14 @@ import re
 
 import pytest
 from headless import as_wide_as, offline_browser, widths
-from manual_parts import parts
-
-from rbdyn.cli.manual.page import page
+from manual_parts import whole_page
 
 
 @pytest.fixture(scope="module")
 def manual(tmp_path_factory):
     """The page, open."""
     path = tmp_path_factory.mktemp("manual") / "manual.html"
-    path.write_text(page(parts()), encoding="utf-8")
+    path.write_text(whole_page(), encoding="utf-8")
     with offline_browser() as driver:
         driver.get(path.as_uri())
         yield driver

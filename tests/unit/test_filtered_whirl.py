@@ -197,7 +197,7 @@ def test_rows_with_an_orbit_are_conditions_of_which_the_run_filters_alike(tmp_pa
     ],
 )
 def test_bad_orbits_end_in_a_sentence(tmp_path: Path, change: dict[str, Any], sentence: str) -> None:
-    time, place = _orbit(2.0, change.get("circles", [SLOW, FAST]))
+    time, place = _orbit(0.5, change.get("circles", [SLOW, FAST]))
     kept = np.delete(np.arange(len(time)), 700 if change.get("uneven") else [])
     path = _file(tmp_path, time[kept], place[:, kept], header=change.get("header", "t_s,x_um,y_um"))
     if "cell" in change:

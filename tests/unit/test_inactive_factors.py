@@ -7,6 +7,7 @@ from dataclasses import replace
 import instant_runs
 import numpy as np
 import pytest
+from coarse_search import coarsely
 from instant_runs import instantly
 from short_studies import silent
 from test_study_adaptive import ROLLERS, with_kinds, written
@@ -84,6 +85,7 @@ def test_an_optimal_design_spends_no_run_on_an_inactive_factor(tmp_path):
 
 def test_the_study_follows_a_pick_at_which_a_factor_means_nothing(tmp_path, monkeypatch):
     instantly(monkeypatch.setattr)
+    coarsely(monkeypatch.setattr)
     plain = instant_runs.instant_result
 
     def result(scene):
@@ -160,6 +162,7 @@ def test_closed_form_tolerance_beside_a_whole_number(tmp_path):
 
 def test_a_whole_number_has_no_tolerance(tmp_path, monkeypatch):
     instantly(monkeypatch.setattr)
+    coarsely(monkeypatch.setattr)
     monkeypatch.setattr(clearance, "histories", lambda *rest: {})
     monkeypatch.setattr(clearance, "draw_motion", lambda *rest: [])
     outer = ('["outer", "inner"]', '["outer", "roller"]\ninactive = {roller = ["guide_clearance_mm"]}')

@@ -222,14 +222,14 @@ def test_unit_parameters_are_few(outer, optional):
 
 
 def test_unit_memory_does_not_grow_with_the_turns(outer):
-    """Store: a run holds as much after 40 turns as after 4; of a replicate some thirty numbers a batch stay."""
+    """Store: a run holds as much after 20 turns as after 4; of a replicate some thirty numbers a batch stay."""
     run = Run(outer, roller_bearing(outer), 0, outer.numerics.rtol, Stop())
     run.to(0.0)  # compiles
     gc.collect()
     tracemalloc.start()
     held, sizes = [], []
     # The interpreter keeps what the first hundreds of calls of compiled code used for the next ones.
-    for calls in (400, 4000):
+    for calls in (400, 2000):
         for call in range(calls):
             run.to((call + 1) * outer.numerics.turns / 400)
         gc.collect()
@@ -237,7 +237,7 @@ def test_unit_memory_does_not_grow_with_the_turns(outer):
         sizes.append([part.size for part in arrays_of(run)])
     tracemalloc.stop()
     assert sizes[0] == sizes[1]
-    # A single float kept a step would be some 400 kB.
+    # A single float kept a step would be some 170 kB.
     assert held[1] - held[0] < 50_000
     kept = run_replicate(outer, run.bearing, 0, outer.numerics.rtol, Stop())
     arrays = [part for part in vars(kept).values() if isinstance(part, np.ndarray)]
@@ -266,4 +266,14 @@ def test_command_line_imports_what_the_scene_needs():
 
 def test_unit_the_plain_path_is_the_general_one():
     """Agreement: ``interpreted_leave_out``, in a process where nothing is compiled."""
-    fresh("-m", "pytest", "-q", "-p", "no:cacheprovider", HELPERS / "interpreted_leave_out.py", interpreted=True)
+    fresh(
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "no:xdist",
+        HELPERS / "interpreted_leave_out.py",
+        interpreted=True,
+    )

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from coarse_search import coarsely
 from instant_runs import instantly
 from scipy.stats import qmc
 from short_studies import EXAMPLES, SHORT, short_study, silent
@@ -36,6 +37,7 @@ def studied(tmp_path_factory):
     """A search in a folder of its own, and one in the folder of a direct search of the same study."""
     patch = pytest.MonkeyPatch()
     instantly(patch.setattr)
+    coarsely(patch.setattr)
     patch.setattr(clearance, "histories", lambda *rest: {})
     patch.setattr(clearance, "draw_motion", lambda *rest: [])
     source = tmp_path_factory.mktemp("study")

@@ -321,6 +321,7 @@ def test_unit_repeats_are_of_one_bearing(make_scene):
 
 def test_command_line_coverage(command, monkeypatch):
     """The command runs its repeats and says what they cost; repeats belong to it alone."""
+    monkeypatch.setattr(coverage, "TRUTH_REPLICATES", 2)  # in place of 64
     scene = "examples/cylindrical_roller.toml"
     short = ("numerics.turns=1", "numerics.discard_turns=1", "numerics.replicates=2", "numerics.extend=false")
     sets = [part for item in short for part in ("--set", item)]

@@ -164,7 +164,7 @@ def test_same_bits_for_any_number_of_workers(finished, tmp_path):
 
 def test_killed_study_loses_no_finished_run(finished, tmp_path):
     # Long enough that the kill comes in the middle of it.
-    path = short_study(tmp_path, SHORT.replace("turns=3,", "turns=30,"))
+    path = short_study(tmp_path, SHORT.replace("turns=3,", "turns=15,"))
     store = tmp_path / "out" / "study.sqlite"
     process = subprocess.Popen(
         [sys.executable, "-m", "doe", "study", str(path), "--out", str(tmp_path / "out"), "--workers", "1"],

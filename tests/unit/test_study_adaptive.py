@@ -9,6 +9,7 @@ from dataclasses import replace
 import instant_runs
 import numpy as np
 import pytest
+from coarse_search import coarsely
 from doe_command import doe
 from instant_runs import instantly
 from short_studies import SHORT, short_study, silent
@@ -27,6 +28,12 @@ from doe.study_file import Study
 from rbdyn.faults import InputError
 
 GOAL = 'name = "whirl_deviation_ratio"\nmodel = "quadratic"\ngoal = '
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    """What these searches find is not the subject."""
+    coarsely(monkeypatch.setattr)
 
 
 def written(folder, *replacements, budget=36):

@@ -30,7 +30,7 @@ def test_cost_of_a_run_to_a_target_is_that_of_pilots_and_all_runs(outer, monkeyp
     numbers = {"impact_window_turns": 10.0, "discard_turns": 5.0}
     scene = outer.model_copy(update={"numerics": outer.numerics.model_copy(update=numbers)})
     started = time.perf_counter()
-    result = simulate(scene, workers=1, target=0.08)
+    result = simulate(scene, workers=1, target=0.2)
     took = time.perf_counter() - started
     cost, last = result.cost, results[-1].cost
     assert result.target["runs"] == len(results) >= 1 and len(runs) == len(LADDER) * PILOT_REPLICATES

@@ -25,9 +25,9 @@ def manual(
         from rbdyn.cli.manual.page import Part, page
         from rbdyn.result import whole_file
 
+        out.mkdir(parents=True, exist_ok=True)  # before the page, which takes seconds
         own = Part("rbdyn", Path(__file__).with_name("prose"), context.find_root().command, kinds())
         text = page([own, *(each.load()() for each in sorted(entry_points(group=GROUP)))])
-        out.mkdir(parents=True, exist_ok=True)
         path = out / "manual.html"
         with whole_file(path) as new:
             new.write_text(text, encoding="utf-8")

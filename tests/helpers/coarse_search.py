@@ -1,0 +1,24 @@
+"""The adaptive search with few candidates, levels and drawn fronts, for tests of what surrounds it.
+
+Its front is rough; its stages, budget, files and sentences are those of a whole one. What a search finds is the subject of
+``test_adaptive``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from doe.adaptive import candidates, improvement, search
+
+FEWER: tuple[tuple[Any, dict[str, int]], ...] = (
+    (candidates, {"EVERYWHERE": 7, "CHILDREN": 32}),
+    (improvement, {"LEVELS": 10, "MOST_LEVELS": 200}),
+    (search, {"DRAWS": 8, "ROUNDS": 1, "SHOWN": 50, "FEW": 256}),
+)
+
+
+def coarsely(patch: Any) -> None:
+    """Let searches be coarse; ``patch(target, name, value)`` replaces an attribute, such as ``monkeypatch.setattr``."""
+    for module, numbers in FEWER:
+        for name, value in numbers.items():
+            patch(module, name, value)
