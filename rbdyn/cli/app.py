@@ -246,6 +246,8 @@ def _write(scene: "Scene", result: "SimulationResult", folder: Path) -> list[str
 
 
 def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
+    from rbdyn.compiled.kernel import compiler_notes
+
     def shown(error: float | None) -> str:
         return "not estimated" if error is None else error_alone(error)
 
@@ -291,7 +293,7 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         gap = result.power_gap * result.power_loss.value
         terminal.print_table(f"power lost; the power balance closes to {gap:.2g} W", ("term", "W"), terms)
         terminal.print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
-    terminal.print_notes(result.notes, quiet)
+    terminal.print_notes([*result.notes, *(compiler_notes() if verbose else ())], quiet)
 
 
 def _print_clearances(clearance: dict[str, Any]) -> None:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
     """Print a result as tables; the reason on standard error where there is none."""
+    from rbdyn.compiled.kernel import compiler_notes
+
     if not result.found:
         print(f"no equilibrium: {result.status}", file=sys.stderr)
         return
@@ -35,7 +37,7 @@ def print_result(result: BallResult, quiet: bool, verbose: bool) -> None:
         axial = f"axial {runout['axial_um']:.3g} um, face {runout['face_um']:.3g} um"
         asynchronous = f"asynchronous {runout['asynchronous_radial_um']:.3g} um"
         print(f"runout over {counted(runout['turns'], 'turn')}: radial {radial}, {axial}; {asynchronous}")
-    print_notes(result.notes or (), quiet)
+    print_notes([*(result.notes or ()), *(compiler_notes() if verbose else ())], quiet)
 
 
 def with_runout(scene: BallScene, result: BallResult) -> "tuple[BallResult, pd.DataFrame | None]":

@@ -4,103 +4,137 @@
 - ``@law``: a function whose body is chosen, at compile time, by the type of its first argument (a
   NamedTuple of parameters). A law that a scene leaves out is thus not compiled at all.
 - ``@entry``: the few functions called from Python, and large ones that several of these share. Their machine code is
-  kept on disk (``cache``), in a folder named by a hash of every module that kernels are made of (``sources``), so that
+  kept on disk, in a folder named by a hash of every module that kernels are made of (``records.sources``), so that
   an edit can never bring back stale code.
+
+``parts`` compiles all of them from numba's inner parts, which a new release may change. Where this numba lacks one, or the
+self-test fails, its own ``njit`` compiles them: the same bits, more than twice the time. ``compiler_notes`` says so.
+
+Machine code on disk is one file for each function and signature, whole or absent, and checked before it is used. numba's own
+cache trusts what it reads: an empty file ends the process, and a flipped bit becomes machine code. Here a file opens with
+the hash of the rest, and the rest names what it is of. What fails a check is removed and compiled anew. A file gets its name
+once it is whole, so that processes may share a folder. Where nothing can be written the run goes on without.
 """
 
 import contextlib
 import functools
-import gc
 import hashlib
+import inspect
+import logging
 import os
+import pickle
+import re
+import secrets
+import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import llvmlite
 import numba
 import numba.extending
 from llvmlite.binding import get_host_cpu_features
-from numba import njit
-from numba.core import event, types
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.registry import CPUDispatcher
-from numba.core.sigutils import normalize_signature
+from numba import njit, types
 
-from rbdyn.compiled.cache import EntryCache
-from rbdyn.compiled.parts import KernelCompiler, PartCompiler, SettledCompiler
-from rbdyn.compiled.sources import compiled_digest
+from rbdyn.records.digest import content_of, with_digest
+from rbdyn.records.sources import compiled_digest
 from rbdyn.records.user_cache import user_cache
 
-# No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
-# arrays happen to lie: only when every operation is rounded by itself do both give the same bits. And NaN stays a signal.
-OPTIONS: dict[str, Any] = {"error_model": "numpy"}
+# Set to anything in the environment, numba's own njit compiles.
+STOCK = "RBDYN_STOCK_NUMBA"
 # Doubles in the widest vector register. Loops that run over whole vectors leave no scalar rest; results do not depend on
 # it, for every lane is rounded by itself.
 VECTOR = 8 if get_host_cpu_features().get("avx512f") else 4
+# Code in a file depends on them.
+VERSIONS = (sys.implementation.cache_tag, llvmlite.__version__, numba.__version__)
+# Whether kernels stay Python: NUMBA_DISABLE_JIT.
+INTERPRETED: bool = getattr(numba.config, "DISABLE_JIT", False)
+
+
+@functools.cache
+def cache_folder() -> Path | None:
+    """Folder of the compiled code of exactly these kernels, made when it is first needed; None where there is no home."""
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(named).absolute() if named else user_cache()
+    digest = hashlib.sha256(repr((VERSIONS, compiled_digest())).encode())
+    return None if base is None else base / "rbdyn" / digest.hexdigest()[:16]
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file under another name and rename it. Raises OSError, and leaves no part of it."""
+    unfinished = path.with_name(f"{path.name}.{secrets.token_hex(8)}")
+    try:
+        unfinished.write_bytes(content)
+        if path.is_dir():
+            _remove(path)
+        unfinished.replace(path)
+    except BaseException:
+        _remove(unfinished)
+        raise
+
+
+def _remove(path: Path) -> None:
+    """Remove a file, or what stands in its place, as far as that is allowed."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with contextlib.suppress(OSError):
+            path.unlink()
+
+
+def working_parts() -> tuple[ModuleType | None, str]:
+    """The module ``parts`` where it works with this numba, else None and why."""
+    if os.environ.get(STOCK):
+        return None, f"{STOCK} is set"
+    try:
+        from rbdyn.compiled import parts
+
+        _test_once(parts.self_test)
+    except Exception as error:  # numba puts what goes wrong in a compiler into errors of its own
+        return None, f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+    return parts, ""
+
+
+def compiler_notes() -> tuple[str, ...]:
+    """A sentence where stock numba compiles, for a person who asks for details."""
+    sentence = (
+        f"stock numba {numba.__version__} compiles ({WHY_STOCK}): the results are the same, "
+        "the first run takes more than twice as long"
+    )
+    return (sentence,) if WHY_STOCK else ()
+
+
+def _test_once(self_test: Callable[[], None]) -> None:
+    """Run the self-test unless it passed before with the same versions and the same code."""
+    folder = cache_folder()
+    passed = None if folder is None else folder / "self-test-passed"
+    if INTERPRETED or (passed is not None and passed.exists()):
+        return
+    self_test()
+    if passed is not None:
+        with contextlib.suppress(OSError):
+            passed.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(passed, b"")
+
+
+PARTS, WHY_STOCK = working_parts()
+WAY = "parts" if PARTS else "stock"
+# No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
+# arrays happen to lie: only when every operation is rounded by itself do both give the same bits. And NaN stays a signal.
+OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 # Calls of compiled code return tuples through memory and carry an error status: small functions must vanish.
-WRAPPERS = ("no_cpython_wrapper", "no_cfunc_wrapper")
-# What is not said here would be as in the caller that came first.
-PART: dict[str, Any] = {
-    **OPTIONS,
-    **dict.fromkeys(WRAPPERS, True),
-    "pipeline_class": PartCompiler,
-    "forceinline": False,
-}
-INLINED: dict[str, Any] = {**PART, "forceinline": True}
-
-
-class Inner(CPUDispatcher):
-    """Machine code that compiled code calls: without the wrappers that Python would need, a fifth of the time of compiling.
-
-    A call from Python goes to a twin that has them, compiled when first called.
-    """
-
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Compile once for all values of an argument: numba would do so for each constant anew."""
-        plain = types.unliteral
-        return super().get_call_template([plain(one) for one in args], {name: plain(one) for name, one in kws.items()})
-
-    def compile(self: Any, sig: Any) -> Any:
-        """Compile without timing it for every caller that waits."""
-        args, result = normalize_signature(sig)
-        if args not in self.overloads:
-            told = event.trigger_event("numba:compile", data={"dispatcher": self})
-            with global_compiler_lock, self._compiling_counter, told:
-                self.add_overload(self._compiler.compile(args, result))
-        return self.overloads[args].entry_point
-
-    def __call__(self, *arguments: Any) -> Any:
-        """Call the twin."""
-        return self.twin(*arguments)
-
-    @functools.cached_property
-    def twin(self) -> Any:
-        """The same function, callable from Python."""
-        return numba.jit(**{**self.targetoptions, **dict.fromkeys(WRAPPERS, False), "pipeline_class": KernelCompiler})(
-            self.py_func
-        )
-
-
-class Entry(CPUDispatcher):
-    """Machine code that Python calls."""
-
-    def compile(self, sig: Any) -> Any:
-        """Compile without looking for garbage: nearly nothing is, and the search takes a tenth of the time."""
-        enabled = gc.isenabled()
-        gc.disable()
-        try:
-            return super().compile(sig)
-        finally:
-            if enabled:
-                gc.enable()
+INLINED: dict[str, Any] = {**OPTIONS, **(PARTS.INLINED if PARTS else {"forceinline": True})}
+SETTLED: dict[str, Any] = {**OPTIONS, **(PARTS.SETTLED if PARTS else {"forceinline": True})}
+ROUTINE: dict[str, Any] = {**OPTIONS, **(PARTS.ROUTINE if PARTS else {"forceinline": False})}
+ENTRY: dict[str, Any] = {**OPTIONS, **(PARTS.ENTRY if PARTS else {}), "nogil": True}
 
 
 def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     make: Any = njit  # whose stubs leave these options out
     compiled = make(**options)(function)
-    if isinstance(compiled, CPUDispatcher):  # a plain function where compiling is switched off
-        compiled.__class__ = Inner
-    return compiled
+    return PARTS.Inner.of(compiled) if PARTS and not INTERPRETED else compiled
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -110,12 +144,12 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 def settled_kernel(function: Callable[..., Any]) -> Any:
     """``kernel`` with a ``reordered_sum``: its order is chosen here, the same for all callers."""
-    return _inner(function, {**INLINED, "pipeline_class": SettledCompiler})
+    return _inner(function, SETTLED)
 
 
 def routine(function: Callable[..., Any]) -> Any:
     """Compile a longer function that is called from several places and not copied into them."""
-    return _inner(function, PART)
+    return _inner(function, ROUTINE)
 
 
 def law(declaration: Callable[..., Any]) -> Any:
@@ -211,9 +245,9 @@ def _choice(of: Any) -> Callable[..., Any]:
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls: releases the GIL and keeps its machine code on disk."""
     make: Any = njit
-    compiled = make(**OPTIONS, nogil=True, no_cfunc_wrapper=True, pipeline_class=KernelCompiler)(function)
-    if isinstance(compiled, CPUDispatcher):
-        compiled.__class__ = Entry
+    compiled = make(**ENTRY)(function)
+    if not INTERPRETED:
+        compiled = PARTS.Entry.of(compiled) if PARTS else compiled
         if (folder := cache_folder()) is not None:
             keep_code(compiled, folder)
     return compiled
@@ -221,14 +255,98 @@ def entry(function: Callable[..., Any]) -> Any:
 
 def keep_code(compiled: Any, folder: Path) -> None:
     """Let a dispatcher keep its machine code in a folder, and look for it there."""
-    with contextlib.suppress(OSError):  # without a source file nothing tells old code from new
+    try:
         compiled._cache = EntryCache(compiled.py_func, folder)
+    except OSError:
+        return  # without a source file nothing tells old code from new
+    except (ImportError, AttributeError) as error:
+        warn_once(
+            f"numba {numba.__version__} lacks what keeping compiled code needs ({error}): every run compiles anew"
+        )
+
+
+class EntryCache:
+    """Compiled code of one function; the methods are those that numba's dispatcher calls."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        """Raises OSError where the source file of the function cannot be read, ImportError or AttributeError where this numba
+        lacks what it takes."""
+        from numba.core.compiler import CompileResult
+        from numba.core.serialize import dumps
+
+        self.dumps, self.reduce, self.rebuild = dumps, CompileResult._reduce, CompileResult._rebuild
+        self.folder = folder
+        self.name = re.sub(r"[^\w.]", "", f"{function.__module__}.{function.__qualname__}")
+        cells = [cell.cell_contents for cell in function.__closure__ or ()]
+        source = Path(inspect.getfile(function)).read_bytes()
+        self.stamp = hashlib.sha256(source + dumps(cells)).hexdigest()
+
+    @property
+    def cache_path(self) -> str:
+        """The folder."""
+        return str(self.folder)
+
+    def path(self, signature: Any, magic: tuple[Any, ...]) -> Path:
+        """File of a signature on a processor, which ``magic`` names."""
+        text = repr((_text(signature), magic, WAY, VERSIONS))
+        return self.folder / f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:24]}.nbc"
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """The compiled code of a signature, None where there is none. What cannot be loaded is removed."""
+        context.refresh()
+        magic = context.codegen().magic_tuple()
+        path = self.path(signature, magic)
+        try:
+            return self.rebuild(context, *_payload(path.read_bytes(), self._key(signature, magic)))
+        except FileNotFoundError:
+            return None
+        except Exception:  # a pickle may raise any
+            _remove(path)
+            return None
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Write compiled code, or say once a process that it cannot be."""
+        if compiled.library.has_dynamic_globals:
+            return  # addresses of this process stand in the code
+        magic = compiled.codegen.magic_tuple()
+        content = self.dumps((self._key(signature, magic), self.reduce(compiled)))
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_whole(self.path(signature, magic), with_digest(content))
+        except OSError as error:
+            warn_once(
+                f"compiled code cannot be kept in {self.folder} ({error.strerror}): every run compiles anew; "
+                "let NUMBA_CACHE_DIR name another folder"
+            )
+
+    def flush(self) -> None:
+        """Remove all that is kept of the function."""
+        for path in self.folder.glob(f"{self.name}-*.nbc"):
+            _remove(path)
+
+    def _key(self, signature: Any, magic: tuple[Any, ...]) -> tuple[Any, ...]:
+        return self.name, self.stamp, signature, magic, WAY, VERSIONS
 
 
 @functools.cache
-def cache_folder() -> Path | None:
-    """Folder of the compiled code of exactly these kernels, made when it is first needed; None where there is no home."""
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    base = Path(named).absolute() if named else user_cache()
-    digest = hashlib.sha256((numba.__version__ + compiled_digest()).encode())
-    return None if base is None else base / "rbdyn" / digest.hexdigest()[:16]
+def warn_once(sentence: str) -> None:
+    """Say that compiled code is not kept; a handler of ``logging`` may take it elsewhere."""
+    logging.getLogger("rbdyn").warning(sentence)
+
+
+def _payload(data: bytes, key: tuple[Any, ...]) -> tuple[Any, ...]:
+    """What was compiled. Raises ValueError where the file is not as it was written, or of something else."""
+    written, compiled = pickle.loads(content_of(data))
+    if written != key:
+        raise ValueError("compiled code of something else")
+    return compiled
+
+
+def _text(of: Any) -> str:
+    """Types of a signature by names that tell apart named tuples of one name from different modules."""
+    if isinstance(of, types.NamedTuple | types.NamedUniTuple):
+        kind = of.instance_class
+        return f"{kind.__module__}.{kind.__qualname__}({', '.join(map(_text, of.types))})"
+    if isinstance(of, tuple):
+        return f"({', '.join(map(_text, of))})"
+    return str(of)

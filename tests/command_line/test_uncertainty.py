@@ -24,9 +24,9 @@ from doe.study.robust_front import fresh_rows
 from doe.study.uncertainty import OUTPUTS, find_uncertainty
 from doe.study_file import Study
 from doe.study_file.front_section import Robust
-from rbdyn.compiled.sources import code_behind
 from rbdyn.faults import InputError
 from rbdyn.records.kept import digest_of
+from rbdyn.records.sources import code_behind
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 

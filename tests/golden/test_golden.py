@@ -4,7 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from regenerate import CASES, FILE, computed, this_platform
+from regenerate import CASES, FILE, HERE, computed, this_platform
+from stock_numba import by_stock
 
 KEPT = json.loads(FILE.read_text(encoding="utf-8"))
 
@@ -32,3 +33,12 @@ def test_golden_numbers(case):
         assert found[50:] == pytest.approx(kept[50:], rel=1e-9, abs=1e-12)
     else:
         assert found == pytest.approx(kept, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["motion outer", "motion everything", "equilibrium angular_contact_ball"])
+def test_golden_stock_numba(case):
+    """Golden: compiled by stock numba, of which a name is gone that parts need, a scene has the bits of the usual way."""
+    stock = by_stock(str(HERE.parent / "helpers" / "stock_numba.py"), case)
+    assert "JITCodeLibrary" in stock["notes"][0]
+    assert stock["cases"][case] == computed(case)

@@ -13,7 +13,7 @@ import pytest
 from cached_entries import ARGUMENTS, FUNCTIONS, fill, fresh, line
 from numba import types
 
-from rbdyn.compiled import cache
+from rbdyn.compiled import kernel
 from rbdyn.compiled.kernel import entry
 from rbdyn.records.digest import content_of, with_digest
 
@@ -133,4 +133,4 @@ def test_unit_named_tuples_of_one_name_have_files_of_their_own():
 
     one, two = (namedtuple("Pair", "a b", module=module) for module in ("first", "second"))
     kinds = [types.NamedTuple((types.float64, types.int64), each) for each in (one, two)]
-    assert str(kinds[0]) == str(kinds[1]) and len({cache._text((kind,)) for kind in kinds}) == 2
+    assert str(kinds[0]) == str(kinds[1]) and len({kernel._text((kind,)) for kind in kinds}) == 2
