@@ -26,17 +26,8 @@ class Reference:
 
     @property
     def matrix(self) -> np.ndarray:
-        """Regressors in extended precision: a power of a printed number has more digits than a double."""
-        return extended(self.regressors)
-
-
-def extended(numbers: list) -> np.ndarray:
-    """Fractions as extended doubles, each rounded once where the machine has 64 bits of mantissa."""
-    if isinstance(numbers[0], list):
-        return np.array([extended(row) for row in numbers])
-    heads = [float(number) for number in numbers]
-    tails = [float(number - Fraction(head)) for number, head in zip(numbers, heads, strict=True)]
-    return np.array(heads, np.longdouble) + np.array(tails, np.longdouble)
+        """Regressors, each rounded once to a double."""
+        return np.array(self.regressors, float)
 
 
 def polynomial(x: list[Fraction], degree: int) -> list[list[Fraction]]:
