@@ -70,7 +70,8 @@ def scene_in(folder: Path) -> Path:
     """A scene with an unknown input, and a rig's table beside it."""
     path = folder / "scene.toml"
     path.write_text((EXAMPLES / "cylindrical_roller.toml").read_text("utf-8") + UNKNOWN, "utf-8")
-    rows = ["operation.inner_speed_rpm,power_loss_W", *(f"{speed},57" for speed in (9000, 12000, 24000))]
+    speeds = 9000, 12000, 24000
+    rows = ["operation.inner_speed_rpm,power_loss_W,power_loss_W_sd", *(f"{speed},57,5" for speed in speeds)]
     (folder / "rig.csv").write_text("\n".join(rows), "utf-8")
     return path
 
