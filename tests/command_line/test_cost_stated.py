@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 from contextlib import suppress
@@ -24,6 +25,7 @@ from doe.study.runs import STORE, run_design
 from doe.study.stages import study_stages
 from doe.study.status import study_status
 from doe.study_file import Study
+from rbdyn.cli.terminal import notice
 from rbdyn.dynamics import pace
 from rbdyn.dynamics import simulate as module
 from rbdyn.records import forecast
@@ -64,6 +66,16 @@ def test_rbdyn_states_what_is_left_on_standard_error(command, more, runs, eager)
     assert shown.returncode == 0 and json.loads(shown.stdout) and left(shown.stderr)[0] == (runs, runs)
     assert left(shown.stdout) == []
     assert in_process("rbdyn", *arguments, "-q").stderr == ""
+
+
+def test_a_sentence_is_written_at_once(monkeypatch):
+    """Standard error that is no terminal is buffered: what a run still takes is of no use once it has ended."""
+    written = io.BytesIO()
+    monkeypatch.setattr("sys.stderr", io.TextIOWrapper(io.BufferedWriter(written), "utf-8"))
+    say = notice(quiet=False)
+    assert say is not None and notice(quiet=True) is None
+    say("2 runs are left")
+    assert written.getvalue() == b"note: 2 runs are left\n"
 
 
 def scene_in(folder: Path) -> Path:
