@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from doe.arrays import Array, Whole
-from doe.running.agenda import AgendaKeeper
 from doe.running.failure import Failure
+from doe.running.keeper import AgendaKeeper
 from doe.running.runner import Engine, Ledger, Progress, Ran, RunResult, run_points
 from doe.running.store import Point, Store
 from doe.study_file import Study
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
 
 
+# What gets the key of a run under way, its share that is done, and the time that this took [s]; None where nobody asks.
+Hear = Callable[[str, float, float], None] | None
 # What simulates a run: its code decides whether a stored one is still good.
 SIMULATION = "rbdyn.dynamics.simulate"
 RESPONSES = ("impact_force_N", "whirl_deviation_ratio", "power_loss_W", "cage_speed_rpm", "cage_slip")
@@ -225,13 +227,17 @@ class Simulations:
         points = points_of(scenes, labels, factors)
         if self.scheduler is None:
             by_key = dict(zip((point.key for point in points), scenes, strict=True))
-            engine: Engine = partial(_in_threads, by_key, self.workers)
+            engine: Engine = partial(
+                _in_threads, by_key, self.workers, None if self.agenda is None else self.agenda.hear
+            )
         else:
             texts = {point.key: scene.model_dump_json() for point, scene in zip(points, scenes, strict=True)}
             engine = partial(_on_cluster, texts, self.scheduler)
         if self.agenda is not None:
             works = {point.key: work_of(scene) for point, scene in zip(points, scenes, strict=True)}
-            engine, progress = self.agenda.timed(engine, works), self.agenda.counting(works, progress)
+            growth = max((scene.numerics.extend_limit for scene in scenes if scene.extends), default=1.0)
+            engine = self.agenda.timed(engine, works, growth, self.scheduler is not None)
+            progress = self.agenda.counting(works, progress)
         outcomes = run_points(points, self.store, engine, progress, sound, self.retry)
         results = [_result(point, outcomes[point.key]) for point in points]
         for point, result in zip(points, results, strict=True):
@@ -271,9 +277,11 @@ def _result(point: Point, outcome: RunResult) -> SimulationResult | Failure:
     return SimulationResult.from_dict(outcome)
 
 
-def _in_threads(scenes: Mapping[str, Scene], workers: int | None, points: Sequence[Point], ledger: Ledger) -> None:
+def _in_threads(
+    scenes: Mapping[str, Scene], workers: int | None, hear: Hear, points: Sequence[Point], ledger: Ledger
+) -> None:
     """Engine of this process. The thread that runs a point claims it before and stores it after: what is claimed is under
-    way, and processes share the work."""
+    way, and processes share the work. ``hear`` gets how far each point under way is."""
     from rbdyn.dynamics.ensemble import Ended, Stop, run_all
     from rbdyn.dynamics.parameters.model import roller_bearing
     from rbdyn.dynamics.run import prepare
@@ -283,7 +291,7 @@ def _in_threads(scenes: Mapping[str, Scene], workers: int | None, points: Sequen
     def run(point: Point, inside: int) -> Ran | None:
         if not ledger.take([point]):
             return None
-        ran = attempt(scenes[point.key], stop, inside)
+        ran = attempt(scenes[point.key], stop, inside, None if hear is None else partial(_heard, hear, point.key))
         ledger.keep(point, ran)
         return ran
 
@@ -324,15 +332,29 @@ def _on_cluster(texts: Mapping[str, str], scheduler: str, points: Sequence[Point
     run_on_cluster(scheduler, work, tasks, end, lambda place: ledger.begin(taken[place]))
 
 
-def attempt(scene: Scene, stop: "Stop | None" = None, workers: int = 1) -> Ran:
-    """Simulate a scene in one thread, or so many; whatever is wrong with it is the cause of a failure."""
+def _heard(hear: Callable[[str, float, float], None], key: str, seconds: float, done: int, total: int) -> None:
+    hear(key, done / total, seconds)
+
+
+def attempt(
+    scene: Scene, stop: "Stop | None" = None, workers: int = 1, heard: Callable[[float, int, int], None] | None = None
+) -> Ran:
+    """Simulate a scene in one thread, or so many; whatever is wrong with it is the cause of a failure.
+
+    ``heard(seconds, done, total)`` is called whenever one more of its replicates has ended.
+    """
     from rbdyn.dynamics.ensemble import CancelledError
     from rbdyn.dynamics.simulate import simulate
 
     started = time.perf_counter()
     result, cause = None, None
+
+    def progress(done: int, total: int) -> None:
+        if heard is not None:
+            heard(time.perf_counter() - started, done, total)
+
     try:
-        result = simulate(scene, workers, None, stop, notice=None).as_dict()
+        result = simulate(scene, workers, progress, stop, notice=None).as_dict()
     except (CancelledError, MemoryError, OSError):
         raise
     except (RunError, InputError) as error:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from doe.commands.options import Quiet, Retry, Scheduler
-from doe.commands.steps import keeping_runs, noted_agenda, simulations_in
+from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, simulations_in
 from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
 from rbdyn.cli.terminal import guarded, hand_over, output_folder
 
@@ -42,9 +42,10 @@ def calibrate(
         asked = read_question(path, data, free or (), overrides or ())
         made_of = question_of(asked)
         output_folder(folder, "doe", path)
-        record = None if retry else stored(folder, made_of)
+        record, noted = None if retry else stored(folder, made_of), None
         if record is None:
-            with noted_agenda(folder, "doe calibrate", workers, inputs=content_digest(path)) as agenda:
+            inputs = content_digest(path)
+            with noted_agenda(folder, "doe calibrate", workers, quiet, inputs=inputs, asked=made_of) as agenda:
                 agenda.plan(calibration_stages(asked))
                 with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json, agenda) as simulations:
                     found = find_calibration(asked, simulations)
@@ -52,5 +53,7 @@ def calibrate(
                 record = record_of(found, made_of)
                 write(found, record, folder)
                 agenda.finish(files_of(record))
+                noted = agenda
         known = record
         hand_over(lambda: known, as_json, lambda: print_calibration(known), folder, files_of(known))
+        print_predicted(noted, as_json)

@@ -9,6 +9,8 @@ from doe.commands.options import Quiet
 from rbdyn.cli.options import Json, folder_option
 from rbdyn.cli.terminal import guarded, hand_over, print_table
 from rbdyn.faults import InputError
+from rbdyn.records.forecast import duration, span
+from rbdyn.records.words import counted
 
 
 def status(
@@ -46,12 +48,21 @@ def print_status(record: dict[str, Any], quiet: bool) -> None:
     read = "read from" if Path(record["store"]).exists() else "nothing has run yet in"
     print(f"{read} {record['store']}")
     if record["stages"]:
-        listed = ", ".join(_stage(each, record["status"] == "finished") for each in record["stages"])
-        print(f"{record['command']}: {listed}")
+        listed = ", ".join(_stage(each) for each in record["stages"])
+        print(f"{record['command']}, {counted(len(record['stages']), 'step')}: {listed}")
     if record["stopped_by"]:
         print(f"stopped by: {record['stopped_by']}")
-    left = "not known yet" if record["left_s"] is None else _span(record["left_s"])
-    print(f"time spent {_span(record['spent_s'])} of one thread; time left {left}")
+    left, runs = "not known yet", ""
+    if record["left_s"] is not None:
+        left = _span(record["left_s"])
+        left += f" ({span(*record['left_range_s'])})" if record["left_s"] else ""
+    if (most := record["runs_left"][1]) > 0:
+        fewest = record["runs_left"][0]
+        runs = f"; runs left {fewest if fewest == most else f'{fewest} to {most}'}"
+    print(f"time spent {_span(record['spent_s'])} of one thread{runs}; time left {left}")
+    if record["predicted_s"] is not None:
+        took = "" if record["took_s"] is None else f"; it took {duration(record['took_s'])}"
+        print(f"predicted for the last command from its start: {span(*record['predicted_s'])}{took}")
     if quiet:
         return
     other = {kind: number for kind, number in record["other"].items() if number}
@@ -67,11 +78,14 @@ def print_status(record: dict[str, Any], quiet: bool) -> None:
         print(f"failed: {', '.join(group['labels'])}: {group['cause']}")
 
 
-def _stage(stage: dict[str, Any], finished: bool) -> str:
-    if not stage["runs"]:
-        return str(stage["name"])
-    of = f"{stage['done']} of {stage['runs']}" if stage["done"] < stage["runs"] and not finished else f"{stage['done']}"
-    return f"{stage['name']} {of}"
+def _stage(stage: dict[str, Any]) -> str:
+    """A step and how far it is; a range where nobody knows yet how many runs it takes."""
+    name, done, runs, most = (stage[key] for key in ("name", "done", "runs", "most"))
+    if stage["state"] == "done":
+        return f"{name} {done}" if runs else f"{name} done"
+    if not most:
+        return name if stage["state"] == "to come" else f"{name} running"
+    return f"{name} {done} of {max(runs, done)}{f' to {most}' if most > max(runs, done) else ''}"
 
 
 def _span(seconds: float) -> str:

@@ -7,14 +7,14 @@ from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rbdyn.cli.terminal import keeping, output_folder, progress_bar
+from rbdyn.cli.terminal import keeping, notice, output_folder, progress_bar
 from rbdyn.faults import RunError
 
 if TYPE_CHECKING:
     from doe.clearance import Simulations
     from doe.pareto import ParetoFront
     from doe.response_surface import Surface
-    from doe.running.agenda import AgendaKeeper
+    from doe.running.keeper import AgendaKeeper
     from doe.running.runner import Progress
     from doe.study.direct import Direct
     from doe.study_file import Study
@@ -73,14 +73,31 @@ def simulations_in(
 
 @contextmanager
 def noted_agenda(
-    folder: Path, command: str, workers: int | None, options: Mapping[str, bool] | None = None, inputs: str = ""
+    folder: Path,
+    command: str,
+    workers: int | None,
+    quiet: bool,
+    options: Mapping[str, bool] | None = None,
+    inputs: str = "",
+    asked: str = "",
 ) -> "Iterator[AgendaKeeper]":
-    """The agenda of a command in the store of its folder, for ``doe status``; ``inputs``: the digest of what it answers."""
-    from doe.running.agenda import agenda_in
+    """The agenda of a command in the store of its folder, for ``doe status``, which states what is left unless ``quiet``;
+    ``inputs``: the digest of what it answers, ``asked``: also of what decides its runs."""
+    from doe.running.keeper import agenda_in
     from doe.study.runs import STORE
 
-    with agenda_in(folder / STORE, command, workers or os.cpu_count() or 1, options, inputs) as agenda:
+    threads = workers or os.cpu_count() or 1
+    with agenda_in(folder / STORE, command, threads, options, inputs, notice(quiet), asked) as agenda:
         yield agenda
+
+
+def print_predicted(agenda: "AgendaKeeper | None", as_json: bool) -> None:
+    """How long a command took compared with what was predicted; nothing where nothing was."""
+    from rbdyn.records.forecast import duration, span
+
+    noted = None if agenda is None or as_json else agenda.agenda
+    if noted is not None and noted.predicted is not None and noted.took_s is not None:
+        print(f"the whole command took {duration(noted.took_s)}; predicted were {span(*noted.predicted)}")
 
 
 class Effort(NamedTuple):

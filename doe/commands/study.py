@@ -7,7 +7,7 @@ from typing import Any
 import typer
 
 from doe.commands.options import Adaptive, Direct, Quiet, Retry, Robust, Scheduler, StudyOut, StudyPath, Verbose
-from doe.commands.steps import keeping_runs, noted_agenda, stages
+from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, stages
 from rbdyn.cli.options import Json, Workers
 from rbdyn.cli.terminal import FAILED, guarded, output_folder, print_json
 from rbdyn.faults import InputError
@@ -50,7 +50,7 @@ def study(
         from doe.study.whole import run_study
 
         options = {"direct": direct, "adaptive": adaptive, "robust": robust}
-        with noted_agenda(folder, "doe study", workers, options, digest) as agenda:
+        with noted_agenda(folder, "doe study", workers, quiet, options, digest) as agenda:
             with stages(quiet or as_json, workers) as progress:
                 bars = agenda.announced(progress)
                 outcome = run_study(loaded, folder, workers, bars, scheduler, retry, **options, agenda=agenda)
@@ -62,6 +62,7 @@ def study(
                 print_fit(outcome.surfaces, factors=loaded.factors)
             print_outcome(outcome, quiet)
             print(f"{outcome.cost['total_s']:.1f} s, of which design runs {outcome.cost['design_s']:.1f} s")
+            print_predicted(agenda, as_json)
             print(f"written to {folder}: {', '.join(record['files'])}")
         _leave_by(record, as_json)
 

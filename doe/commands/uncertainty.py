@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from doe.commands.options import Quiet, Retry, Scheduler
-from doe.commands.steps import keeping_runs, noted_agenda, simulations_in
+from doe.commands.steps import keeping_runs, noted_agenda, print_predicted, simulations_in
 from rbdyn.cli.options import Json, Set, Workers, folder_option, valued
 from rbdyn.cli.terminal import guarded, hand_over, output_folder
 from rbdyn.faults import refuse
@@ -35,14 +35,15 @@ def uncertainty(
         from doe.report.steps.uncertainty import print_uncertainty, record_of, write
         from doe.running.agenda import ANSWER
         from doe.study.stages_unknown import uncertainty_stages
-        from doe.study.status import content_digest
+        from doe.study.status import content_digest, runs_digest
         from doe.study.uncertainty import find_uncertainty
         from rbdyn.dynamics.target import target_of
 
         refuse([] if points is None else no_power_of_two("--points ", points))
         accuracy = target_of(target)
         output_folder(folder, "doe", path)
-        with noted_agenda(folder, "doe uncertainty", workers, inputs=content_digest(path)) as agenda:
+        inputs, runs = content_digest(path), runs_digest(path, overrides or ())
+        with noted_agenda(folder, "doe uncertainty", workers, quiet, inputs=inputs, asked=runs) as agenda:
             agenda.plan(uncertainty_stages(path, overrides or (), points))
             with simulations_in(folder, path, workers, scheduler, retry, quiet or as_json, agenda) as simulations:
                 found = find_uncertainty(path, overrides or (), simulations, points, accuracy)
@@ -50,3 +51,4 @@ def uncertainty(
             files = write(found, folder)
             agenda.finish(files)
         hand_over(lambda: record_of(found), as_json, lambda: print_uncertainty(found), folder, files)
+        print_predicted(agenda, as_json)

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from doe.study_file import Study
-from rbdyn.records.sources import source_digest
 from rbdyn.faults import InputError, read_toml
 from rbdyn.records.kept import digest_of, intact
+from rbdyn.records.sources import source_digest
 from rbdyn.result import read_json, versions
 
 # What simulates, what judges, and what tells it.

@@ -10,8 +10,8 @@ import numpy as np
 from doe import clearance
 from doe.arrays import Array, Whole
 from doe.designs import Design
-from doe.running.agenda import AgendaKeeper
 from doe.running.failure import Failure, alike, sentence
+from doe.running.keeper import AgendaKeeper
 from doe.running.runner import Progress
 from doe.running.store import Store
 from doe.study.design import actual_of, check_runs, design_of, terms_of

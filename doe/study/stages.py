@@ -9,15 +9,15 @@ from doe.study.runs import ordered_runs
 from doe.study_file import Study
 from doe.study_file.front_section import Front
 
-# Wall time [s] that surfaces with their front take about.
-FRONT_S = 6.0
-DESIGN, FRONT = "design runs", "front"
+# Wall time [s] that surfaces with their front take about, and the pick's tolerances with the chains.
+FRONT_S, TOLERANCES_S = 6.0, 1.0
+DESIGN, FRONT, TOLERANCES = "design runs", "front", "tolerances"
 
 
 def study_stages(study: Study, direct: bool = False, adaptive: bool = False, robust: bool = False) -> list[Stage]:
-    """Stages of ``doe study`` with these options. Raises InputError where the study is impossible.
+    """Stages of ``doe study`` with these options, to the end. Raises InputError where the study is impossible.
 
-    Further points, where a limit is not kept, are not among them: nobody knows whether they are needed.
+    Further points, where a limit is not kept, are among the most that a stage may run: nobody knows whether they are needed.
     """
     works = {
         key: work
@@ -27,20 +27,34 @@ def study_stages(study: Study, direct: bool = False, adaptive: bool = False, rob
     stages = [Stage(DESIGN, (DESIGN,), len(works), sum(works.values())), Stage(FRONT, besides_s=FRONT_S)]
     if direct:
         (scene,) = clearance.direct_scenes(study, study.baseline[None], 0)
-        stages.append(Stage.of("direct front", study.file.direct.evaluations, work_of(scene)))
+        evaluations = study.file.direct.evaluations
+        # Then as many fresh runs of the surfaces' front as the search makes of its own.
+        most = round(evaluations * (1.0 + study.file.direct.resample))
+        stages.append(Stage.of("direct front", evaluations, work_of(scene), most=most))
     if adaptive:
+        from doe.adaptive.search import FRESH
+
         usual = clearance.design_scenes(study, study.baseline[None])[0].numerics.replicates
         (scene,) = clearance.adaptive_scenes(study, study.baseline[None], [usual], 0)
-        stages.append(Stage.of("adaptive front", max(study.file.adaptive.budget - len(works), 0), work_of(scene)))
+        settings, runs = study.file.adaptive, max(study.file.adaptive.budget - len(works), 0)
+        # A search that gains nothing more stops after a batch and its fresh runs.
+        fewest = min(settings.batch + round(FRESH * settings.budget), runs)
+        stages.append(Stage.of("adaptive front", runs, work_of(scene), fewest=fewest))
     # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
     rules = len(get_args(Front.model_fields["pick"].annotation))
     points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * (direct or adaptive)
     one = work_of(clearance.confirmation_scene(study, study.baseline))
-    stages.append(Stage.of("confirmation", points, one, "confirmation", "beyond the region"))
+    limited = any(each.lower is not None or each.upper is not None for each in study.file.response)
+    tries = study.file.confirmation.tries - 1 if limited else 0
+    most = points + tries + (len(study.factors) if direct or adaptive else 0)
+    # Picks by several rules may be one point of the drawing.
+    stages.append(Stage.of("confirmation", points, one, "confirmation", "beyond the region", fewest=2, most=most))
     if robust or clearance.declares_unknowns(study):
         from doe.study.stages_unknown import robust_stage
 
         stages.append(robust_stage(study))
+    if study.file.tolerances is not None or study.file.chain:
+        stages.append(Stage(TOLERANCES, besides_s=TOLERANCES_S))
     return [*stages, Stage(ANSWER, besides_s=ANSWER_S)]
 
 

@@ -10,25 +10,32 @@ from doe.study.calibration_question import Question, cases_of
 from doe.study.input_sets import Case, read_case
 from doe.study.robust import case_of_study
 from doe.study.robust_front import CONFIRMED, POINTS, fresh_rows
-from doe.study.uncertainty import OUTPUTS
+from doe.study.uncertainty import MOST, MOST_EFFORT, OUTPUTS
 from doe.study_file import Study
 from doe.unknown import inputs
 from doe.unknown.calibration import TRIED, sets_a_wave
 from rbdyn.scene import Scene
 
+# Wall time [s] that the emulators of a robust judgement take about.
+ROBUST_S = 10.0
+
 
 def robust_stage(study: Study) -> Stage:
     """Input sets of the baseline and the pick, further replicates, a robust front and the simulations of its points."""
     settings, case = study.file.robust, case_of_study(study)
-    runs = round(2 * settings.points * (1.0 + settings.settle))
+    fewest, runs = 2 * settings.points, round(2 * settings.points * (1.0 + settings.settle))
     if settings.front != "none":
         more = int((fresh_rows(settings.points) >= settings.points).sum())
+        fewest += settings.points
         runs += settings.points + POINTS * CONFIRMED + 2 * more
-    return Stage.of("robust", runs, _work_of_a_set(case), "input sets", "runs of the robust front")
+    titles = "input sets", "runs of the robust front"
+    stage = Stage.of("robust", runs, _work_of_a_set(case), *titles, fewest=fewest)
+    return replace(stage, besides_s=ROBUST_S)
 
 
 def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None) -> list[Stage]:
-    """Stages of ``doe uncertainty`` with so many input sets, as the scene says where left out; they may be doubled later.
+    """Stages of ``doe uncertainty`` with so many input sets, as the scene says where left out; they and their replicates may be
+    doubled later.
 
     Raises InputError.
     """
@@ -36,7 +43,7 @@ def uncertainty_stages(path: Path, overrides: Sequence[str], points: int | None)
     count = case.uncertain.points if points is None else points
     return [
         Stage.of("as the scene says", 1, work_of(case.scene)),
-        Stage.of("input sets", count, _work_of_a_set(case)),
+        Stage.of("input sets", count, _work_of_a_set(case), most=MOST_EFFORT * max(count, MOST)),
         Stage(ANSWER, besides_s=ANSWER_S),
     ]
 
@@ -46,12 +53,13 @@ def calibration_stages(question: Question) -> list[Stage]:
     case, sought = question.case, question.sought
     conditions, one = len(cases_of(case, question.rig)), _work_of_a_set(case)
     screened = _screening_runs(replace(case, every=sought))
-    sets = case.scene.calibrate.waves * sets_a_wave(min(len(sought), case.uncertain.inputs))
+    waves, sets = case.scene.calibrate.waves, sets_a_wave(min(len(sought), case.uncertain.inputs)) * conditions
     return [
         *([Stage.of("screening", screened, one)] if screened else []),
         Stage.of("as the scene says", conditions, one),
-        Stage.of("waves", sets * conditions, one, "wave"),
-        Stage.of("posterior", TRIED * conditions, one),
+        Stage.of("waves", waves * sets, one, "wave", fewest=sets),
+        # Where emulators miss the posterior, it is tried once more.
+        Stage.of("posterior", TRIED * conditions, one, most=2 * TRIED * conditions),
         Stage(ANSWER, besides_s=ANSWER_S),
     ]
 

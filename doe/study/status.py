@@ -5,7 +5,7 @@ What is finished is told by the answer's files alone; whether something runs, by
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import product
 from pathlib import Path
@@ -15,6 +15,7 @@ from doe import clearance
 from doe.clearance import points_of
 from doe.running.agenda import Agenda, Stage, agendas_of
 from doe.running.failure import Failure, grouped
+from doe.running.outlook import forecast_of
 from doe.running.owner import folders_of
 from doe.running.store import Claim, EndedRun, Point, RunResult, Store
 from doe.study.finished import finished, inputs_digest
@@ -22,7 +23,7 @@ from doe.study.runs import STORE, ordered_runs
 from doe.study.stages import DESIGN, design_works, study_stages
 from doe.study_file import Study
 from rbdyn.faults import InputError, read_toml
-from rbdyn.records.kept import digest_of
+from rbdyn.records.kept import code_version, digest_of
 
 FORMAT = "doe.status/1"
 # Folders of commands on a scene, where none is named.
@@ -79,12 +80,12 @@ def study_status(study: Study, folder: Path) -> dict[str, Any]:
     if agenda is None or not agenda.stages or agenda.inputs != inputs_digest(study, **options):
         # Nothing was planned for the study as it stands now.
         fresh = Agenda("doe study", options, "", agenda.threads if agenda else 1, study_stages(study, **options))
-        fresh.work, fresh.seconds = (agenda.work, agenda.seconds) if agenda else (0.0, 0.0)
-        agenda = fresh
+        agenda = replace(fresh, measured=agenda.measured, crowd=agenda.crowd) if agenda else fresh
     _count_design(agenda.stages, works, content.outcomes)
-    if not agenda.work:
-        rows = [(run.seconds, works[run.key]) for run in content.ended if run.seconds is not None and run.key in works]
-        agenda.seconds, agenda.work = (float(sum(column)) for column in zip(*rows, strict=True)) if rows else (0.0, 0.0)
+    if not agenda.measured.number:
+        rows = [(works[run.key], run.seconds) for run in content.ended if run.seconds is not None and run.key in works]
+        for work, seconds in rows:
+            agenda.measured = agenda.measured.plus(work, seconds)
     keys = set(works)
     failures = [outcome for outcome in content.outcomes.values() if isinstance(outcome, Failure)]
     running = [claim for claim in content.running if claim.key in keys]
@@ -151,6 +152,11 @@ def content_digest(path: Path) -> str:
     return digest_of(path.read_bytes())
 
 
+def runs_digest(path: Path, overrides: Sequence[str]) -> str:
+    """Digest of what decides the runs of a scene's file: its content, keys that are replaced, and the code. Raises OSError."""
+    return digest_of("\n".join([content_digest(path), *overrides, code_version(clearance.SIMULATION)]))
+
+
 def _answered(study: Study, folder: Path) -> bool:
     """Whether the folder holds the answer to the study with any options."""
     for direct, adaptive, robust in product((False, True), repeat=3):
@@ -180,7 +186,10 @@ def _record(
     # A live process whose answer is written has nothing left to run.
     alive = any(each.files is None for each in content.alive) or bool(content.claims and not answered)
     answered = answered and not alive
-    stage = agenda.stage
+    stage, left_s = agenda.stage, 0.0 if answered else _left_s(agenda, content)
+    forecast = None if answered else forecast_of(agenda, _threads(agenda, content), agenda.measured)
+    low, high = (0.0, 0.0) if forecast is None else forecast.seconds
+    runs = (0, 0) if answered else agenda.runs_left
     return {
         "format": FORMAT,
         "status": "running" if alive else "finished" if answered else "unfinished",
@@ -189,14 +198,28 @@ def _record(
         "command": " ".join([agenda.command, *(f"--{name}" for name, given in agenda.options.items() if given)]),
         "stage": None if answered or stage is None else stage.name,
         "stopped_by": "" if answered or alive else agenda.fault,
-        "stages": [{"name": each.name, "done": each.done, "runs": each.runs} for each in agenda.stages],
+        "stages": [_stage(agenda, place, answered) for place in range(len(agenda.stages))],
         "points": dict(counts),
         "failures": grouped(failures),
         "running": [_running(claim) for claim in content.running],
         "other": dict(other),
         "spent_s": sum(run.seconds or 0.0 for run in content.ended),
-        "left_s": 0.0 if answered else _left_s(agenda, content),
+        "left_s": left_s,
+        "left_range_s": None if left_s is None else [min(left_s, low), max(left_s, high)],
+        "runs_left": list(runs),
+        "predicted_s": None if agenda.predicted is None else list(agenda.predicted),
+        "took_s": agenda.took_s,
     }
+
+
+def _stage(agenda: Agenda, place: int, answered: bool) -> dict[str, Any]:
+    """A stage as ``doe status`` tells it; ``state``: done, running (or where a command that is gone ended) or to come."""
+    stage = agenda.stages[place]
+    past = answered or place < agenda.place
+    state = "done" if past else "to come" if agenda.stage is None or place > agenda.place else "running"
+    done = stage.done if past else max(stage.done, stage.stored)
+    most = done if past else done + stage.left[1]
+    return {"name": stage.name, "state": state, "done": done, "runs": stage.runs, "most": most}
 
 
 def _running(claim: Claim) -> dict[str, Any]:
@@ -216,14 +239,14 @@ def _left_s(agenda: Agenda, content: Content) -> float | None:
 
     A live process goes on with as many runs at once as it has had in the stage, another with its threads.
     """
-    if not agenda.work:
+    whole = agenda.measured.pace
+    if whole is None:
         return None
-    now, left_s = time.time(), 0.0
-    threads = max(sum(each.threads for each in content.alive), 1) if content.alive else agenda.threads
+    now, left_s, threads = time.time(), 0.0, _threads(agenda, content)
     for place, (stage, work) in enumerate(agenda.left()):
         begun = stage.since is not None and place == 0
         measured = begun and stage.measured_work > 0.0
-        pace = stage.seconds / stage.measured_work if measured else agenda.seconds / agenda.work
+        pace = stage.seconds / stage.measured_work if measured else whole
         seconds, at_once = pace * max(work, 0.0), float(threads)
         if begun and content.alive and stage.since is not None:
             at_once = _at_once(stage.since, content, now) or at_once
@@ -234,6 +257,11 @@ def _left_s(agenda: Agenda, content: Content) -> float | None:
             besides_s = stage.besides_s
         left_s += max(seconds, 0.0) / at_once + besides_s
     return max(left_s, LEAST_S)
+
+
+def _threads(agenda: Agenda, content: Content) -> int:
+    """Threads of the live processes, of the last one where none lives."""
+    return max(sum(each.threads for each in content.alive), 1) if content.alive else agenda.threads
 
 
 def _at_once(since: float, content: Content, now: float) -> float | None:

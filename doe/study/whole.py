@@ -13,8 +13,9 @@ from doe.dimension_chain import ChainResult
 from doe.pareto import ParetoFront
 from doe.pareto.tolerance import WidestTolerances
 from doe.response_surface import Surface
-from doe.running.agenda import ANSWER, AgendaKeeper, Stage
+from doe.running.agenda import ANSWER, Stage
 from doe.running.failure import Failure
+from doe.running.keeper import AgendaKeeper
 from doe.running.runner import Progress
 from doe.running.store import Store
 from doe.study.adaptive import Adaptive, Searched, advice, find_adaptive
@@ -36,7 +37,7 @@ from doe.study.reference import Beside, beside
 from doe.study.robust import Robust, check_robust, judge, robust_advice
 from doe.study.runs import STORE, Runs, run_design
 from doe.study.searched_draws import draws_about
-from doe.study.stages import FRONT, study_stages
+from doe.study.stages import FRONT, TOLERANCES, study_stages
 from doe.study.surfaces import fit_surfaces, with_rivals
 from doe.study.widest import widest_of
 from doe.study_file import Study
@@ -175,9 +176,10 @@ def run_study(
         edge = _edge(study, surfaces, chosen, searched, simulations)
         clock.lap("confirmation_s")
         judged = judge(study, pick, simulations) if robust else None
-        clock.lap("robust_s", ANSWER)
+        clock.lap("robust_s", TOLERANCES)
     tolerances = _tolerances(study, surfaces, searched, confirmed)
     chains, notes = solve_chains(study, pick, tolerances)
+    clock.enter(ANSWER)
     reference = reference and reference.only(runs.places)
     lost = [failure for each in (searched, judged) if each for failure in each.failures]
     return StudyResult(
@@ -281,8 +283,12 @@ class _Clock:
         """The stage ``name`` ends here, and the ``following`` one of the agenda begins."""
         now = time.perf_counter()
         self._laps[name], self._last = now - self._last, now
-        if following and self._agenda is not None:
-            self._agenda.enter(following)
+        self.enter(following)
+
+    def enter(self, stage: str) -> None:
+        """The ``stage`` of the agenda begins, if it is among those planned."""
+        if self._agenda is not None and stage in [each.name for each in self._agenda.agenda.stages]:
+            self._agenda.enter(stage)
 
     def total(self) -> dict[str, float]:
         """All stages and the whole."""

@@ -13,6 +13,7 @@ from rbdyn.cli.keys import command as keys
 from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
 from rbdyn.records.cells import save_table
+from rbdyn.records.forecast import span
 from rbdyn.records.words import counted, error_alone
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def simulate(
         from rbdyn.dynamics.simulate import simulate as run_scene
 
         with terminal.progress_bar("simulating", quiet or as_json, workers) as progress:
-            result = run_scene(loaded, workers, progress, target=aim, notice=terminal.notice(quiet or as_json))
+            result = run_scene(loaded, workers, progress, target=aim, notice=terminal.notice(quiet))
         loaded = type(loaded).from_dict(result.scene)
         files = _write(loaded, result, folder) if folder else []
         terminal.hand_over(result.as_dict, as_json, lambda: _print(result, quiet, verbose), folder, files)
@@ -180,8 +181,7 @@ def slip_map(
         axes = axis_values(speed, "--speed"), axis_values(load, "--load")
         points = folder / study.POINTS if folder else None
         with terminal.keeping(points), terminal.progress_bar("mapping", quiet or as_json, workers) as progress:
-            say = terminal.notice(quiet or as_json)
-            mapped = study.slip_map(loaded, *axes, workers, progress, points, say)
+            mapped = study.slip_map(loaded, *axes, workers, progress, points, terminal.notice(quiet))
         files = _write_map(mapped, folder) if folder else []
         terminal.hand_over(mapped.as_dict, as_json, lambda: _print_map(mapped), folder, files)
         for point in mapped.failed:
@@ -273,7 +273,9 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         _print_target(result.target)
     loads = f"{result.max_inner_load:.0f} N (inner), {result.max_outer_load:.0f} N (outer)"
     runs = f"{counted(result.replicates, 'replicate')}, seed {result.seed}"
-    took = f"{result.cost['wall_s']:.2f} s, {result.cost['compile_s']:.1f} s to load or compile"
+    took = (
+        f"{result.cost['wall_s']:.2f} s{_predicted(result.cost)}, {result.cost['compile_s']:.1f} s to load or compile"
+    )
     print(f"race loads up to {loads}; power balance closes to {100.0 * result.power_gap:.2g} %; {runs}; {took}")
     for race, at in result.races.items():
         film = f", film {at['central_film_um']:.2g} um, lambda {at['lambda_ratio']:.2g}" if "lambda_ratio" in at else ""
@@ -294,6 +296,13 @@ def _print(result: "SimulationResult", quiet: bool, verbose: bool) -> None:
         terminal.print_table(f"power lost; the power balance closes to {gap:.2g} W", ("term", "W"), terms)
         terminal.print_table("cost", ("", ""), [(key, f"{value:.6g}") for key, value in result.cost.items()])
     terminal.print_notes([*result.notes, *(compiler_notes() if verbose else ())], quiet)
+
+
+def _predicted(cost: dict[str, float]) -> str:
+    """What was stated of the wall time on the way, if anything."""
+    if "predicted_most_s" not in cost:
+        return ""
+    return f" (predicted: {span(cost['predicted_least_s'], cost['predicted_most_s'])})"
 
 
 def _print_clearances(clearance: dict[str, Any]) -> None:

@@ -19,7 +19,7 @@ from rbdyn.scene import Scene
 if TYPE_CHECKING:
     from rbdyn.dynamics.motion.history import History
     from rbdyn.dynamics.motion.orbit import Largest, Race, Spectrum
-    from rbdyn.dynamics.pace import Notice
+    from rbdyn.records.forecast import Notice
 
 FORMAT = "rbdyn.orbit/1"
 SHOWN_TURNS = 20.0

@@ -140,8 +140,8 @@ def progress_bar(title: str, quiet: bool, workers: int | None = 1) -> Iterator[C
 
 
 def notice(quiet: bool) -> Callable[[str], None] | None:
-    """What prints a sentence while a command runs, to standard error; nothing where it is to be quiet."""
-    return None if quiet else lambda sentence: print(f"note: {sentence}", file=sys.stderr)
+    """What prints a sentence while a command runs, to standard error, at once; nothing where it is to be quiet."""
+    return None if quiet else lambda sentence: print(f"note: {sentence}", file=sys.stderr, flush=True)
 
 
 def print_notes(notes: Iterable[str], quiet: bool) -> None:

@@ -1,18 +1,21 @@
-"""How long runs take at their pace: stated early where that is long. No figure of a run depends on it."""
+"""How long the runs of a scene take, as those under way show it. No figure of a run depends on it."""
 
+import itertools
 import logging
 import math
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from rbdyn.records.words import counted
+from rbdyn.records.forecast import LONG_S, Forecast, Measured, Notice, duration
 from rbdyn.scene import Scene
 
-# What is done with a sentence on the time that runs take; None where nobody asks.
-Notice = Callable[[str], object] | None
-# A run is looked at after this time [s] and then at every doubling; what all runs take is stated beyond LONG_S.
-FIRST_LOOK_S, LONG_S = 10.0, 300.0
+# Runs are looked at once they have been under way for this time [s], then at every doubling of it; the budget of steps of
+# one run after this time of its own [s].
+FIRST_LOOK_S, BUDGET_LOOK_S = 1.0, 10.0
+# Scatter of the time of a shaft turn between runs of one scene, and between scenes of other speeds and loads.
+ALIKE, UNLIKE = 0.1, 0.4
+# A companion takes from so many to so many times the time of a run, by its tolerance and its longest step.
+COMPANION = (0.6, 1.5)
 
 
 def log(sentence: str) -> None:
@@ -22,9 +25,10 @@ def log(sentence: str) -> None:
 
 @dataclass
 class Pace:
-    """Time that ``runs`` equal runs of so many shaft turns take on so many threads, as those under way show it.
+    """Time that ``runs`` of so many shaft turns, then ``companions`` of them, take on so many threads, as those under way show it.
 
-    ``growth``: how many times as long they may become.
+    ``growth``: how many times as long they may become; ``scatter``: relative standard deviation of a turn's time between runs.
+    ``predicted``: time of all of it [s], the least and the most, once that was stated.
     """
 
     scene: Scene
@@ -33,51 +37,72 @@ class Pace:
     turns: float
     threads: int
     growth: float = 1.0
+    companions: int = 0
+    scatter: float = ALIKE
+    predicted: tuple[float, float] | None = field(default=None, init=False)
+    _under_way: dict[int, tuple[float, float]] = field(default_factory=dict, init=False)
+    _tickets: "itertools.count[int]" = field(default_factory=itertools.count, init=False)
     _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
     def __post_init__(self) -> None:
-        self._look_s, self._stated_s = FIRST_LOOK_S, 0.5 * LONG_S
+        self._look_s, self._stated_s, self._short_of_steps = FIRST_LOOK_S, 0.0, False
 
-    def look(self, spent_s: float, turns: float, steps: int, budget: int) -> None:
+    def enter(self) -> int:
+        """A number by which a run that begins is known."""
+        return next(self._tickets)
+
+    def look(self, run: int, spent_s: float, turns: float, steps: int, budget: int) -> None:
         """Look at a run that took so many seconds for so many shaft turns and steps, of which it has a budget.
 
-        States the time of all runs where it is long, and again where it proves to be twice as long.
+        States what is left of all runs once, and again where they prove to take longer than the most that was stated.
         """
-        if self.notice is None or spent_s < self._look_s or turns <= 0.0:
+        if self.notice is None or turns <= 0.0:
             return
+        sentences = []
         with self._lock:
-            if spent_s < self._look_s:
-                return
-            self._look_s = 2.0 * spent_s
-            run_s, budget_s = spent_s / turns * self.turns, spent_s / steps * budget
-            rounds = math.ceil(self.runs / self.threads)
-            whole_s = rounds * min(run_s, budget_s)
-            if whole_s < 2.0 * self._stated_s:
-                return
-            self._stated_s = whole_s
-            sentence = self._sentence(whole_s, spent_s / turns, budget_s if budget_s < run_s else None)
-        self.notice(sentence)
+            self._under_way[run] = spent_s, turns
+            spent = sum(seconds for seconds, _ in self._under_way.values())
+            elapsed_s = spent / min(len(self._under_way), self.threads)
+            if elapsed_s >= self._look_s:
+                self._look_s = 2.0 * elapsed_s
+                forecast, low_s = self._forecast(spent, elapsed_s)
+                if forecast.notable and low_s > self._stated_s:
+                    low, high = (elapsed_s + each for each in forecast.seconds)
+                    self.predicted = self.predicted or (low, max(high, elapsed_s + forecast.longest_s))
+                    self._stated_s = max(high, elapsed_s + forecast.longest_s)
+                    sentences.append(forecast.sentence)
+            budget_s = spent_s / steps * budget
+            short = spent_s >= BUDGET_LOOK_S and budget_s < spent_s / turns * self.turns
+            if short and budget_s >= LONG_S and not self._short_of_steps:
+                self._short_of_steps = True
+                sentences.append(self._budget_sentence(budget_s))
+        for sentence in sentences:
+            self.notice(sentence)
 
-    def _sentence(self, whole_s: float, turn_s: float, budget_s: float | None) -> str:
-        if budget_s is not None:
-            per_turn = self.scene.numerics.step_budget_per_turn
-            spent = f"after about {duration(budget_s)} (numerics.step_budget_per_turn = {per_turn})"
-            return f"runs will use up their budget of steps {spent} at this pace; {self._remedy}"
-        runs = f"{counted(self.runs, 'run')} of {counted(self.turns, 'shaft turn')} at {duration(turn_s)} each"
-        longer = f", up to {self.growth:g} times that where figures drift" if self.growth > 1.0 else ""
-        return f"all runs take about {duration(whole_s)} at this pace: {runs}, {self.threads} at once{longer}; {self._remedy}"
+    def _forecast(self, spent: float, elapsed_s: float) -> tuple[Forecast, float]:
+        """What is left, and the least time of all runs [s], those that have ended included."""
+        counts, each = self.runs + self.companions, self._under_way.values()
+        done = sum(turns for _, turns in each)
+        ended = sum(turns >= self.turns * (1.0 - 1e-9) for _, turns in each)
+        left, measured = max(counts - ended, 0), Measured(len(each), done, spent)
+        first, rest = (math.ceil(number / self.threads) for number in (self.runs, self.companions))
+        low, high = (
+            factor * (measured.pace or 0.0) * self.turns * (first + companion * rest)
+            for factor, companion in zip(measured.factors(left, self.scatter), COMPANION, strict=True)
+        )
+        seconds = max(low - elapsed_s, 0.0), max(high - elapsed_s, 0.0)
+        longest_s = self.growth * high - elapsed_s if self.growth > 1.0 else 0.0
+        turns = max(counts * self.turns - done, 0.0)
+        return Forecast((left, left), (turns, turns), seconds, self.threads, longest_s, remedy=self._remedy), low
+
+    def _budget_sentence(self, budget_s: float) -> str:
+        per_turn = self.scene.numerics.step_budget_per_turn
+        spent = f"after about {duration(budget_s)} (numerics.step_budget_per_turn = {per_turn})"
+        return f"runs will use up their budget of steps {spent} at this pace; {self._remedy} to shorten them"
 
     @property
     def _remedy(self) -> str:
         numerics = self.scene.numerics
         shorter = ["model.slices"] if self.scene.slices > 1 else []
         shorter += ["numerics.turns", *(["numerics.replicates"] if numerics.replicates > 1 else [])]
-        return f"reduce {' or '.join([', '.join(shorter[:-1]), shorter[-1]] if shorter[1:] else shorter)} to shorten it"
-
-
-def duration(seconds: float) -> str:
-    """A time in the unit that suits it, to two digits."""
-    for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0)):
-        if seconds >= 2.0 * size:
-            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
-    return f"{seconds:.2g} s"
+        return f"reduce {' or '.join([', '.join(shorter[:-1]), shorter[-1]] if shorter[1:] else shorter)}"

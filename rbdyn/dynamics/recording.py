@@ -25,12 +25,13 @@ from rbdyn.dynamics.integrators.records import (
     SPEEDS,
     SQUARES,
 )
-from rbdyn.dynamics.pace import Notice, Pace
+from rbdyn.dynamics.pace import Pace
 from rbdyn.dynamics.parameters.scales import scales
 from rbdyn.dynamics.relaxation import MOTIONS, Linearised
 from rbdyn.dynamics.run import Run, with_numerics
 from rbdyn.dynamics.statistics.filtered_whirl import filtered_speed, speed_sums
 from rbdyn.dynamics.statistics.metrics import Replicate
+from rbdyn.records.forecast import Notice
 from rbdyn.scene import Scene
 from rbdyn.scene.laws import MOST_OF_A_RUN
 

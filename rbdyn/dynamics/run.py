@@ -30,7 +30,8 @@ class Run:
     """One replicate under way: parameters, integrator memory and where it stands.
 
     ``longest_step`` [s] bounds the steps. ``method``: "auto" until its first step, where the scene
-    leaves it open; ``spent_s``: time that its steps took; ``pace``: what states the time that this and its like take.
+    leaves it open; ``spent_s``: time that its steps took; ``pace``: what states the time that this and its like take,
+    by whose number, the ``ticket``, it knows the run.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class Run:
     ) -> None:
         self.scene, self.bearing, self.replicate, self.stop = scene, bearing, replicate, stop
         self.pace, self.spent_s = pace, 0.0
+        self.ticket = 0 if pace is None else pace.enter()
         self.rtol, self.longest_step = rtol, longest_step
         self.layout = layout_of(scene)
         seeds = np.random.SeedSequence(scene.numerics.seed, spawn_key=(replicate,))
@@ -97,7 +99,8 @@ class Run:
             status = list(Status)[advance(self.bearing, short, self.carry, self.tally, end, self.sample_step)]
             self.spent_s = time.perf_counter() - started
             if self.pace is not None:
-                self.pace.look(self.spent_s, self.carry.clock[at.NOW] / self.scene.turn_s, self.steps, budget)
+                turned = self.carry.clock[at.NOW] / self.scene.turn_s
+                self.pace.look(self.ticket, self.spent_s, turned, self.steps, budget)
             if status is Status.FINISHED:
                 return
             if status is not Status.STEP_BUDGET or self.steps >= budget:

@@ -11,7 +11,7 @@ from rbdyn.dynamics.companions import TIGHT
 from rbdyn.dynamics.ensemble import Reporter, Stop, threads_of
 from rbdyn.dynamics.forces.equations import INNER_LOAD, LAND_LOAD, LOSSES, OUTER_LOAD
 from rbdyn.dynamics.integrators.method import explicit_method, stiffness_cost, stiffness_notes
-from rbdyn.dynamics.pace import Notice, Pace, log
+from rbdyn.dynamics.pace import Pace, log
 from rbdyn.dynamics.parameters.friction_check import friction_check, friction_notes
 from rbdyn.dynamics.parameters.left_out import film_drive_notes, heat_notes, left_out_notes, light_load_notes
 from rbdyn.dynamics.parameters.model import roller_bearing
@@ -23,6 +23,7 @@ from rbdyn.dynamics.statistics.cage_orbit import orbit_radius_share, whirl_notes
 from rbdyn.dynamics.statistics.error_bars import error_notes, quantities
 from rbdyn.dynamics.statistics.metrics import work_done
 from rbdyn.mounting.cage import OperatingClearance
+from rbdyn.records.forecast import Notice
 from rbdyn.result import SimulationResult, versions
 from rbdyn.scene import Scene, rollers_only
 
@@ -52,8 +53,8 @@ def simulate(
 
     ``workers``: threads, all processors by default; the result does not depend on it. ``progress(done, total)`` is
     called after every run. ``target``: relative error to reach, for which tolerance, turns and replicates are chosen
-    (``rbdyn.dynamics.target``). ``notice(sentence)`` is called early where the runs take minutes at their pace; a warning of
-    the logger "rbdyn" unless given, None for silence. Raises RunError when a replicate cannot go on, InputError for what is
+    (``rbdyn.dynamics.target``). ``notice(sentence)`` is called early with what the runs still take; a warning of the logger
+    "rbdyn" unless given, None for silence. Raises RunError when a replicate cannot go on, InputError for what is
     no roller bearing and for an impossible target or number of workers, KeyboardInterrupt on Ctrl-C.
     """
     scene = rollers_only(scene)
@@ -72,14 +73,20 @@ def simulate(
     numerics = scene.numerics
     turns = numerics.warm_up_turns + (whole_windows(scene) if scene.extends else numerics.turns)
     growth = numerics.extend_limit if scene.extends else 1.0
-    pace = Pace(scene, notice, numerics.replicates + numerics.companions, turns, threads_of(workers), growth)
+    pace = Pace(scene, notice, numerics.replicates, turns, threads_of(workers), growth, numerics.companions)
 
     ensemble = run_until_settled(scene, partial(recording_of, scene, bearing, pace), workers, progress, stop)
     wall_s = time.perf_counter() - started
-    return _gather(scene, ensemble, wall_s, compile_s)
+    return _gather(scene, ensemble, {"wall_s": wall_s, "compile_s": compile_s, **_predicted(pace)})
 
 
-def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -> SimulationResult:
+def _predicted(pace: Pace) -> dict[str, float]:
+    """What was stated of the wall time while the runs went on, if anything."""
+    low, high = pace.predicted or (None, None)
+    return {} if low is None or high is None else {"predicted_least_s": low, "predicted_most_s": high}
+
+
+def _gather(scene: Scene, ensemble: Ensemble, clock: dict[str, float]) -> SimulationResult:
     runs, companions = ensemble.runs, ensemble.companions
     everything = [*runs, *companions]
     figures = quantities(scene, runs, companions, ensemble.plan.share, ensemble.since)
@@ -114,8 +121,7 @@ def _gather(scene: Scene, ensemble: Ensemble, wall_s: float, compile_s: float) -
         counted_turns=runs[0].duration / scene.turn_s,
         target=None,
         cost={
-            "wall_s": wall_s,
-            "compile_s": compile_s,
+            **clock,
             **work_done(everything),
             "turns": sum(float(run.durations.sum()) for run in everything) / scene.turn_s,
             **stiffness_cost(runs),

@@ -16,13 +16,14 @@ from rbdyn.cli.ranges import MOST_VALUES
 from rbdyn.dynamics.companions import Companions, companions_of
 from rbdyn.dynamics.ensemble import Ended, Reporter, Stop, run_all, threads_of
 from rbdyn.dynamics.forces.equations import RollerBearing
-from rbdyn.dynamics.pace import Notice, Pace, log
+from rbdyn.dynamics.pace import UNLIKE, Pace, log
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_one
 from rbdyn.dynamics.run import prepare
 from rbdyn.dynamics.statistics.error_bars import after_transient, quantities
 from rbdyn.dynamics.statistics.metrics import Replicate
 from rbdyn.faults import InputError
+from rbdyn.records.forecast import Notice
 from rbdyn.records.kept import Kept, code_version, run_key
 from rbdyn.records.record import Record, derived, keyed, spread
 from rbdyn.records.words import counted
@@ -178,7 +179,8 @@ def slip_map(
         prepare(scenes[place], bearings[place])
     numerics, stop = scene.numerics, Stop()
     total, done = len(bearings) * (numerics.replicates + numerics.companions), 0
-    pace = Pace(scene, notice, total, numerics.warm_up_turns + numerics.turns, threads_of(workers))
+    turns, runs = numerics.warm_up_turns + numerics.turns, len(bearings) * numerics.replicates
+    pace = Pace(scene, notice, runs, turns, threads_of(workers), companions=total - runs, scatter=UNLIKE)
     series = [Series(place, scenes[place], bearings[place], stop, pace) for place in bearings]
 
     def ended(one: Ended[Replicate]) -> list[Job]:

@@ -19,7 +19,6 @@ import numpy as np
 
 from rbdyn.arrays import Array
 from rbdyn.dynamics.ensemble import Reporter, Stop
-from rbdyn.dynamics.pace import Notice
 from rbdyn.dynamics.parameters.model import roller_bearing
 from rbdyn.dynamics.recording import run_series
 from rbdyn.dynamics.run import prepare, with_numerics
@@ -28,6 +27,7 @@ from rbdyn.dynamics.statistics.bias import bias_scale, companion_tolerance
 from rbdyn.dynamics.statistics.error_bars import FIGURES, after_transient
 from rbdyn.dynamics.statistics.metrics import Replicate, mean_gap, work_done
 from rbdyn.faults import LONGEST_NAME, InputError, one_line
+from rbdyn.records.forecast import Notice
 from rbdyn.result import Quantity, SimulationResult
 from rbdyn.scene import Scene
 
@@ -151,7 +151,9 @@ def reach(
         },
     }
     notes = result.notes if met else (*result.notes, _shortfall(target, errors, result, choice))
-    return replace(result, cost=result.cost | dict(spent), target=record, notes=notes)
+    # What was predicted was the last run alone.
+    cost = {key: value for key, value in result.cost.items() if not key.startswith("predicted_")}
+    return replace(result, cost=cost | dict(spent), target=record, notes=notes)
 
 
 def total_error(figure: Quantity) -> float | None:

@@ -21,7 +21,8 @@ from typer.testing import CliRunner
 from doe import clearance
 from doe.cli import app
 from doe.commands.status import print_status
-from doe.running.agenda import ANSWER_S, Stage, agenda_in
+from doe.running.agenda import ANSWER_S, Stage
+from doe.running.keeper import agenda_in
 from doe.running.owner import at_work
 from doe.running.store import Point, Store
 from doe.study.finished import inputs_digest
@@ -87,7 +88,8 @@ def test_running_study_tells_who_runs_what_and_how_long_it_will_take(tmp_path, m
     shown = capsys.readouterr().out
     assert (
         f"{points['done']} done, 2 failed" in shown
-        and "confirmation 0 of 5, answer" in shown
+        and "5 steps: design runs" in shown
+        and "confirmation 0 of 5, tolerances, answer" in shown
         and "failed: design run 2, design run 4: " in shown
         and "time left" in shown
     )
@@ -110,7 +112,7 @@ def test_command_reads_only_and_loads_no_compiler(tmp_path, monkeypatch):
     assert shown.returncode == 0 and shown.stderr == ""
     assert set(record) == {
         "format", "status", "study", "store", "points", "failures", "running", "other", "spent_s", "left_s", "command", "stage",
-        "stages", "stopped_by",
+        "stages", "stopped_by", "left_range_s", "runs_left", "predicted_s", "took_s",
     }  # fmt: skip
     # The claim of a live process is seen, whatever it is for.
     assert record["points"]["done"] == 20 and record["status"] == "running"
@@ -265,7 +267,7 @@ def test_time_left_is_that_of_all_stages_known_to_come(tmp_path):
     path = short_study(tmp_path)
     study = Study.load(path)
     plain = {each.name: each for each in study_stages(study)}
-    assert list(plain) == ["design runs", "front", "confirmation", "answer"]
+    assert list(plain) == ["design runs", "front", "confirmation", "tolerances", "answer"]
     # 20 runs of 2 replicates and 4 turns; 5 points of 2 replicates with a companion.
     assert plain["design runs"].work == 20 * 2 * 4 and plain["confirmation"].work == 5 * 3 * 4
     searched = {each.name: each for each in study_stages(study, adaptive=True, robust=True)}

@@ -14,7 +14,8 @@ from short_studies import short_study
 
 from doe.clearance import points_of
 from doe.commands.status import print_status
-from doe.running.agenda import NOTE, agenda_in
+from doe.running.agenda import NOTE
+from doe.running.keeper import agenda_in
 from doe.running.store import Store
 from doe.study.finished import inputs_digest
 from doe.study.runs import STORE, ordered_runs
@@ -47,7 +48,8 @@ def history(draw: random.Random, study: Study, folder: Path, plans: dict) -> dic
                     keeper.enter(stage.name)
                     works = {f"{stage.name} {number}": draw.uniform(0.0, 100.0) for number in range(draw.randint(0, 9))}
                     keeper.counting(works, lambda done, total: None)(draw.randint(0, len(works)), len(works))
-            keeper.agenda.work, keeper.agenda.seconds = draw.choice([(0.0, 0.0), (10.0, 1e-3), (1.0, 1e6)])
+            for work, seconds in draw.choice([[], [(10.0, 1e-3)], [(1.0, 1e6)], [(1.0, 1e6), (10.0, 0.0)]]):
+                keeper.agenda.measured = keeper.agenda.measured.plus(work, seconds)
             if draw.random() < 0.3:
                 keeper.finish(["answer.txt"])
     with Store(folder / STORE) as store:
@@ -103,6 +105,8 @@ def test_invariant_status_of_any_history_is_true(tmp_path, fuzz_cases, capsys):
             assert truth["answer"] and inputs != "other" and record["left_s"] == 0.0, case
         else:
             assert record["left_s"] is None or record["left_s"] > 0.0, case
+            low, high = record["left_range_s"] or (0.0, 0.0)
+            assert low <= (record["left_s"] or 0.0) <= high and record["runs_left"][0] <= record["runs_left"][1], case
         assert all(each["done"] >= 0 and each["runs"] >= 0 for each in record["stages"]), case
         assert shown.isprintable() or all(line.isprintable() for line in shown.splitlines()), case
         json.dumps(record, allow_nan=False)

@@ -1,4 +1,4 @@
-"""Time of long runs: stated early, once, with what shortens them; short runs say nothing, and no figure depends on it."""
+"""Time of the runs of a scene: stated early, once, with what shortens it; no figure depends on it."""
 
 import logging
 import re
@@ -7,89 +7,98 @@ import pytest
 
 import rbdyn
 from rbdyn.dynamics import pace
-from rbdyn.dynamics.pace import Pace, duration
+from rbdyn.dynamics.pace import Pace
 from rbdyn.dynamics.simulate import simulate
+from rbdyn.records import forecast
 
 QUICK = ("numerics.turns=4", "numerics.discard_turns=1", "numerics.replicates=2")
 
 
-def sentences(scene, looks, runs=10, turns=120.0, threads=2, growth=1.0):
-    """What is stated at looks (seconds, shaft turns, steps, budget of steps)."""
+def watched(scene, looks, runs=10, turns=120.0, threads=2, growth=1.0, **more):
+    """A pace and what it states at looks (run, seconds, shaft turns, steps, budget of steps)."""
     stated = []
-    watched = Pace(scene, stated.append, runs, turns, threads, growth)
+    one = Pace(scene, stated.append, runs, turns, threads, growth, **more)
     for look in looks:
-        watched.look(*look)
-    return stated
+        one.look(*look)
+    return one, stated
 
 
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [
-        (0.0123, "0.012 s"),
-        (2.34, "2.3 s"),
-        (119.0, "120 s"),
-        (150.0, "2.5 min"),
-        (1440.0, "24 min"),
-        (9000.0, "2.5 h"),
-        (1e6, "12 days"),
-    ],
-)
-def test_unit_a_duration_has_two_digits_and_the_unit_that_suits_it(seconds, words):
-    """Unit: seconds, minutes, hours and days."""
-    assert duration(seconds) == words
-
-
-def test_unit_long_runs_state_their_time_and_what_shortens_it(make_scene):
-    """Unit: ten runs of 120 turns at 2.4 s a turn, two at once, are 24 min."""
+def test_unit_what_is_left_is_stated_with_runs_turns_and_time(make_scene):
+    """Unit: ten runs of 120 turns at 2.4 s a turn, two at once, take 24 min; 12 s of each are over."""
+    looks = [(0, 12.0, 5.0, 10_000, 10**7), (1, 12.0, 5.0, 10_000, 10**7)]
     scene = make_scene("bearing.roller_profile=logarithmic")
-    (sentence,) = sentences(scene, [(12.0, 5.0, 10_000, 10**7)], growth=8.0)
-    assert sentence == (
-        "all runs take about 24 min at this pace: 10 runs of 120 shaft turns at 2.4 s each, 2 at once, up to 8 times that where "
-        "figures drift; reduce model.slices, numerics.turns or numerics.replicates to shorten it"
+    one, (first,) = watched(scene, looks, growth=8.0)
+    assert re.fullmatch(
+        r"10 runs of 1200 shaft turns in all are left: 2 at once, they take \d+ to \d+ min, up to [\d.]+ h where figures drift; "
+        r"reduce model.slices, numerics.turns or numerics.replicates to shorten it",
+        first,
     )
+    low, high = one.predicted
+    assert low < 24 * 60 < high / 8.0 < 1.5 * 24 * 60
+
+
+def test_unit_companions_and_rounds_of_runs_count(make_scene):
+    """Unit: three runs on two threads are two rounds; a companion is one more, of 0.6 to 1.5 times a run."""
+    looks = [(0, 10.0, 10.0, 10_000, 10**7)]
+    (plain, _), (more, _) = (watched(make_scene(), looks, 3, 100.0, companions=count) for count in (0, 1))
+    assert plain.predicted[0] < 200.0 < plain.predicted[1]
+    assert more.predicted[0] / plain.predicted[0] == pytest.approx(1.3, rel=0.02)
+    assert more.predicted[1] / plain.predicted[1] == pytest.approx(1.75, rel=0.03)
+
+
+def test_unit_runs_that_have_ended_are_not_left(make_scene):
+    """Unit: of ten runs, of which four have made all their turns, six are left."""
+    looks = [(run, 20.0, 120.0, 10_000, 10**7) for run in range(4)]
+    one = Pace(make_scene(), (stated := []).append, 10, 120.0, 2)
+    one._look_s = 40.0
+    for look in looks:
+        one.look(*look)
+    assert stated[0].startswith("6 runs of 720 shaft turns in all are left")
 
 
 def test_unit_a_budget_states_the_time_that_it_stands_for(make_scene):
-    """Unit: where steps run out before the turns do, the sentence says when, with the key."""
-    (sentence,) = sentences(make_scene(), [(12.0, 0.001, 10_000, 1_000_000)])
+    """Unit: where steps run out before the turns do, a sentence says when, with the key."""
+    _, stated = watched(make_scene(), [(0, 12.0, 0.001, 10_000, 1_000_000)])
     assert (
-        "runs will use up their budget of steps after about 20 min (numerics.step_budget_per_turn = 100000)" in sentence
+        "runs will use up their budget of steps after about 20 min (numerics.step_budget_per_turn = 100000)"
+        in stated[-1]
     )
 
 
 def test_unit_short_runs_say_nothing(make_scene):
-    """Unit: nothing in the first seconds, nothing where all take less than some minutes, nothing where nobody asks."""
+    """Unit: nothing in the first moments, nothing where all take less than some seconds, nothing where nobody asks."""
     scene = make_scene()
-    assert sentences(scene, [(9.0, 0.1, 10_000, 10**9)]) == []
-    assert sentences(scene, [(12.0, 30.0, 10_000, 10**9)]) == []
-    assert sentences(scene, [(12.0, 0.0, 10_000, 10**9)]) == []
-    Pace(scene, None, 10, 120.0, 2).look(12.0, 0.001, 10_000, 10**9)
+    assert watched(scene, [(0, 0.9, 0.1, 10_000, 10**9)])[1] == []
+    assert watched(scene, [(0, 1.2, 500.0, 10_000, 10**9)])[1] == []
+    assert watched(scene, [(0, 12.0, 0.0, 10_000, 10**9)])[1] == []
+    silent = Pace(scene, None, 10, 120.0, 2)
+    silent.look(0, 12.0, 0.001, 10_000, 10**9)
+    assert silent.predicted is None
 
 
-def test_unit_the_time_is_stated_again_where_it_doubles(make_scene):
-    """Unit: a look at every doubling of the time; a second sentence where the estimate has doubled, none where it has not."""
-    steady = [(10.0 * 2.0**n, 2.0**n, 10_000 * 2**n, 10**9) for n in range(6)]
-    assert len(sentences(make_scene(), steady)) == 1
-    slower = [
-        (10.0, 2.0, 10_000, 10**9),
-        (15.0, 2.1, 15_000, 10**9),
-        (20.0, 2.2, 20_000, 10**9),
-        (40.0, 2.3, 40_000, 10**9),
-    ]
-    assert len(sentences(make_scene(), slower)) == 2
+def test_unit_the_time_is_stated_again_where_it_exceeds_the_most(make_scene):
+    """Unit: a steady pace is stated once, one that becomes four times as slow twice; the first prediction stays."""
+    steady = [(0, 10.0 * 2.0**n, 2.0**n, 10_000 * 2**n, 10**9) for n in range(6)]
+    assert len(watched(make_scene(), steady)[1]) == 1
+    slower = [(0, 10.0, 10.0, 10_000, 10**9), (0, 40.0, 12.0, 20_000, 10**9), (0, 90.0, 20.0, 30_000, 10**9)]
+    one, stated = watched(make_scene(), slower)
+    assert len(stated) == 2 and one.predicted == watched(make_scene(), slower[:1])[0].predicted
 
 
 def test_invariant_a_statement_changes_no_figure(make_scene, monkeypatch, caplog):
-    """Invariant: stated or not, by default as a warning of the logger "rbdyn", a simulation has the same bits."""
+    """Invariant: stated or not, by default as a warning of the logger "rbdyn", a simulation has the same bits; its cost has what
+    was predicted."""
     scene, stated = make_scene(*QUICK), []
+    monkeypatch.setattr(forecast, "NOTABLE_S", 1e9)
     plain = simulate(scene, notice=stated.append)
-    assert stated == []
+    assert stated == [] and "predicted_most_s" not in plain.cost
     monkeypatch.setattr(pace, "FIRST_LOOK_S", 0.0)
-    monkeypatch.setattr(pace, "LONG_S", 0.0)
+    monkeypatch.setattr(forecast, "NOTABLE_S", 0.0)
     with caplog.at_level(logging.WARNING, "rbdyn"):
         again = simulate(scene)
-    assert "all runs take about" in caplog.messages[0] and {each.name for each in caplog.records} == {"rbdyn"}
+    assert "shaft turns in all are left" in caplog.messages[0] and {each.name for each in caplog.records} == {"rbdyn"}
     assert (again.impact_force, again.power_loss) == (plain.impact_force, plain.power_loss)
+    assert 0.0 < again.cost["predicted_least_s"] <= again.cost["predicted_most_s"]
 
 
 def test_unit_a_spent_budget_states_the_seconds(make_scene):
