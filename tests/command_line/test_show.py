@@ -11,7 +11,7 @@ from conftest import EXAMPLE, SHORT
 
 from rbdyn.cli.show import request_of
 from rbdyn.faults import InputError
-from rbdyn.plots import animation
+from rbdyn.plots import roller
 
 QUICK = [part for assignment in SHORT for part in ("--set", assignment)]
 PICTURES = {
@@ -33,7 +33,7 @@ def shown(command, saved, tmp_path_factory):
     """All that ``rbdyn show`` can write, and its JSON; the film in a quarter of its frames."""
     folder = tmp_path_factory.mktemp("shown")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(animation, "FRAMES_PER_TURN", 11)
+        patch.setattr(roller, "FRAMES_PER_TURN", 11)
         done = command("show", saved, "--out", folder, "--animate", "--lyapunov", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     return folder, json.loads(done.stdout)

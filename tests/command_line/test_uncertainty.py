@@ -76,7 +76,7 @@ def _closed_form(patch: pytest.MonkeyPatch) -> None:
         return replace(instant_result(scene), impact_force=Quantity(impact, 0.45, None, 10.0, 9))
 
     patch.setattr("doe.study.uncertainty.OUTPUTS", ("impact_force_N",))
-    patch.setattr("doe.unknown.sensitivity.REFITS", 4)  # intervals of shares are not the subject
+    patch.setattr("doe.unknown.propagation.REFITS", 4)  # intervals of shares are not the subject
     patch.setattr("rbdyn.dynamics.simulate.simulate", simulate)
     patch.setattr("rbdyn.dynamics.run.prepare", lambda scene, bearing: 0.0)
 
@@ -85,7 +85,7 @@ def test_record_files_and_resumption(tmp_path: Path, monkeypatch: pytest.MonkeyP
     """The simulation itself: every file and key, and the same record from the store."""
     monkeypatch.setattr("doe.study.uncertainty.MOST", 16)
     monkeypatch.setattr("doe.study.uncertainty.MOST_EFFORT", 2)
-    monkeypatch.setattr("doe.unknown.sensitivity.REFITS", 4)
+    monkeypatch.setattr("doe.unknown.propagation.REFITS", 4)
     scene, out = _scene(tmp_path), tmp_path / "out"
     command = [str(scene), "--target", "50%", "--out", str(out), "--json", *(f"--set={each}" for each in SHORT)]
     first = _run(*command, "--workers", "2")
