@@ -120,6 +120,7 @@ def _test_once(self_test: Callable[[], None]) -> None:
 
 
 PARTS, WHY_STOCK = working_parts()
+# In the name of what is kept on disk, for each way takes its own.
 WAY = "parts" if PARTS else "stock"
 # No relaxed arithmetic at all. The compiler keeps a scalar and a vector version of a loop and takes one by where the
 # arrays happen to lie: only when every operation is rounded by itself do both give the same bits. And NaN stays a signal.
@@ -161,7 +162,7 @@ def law(declaration: Callable[..., Any]) -> Any:
     bodies: dict[type, Callable[..., Any]] = {}
 
     @functools.wraps(declaration)
-    def chosen(parameters: Any, *arguments: Any) -> Any:
+    def choice(parameters: Any, *arguments: Any) -> Any:
         if type(parameters) not in bodies:
             raise TypeError(f"{declaration.__name__} has no body for {type(parameters).__name__}")
         return bodies[type(parameters)](parameters, *arguments)
@@ -176,10 +177,10 @@ def law(declaration: Callable[..., Any]) -> Any:
     def choose_at_compile_time(parameters: types.Type, *arguments: types.Type) -> Callable[..., Any] | None:
         return bodies.get(getattr(parameters, "instance_class", type(None)))
 
-    chosen.body, chosen.bodies = body, bodies  # type: ignore[attr-defined]
+    choice.body, choice.bodies = body, bodies  # type: ignore[attr-defined]
     overload: Any = numba.extending.overload
-    overload(chosen, jit_options=INLINED, strict=False)(choose_at_compile_time)
-    return chosen
+    overload(choice, jit_options=INLINED, strict=False)(choose_at_compile_time)
+    return choice
 
 
 def _leaves(of: Any) -> list[types.Type]:
@@ -236,10 +237,10 @@ def _choice(of: Any) -> Callable[..., Any]:
 
         return body
     fields = "".join(f"either(first, one.{name}, other.{name})," for name in of.fields)
-    made: dict[str, Any] = {"either": either, "made": of.instance_class, "__name__": __name__}
-    exec(f"def body(first, one, other): return made({fields})", made)
-    chosen: Callable[..., Any] = made["body"]
-    return chosen
+    names: dict[str, Any] = {"either": either, "record": of.instance_class, "__name__": __name__}
+    exec(f"def body(first, one, other): return record({fields})", names)
+    body_of_record: Callable[..., Any] = names["body"]
+    return body_of_record
 
 
 def entry(function: Callable[..., Any]) -> Any:

@@ -61,10 +61,10 @@ def code_behind(roots: Sequence[str], texts: Mapping[Path, str] = MappingProxyTy
 def what_runs(text: str) -> str:
     """Source text without docstrings, comment lines, empty lines and imports for typing only."""
 
-    def kept(found: re.Match[str]) -> str:
-        return found[0] if found["rest"] or (found["rest"] is not None and found["docstring"] is None) else ""
+    def code_of(match: re.Match[str]) -> str:
+        return match[0] if match["rest"] or (match["rest"] is not None and match["docstring"] is None) else ""
 
-    bare = _PROSE.sub(kept, text)
+    bare = _PROSE.sub(code_of, text)
     return "\n".join(line for line in _TYPING.sub("", bare).splitlines() if line.strip())
 
 
