@@ -1,5 +1,6 @@
 """The stages of a study: what each runs, as far as that is known before it begins. Loads nothing heavy for a plain study."""
 
+from dataclasses import replace
 from typing import get_args
 
 from doe import clearance
@@ -11,6 +12,8 @@ from doe.study_file.front_section import Front
 
 # Wall time [s] that surfaces with their front take about, and the pick's tolerances with the chains.
 FRONT_S, TOLERANCES_S = 6.0, 1.0
+# Wall time [s] of the emulators for a batch of an adaptive search.
+BATCH_S = 0.6
 DESIGN, FRONT, TOLERANCES = "design runs", "front", "tolerances"
 
 
@@ -39,7 +42,8 @@ def study_stages(study: Study, direct: bool = False, adaptive: bool = False, rob
         settings, runs = study.file.adaptive, max(study.file.adaptive.budget - len(works), 0)
         # A search that gains nothing more stops after a batch and its fresh runs.
         fewest = min(settings.batch + round(FRESH * settings.budget), runs)
-        stages.append(Stage.of("adaptive front", runs, work_of(scene), fewest=fewest))
+        stage = Stage.of("adaptive front", runs, work_of(scene), fewest=fewest)
+        stages.append(replace(stage, besides_s=BATCH_S * runs / settings.batch))
     # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
     rules = len(get_args(Front.model_fields["pick"].annotation))
     points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * (direct or adaptive)

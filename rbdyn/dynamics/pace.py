@@ -45,7 +45,7 @@ class Pace:
     _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
     def __post_init__(self) -> None:
-        self._look_s, self._stated_s, self._short_of_steps = FIRST_LOOK_S, 0.0, False
+        self._look_s, self._spent_s, self._stated_s, self._short_of_steps = FIRST_LOOK_S, 0.0, 0.0, False
 
     def enter(self) -> int:
         """A number by which a run that begins is known."""
@@ -60,13 +60,14 @@ class Pace:
             return
         sentences = []
         with self._lock:
+            before_s, _ = self._under_way.get(run, (0.0, 0.0))
             self._under_way[run] = spent_s, turns
-            spent = sum(seconds for seconds, _ in self._under_way.values())
-            elapsed_s = spent / min(len(self._under_way), self.threads)
+            self._spent_s += spent_s - before_s
+            elapsed_s = self._spent_s / min(len(self._under_way), self.threads)
             if elapsed_s >= self._look_s:
                 self._look_s = 2.0 * elapsed_s
-                forecast, low_s = self._forecast(spent, elapsed_s)
-                if forecast.notable and low_s > self._stated_s:
+                forecast, low_s = self._forecast(elapsed_s)
+                if forecast.notable and forecast.runs[1] and low_s > self._stated_s:
                     low, high = (elapsed_s + each for each in forecast.seconds)
                     self.predicted = self.predicted or (low, max(high, elapsed_s + forecast.longest_s))
                     self._stated_s = max(high, elapsed_s + forecast.longest_s)
@@ -79,12 +80,12 @@ class Pace:
         for sentence in sentences:
             self.notice(sentence)
 
-    def _forecast(self, spent: float, elapsed_s: float) -> tuple[Forecast, float]:
+    def _forecast(self, elapsed_s: float) -> tuple[Forecast, float]:
         """What is left, and the least time of all runs [s], those that have ended included."""
         counts, each = self.runs + self.companions, self._under_way.values()
         done = sum(turns for _, turns in each)
         ended = sum(turns >= self.turns * (1.0 - 1e-9) for _, turns in each)
-        left, measured = max(counts - ended, 0), Measured(len(each), done, spent)
+        left, measured = max(counts - ended, 0), Measured(len(each), done, self._spent_s)
         first, rest = (math.ceil(number / self.threads) for number in (self.runs, self.companions))
         low, high = (
             factor * (measured.pace or 0.0) * self.turns * (first + companion * rest)
