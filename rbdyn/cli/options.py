@@ -26,16 +26,6 @@ def verbose_flag(says: str) -> Any:
     return flag("--verbose", "-v", says=says)
 
 
-def study_flag(name: str, studies: str) -> Any:
-    """A flag that asks for another study than the usual one."""
-    return flag(name, says=f"{studies}, instead.")
-
-
-def count_option(least: int, says: str, default: int) -> Any:
-    """A number of things to run."""
-    return valued("N", says, str(default), min=least, max=100_000)
-
-
 def _tell_version(wanted: bool) -> None:
     if wanted:
         from importlib.metadata import version

@@ -41,12 +41,12 @@ RUN = (
 SIMULATED = [
     RUN,
     f"rbdyn map {EXAMPLE} --speed 20000 --load 900 --turns 2 --replicates 1 --set numerics.companion=false",
-    f"brief_accuracy {EXAMPLE} --coverage --repeats 2 --set numerics.turns=1 --set numerics.discard_turns=1 "
+    f"brief_accuracy {EXAMPLE} coverage --set numerics.turns=1 --set numerics.discard_turns=1 "
     "--set numerics.replicates=2 --set numerics.extend=false --set numerics.companion=false",
 ]
-# ``rbdyn accuracy`` with a truth of two replicates in place of 64.
+# ``rbdyn accuracy`` with two repeats and a truth of two replicates.
 ACCURACY = (
-    "import sys; from rbdyn.accuracy.rollers import coverage; coverage.TRUTH_REPLICATES = 2; "
+    "import sys; from rbdyn.accuracy import coverage; coverage.TRUTH_REPLICATES = coverage.REPEATS = 2; "
     "from rbdyn.cli import run; sys.argv[1:1] = ['accuracy']; run()"
 )
 
