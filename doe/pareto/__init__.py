@@ -5,7 +5,7 @@
 - ``uncertainty``: what the surfaces' errors make of a front and of a gain
 - ``quadratic``, ``tolerance_aware``: the front of what manufacture leaves of a point
 - ``tolerance``: backwards from a pick to the widest tolerances that keep its gains
-- ``direct``, ``surrogate_loss``: the front of a noisy simulator, and what surfaces lose against it
+- ``simulated``, ``simulated_tolerance``: a front run on the simulator, and what manufacture leaves of its points
 """
 
 from doe.pareto.archive import hypervolume, non_dominated

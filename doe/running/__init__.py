@@ -1,5 +1,5 @@
 """Where points run and how they are kept; knows no bearing.
 
-``store`` (on ``database``), ``owner`` (who has claimed a point, which study runs where), ``runner`` (threads),
+``store`` (on ``database``), ``lock`` (one process at a time, which study runs where), ``runner``,
 ``cluster`` (dask), ``failure``, ``agenda`` (the stages of a command that are left).
 """

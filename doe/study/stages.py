@@ -14,7 +14,7 @@ FRONT_S = 6.0
 DESIGN, FRONT = "design runs", "front"
 
 
-def study_stages(study: Study, direct: bool = False, adaptive: bool = False, robust: bool = False) -> list[Stage]:
+def study_stages(study: Study, adaptive: bool = False, robust: bool = False) -> list[Stage]:
     """Stages of ``doe study`` with these options. Raises InputError where the study is impossible.
 
     Further points, where a limit is not kept, are not among them: nobody knows whether they are needed.
@@ -25,16 +25,13 @@ def study_stages(study: Study, direct: bool = False, adaptive: bool = False, rob
         for key, work in design_works(study.at(at))
     }
     stages = [Stage(DESIGN, (DESIGN,), len(works), sum(works.values())), Stage(FRONT, besides_s=FRONT_S)]
-    if direct:
-        (scene,) = clearance.direct_scenes(study, study.baseline[None], 0)
-        stages.append(Stage.of("direct front", study.file.direct.evaluations, work_of(scene)))
     if adaptive:
         usual = clearance.design_scenes(study, study.baseline[None])[0].numerics.replicates
         (scene,) = clearance.adaptive_scenes(study, study.baseline[None], [usual], 0)
         stages.append(Stage.of("adaptive front", max(study.file.adaptive.budget - len(works), 0), work_of(scene)))
     # The baseline, the pick by each rule, the one without its tolerances, and those of the surfaces and of the search.
     rules = len(get_args(Front.model_fields["pick"].annotation))
-    points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * (direct or adaptive)
+    points = 1 + rules + (study.file.front.tolerance_aware != "none") + 2 * adaptive
     one = work_of(clearance.confirmation_scene(study, study.baseline))
     stages.append(Stage.of("confirmation", points, one, "confirmation", "beyond the region"))
     if robust or clearance.declares_unknowns(study):

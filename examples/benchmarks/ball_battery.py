@@ -157,7 +157,7 @@ OURS = "convex"
 MODEL = ("gyroscopic", "light_load_share", "friction_limit")
 # Balls whose loads differ by more than this share of the largest are in another equilibrium.
 SAME = 1e-6
-_control, _load = attrgetter("control"), attrgetter("load")
+_control, _kind_of_load = attrgetter("control"), attrgetter("load")
 
 
 class Run(NamedTuple):
@@ -178,7 +178,7 @@ def study(scene: BallScene, progress: Reporter = None, scenes: int = SCENES) -> 
     counted = Progress(progress, sum(sizes.values()))
     runs = {name: run(name, drawn[:size], problems, counted) for name, size in sizes.items()}
     ours = runs[OURS]
-    by_control, by_load = _by_kind(ours, CONTROLS, _control), _by_kind(ours, LOADS, _load)
+    by_control, by_load = _by_kind(ours, CONTROLS, _control), _by_kind(ours, LOADS, _kind_of_load)
     solvers = [_fared(name, series) for name, series in runs.items()]
     others = {name: _elsewhere(series, ours) for name, series in runs.items() if name != OURS}
     refused = _refused_by_rule_a(runs["finite search"], problems)
@@ -191,7 +191,7 @@ def study(scene: BallScene, progress: Reporter = None, scenes: int = SCENES) -> 
             success_table("convex solver, by load", by_load, "load"),
             _steps_table(ours),
             success_table(f"solvers on the same scenes{slow}", solvers),
-            _share_table("solved by load", LOADS, runs, _load),
+            _share_table("solved by load", LOADS, runs, _kind_of_load),
             _share_table("solved by raceway control", CONTROLS, runs, _control),
         ),
         (

@@ -131,7 +131,7 @@ def main() -> int:
     options.add_argument("--part", action="append", default=[], metavar="NAME", help="this part only; repeatable")
     asked = options.parse_args()
     try:
-        found = measure(asked.page, asked.part, progress_bar)
+        found = measure(asked.page, asked.part, lambda name: progress_bar(name, False))
     except InputError as error:
         print(error, file=sys.stderr)
         return 2

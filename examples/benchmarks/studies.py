@@ -41,7 +41,7 @@ def main(study: "Callable[..., Report]", about: str, scene: str = "cylindrical_r
     given = parser.parse_args()
     try:
         loaded = Scene.load(given.scene, given.set)
-        with progress_bar(Path(sys.argv[0]).stem) as progress:
+        with progress_bar(Path(sys.argv[0]).stem, False) as progress:
             report = study(loaded, progress, **{name: getattr(given, name) for name in counts})
     except (InputError, RunError) as error:
         print(error, file=sys.stderr)

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand
 
 from rbdyn.cli import options as given
 from rbdyn.cli import terminal
@@ -13,7 +12,6 @@ from rbdyn.cli.ball import ball
 from rbdyn.cli.keys import command as keys
 from rbdyn.cli.manual.command import manual
 from rbdyn.cli.new import new
-from rbdyn.faults import InputError
 from rbdyn.records.cells import save_table
 from rbdyn.records.words import counted, error_alone
 
@@ -91,19 +89,7 @@ def simulate(
         terminal.hand_over(result.as_dict, as_json, lambda: _print(result, quiet, verbose), folder, files)
 
 
-class _Accuracy(TyperCommand):
-    """A command line whose former options are refused by what took their place."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Refuse former options before any other."""
-        former = next((option for word in args if (option := word.partition("=")[0]) in FORMER), None)
-        if former is not None:
-            with terminal.guarded("--json" in args):
-                raise InputError([f"{former}: is no option any more; {FORMER[former]}"])
-        return super().parse_args(ctx, args)
-
-
-@app.command(cls=_Accuracy)
+@app.command(cls=given.refusing(FORMER))
 def accuracy(
     scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene to study.")],
     study: Annotated[

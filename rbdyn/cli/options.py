@@ -1,9 +1,14 @@
 """Arguments and options that several commands share. Help tells the default of each: ``show_default`` where it is None."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
+
+from rbdyn.cli.terminal import guarded
+from rbdyn.faults import InputError
 
 
 def flag(*names: str, says: str, **more: Any) -> Any:
@@ -14,6 +19,21 @@ def flag(*names: str, says: str, **more: Any) -> Any:
 def valued(metavar: str, says: str, default: str, *names: str, **more: Any) -> Any:
     """An option with a value; ``default`` says what holds without it, where that is no plain value."""
     return typer.Option(*names, metavar=metavar, help=says, show_default=default, **more)
+
+
+def refusing(former: Mapping[str, str]) -> type[TyperCommand]:
+    """A kind of command, for ``cls``, that refuses options it had once by what took their place."""
+
+    class Refusing(TyperCommand):
+        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+            """Refuse former options before any other."""
+            option = next((name for word in args if (name := word.partition("=")[0]) in former), None)
+            if option is not None:
+                with guarded("--json" in args):
+                    raise InputError([f"{option}: is no option any more; {former[option]}"])
+            return super().parse_args(ctx, args)
+
+    return Refusing
 
 
 def folder_option(says: str, default: str = "nothing is written") -> Any:

@@ -10,13 +10,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from direct_search import direct_front
 from scipy import ndimage
 from scipy.stats import qmc
 
 from doe.adaptive import Plan, Runs, adaptive_front
 from doe.adaptive.candidates import Region
 from doe.pareto.archive import best_for_hypervolume, hypervolume, non_dominated, spread
-from doe.pareto.direct import direct_front
 from doe.pareto.goals import Goals
 
 THREE = Goals.of(["min"] * 3)

@@ -117,7 +117,14 @@ def test_oracle_the_schur_complement_is_the_rings_stiffness(problem, ours):
 
 
 @pytest.mark.parametrize(
-    "solver", [plain_newton.solve, finite_search.solve, minpack.SOLVERS["MINPACK hybrid"], minpack.SOLVERS["MINPACK LM"], limited.solve]
+    "solver",
+    [
+        plain_newton.solve,
+        finite_search.solve,
+        minpack.SOLVERS["MINPACK hybrid"],
+        minpack.SOLVERS["MINPACK LM"],
+        limited.solve,
+    ],
 )
 def test_oracle_all_solvers_find_the_same_equilibrium(solver):
     """At a load where each of them converges."""

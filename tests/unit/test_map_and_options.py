@@ -242,5 +242,5 @@ def test_unit_footprint_of_options(outer):
     plain, alike, clocked = report.record["options"]
     assert plain["state"] == 60 and plain["instructions"] > 1000 and plain["modules"] == ""
     assert alike == {**plain, "option": "contact law of ISO/TS 16281"}
-    assert clocked["state"] == 61 and clocked["instructions"] > plain["instructions"]
+    assert clocked["state"] == 63 and clocked["instructions"] > plain["instructions"]
     assert "rbdyn.dynamics.forces.clock" in clocked["modules"].split()

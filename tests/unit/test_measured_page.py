@@ -65,7 +65,7 @@ def test_unit_folder_is_one_for_a_part(measured):
         line.split(" --out ")[1].split()[0] for line in text.splitlines() if line.startswith("told") and "--out" in line
     }
     assert len(used) == 1 and "TMP" not in used
-    assert "`doe study examples/clearance_study.toml --out TMP --direct`, " in text
+    assert "`python examples/benchmarks/direct_front.py examples/clearance_study.toml --out TMP`, " in text
 
 
 def test_unit_unknown_part_is_refused(measured):
